@@ -1,0 +1,62 @@
+# All set-up happens here, in one virtual environment; a target that finds it current installs nothing.
+VENV   := .venv
+PYTHON := $(VENV)/bin/python
+PORT   ?= 8000
+TESTS  ?= tests
+
+PIP_INSTALL = $(PYTHON) -m pip install --quiet --disable-pip-version-check
+
+.DEFAULT_GOAL := help
+.PHONY: help serve test check tables paper bench soak lock system clean
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+serve: $(VENV)/.runtime ## serve on http://127.0.0.1:8000 (PORT=...)
+	@$(VENV)/bin/underskin serve --port $(PORT)
+
+test: $(VENV)/.dev system ## run the tests at reduced counts (TESTS=tests/test_x.py for some of them)
+	$(PYTHON) -m pytest $(TESTS)
+
+soak: $(VENV)/.dev system ## run the tests at full counts, the long ones included
+	UNDERSKIN_SOAK=1 $(PYTHON) -m pytest $(TESTS)
+
+check: $(VENV)/.dev ## format, lint, strict types, import direction
+	$(PYTHON) -m ruff format --check .
+	$(PYTHON) -m ruff check .
+	$(PYTHON) -m mypy
+	$(VENV)/bin/lint-imports
+
+tables: $(VENV)/.runtime ## solve the default table again
+	$(VENV)/bin/underskin tablegen sigma --out tables/sigma.h5
+
+paper: $(VENV)/.dev ## regenerate docs/paper.md and its figures
+	$(PYTHON) docs/paper.py
+
+bench: $(VENV)/.dev ## measure speed, as ratios against peers in the same run
+	$(PYTHON) -m bench
+
+lock: $(VENV)/.dev ## resolve requirements.lock and requirements-dev.lock anew
+	scripts/lock.sh $(PYTHON)
+
+clean: ## remove the environment and all caches
+	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	find . -name __pycache__ -prune -exec rm -rf {} +
+
+system: # Debian packages that some tests use
+	@scripts/system-packages.sh
+
+$(VENV)/.created: scripts/make-venv.sh
+	@scripts/make-venv.sh $(VENV)
+	@touch $@
+
+$(VENV)/.runtime: $(VENV)/.created requirements.lock pyproject.toml
+	@echo "Installing the locked packages into $(VENV) ..."
+	@$(PIP_INSTALL) --require-hashes -r requirements.lock
+	@$(PIP_INSTALL) --no-deps --no-build-isolation -e .
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.runtime requirements-dev.lock
+	@echo "Installing the locked development packages into $(VENV) ..."
+	@$(PIP_INSTALL) --require-hashes -r requirements-dev.lock
+	@touch $@
