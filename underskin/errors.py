@@ -1,0 +1,47 @@
+"""Everything that underskin raises on purpose.
+
+UnderskinError
+├── InvalidInput      a value that cannot be used: names the field, the value and what is allowed
+├── TableError        a table that is missing, damaged, altered or of another schema
+├── SolverError       a finite-element solve that did not converge: names the point
+└── ServiceError      an answer of the server that is not a success (raised by the client)
+"""
+
+from typing import Any
+
+
+class UnderskinError(Exception):
+    """Base of all errors raised on purpose."""
+
+
+class InvalidInput(UnderskinError, ValueError):
+    """A value that cannot be used.
+
+    Attributes: `field` (the name the user knows), `index` (row in a column, or None), `value`, `allowed`
+    (what would be accepted, in words).
+    """
+
+    def __init__(self, field: str, value: Any, allowed: str, index: int | None = None) -> None:
+        self.field = field
+        self.value = value
+        self.allowed = allowed
+        self.index = index
+        place = field if index is None else f"{field}[{index}]"
+        super().__init__(f"{place} = {value!r}: {allowed}")
+
+
+class TableError(UnderskinError):
+    """A table that cannot be trusted or read; the message says why and what to do."""
+
+
+class SolverError(UnderskinError):
+    """A finite-element solve that did not converge, even with smaller steps; the message names the point."""
+
+
+class ServiceError(UnderskinError):
+    """The server refused or failed; carries the RFC 9457 problem (`problem`) and the HTTP `status`."""
+
+    def __init__(self, status: int, problem: dict[str, Any]) -> None:
+        self.status = status
+        self.problem = problem
+        super().__init__(f"{status} {problem.get('title', '')}: {problem.get('detail', '')}")

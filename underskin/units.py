@@ -1,0 +1,106 @@
+"""Lab units at the boundary, SI inside: the one place where the two meet.
+
+A boundary field carries its unit in its name (`thickness_mm`). `LAB` lists every such field with its unit, its
+factor to SI and the range of magnitudes that a piezoelectric skin's lab can mean; `checked` refuses what is not
+finite, not positive, or of a magnitude that looks like a slip of units, and guesses the slip.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from underskin.errors import InvalidInput
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LabField:
+    """A field as a lab writes it: SI value = number × `to_si`; `likely` bounds the number's magnitude."""
+
+    name: str
+    unit: str
+    to_si: float
+    likely: tuple[float, float] | None = None
+    signed: bool = False
+
+
+LAB: dict[str, LabField] = {
+    field.name: field
+    for field in (
+        LabField("thickness_mm", "mm", 1e-3, (0.01, 100.0)),
+        LabField("youngs_modulus_mpa", "MPa", 1e6, (1e-3, 1e4)),
+        LabField("sensor_radius_mm", "mm", 1e-3, (0.01, 100.0)),
+        LabField("indenter_radius_mm", "mm", 1e-3, (0.05, 1000.0)),
+        LabField("preload_n", "N", 1.0, (1e-3, 1e3)),
+        LabField("d33_pc_per_n", "pC/N", 1e-12, (1e-2, 1e4), signed=True),
+        LabField("frf_pc_per_n", "pC/N", 1e-12, signed=True),
+        LabField("frf_uncertainty_pc_per_n", "pC/N", 1e-12),
+        LabField("frequency_hz", "Hz", 1.0),
+        LabField("contact_radius_mm", "mm", 1e-3),
+        LabField("mean_stress_mpa", "MPa", 1e6),
+        LabField("d33_uncertainty_pc_per_n", "pC/N", 1e-12),
+    )
+}
+
+_NEIGHBOURS = {
+    "mm": {1e-3: "µm", 1e3: "m"},
+    "MPa": {1e-3: "kPa", 1e-6: "Pa", 1e3: "GPa"},
+    "N": {1e-3: "mN", 1e-6: "µN", 1e3: "kN"},
+    "pC/N": {1e-3: "fC/N", 1e3: "nC/N", 1e6: "µC/N", 1e12: "C/N"},
+}
+
+
+def to_si(name: str, value: ArrayLike) -> Floats:
+    """The SI value of a field given in lab units."""
+    return np.asarray(value, dtype=float) * LAB[name].to_si
+
+
+def to_lab(name: str, value: ArrayLike) -> Floats:
+    """The lab-unit value of a field given in SI."""
+    return np.asarray(value, dtype=float) / LAB[name].to_si
+
+
+def checked(name: str, value: ArrayLike, *, units_checked: bool = False) -> Floats:
+    """The SI value of a declared field given in lab units, after checking every entry.
+
+    Raises InvalidInput at the first entry that is not finite, is zero, is negative (unless the field may be:
+    d33 has a sign), or has an unlikely magnitude (unless `units_checked`).
+    """
+    field = LAB[name]
+    values = np.asarray(value, dtype=float)
+    size = np.abs(values) if field.signed else values
+    positive = "finite and not zero" if field.signed else "finite and greater than 0"
+    _refuse(name, values, ~(np.isfinite(values) & (size > 0)), f"must be {positive} ({field.unit})")
+    if field.likely is not None and not units_checked:
+        low, high = field.likely
+        unlikely = (size < low) | (size > high)
+        if unlikely.any():
+            first = float(size.flat[int(np.argmax(unlikely))])
+            _refuse(name, values, unlikely, _slip(field, first))
+    return values * field.to_si
+
+
+def _refuse(name: str, values: Floats, bad: NDArray[np.bool_], allowed: str) -> None:
+    if bad.any():
+        first = int(np.argmax(bad))
+        raise InvalidInput(name, float(values.flat[first]), allowed, index=first if values.ndim else None)
+
+
+def _slip(field: LabField, size: float) -> str:
+    """What is allowed, and the unit that was probably meant."""
+    assert field.likely is not None
+    low, high = field.likely
+    text = f"must be {low:g} to {high:g} {field.unit} in magnitude (or set units_checked to true)"
+    for factor, unit in _NEIGHBOURS[field.unit].items():
+        if _usual(size * factor, low, high):
+            return f"{text}; {size:g} {unit} is {size * factor:g} {field.unit}: was it given in {unit}?"
+    for power in (3, 6, 9, 12, -3, -6, -9, -12):
+        if _usual(size * 10.0**power, low, high):
+            return f"{text}; off by a factor of 10^{-power}? {size * 10.0**power:g} {field.unit} would be usual"
+    return text
+
+
+def _usual(size: float, low: float, high: float) -> bool:
+    return low <= size <= high
