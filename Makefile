@@ -33,14 +33,14 @@ tables: $(VENV)/.runtime ## solve the default table again
 paper: $(VENV)/.dev ## regenerate docs/paper.md and its figures
 	$(PYTHON) docs/paper.py
 
-bench: $(VENV)/.dev ## measure speed, as ratios against peers in the same run
+bench: $(VENV)/.dev $(VENV)-tesseract/.installed ## measure speed, as ratios against peers in the same run
 	$(PYTHON) -m bench
 
-lock: $(VENV)/.dev ## resolve requirements.lock and requirements-dev.lock anew
+lock: $(VENV)/.dev ## resolve pyproject.toml into the lock files
 	scripts/lock.sh $(PYTHON)
 
 clean: ## remove the environment and all caches
-	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(VENV)-tesseract build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 system: # Debian packages that some tests use
@@ -59,4 +59,10 @@ $(VENV)/.runtime: $(VENV)/.created requirements.lock pyproject.toml
 $(VENV)/.dev: $(VENV)/.runtime requirements-dev.lock
 	@echo "Installing the locked development packages into $(VENV) ..."
 	@$(PIP_INSTALL) --require-hashes -r requirements-dev.lock
+	@touch $@
+
+$(VENV)-tesseract/.installed: requirements-tesseract.lock
+	@scripts/make-venv.sh $(VENV)-tesseract
+	@echo "Installing Tesseract Core, a peer to measure against, into $(VENV)-tesseract ..."
+	@$(VENV)-tesseract/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $<
 	@touch $@
