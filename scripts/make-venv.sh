@@ -6,7 +6,8 @@ for python in python3.11 python3.12 python3.13 python3.14 python3; do
     "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || continue
     found=$python
     "$python" -c 'import ensurepip, venv' 2>/dev/null || continue
-    exec "$python" -m venv "$1"
+    "$python" -m venv "$1"
+    exit
 done
 
 if [ -n "$found" ]; then
