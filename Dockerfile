@@ -16,7 +16,7 @@ RUN python3 -m compileall -q /app && \
     /opt/venv/bin/pip uninstall --quiet --yes hatchling editables pip
 
 FROM python:3.11-slim-bookworm
-RUN useradd --system --uid 10001 --user-group --no-create-home --shell /usr/sbin/nologin underskin && \
+RUN useradd --uid 10001 --user-group --no-create-home --shell /usr/sbin/nologin underskin && \
     install -d -o underskin -g underskin -m 750 /data
 COPY --from=builder /opt/venv /opt/venv
 COPY --from=builder /app /app
