@@ -2,11 +2,12 @@
 
 Usage, as root on Debian: python scripts/verify_image.py [WORK_DIRECTORY]. Needs debootstrap and util-linux.
 
-Each stage of the Dockerfile runs in a root of its own: `FROM` is stood in for by a fresh Debian bookworm with
-its Python 3.11 (the official image is that release with the same Python under /usr/local), `COPY` takes committed
-files that .dockerignore lets through, `RUN` runs in a chroot. The last root is then mounted read-only in fresh
-mount, process and network namespaces, without capabilities, and the entry point is tried: no start without keys,
-then a key, health and an answer. What this cannot show is the engine's own part: pulling, layers, published ports.
+Each stage of the Dockerfile runs in a root of its own: `FROM` is stood in for by a fresh Debian bookworm
+with its Python 3.11 (the official image is that release with the same Python under /usr/local), `COPY`
+takes committed files that .dockerignore lets through, `RUN` runs in a chroot. The last root is then mounted
+read-only in fresh mount, process and network namespaces, without capabilities, and the entry point is
+tried: no start without keys, then a key, health and an answer. What this cannot show is the engine's own
+part: pulling, layers, published ports.
 """
 
 import json
