@@ -1,10 +1,10 @@
 """The exact answer that the block is judged by: an endless incompressible layer, read one unit below its top.
 
 Lengths in units of the depth h of the sensors' plane; the rigid base lies `depth` ≥ 1 below the top. With
-u_z = W(z) J0(kr) and, by incompressibility, u_r = −W'(z)/k · J1(kr), equilibrium leaves W = a combination of e^(±kz)
-and z e^(±kz); the shear stress is −(W'' + k² W)/k and T3 = 3 W' − W'''/k² (shear modulus 1). Four conditions at base
-and top fix the combination for each wavenumber k. For depth 1 this is `underskin.linear_layer`, for depth → ∞
-`underskin.half_space`.
+u_z = W(z) J0(kr) and, by incompressibility, u_r = −W'(z)/k · J1(kr), equilibrium leaves W = a combination of
+e^(±kz) and z e^(±kz); the shear stress is −(W'' + k² W)/k and T3 = 3 W' − W'''/k² (shear modulus 1). Four
+conditions at base and top fix the combination for each wavenumber k. For depth 1 this is
+`underskin.linear_layer`, for depth → ∞ `underskin.half_space`.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ _POINTS = 400
 
 
 def sigma(depth: float, a: float, rho: Floats, *, bonded: bool = True) -> Floats:
-    """σ under the Hertz pressure of radius `a` (a/h) for sensors of radii `rho` (rT/h, array); a and rho below 3.
+    """σ under the Hertz pressure of radius `a` (a/h) for sensors of radii `rho` (rT/h, array), all below 3.
 
     `bonded`: the base holds the layer; otherwise it only carries it, without friction.
     """
