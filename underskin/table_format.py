@@ -77,7 +77,11 @@ def _write_group(group: h5py.Group, datasets: Group, signal: str) -> None:
     group.attrs["axes"] = list(datasets[signal].axes)
     for name, dataset in datasets.items():
         stored = group.create_dataset(
-            name, data=np.asarray(dataset.values, dtype="<f8"), compression="gzip", shuffle=True, track_times=False
+            name,
+            data=np.asarray(dataset.values, dtype="<f8"),
+            compression="gzip",
+            shuffle=True,
+            track_times=False,
         )
         stored.attrs["units"] = ""
         stored.attrs["long_name"] = dataset.meaning
@@ -124,10 +128,14 @@ def _verified(path: Path, file: h5py.File, schema: str) -> TableFile:
     for group_name, group in file.items():
         for name, dataset in group.items():
             data[f"{group_name}/{name}"] = np.asarray(dataset[()], dtype=float)
+    for group_name, group in file.items():
+        for name, dataset in group.items():
             _verify_values(path, group_name, name, data, list(dataset.attrs.get("axes", ())))
     digest = data_hash(data)
     if digest != attributes.get("data_sha256"):
-        raise TableError(f"table {path} was altered after it was written: its SHA-256 does not match. {_REMEDY}")
+        raise TableError(
+            f"table {path} was altered after it was written: its SHA-256 does not match. {_REMEDY}"
+        )
     return TableFile(data, attributes, digest)
 
 
@@ -139,4 +147,6 @@ def _verify_values(path: Path, group: str, name: str, data: Mapping[str, Floats]
         raise TableError(f"table {path}: axis {group}/{name} does not ascend. {_REMEDY}")
     expected = tuple(data[f"{group}/{axis}"].size for axis in axes)
     if axes and values.shape != expected:
-        raise TableError(f"table {path}: {group}/{name} has shape {values.shape}, its axes {expected}. {_REMEDY}")
+        raise TableError(
+            f"table {path}: {group}/{name} has shape {values.shape}, its axes {expected}. {_REMEDY}"
+        )
