@@ -1,4 +1,4 @@
-"""The bonded layer under a Hertz pressure, solved by FElupe: a check of the tables (GPL: for tests and bench).
+"""The bonded layer under a Hertz pressure, solved by FElupe: a check of the tables (GPL: tests and bench).
 
 Nothing here is shared with tablegen: another code, another element (Taylor–Hood, 9 displacement and 4
 continuous pressure nodes, against discontinuous pressures of high order), another formulation (displacement,
@@ -44,25 +44,25 @@ class FelupeLayer:
         self.body = felupe.SolidBody(material, self.field)
         self.load = felupe.PointLoad(self.field, self._nodes(1.0))
         self._unit_load = self._hertz_forces()
-        self.boundaries = {
+        boundaries = {
             "base": felupe.Boundary(self.field[0], fx=0.0),
             "axis": felupe.Boundary(self.field[0], fy=0.0, skip=(1, 0)),
         }
-        self.held, self.free = felupe.dof.partition(self.field, self.boundaries)
+        self.held, self.free = felupe.dof.partition(self.field, boundaries)
+        self.prescribed = felupe.dof.apply(self.field, boundaries, self.held)
 
     def apply(self, peak_pressure: float) -> None:
         """Set the dead load (per reference area) with the peak q0/G; `solve` then finds its equilibrium."""
-        self.load.update(
-            np.stack([-peak_pressure * self._unit_load, np.zeros_like(self._unit_load)], axis=-1)
-        )
+        self.load.update(np.stack([-peak_pressure * self._unit_load, np.zeros_like(self._unit_load)], axis=-1))
 
     def solve(self, tolerance: float = 1e-7) -> None:
         """Newton's method from the present state."""
         self.field = felupe.newtonraphson(
+            x0=self.field,
             items=[self.body, self.load],
             dof0=self.held,
             dof1=self.free,
-            ext0=felupe.dof.apply(self.field, self.boundaries, self.held),
+            ext0=self.prescribed,
             tol=tolerance,
             verbose=0,
         ).x

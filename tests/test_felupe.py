@@ -40,6 +40,4 @@ def test_both_codes_meet_the_finite_strain_values_on_record() -> None:
         layer.apply(felupe_layer.peak_pressure(load))
         layer.solve()
         assert layer.sigma([0.6])[0] / linear_layer.sigma(0.3, 0.6) == pytest.approx(ratio, abs=1e-4)
-        assert table.sigma(0.3, 0.6, load).sigma / table.sigma(0.3, 0.6, 0.0).sigma == pytest.approx(
-            ratio, abs=1e-4
-        )
+        assert table.sigma(0.3, 0.6, load).sigma / table.sigma(0.3, 0.6, 0.0).sigma == pytest.approx(ratio, abs=1e-4)
