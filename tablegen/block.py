@@ -166,9 +166,7 @@ class _Problem:
 
     def solve(self, load: Floats) -> tuple[Floats, Floats, int]:
         """Displacement (3, x, y, z), pressure (x, y, z) and the number of iterations for a load along z."""
-        right = self._joined(
-            np.stack([np.zeros_like(load), np.zeros_like(load), load]), np.zeros(self.shape_p)
-        )
+        right = self._joined(np.stack([np.zeros_like(load), np.zeros_like(load), load]), np.zeros(self.shape_p))
         iterations = 0
 
         def count(_: Floats) -> None:
@@ -195,9 +193,7 @@ class _Problem:
 
     def _precondition(self, vector: Floats) -> Floats:
         u, p = self._split(vector)
-        inverse_u = np.stack(
-            [inverse(component) for inverse, component in zip(self.inverses, u, strict=True)]
-        )
+        inverse_u = np.stack([inverse(component) for inverse, component in zip(self.inverses, u, strict=True)])
         return self._joined(inverse_u, _kronecker(self.inverse_masses, p))
 
     def _joined(self, u: Floats, p: Floats) -> Floats:

@@ -56,7 +56,12 @@ def tangential_stress(transmission: Transform, rho: ArrayLike, offset: ArrayLike
 
 
 def _transform(
-    transmission: Transform, pressure: Transform, bessel: Transform, a: ArrayLike, rho: ArrayLike, offset: ArrayLike
+    transmission: Transform,
+    pressure: Transform,
+    bessel: Transform,
+    a: ArrayLike,
+    rho: ArrayLike,
+    offset: ArrayLike,
 ) -> Floats:
     a_all, rho_all, offset_all = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (a, rho, offset)))
     shape = a_all.shape
@@ -73,7 +78,7 @@ def _transform(
 
 def _nodes(highest_frequency: float) -> tuple[Floats, Floats]:
     """Gauss–Legendre nodes and weights on panels of [0, 44], short enough for the fastest oscillation."""
-    panels = 8 + int(np.ceil(_END * highest_frequency / 12.0))
+    panels = 24 + int(np.ceil(_END * highest_frequency / 12.0))
     x, w = np.polynomial.legendre.leggauss(16)
     edges = np.linspace(0.0, _END, panels + 1)
     half = np.diff(edges)[:, None] / 2

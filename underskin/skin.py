@@ -69,6 +69,9 @@ def _checked_poisson_ratio(value: ArrayLike) -> Floats:
     if bad.any():
         first = int(np.argmax(bad))
         raise InvalidInput(
-            "poisson_ratio", float(values.flat[first]), "must be 0 to 0.5", index=first if values.ndim else None
+            "poisson_ratio",
+            float(values.flat[first]),
+            "must be 0 to 0.5",
+            index=first if values.ndim else None,
         )
     return values

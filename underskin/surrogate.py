@@ -40,7 +40,9 @@ class SigmaTable:
         self.attributes = file.attributes
         data = file.data
         try:
-            self.axes = tuple(data[f"sigma/{name}"] for name in ("a_over_h", "rt_over_h", "cbrt_load_parameter"))
+            self.axes = tuple(
+                data[f"sigma/{name}"] for name in ("a_over_h", "rt_over_h", "cbrt_load_parameter")
+            )
             self._sigma = _spline(self.axes, data["sigma/sigma"])
             self._cell_error = _largest_at_corners(
                 data["sigma/discretisation_error"] + data["sigma/interpolation_error"]
@@ -135,7 +137,7 @@ def _points(
     points = np.stack([column.ravel() for column in columns], axis=-1)
     low = np.array([axis[0] for axis in axes])
     high = np.array([axis[-1] for axis in axes])
-    inside = ((points >= low) & (points <= high)).all(axis=1)
+    inside: NDArray[np.bool_] = np.all((points >= low) & (points <= high), axis=1)
     if not inside.all():
         points[~inside] = low
     return points, inside, columns[0].shape

@@ -1,0 +1,46 @@
+"""The incompressible neo-Hookean solid in axisymmetry, at every integration point at once.
+
+Energy per undeformed volume W = (G/2)(I₁ − 3 − 2 ln J) − p (J − 1) with G = 1. The deformation gradient has the five
+components F = (F_rr, F_rz, F_zr, F_zz, F_θθ), the last axis of every array here; cof F = ∂J/∂F. Where J = 1 the term in
+ln J is only a shift of p by G, so that p = 0 at rest; but elements meet J = 1 on average only, and without that term
+modes that violate it inside an element lose their stiffness once the pressure exceeds about 1.5 G (found as a negative
+eigenvalue in the element under the centre of the contact). Source: Holzapfel, Nonlinear Solid Mechanics (2000), ch. 6;
+Auricchio et al., Comput. Methods Appl. Mech. Engrg. 194 (2005) 1075, on that loss of stability.
+"""
+
+import numpy as np
+
+from underskin.units import Floats
+
+IDENTITY = np.array([1.0, 0.0, 0.0, 1.0, 1.0])
+SHEAR_MODULUS = 1.0
+YOUNGS_MODULUS = 3.0
+
+
+def cofactor(f: Floats) -> Floats:
+    """cof F = ∂J/∂F, shape (…, 5)."""
+    rr, rz, zr, zz, tt = np.moveaxis(f, -1, 0)
+    return np.stack([zz * tt, -zr * tt, -rz * tt, rr * tt, rr * zz - rz * zr], axis=-1)
+
+
+def volume_ratio(f: Floats) -> Floats:
+    """J = det F, shape (…)."""
+    rr, rz, zr, zz, tt = np.moveaxis(f, -1, 0)
+    return (rr * zz - rz * zr) * tt
+
+
+def stress(f: Floats, p: Floats) -> Floats:
+    """First Piola–Kirchhoff stress P = F − (p + 1/J) cof F, shape (…, 5)."""
+    return f - (p + 1 / volume_ratio(f))[..., None] * cofactor(f)
+
+
+def tangent(f: Floats, p: Floats) -> Floats:
+    """∂P/∂F = 1 − (p + 1/J) ∂²J/∂F² + cof F ⊗ cof F / J², shape (…, 5, 5), symmetric."""
+    rr, rz, zr, zz, tt = np.moveaxis(f, -1, 0)
+    second = np.zeros((*p.shape, 5, 5))
+    for i, j, value in ((0, 3, tt), (1, 2, -tt), (0, 4, zz), (3, 4, rr), (1, 4, -zr), (2, 4, -rz)):
+        second[..., i, j] = second[..., j, i] = value
+    volume, cof = volume_ratio(f), cofactor(f)
+    shift = (p + 1 / volume)[..., None, None]
+    normalised = cof / volume[..., None]
+    return np.eye(5) - shift * second + normalised[..., :, None] * normalised[..., None, :]

@@ -1,0 +1,92 @@
+"""The finite-element layer: exact linear limit, convergence rate, force balance, and what must not matter."""
+
+import numpy as np
+import pytest
+
+import tablegen.mesh
+import tablegen.newton
+from tablegen.base_stress import BaseStress
+from tablegen.discretisation import discretise
+from tablegen.faces import hertz_load
+from tablegen.mesh import layer_mesh
+from tablegen.newton import Layer
+from tablegen.sigma import Nodes, peak_pressures, solve_column
+from underskin import SolverError, linear_layer
+
+RHO = np.array([0.0, 0.1, 0.2, 0.6, 1.0, 2.0, 3.0])
+R = np.linspace(0, 8, 17)
+
+
+def nodes(*load_parameters: float) -> Nodes:
+    return Nodes(np.zeros(1), RHO, np.cbrt([0.0, *load_parameters]), R)
+
+
+@pytest.mark.parametrize("a", [0.02, 0.3, 1.0, 3.0])
+def test_linear_limit_is_the_exact_layer_and_the_base_carries_the_force(a: float) -> None:
+    column = solve_column(a, nodes(1e-3), order=5)
+    assert np.abs(column.linear_error / linear_layer.sigma(a, RHO)).max() < 3e-6
+    assert column.force_error < 1e-6
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_convergence_rate_of_the_stress_on_the_base(order: int) -> None:
+    """Halving the elements of a layer under a wide contact: the stress on the base gains at least 2^(order + 1)."""
+    errors = []
+    for refinement in (1, 2):
+        layer = Layer(discretise(layer_mesh(1.0, refinement), order))
+        base = BaseStress(layer.discretisation)
+        stress = base.at_points(layer.linear_force(hertz_load(layer.discretisation, 1.0)))
+        exact = linear_layer.sigma(1.0, 0.0, base.points)
+        near = base.points < 3
+        errors.append(float(np.sqrt(np.mean((stress[near] - exact[near]) ** 2))))
+    assert errors[0] / errors[1] > 2 ** (order + 1)
+
+
+def test_finite_strain_reference_values() -> None:
+    """PHYSICS, section 2: σ(L)/σ(0) at a/h 0.3, ρ 0.6 (Richardson, ± 5e-5)."""
+    column = solve_column(0.3, nodes(1e-3, 1e-2, 3e-2, 1e-1), order=5)
+    ratio = 1 + column.sigma_change[3] / linear_layer.sigma(0.3, 0.6)
+    assert ratio == pytest.approx([1, 1.01293, 1.02966, 1.04522, 1.07489], abs=1e-4)
+
+
+def test_volume_is_kept_and_the_path_of_loading_does_not_matter() -> None:
+    layer = Layer(discretise(layer_mesh(0.5), 4))
+    load = hertz_load(layer.discretisation, 0.5)
+    peak = float(peak_pressures(np.cbrt(np.array([0.1])))[0])
+    direct = layer.equilibrium(layer.rest(), peak * load)
+    overshoot = layer.equilibrium(direct, 1.2 * peak * load)
+    back = layer.equilibrium(overshoot, peak * load)
+    assert layer.volume_change(direct) < 1e-8
+    assert back.displacement == pytest.approx(direct.displacement, abs=1e-9)
+
+
+def test_the_surface_sinks_under_the_contact_and_the_base_does_not_move() -> None:
+    d = discretise(layer_mesh(0.5), 4)
+    layer = Layer(d)
+    state = layer.equilibrium(layer.rest(), 0.3 * hertz_load(d, 0.5))
+    vertices = d.basis.mesh.p
+    on_axis = np.flatnonzero((vertices[0] == 0) & (vertices[1] == 1.0))
+    on_base = np.flatnonzero(vertices[1] == 0.0)
+    scalar = d.basis.nodal_dofs[0]
+    assert (state.displacement[2 * scalar[on_axis] + 1] < -0.01).all()
+    assert (state.displacement[2 * scalar[on_base] + 1] == 0).all()
+
+
+def test_rim_and_augmentation_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = solve_column(1.0, nodes(0.1), order=4)
+    monkeypatch.setattr(tablegen.newton, "_AUGMENTATION", 1e5)
+    monkeypatch.setattr(tablegen.mesh, "RIM", 16.0)
+    there = solve_column(1.0, nodes(0.1), order=4)
+    scale = linear_layer.sigma(1.0, RHO)[:, None]
+    assert np.abs((there.sigma_change - here.sigma_change) / scale).max() < 2e-6
+
+
+def test_change_grows_like_the_cube_root_of_the_load() -> None:
+    """σ(L) − σ(0) ∝ L^(1/3) as L → 0, so that the table's axis is smooth."""
+    column = solve_column(0.5, nodes(1e-6, 8e-6), order=4)
+    assert column.sigma_change[3, 2] / column.sigma_change[3, 1] == pytest.approx(2.0, rel=0.01)
+
+
+def test_an_unreachable_load_names_the_point() -> None:
+    with pytest.raises(SolverError, match=r"a/h = 1, L = 200"):
+        solve_column(1.0, nodes(200.0), order=2)
