@@ -31,7 +31,7 @@ tables: $(VENV)/.runtime ## solve the default table again
 	$(VENV)/bin/underskin tablegen sigma --out tables/sigma.h5
 
 paper: $(VENV)/.dev ## regenerate docs/paper.md and its figures
-	$(PYTHON) docs/paper.py
+	$(PYTHON) -m docs.paper
 
 bench: $(VENV)/.dev $(VENV)-tesseract/.installed ## measure speed, as ratios against peers in the same run
 	$(PYTHON) -m bench
