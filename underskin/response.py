@@ -5,8 +5,9 @@ positive in compression for a positive d33; in the base model it is real and fla
 """
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from underskin.errors import InvalidInput
 from underskin.units import Floats
 
 
@@ -28,6 +29,21 @@ def charge(preload: ArrayLike, d33: ArrayLike, sigma: ArrayLike, rt_over_h: Arra
 def mean_stress(preload: ArrayLike, sigma: ArrayLike, thickness: ArrayLike) -> Floats:
     """T0 = 3 F σ / (2 π h²) [Pa], the static mean stress on the sensor, positive in compression."""
     return 1.5 / np.pi * np.asarray(preload, dtype=float) * np.asarray(sigma) / np.square(thickness)
+
+
+def plateau(lines: Floats, in_band: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """The mean of each row's lines in the band, and its standard error; `lines` is (rows, lines), any unit.
+
+    The standard error is NaN where the band holds one line, which has no scatter. It sees the scatter between lines
+    only: the lines of one recording share its gain error. Raises InvalidInput where the band holds no line.
+    """
+    count = int(in_band.sum())
+    if count == 0:
+        raise InvalidInput("band_hz", "no line inside", "must hold at least one entry of frequency_hz")
+    chosen = lines[:, in_band]
+    if count == 1:
+        return chosen[:, 0], np.full(len(chosen), np.nan)
+    return chosen.mean(axis=1), chosen.std(axis=1, ddof=1) / np.sqrt(count)
 
 
 def d33(

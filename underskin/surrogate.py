@@ -4,7 +4,9 @@ A cubic spline in a/h, rT/h and L^(1/3) passes through the table's nodes; σ is 
 proportional to the strain (PHYSICS, section 2). Rows outside the domain are NaN, never extrapolated.
 """
 
+import math
 import os
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,9 +42,8 @@ class SigmaTable:
         self.attributes = file.attributes
         data = file.data
         try:
-            self.axes = tuple(
-                data[f"sigma/{name}"] for name in ("a_over_h", "rt_over_h", "cbrt_load_parameter")
-            )
+            self.axes = tuple(data[f"sigma/{name}"] for name in ("a_over_h", "rt_over_h", "cbrt_load_parameter"))
+            self._nodes = [axis.tolist() for axis in self.axes]
             self._sigma = _spline(self.axes, data["sigma/sigma"])
             self._cell_error = _largest_at_corners(
                 data["sigma/discretisation_error"] + data["sigma/interpolation_error"]
@@ -73,6 +74,16 @@ class SigmaTable:
             sigma[outside] = np.nan
             rel_error[outside] = np.nan
         return Sigma(sigma.reshape(shape), rel_error.reshape(shape), inside.reshape(shape))
+
+    def at(self, a_over_h: float, rt_over_h: float, load_parameter: float = 0.0) -> tuple[float, float] | None:
+        """σ and the bound on its relative error at one point, without the cost of arrays; None outside the domain."""
+        point = (a_over_h, rt_over_h, math.cbrt(load_parameter))
+        cell = []
+        for value, axis in zip(point, self._nodes, strict=True):
+            if not axis[0] <= value <= axis[-1]:
+                return None
+            cell.append(bisect_right(axis, value, 1, len(axis) - 1) - 1)
+        return float(self._sigma(point)), float(self._cell_error[tuple(cell)])
 
     def gradient(
         self, a_over_h: ArrayLike, rt_over_h: ArrayLike, load_parameter: ArrayLike = 0.0
@@ -144,9 +155,7 @@ def _points(
 
 
 def _cells(axes: Sequence[Floats], points: Floats) -> tuple[NDArray[np.intp], ...]:
-    return tuple(
-        np.searchsorted(axis[1:-1], points[:, number], side="right") for number, axis in enumerate(axes)
-    )
+    return tuple(np.searchsorted(axis[1:-1], points[:, number], side="right") for number, axis in enumerate(axes))
 
 
 def _largest_at_corners(values: Floats) -> Floats:

@@ -1,0 +1,153 @@
+"""d33 of each sensor from its measured FRF."""
+
+from typing import Any, ClassVar
+
+import numpy as np
+from fastapi import APIRouter
+from pydantic import Field
+
+from service.answers import Columns
+from service.columns import NonNegative, Numbers, NumbersPerRow, Signed, finite, non_negative, rows
+from service.dependencies import columns_body, columns_route
+from service.frf import EXAMPLE as FRF_EXAMPLE
+from service.skin_columns import (
+    FIELDS,
+    PressedSkinAnswer,
+    PressedSkinColumns,
+    lab_columns,
+    pressed,
+    require_known_model,
+)
+from underskin import InvalidInput, response
+from underskin.surrogate import SigmaTable
+from underskin.units import Floats, to_lab, to_si
+
+router = APIRouter(tags=["d33"])
+
+
+class D33Columns(PressedSkinColumns):
+    """The skin, the sphere and the measured FRF: plateau values, or lines with a band to average over."""
+
+    json_only: ClassVar[frozenset[str]] = frozenset({"frequency_hz", "band_hz", "frf_re_pc_per_n", "frf_im_pc_per_n"})
+
+    frf_pc_per_n: Signed | None = Field(
+        default=None, description="Measured FRF on the plateau, real part [pC/N]; or give lines."
+    )
+    frf_uncertainty_pc_per_n: NonNegative | None = Field(
+        default=None,
+        description="Standard uncertainty of the plateau [pC/N]. Left out: 0 for plateau values; for lines the "
+        "standard error of their mean, which does not see the gain error that lines of one recording share.",
+    )
+    frequency_hz: Numbers | None = Field(
+        default=None, min_length=1, description="Frequencies of the lines, the same for all rows [Hz]."
+    )
+    frf_re_pc_per_n: NumbersPerRow | None = Field(
+        default=None, min_length=1, description="Real part of the FRF, rows × lines [pC/N]."
+    )
+    frf_im_pc_per_n: NumbersPerRow | None = Field(
+        default=None,
+        min_length=1,
+        description="Imaginary part, rows × lines [pC/N]; its mean is answered and not used.",
+    )
+    band_hz: Numbers | None = Field(
+        default=None, min_length=2, max_length=2, description="Lowest and highest frequency averaged over [Hz]."
+    )
+
+
+class D33Answer(PressedSkinAnswer):
+    """d33 in columns."""
+
+    frf_pc_per_n: list[float] = Field(description="The plateau that was inverted [pC/N].")
+    frf_uncertainty_pc_per_n: list[float] = Field(description="Its standard uncertainty [pC/N].")
+    frf_im_pc_per_n: list[float] | None = Field(
+        default=None, description="Mean imaginary part over the band, where given [pC/N]."
+    )
+    d33_pc_per_n: list[float | None] = Field(description="d33 = FRF / ((3/2) (rT/h)² σ) [pC/N].")
+    d33_uncertainty_pc_per_n: list[float | None] = Field(
+        description="Standard uncertainty: the FRF's and the table's, in quadrature [pC/N]."
+    )
+
+
+def answer(table: SigmaTable, request: D33Columns) -> Columns:
+    """d33 for each row."""
+    require_known_model(request)
+    measured = _plateau(request) if request.frf_pc_per_n is None else _given(request)
+    columns = {name: request.column(name) for name in FIELDS} | measured
+    count = rows(columns)
+    reached = pressed(table, request, columns)
+    d33, uncertainty = reached.d33(
+        *(to_si(name, measured[name]) for name in ("frf_pc_per_n", "frf_uncertainty_pc_per_n"))
+    )
+    return Columns(
+        rows=count,
+        model=request.model,
+        table_sha256=table.sha256,
+        inside=reached.inside,
+        columns={
+            **lab_columns(reached),
+            **measured,
+            "d33_pc_per_n": to_lab("d33_pc_per_n", d33),
+            "d33_uncertainty_pc_per_n": to_lab("d33_uncertainty_pc_per_n", uncertainty),
+        },
+    )
+
+
+def _given(request: D33Columns) -> dict[str, Floats]:
+    """Plateau values as they were sent."""
+    for name in sorted(request.json_only):
+        if getattr(request, name) is not None:
+            raise InvalidInput(name, "given", "goes with lines; leave it out, or leave out frf_pc_per_n")
+    return {"frf_pc_per_n": finite("frf_pc_per_n", request.column("frf_pc_per_n")), **_uncertainty(request)}
+
+
+def _uncertainty(request: D33Columns) -> dict[str, Floats]:
+    name = "frf_uncertainty_pc_per_n"
+    if request.frf_uncertainty_pc_per_n is None:
+        return {name: np.zeros(())}
+    return {name: non_negative(name, request.column(name))}
+
+
+def _plateau(request: D33Columns) -> dict[str, Floats]:
+    """Mean over the band of each row's lines, and its standard error unless an uncertainty was sent."""
+    for name in ("frequency_hz", "frf_re_pc_per_n", "band_hz"):
+        if getattr(request, name) is None:
+            raise InvalidInput(name, None, "is required where frf_pc_per_n is not given")
+    frequency = non_negative("frequency_hz", request.column("frequency_hz"))
+    band = non_negative("band_hz", request.column("band_hz"))
+    inside = (frequency >= band[0]) & (frequency <= band[1])
+    real, error = response.plateau(_lines(request, "frf_re_pc_per_n", len(frequency)), inside)
+    measured = {"frf_pc_per_n": real}
+    if request.frf_uncertainty_pc_per_n is not None:
+        measured |= _uncertainty(request)
+    elif inside.sum() < 2:
+        raise InvalidInput(
+            "frf_uncertainty_pc_per_n", None, "is required where band_hz holds one line, which has no scatter"
+        )
+    else:
+        measured["frf_uncertainty_pc_per_n"] = error
+    if request.frf_im_pc_per_n is not None:
+        measured["frf_im_pc_per_n"], _ = response.plateau(_lines(request, "frf_im_pc_per_n", len(frequency)), inside)
+    return measured
+
+
+def _lines(request: D33Columns, name: str, count: int) -> Floats:
+    """Rows × lines, after checking that each row has a value a frequency."""
+    for row, line in enumerate(getattr(request, name)):
+        if len(line) != count:
+            allowed = f"must have as many lines as frequency_hz ({count})"
+            raise InvalidInput(name, f"{len(line)} lines", allowed, index=row)
+    return finite(name, request.column(name))
+
+
+EXAMPLE = {**FRF_EXAMPLE, "frf_pc_per_n": [6.8, 6.9], "frf_uncertainty_pc_per_n": 0.1}
+del EXAMPLE["d33_pc_per_n"]
+
+_ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": D33Answer, "content": {"text/csv": {}}}}
+
+router.post(
+    "/d33",
+    operation_id="d33_columns",
+    summary="d33 from measured FRF",
+    responses=_ANSWER,
+    openapi_extra=columns_body(D33Columns, EXAMPLE),
+)(columns_route(D33Columns, answer))

@@ -1,0 +1,60 @@
+"""What routes are given, as annotated types."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Annotated, Any, TypeVar
+
+from fastapi import Depends, Request, Response
+
+from service.answers import Accept, Columns, respond
+from service.columns import ColumnsRequest, parse
+from underskin.surrogate import SigmaTable
+
+
+def _table(request: Request) -> SigmaTable:
+    table: SigmaTable = request.app.state.table
+    return table
+
+
+Table = Annotated[SigmaTable, Depends(_table)]
+
+# A body up to this size is answered on the event loop (a few ms at most); a larger one in a thread, a few at a time.
+_INLINE_BYTES = 1024
+_threads = asyncio.Semaphore(4)
+
+_Kind = TypeVar("_Kind", bound=ColumnsRequest)
+
+
+def columns_route(
+    kind: type[_Kind], answer: Callable[[SigmaTable, _Kind], Columns]
+) -> Callable[..., Awaitable[Response]]:
+    """An endpoint that reads a request in columns, answers it and writes it as the client accepts it."""
+
+    async def endpoint(request: Request, table: Table, accept: Accept = "application/json") -> Response:
+        body = await request.body()
+        content_type = request.headers.get("content-type", "")
+
+        def work() -> Response:
+            return respond(answer(table, parse(kind, body, content_type)), accept)
+
+        if len(body) <= _INLINE_BYTES:
+            return work()
+        async with _threads:
+            return await asyncio.to_thread(work)
+
+    return endpoint
+
+
+def columns_body(kind: type[ColumnsRequest], examples: dict[str, Any]) -> dict[str, Any]:
+    """OpenAPI's description of a body in columns."""
+    schema = kind.model_json_schema()
+    csv_text = ",".join(examples) + "\r\n" + ",".join(str(value) for value in examples.values()) + "\r\n"
+    return {
+        "requestBody": {
+            "required": True,
+            "content": {
+                "application/json": {"schema": schema, "example": examples},
+                "text/csv": {"schema": {"type": "string"}, "example": csv_text},
+            },
+        }
+    }

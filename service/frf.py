@@ -1,0 +1,107 @@
+"""What the model predicts for a skin: FRF, and what leads to it."""
+
+from typing import Any, ClassVar
+
+import numpy as np
+from fastapi import APIRouter
+from pydantic import Field
+
+from service.answers import Columns
+from service.columns import Numbers, Signed, non_negative, rows
+from service.dependencies import columns_body, columns_route
+from service.skin_columns import (
+    FIELDS,
+    PressedSkinAnswer,
+    PressedSkinColumns,
+    lab_columns,
+    pressed,
+    require_known_model,
+)
+from underskin import InvalidInput
+from underskin.surrogate import SigmaTable
+from underskin.units import Floats, checked, to_lab
+
+router = APIRouter(tags=["frf"])
+
+# A spectrum a row multiplies the answer; this is some 20 MB of JSON.
+_LARGEST_SPECTRA = 1_000_000
+
+
+class FrfColumns(PressedSkinColumns):
+    """The skin, the sphere and d33, in columns."""
+
+    json_only: ClassVar[frozenset[str]] = frozenset({"frequency_hz"})
+
+    d33_pc_per_n: Signed = Field(description="Piezoelectric coefficient d33 of the sensor [pC/N], not 0.")
+    frequency_hz: Numbers | None = Field(
+        default=None,
+        min_length=1,
+        description="Frequencies of the spectra, the same for all rows [Hz]. The paper's model is flat and real.",
+    )
+
+
+class FrfAnswer(PressedSkinAnswer):
+    """The FRF in columns."""
+
+    frf_pc_per_n: list[float | None] = Field(description="FRF on the plateau, charge over force [pC/N].")
+    frequency_hz: list[float] | None = Field(default=None, description="As asked, if it was [Hz].")
+    frf_re_pc_per_n: list[list[float | None]] | None = Field(
+        default=None, description="Real part, rows × frequencies; only with `frequency_hz` [pC/N]."
+    )
+    frf_im_pc_per_n: list[list[float | None]] | None = Field(
+        default=None, description="Imaginary part (e^(+iωt)), rows × frequencies; only with `frequency_hz` [pC/N]."
+    )
+
+
+def answer(table: SigmaTable, request: FrfColumns) -> Columns:
+    """FRF for each row."""
+    require_known_model(request)
+    columns = {name: request.column(name) for name in (*FIELDS, "d33_pc_per_n")}
+    count = rows(columns)
+    reached = pressed(table, request, columns)
+    d33 = checked("d33_pc_per_n", columns["d33_pc_per_n"], units_checked=request.units_checked)
+    frf = to_lab("frf_pc_per_n", reached.frf(d33))
+    spectra, frequency = _spectra(request, frf, count)
+    return Columns(
+        rows=count,
+        model=request.model,
+        table_sha256=table.sha256,
+        inside=reached.inside,
+        shared={} if frequency is None else {"frequency_hz": frequency},
+        columns={**lab_columns(reached), "frf_pc_per_n": frf, **spectra},
+        line_hz=frequency,
+    )
+
+
+def _spectra(request: FrfColumns, frf: Floats, count: int) -> tuple[dict[str, Floats], Floats | None]:
+    """Real and imaginary part, rows × frequencies: flat and real in the paper's model."""
+    if request.frequency_hz is None:
+        return {}, None
+    frequency = non_negative("frequency_hz", request.column("frequency_hz"))
+    if count * len(frequency) > _LARGEST_SPECTRA:
+        allowed = f"rows times frequencies must be at most {_LARGEST_SPECTRA}"
+        raise InvalidInput("frequency_hz", f"{count} rows, {len(frequency)} frequencies", allowed)
+    shape = (count, len(frequency))
+    real = np.broadcast_to(np.broadcast_to(frf, (count,))[:, None], shape)
+    imaginary = np.where(np.isnan(real), np.nan, 0.0)
+    return {"frf_re_pc_per_n": real, "frf_im_pc_per_n": imaginary}, frequency
+
+
+EXAMPLE = {
+    "thickness_mm": 2.5,
+    "youngs_modulus_mpa": 16.0,
+    "sensor_radius_mm": 1.5,
+    "indenter_radius_mm": 4.0,
+    "preload_n": 1.0,
+    "d33_pc_per_n": 14.0,
+}
+
+_ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": FrfAnswer, "content": {"text/csv": {}}}}
+
+router.post(
+    "/frf",
+    operation_id="frf_columns",
+    summary="FRF of a skin under a sphere",
+    responses=_ANSWER,
+    openapi_extra=columns_body(FrfColumns, EXAMPLE),
+)(columns_route(FrfColumns, answer))

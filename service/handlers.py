@@ -1,0 +1,45 @@
+"""Every error that a route raises, as a problem."""
+
+from fastapi import FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+
+from service.problems import MEDIA_TYPE, Refusal, from_validation, invalid_input
+from underskin import InvalidInput
+
+
+def install_handlers(api: FastAPI) -> None:
+    """One shape for what we raise, what FastAPI raises, and what nobody expected."""
+    api.add_exception_handler(Refusal, _handle)
+    api.add_exception_handler(InvalidInput, _handle)
+    api.add_exception_handler(RequestValidationError, _handle)
+    api.add_exception_handler(HTTPException, _handle)
+    api.add_exception_handler(Exception, _handle)
+
+
+async def _handle(request: Request, error: Exception) -> Response:
+    refusal = _as_refusal(request, error)
+    return Response(
+        refusal.body(request.scope.get("request_id", "")),
+        refusal.status,
+        headers=refusal.headers,
+        media_type=MEDIA_TYPE,
+    )
+
+
+def _as_refusal(request: Request, error: Exception) -> Refusal:
+    match error:
+        case Refusal():
+            return error
+        case InvalidInput():
+            return invalid_input([error])
+        case RequestValidationError():
+            return from_validation(error.errors())
+        case HTTPException(status_code=404):
+            return Refusal(404, f"There is nothing at {request.url.path}; /openapi.json lists all routes.")
+        case HTTPException(status_code=405):
+            return Refusal(405, f"{request.url.path} does not take {request.method}.", headers=error.headers)
+        case HTTPException():
+            return Refusal(error.status_code, str(error.detail), headers=error.headers)
+        case _:
+            return Refusal(500, "Something went wrong in the server; its log has the request's id.")

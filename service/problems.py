@@ -1,0 +1,119 @@
+"""Errors as RFC 9457 problems, in one shape over all routes (UM-Bridge's protocol has its own)."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from http import HTTPStatus
+from typing import Any
+
+import orjson
+from pydantic import BaseModel, Field, ValidationError
+
+from underskin import InvalidInput
+
+MEDIA_TYPE = "application/problem+json"
+
+
+class FieldError(BaseModel):
+    """What is wrong with one value."""
+
+    field: str = Field(description="Name of the field.", examples=["preload_n"])
+    index: int | None = Field(description="Row in the column, from 0; null for a single value.", examples=[3])
+    value: Any = Field(description="What was sent; null where nothing was.", examples=[-1.0])
+    allowed: str = Field(description="What would be accepted.", examples=["must be finite and greater than 0 (N)"])
+
+
+class Problem(BaseModel):
+    """An error (RFC 9457)."""
+
+    type: str = Field(description="What kind of problem, as a URN.", examples=["urn:underskin:problem:invalid-input"])
+    title: str = Field(description="The kind in words.", examples=["Invalid input"])
+    status: int = Field(description="The HTTP status.", examples=[422])
+    detail: str = Field(description="What happened and what to do.")
+    request_id: str = Field(description="Finds this request in the server's log; also in X-Request-ID.")
+    errors: list[FieldError] = Field(description="The values that were refused; empty for other problems.")
+
+
+class Refusal(Exception):
+    """Ends a request with a problem; `errors` as in `Problem`."""
+
+    def __init__(
+        self,
+        status: int,
+        detail: str,
+        *,
+        kind: str | None = None,
+        errors: Sequence[Mapping[str, Any]] = (),
+        headers: Mapping[str, str] | None = None,
+    ) -> None:
+        self.status = status
+        self.detail = detail
+        self.title = kind or HTTPStatus(status).phrase
+        self.errors = errors
+        self.headers = dict(headers or {})
+        super().__init__(detail)
+
+    def body(self, request_id: str) -> bytes:
+        """The problem document."""
+        name = self.title.lower().replace(" ", "-").replace("'", "")
+        return orjson.dumps(
+            {
+                "type": f"urn:underskin:problem:{name}",
+                "title": self.title,
+                "status": self.status,
+                "detail": self.detail,
+                "request_id": request_id,
+                "errors": [{**error, "value": _shown(error["value"])} for error in self.errors],
+            }
+        )
+
+
+def invalid_input(errors: Iterable[InvalidInput]) -> Refusal:
+    """The problem of values that cannot be used: 422."""
+    found = list(errors)
+    entries = [
+        {"field": error.field, "index": error.index, "value": error.value, "allowed": error.allowed} for error in found
+    ]
+    return Refusal(422, "; ".join(str(error) for error in found), kind="Invalid input", errors=entries)
+
+
+def from_validation(errors: ValidationError | Sequence[Any]) -> Refusal:
+    """The same problem from pydantic's list of errors."""
+    details = errors.errors(include_url=False) if isinstance(errors, ValidationError) else errors
+    return invalid_input(_as_invalid_input(detail) for detail in details)
+
+
+# pydantic's words where a lab's are clearer; the others are shown as they are.
+_WORDS = {
+    "greater_than_equal": "must be at least 0",
+    "missing": "is required",
+    "extra_forbidden": "is not a field of this request",
+    "float_type": "must be a number (NaN and null are not)",
+    "float_parsing": "must be a number",
+    "finite_number": "must be finite",
+    "model_type": "must be a JSON object with the fields as columns",
+    "too_short": "must not be empty",
+}
+_NOT_FIELDS = {"body", "query", "scalar", "column"}
+
+
+def _as_invalid_input(detail: Mapping[str, Any]) -> InvalidInput:
+    place = [part for part in detail["loc"] if part not in _NOT_FIELDS]
+    names = [part for part in place if isinstance(part, str)]
+    indices = [part for part in place if isinstance(part, int)]
+    message = str(detail["msg"])
+    return InvalidInput(
+        names[0] if names else "body",
+        None if detail["type"] == "missing" else detail.get("input"),
+        _WORDS.get(detail["type"], message[:1].lower() + message[1:]),
+        index=indices[0] if indices else None,
+    )
+
+
+def _shown(value: Any) -> Any:
+    """The refused value as JSON can carry it, in few words."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else str(value)
+    if value is None or isinstance(value, bool) or (isinstance(value, int) and abs(value) < 2**53):
+        return value
+    text = str(value) if not isinstance(value, int) else "a very large integer"
+    return text if len(text) <= 80 else text[:77] + "..."

@@ -1,0 +1,46 @@
+"""Settings, from the environment (docs/settings.md)."""
+
+from pathlib import Path
+
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from underskin.surrogate import tables_folder
+
+
+class Settings(BaseSettings):
+    """Read from variables named UNDERSKIN_ and the field in capitals."""
+
+    model_config = SettingsConfigDict(env_prefix="UNDERSKIN_")
+
+    data: Path = Field(
+        default=Path("~/.local/share/underskin"),
+        description="Folder of what the service keeps: API keys. Made at start if missing; must be writable.",
+    )
+    tables: Path = Field(
+        default_factory=tables_folder,
+        description="Folder of the tables; by default those that ship with underskin.",
+    )
+    max_body_mb: float = Field(
+        default=64, gt=0, description="Largest request body in MB (10^6 bytes), counted as it streams in."
+    )
+    hosts: str = Field(
+        default="",
+        description="Names, separated by commas, by which clients reach the service, beside localhost, "
+        "127.0.0.1, [::1] and the address it is bound to. A request with another Host is refused.",
+    )
+
+    @property
+    def data_folder(self) -> Path:
+        """`data` with ~ resolved."""
+        return self.data.expanduser()
+
+    @property
+    def max_body_bytes(self) -> int:
+        """`max_body_mb` in bytes."""
+        return int(self.max_body_mb * 1e6)
+
+    @property
+    def host_names(self) -> frozenset[str]:
+        """`hosts`, in lower case."""
+        return frozenset(name.strip().lower() for name in self.hosts.split(",") if name.strip())

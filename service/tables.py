@@ -1,0 +1,52 @@
+"""The tables that answer, and the hash that names each."""
+
+from typing import Any
+
+import numpy as np
+from fastapi import APIRouter
+from pydantic import BaseModel, Field
+
+from service.dependencies import Table
+from underskin.table_format import SIGMA_SCHEMA
+
+router = APIRouter(tags=["tables"])
+
+
+class TableAxis(BaseModel):
+    """One axis of a table."""
+
+    name: str = Field(description="The field that runs along it.", examples=["a_over_h"])
+    low: float = Field(description="Lowest value inside, limit included [-].")
+    high: float = Field(description="Highest value inside, limit included [-].")
+    nodes: int = Field(description="How many nodes the table has along it.")
+
+
+class TableEntry(BaseModel):
+    """One table."""
+
+    name: str = Field(description="Which quantity it holds.", examples=["sigma"])
+    table_schema: str = Field(description="Format of the file.", examples=[SIGMA_SCHEMA])
+    table_sha256: str = Field(description="SHA-256 of its datasets; every answer names it.")
+    axes: list[TableAxis] = Field(description="Its domain.")
+    about: dict[str, Any] = Field(description="How it was made: mesh, solver, versions.")
+
+
+class Tables(BaseModel):
+    """All tables."""
+
+    tables: list[TableEntry] = Field(description="One entry a table.")
+
+
+@router.get("/tables", operation_id="tables", summary="The tables in use")
+async def tables(table: Table) -> Tables:
+    """The tables that answers come from, with domain and origin."""
+    axes = [
+        TableAxis(name=name, low=low, high=high, nodes=len(nodes))
+        for (name, (low, high)), nodes in zip(table.domain.items(), table.axes, strict=True)
+    ]
+    about = {name: np.asarray(value).tolist() for name, value in table.attributes.items() if name not in _NAMED}
+    entry = TableEntry(name="sigma", table_schema=SIGMA_SCHEMA, table_sha256=table.sha256, axes=axes, about=about)
+    return Tables(tables=[entry])
+
+
+_NAMED = {"schema", "data_sha256", "default"}
