@@ -10,7 +10,6 @@ axis of rotation, so points are (z, r): z = 0 the base, z = 1 the surface.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import felupe
 import numpy as np
@@ -24,20 +23,12 @@ RIM = 12.0  # distance from the contact to the free rim
 _GAUSS = np.polynomial.legendre.leggauss(12)
 
 
-@dataclass(frozen=True)
-class Fineness:
-    """Element sizes: `edge` of the contact radius (at most of the thickness) at its edge, up to `largest`."""
-
-    edge: float = 0.04
-    largest: float = 0.05
-
-
 class FelupeLayer:
-    """The layer with a contact of radius a/h, ready to be loaded."""
+    """The layer with a contact of radius a/h, ready to be loaded; `mesh` must have a node at (z, r) = (1, a)."""
 
-    def __init__(self, a: float, fineness: Fineness = Fineness()) -> None:
+    def __init__(self, a: float, mesh: felupe.Mesh | None = None) -> None:
         self.a = a
-        self.mesh = _mesh(a, fineness)
+        self.mesh = graded_mesh(a) if mesh is None else mesh
         region = felupe.RegionBiQuadraticQuad(self.mesh)
         self.field = felupe.FieldsMixed(region, n=3, axisymmetric=True, disconnect=False)
         material = felupe.NearlyIncompressible(felupe.NeoHooke(mu=1.0), bulk=BULK_MODULUS)
@@ -125,22 +116,25 @@ def peak_pressure(load_parameter: float) -> float:
     return float(3 * 1.5 / np.pi * 0.75 ** (-4 / 3) * load_parameter ** (1 / 3))
 
 
-def _mesh(a: float, fineness: Fineness) -> felupe.Mesh:
-    """9-node quadrilaterals on a tensor grid that is fine at the contact's edge (r, z) = (a, 1)."""
-    smallest = fineness.edge * min(a, 1.0)
-    inward = a - _graded(a, smallest, fineness.largest)[::-1]
-    outward = a + _graded(RIM, smallest, fineness.largest)
-    z = 1 - _graded(1.0, smallest, fineness.largest)[::-1]
-    return felupe.Grid(z, np.append(inward, outward[1:])).add_midpoints_edges().add_midpoints_faces()
+def graded_mesh(a: float) -> felupe.Mesh:
+    """A mesh that is fine at the contact's edge (1, a); errors of 3e-5 at most, on the axis, elsewhere 1e-5."""
+    smallest = 0.04 * min(a, 1.0)
+    r = np.append(a - _graded(a, smallest)[::-1], (a + _graded(RIM, smallest))[1:])
+    return quadratic_mesh(1 - _graded(1.0, smallest)[::-1], r)
 
 
-def _graded(length: float, smallest: float, largest: float) -> Floats:
-    """Nodes from 0 to `length`, their spacing growing from `smallest` to `largest`, and further beyond 5."""
+def quadratic_mesh(z: Floats, r: Floats) -> felupe.Mesh:
+    """9-node quadrilaterals between the lines of a tensor grid."""
+    return felupe.Grid(z, r).add_midpoints_edges().add_midpoints_faces()
+
+
+def _graded(length: float, smallest: float) -> Floats:
+    """Nodes from 0 to `length`, their spacing growing from `smallest` to 0.05, and further beyond 5."""
     nodes = [0.0]
     step = smallest
     while nodes[-1] < length:
         nodes.append(nodes[-1] + step)
-        step = min(1.4 * step, largest if nodes[-1] < 5 else 2.0)
+        step = min(1.4 * step, 0.05 if nodes[-1] < 5 else 2.0)
     scaled = np.array(nodes) * (length / nodes[-1])
     scaled[-1] = length
     return scaled

@@ -1,0 +1,1 @@
+"""`make bench`: speed as ratios against peers, measured side by side in one run."""

@@ -1,0 +1,64 @@
+"""Run the benchmarks: python -m bench [PART ...]. A full run is written to docs/bench-results.json."""
+
+import json
+import os
+import platform
+import sys
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+
+from bench import batch, newton_step, single_requests, start
+from bench.figures import Figure
+
+PARTS = {
+    "requests": single_requests.measure,
+    "batch": batch.measure,
+    "start": start.measure,
+    "newton": newton_step.measure,
+}
+RESULTS = Path(__file__).parent.parent / "docs" / "bench-results.json"
+_PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem")
+
+
+def main(names: list[str]) -> None:
+    """Measure the parts named, or all; only a full run is written down."""
+    figures = [figure for name in names or PARTS for figure in PARTS[name]()]
+    print(markdown(figures))
+    if not names:
+        record = {"machine": machine(), "figures": [asdict(figure) | {"met": figure.met} for figure in figures]}
+        RESULTS.write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n")
+
+
+def markdown(figures: list[Figure]) -> str:
+    """The figures as a table."""
+    lines = ["| what | measured | target | met |", "|---|---|---|---|"]
+    for f in figures:
+        target = "" if f.target is None else f"{'≥' if f.better == 'higher' else '≤'} {f.target:,.10g}"
+        met = {None: "", True: "yes", False: "**no**"}[f.met]
+        lines.append(f"| {f.name} | {_rounded(f.value)} {f.unit} | {target} | {met} |")
+    return "\n".join(lines)
+
+
+def machine() -> dict[str, str | int]:
+    """What it was measured on."""
+    processor = next(
+        line.split(":")[1].strip()
+        for line in Path("/proc/cpuinfo").read_text().splitlines()
+        if line.startswith("model name")
+    )
+    packages = ", ".join(f"{name} {version(name)}" for name in _PACKAGES)
+    return {
+        "processor": processor,
+        "cores": len(os.sched_getaffinity(0)),
+        "python": platform.python_version(),
+        "packages": packages,
+    }
+
+
+def _rounded(value: float) -> str:
+    """Three significant digits, thousands separated."""
+    return f"{value:,.0f}" if value >= 1000 else f"{value:.3g}"
+
+
+main(sys.argv[1:])

@@ -1,0 +1,120 @@
+"""Real server processes, each pinned to one core: ours and the peers'."""
+
+import http.client
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from underskin.surrogate import SIGMA_TABLE, tables_folder
+
+CHECKOUT = Path(__file__).parent.parent
+TABLE = tables_folder() / SIGMA_TABLE
+_CORES = sorted(os.sched_getaffinity(0))
+SERVER_CORE, LOAD_CORE = _CORES[0], _CORES[-1]
+_START_LIMIT = 60.0  # s
+
+
+@dataclass(frozen=True)
+class Server:
+    """A running server."""
+
+    process: subprocess.Popen[bytes]
+    port: int
+    started_in: float  # s, from launching the process to its first answer
+
+    def resident_mb(self) -> float:
+        """Memory of the process, which has no children."""
+        status = Path(f"/proc/{self.process.pid}/status").read_text()
+        return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS")) / 1024
+
+    def post(self, path: str, body: object) -> Any:
+        """The answer to one JSON request."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=30)
+        connection.request("POST", path, json.dumps(body), {"Content-Type": "application/json"})
+        response = connection.getresponse()
+        text = response.read()
+        connection.close()
+        if response.status != 200:
+            raise RuntimeError(f"{path} answered {response.status}: {text[:500].decode()}")
+        return json.loads(text)
+
+
+@contextmanager
+def underskin() -> Iterator[Server]:
+    """Our service as `make serve` starts it."""
+    port = _free_port()
+    command = [str(Path(sys.executable).with_name("underskin")), "serve", "--port", str(port)]
+    with _running(command, port, "/ready") as server:
+        yield server
+
+
+@contextmanager
+def umbridge() -> Iterator[Server]:
+    """The umbridge package's server."""
+    port = _free_port()
+    command = [sys.executable, "-m", "bench.peers.umbridge_server", str(TABLE), str(port)]
+    with _running(command, port, "/Info") as server:
+        yield server
+
+
+@contextmanager
+def tesseract() -> Iterator[Server]:
+    """Tesseract Core's runtime, from the environment that `make bench` installs for it."""
+    port = _free_port()
+    command = [str(CHECKOUT / ".venv-tesseract" / "bin" / "tesseract-runtime"), "serve", "--port", str(port)]
+    settings = {
+        "TESSERACT_API_PATH": str(CHECKOUT / "bench" / "peers" / "tesseract_api.py"),
+        "SIGMA_TABLE": str(TABLE),
+        "PYTHONPATH": str(CHECKOUT),
+    }
+    with _running(command, port, "/health", settings) as server:
+        yield server
+
+
+@contextmanager
+def _running(
+    command: Sequence[str], port: int, path: str, settings: Mapping[str, str] | None = None
+) -> Iterator[Server]:
+    one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    start = time.perf_counter()
+    process = subprocess.Popen(
+        ["taskset", "-c", str(SERVER_CORE), *command],
+        env=os.environ | one_thread | dict(settings or {}),
+        cwd=CHECKOUT,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        while not _answers(port, path):
+            if process.poll() is not None or time.perf_counter() - start > _START_LIMIT:
+                raise RuntimeError(f"did not start: {' '.join(command)}")
+            time.sleep(0.002)
+        yield Server(process, port, time.perf_counter() - start)
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+def _answers(port: int, path: str) -> bool:
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=5)
+    try:
+        connection.request("GET", path)
+        return connection.getresponse().status == 200
+    except OSError:
+        return False
+    finally:
+        connection.close()
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
