@@ -39,10 +39,7 @@ def test_a_very_wide_block_is_the_endless_layer(depth: float, bonded: bool) -> N
 
 def test_the_error_falls_with_the_order_of_the_elements() -> None:
     exact = linear_layer.sigma(A, RHO)
-    errors = [
-        float(np.max(np.abs(solve(Block(16.0, 16.0, 1.0), A, RHO, order).sigma / exact - 1)))
-        for order in (4, 5)
-    ]
+    errors = [float(np.max(np.abs(solve(Block(16.0, 16.0, 1.0), A, RHO, order).sigma / exact - 1))) for order in (4, 5)]
     assert errors[1] < errors[0] / 10
 
 
