@@ -6,6 +6,7 @@ import os
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -84,23 +85,25 @@ def _running(
     command: Sequence[str], port: int, path: str, settings: Mapping[str, str] | None = None
 ) -> Iterator[Server]:
     one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    start = time.perf_counter()
-    process = subprocess.Popen(
-        ["taskset", "-c", str(SERVER_CORE), *command],
-        env=os.environ | one_thread | dict(settings or {}),
-        cwd=CHECKOUT,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        while not _answers(port, path):
-            if process.poll() is not None or time.perf_counter() - start > _START_LIMIT:
-                raise RuntimeError(f"did not start: {' '.join(command)}")
-            time.sleep(0.002)
-        yield Server(process, port, time.perf_counter() - start)
-    finally:
-        process.terminate()
-        process.wait(10)
+    with tempfile.TemporaryFile("w+") as errors:
+        start = time.perf_counter()
+        process = subprocess.Popen(
+            ["taskset", "-c", str(SERVER_CORE), *command],
+            env=os.environ | one_thread | dict(settings or {}),
+            cwd=CHECKOUT,
+            stdout=subprocess.DEVNULL,
+            stderr=errors,
+        )
+        try:
+            while not _answers(port, path):
+                if process.poll() is not None or time.perf_counter() - start > _START_LIMIT:
+                    errors.seek(0)
+                    raise RuntimeError(f"did not start: {' '.join(command)}\n{errors.read()[-2000:]}")
+                time.sleep(0.002)
+            yield Server(process, port, time.perf_counter() - start)
+        finally:
+            process.terminate()
+            process.wait(10)
 
 
 def _answers(port: int, path: str) -> bool:
