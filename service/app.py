@@ -1,23 +1,44 @@
-"""The application: routes by noun on FastAPI."""
+"""The application: routes by noun on FastAPI, behind the front."""
 
-from fastapi import APIRouter, FastAPI
+from fastapi import APIRouter, FastAPI, Security
+from starlette.types import ASGIApp
 
-from service import d33, frf, health, sigma, tables
+from service import d33, frf, health, metrics, openapi, sigma, tables, umbridge
+from service.dependencies import authorised
+from service.front import Front
+from service.gate import Gate
 from service.handlers import install_handlers
 from service.settings import Settings
 from underskin import __version__
 from underskin.surrogate import SigmaTable
 
 
-def create_api(settings: Settings, table: SigmaTable) -> FastAPI:
+def create_api(settings: Settings, table: SigmaTable, gate: Gate) -> FastAPI:
     """All routes, with the table they answer from."""
-    api = FastAPI(title="underskin", version=__version__, docs_url=None, redoc_url=None)
+    api = FastAPI(
+        title="underskin",
+        version=__version__,
+        description=openapi.DESCRIPTION,
+        docs_url=None,
+        redoc_url=None,
+        openapi_url=None,
+    )
     api.state.settings = settings
     api.state.table = table
+    api.state.gate = gate
     install_handlers(api)
-    v1 = APIRouter(prefix="/v1")
+    v1 = APIRouter(prefix="/v1", dependencies=[Security(authorised, scopes=["read"])])
     for noun in (sigma, frf, d33, tables):
         v1.include_router(noun.router)
-    api.include_router(v1)
-    api.include_router(health.router)
+    for router in (v1, umbridge.router, health.router, metrics.router, openapi.router):
+        api.include_router(router)
     return api
+
+
+def create_app(settings: Settings, table: SigmaTable, gate: Gate) -> ASGIApp:
+    """What the server runs."""
+    hot = {
+        ("GET", "/v1/sigma"): sigma.hot_route(table),
+        ("POST", "/umbridge/Evaluate"): umbridge.hot_route(table),
+    }
+    return Front(create_api(settings, table, gate), gate, hot)

@@ -1,20 +1,131 @@
 """Commands that need the server: serve and key."""
 
-from typing import Annotated
+import ipaddress
+import socket
+import tempfile
+from pathlib import Path
+from typing import Annotated, NoReturn
 
 import typer
 import uvicorn
+from pydantic import ValidationError
 
-from service.app import create_api
+from service.app import create_app
+from service.gate import Gate
+from service.keys import KeyStore, Scope
+from service.log import configure_logging
 from service.settings import Settings
+from underskin import TableError, UnderskinError
 from underskin.surrogate import SIGMA_TABLE, load_table
+
+key = typer.Typer(help="API keys: create, list, revoke.", no_args_is_help=True)
 
 
 def serve(
-    host: Annotated[str, typer.Option(help="Address to bind to.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Port to listen on.")] = 8000,
+    host: Annotated[str, typer.Option(help="Address to bind to; any but loopback needs a key.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port to listen on.", min=0, max=65535)] = 8000,
 ) -> None:
-    """Serve sigma, FRF and d33 over HTTP."""
-    settings = Settings()
-    table = load_table(settings.tables / SIGMA_TABLE)
-    uvicorn.run(create_api(settings, table), host=host, port=port)
+    """Serve σ, FRF and d33 over HTTP."""
+    settings = _settings()
+    keys = KeyStore(settings.data_folder)
+    loopback = _is_loopback(host)
+    try:
+        _require_writable(settings.data_folder)
+        if not loopback and not keys.entries():
+            _fail(f"refusing to listen on {host} without API keys: make one with `underskin key create NAME`")
+        table = load_table(settings.tables / SIGMA_TABLE)
+        listener = _listen(host, port)
+    except (TableError, OSError, ValueError) as error:
+        _fail(str(error))
+    configure_logging()
+    gate = Gate(
+        host_names=settings.host_names | {_host_name(host)},
+        keys=keys,
+        keys_always=not loopback,
+        max_body_bytes=settings.max_body_bytes,
+    )
+    config = uvicorn.Config(
+        create_app(settings, table, gate),
+        access_log=False,
+        log_config=None,
+        server_header=False,
+        timeout_graceful_shutdown=10,
+    )
+    uvicorn.Server(config).run(sockets=[listener])
+
+
+@key.command("create")
+def create_key(
+    name: Annotated[str, typer.Argument(help="Who or what will use it.")],
+    scope: Annotated[Scope, typer.Option(help="read computes and reads; write changes what is kept.")] = "read",
+) -> None:
+    """Make a key and print it: it is shown this once."""
+    try:
+        typer.echo(_keys().create(name, scope))
+    except (UnderskinError, OSError, ValueError) as error:
+        _fail(str(error))
+
+
+@key.command("list")
+def list_keys() -> None:
+    """Names, scopes and dates of all keys."""
+    try:
+        for entry in _keys().entries():
+            typer.echo(f"{entry.name}\t{entry.scope}\t{entry.created}")
+    except (OSError, ValueError) as error:
+        _fail(str(error))
+
+
+@key.command("revoke")
+def revoke_key(name: Annotated[str, typer.Argument(help="As it was created.")]) -> None:
+    """Forget a key; a running server refuses it from then on."""
+    try:
+        _keys().revoke(name)
+    except (UnderskinError, OSError, ValueError) as error:
+        _fail(str(error))
+
+
+def _fail(reason: str) -> NoReturn:
+    typer.echo(f"underskin: {reason}", err=True)
+    raise typer.Exit(1)
+
+
+def _settings() -> Settings:
+    try:
+        return Settings()
+    except ValidationError as error:
+        first = error.errors()[0]
+        _fail(f"UNDERSKIN_{str(first['loc'][0]).upper()} = {first['input']!r}: {first['msg'].lower()}")
+
+
+def _keys() -> KeyStore:
+    return KeyStore(_settings().data_folder)
+
+
+def _require_writable(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OSError(f"the data folder {folder} (UNDERSKIN_DATA) is not writable: {error.strerror}") from error
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _host_name(host: str) -> str:
+    """The address as a Host header spells it."""
+    return f"[{host.lower()}]" if ":" in host else host.lower()
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    try:
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        return socket.create_server(address, family=family, backlog=2048)
+    except OSError as error:
+        raise OSError(f"cannot listen on {host} port {port}: {error.strerror}") from error

@@ -57,9 +57,9 @@ class D33Columns(PressedSkinColumns):
 class D33Answer(PressedSkinAnswer):
     """d33 in columns."""
 
-    frf_pc_per_n: list[float] = Field(description="The plateau that was inverted [pC/N].")
-    frf_uncertainty_pc_per_n: list[float] = Field(description="Its standard uncertainty [pC/N].")
-    frf_im_pc_per_n: list[float] | None = Field(
+    frf_pc_per_n: list[float | None] = Field(description="The plateau that was inverted [pC/N].")
+    frf_uncertainty_pc_per_n: list[float | None] = Field(description="Its standard uncertainty [pC/N].")
+    frf_im_pc_per_n: list[float | None] | None = Field(
         default=None, description="Mean imaginary part over the band, where given [pC/N]."
     )
     d33_pc_per_n: list[float | None] = Field(description="d33 = FRF / ((3/2) (rT/h)² σ) [pC/N].")
@@ -82,7 +82,7 @@ def answer(table: SigmaTable, request: D33Columns) -> Columns:
         rows=count,
         model=request.model,
         table_sha256=table.sha256,
-        inside=reached.inside,
+        inside=reached.inside & np.isfinite(d33),
         columns={
             **lab_columns(reached),
             **measured,

@@ -4,10 +4,14 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Annotated, Any, TypeVar
 
+import numpy as np
 from fastapi import Depends, Request, Response
+from fastapi.security import SecurityScopes
 
 from service.answers import Accept, Columns, respond
 from service.columns import ColumnsRequest, parse
+from service.keys import Key
+from service.problems import Refusal
 from underskin.surrogate import SigmaTable
 
 
@@ -17,6 +21,14 @@ def _table(request: Request) -> SigmaTable:
 
 
 Table = Annotated[SigmaTable, Depends(_table)]
+
+
+def authorised(scopes: SecurityScopes, request: Request) -> None:
+    """Refuses a key of too narrow a scope; that there is a key, where one is needed, was checked before."""
+    key: Key | None = request.scope["key"]
+    if key is not None and "write" in scopes.scopes and key.scope != "write":
+        raise Refusal(403, f"Key {key.name!r} has scope read; this needs a key of scope write.")
+
 
 # A body up to this size is answered on the event loop (a few ms at most); a larger one in a thread, a few at a time.
 _INLINE_BYTES = 1024
@@ -35,7 +47,8 @@ def columns_route(
         content_type = request.headers.get("content-type", "")
 
         def work() -> Response:
-            return respond(answer(table, parse(kind, body, content_type)), accept)
+            with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
+                return respond(answer(table, parse(kind, body, content_type)), accept)
 
         if len(body) <= _INLINE_BYTES:
             return work()

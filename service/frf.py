@@ -66,7 +66,7 @@ def answer(table: SigmaTable, request: FrfColumns) -> Columns:
         rows=count,
         model=request.model,
         table_sha256=table.sha256,
-        inside=reached.inside,
+        inside=reached.inside & np.isfinite(frf),
         shared={} if frequency is None else {"frequency_hz": frequency},
         columns={**lab_columns(reached), "frf_pc_per_n": frf, **spectra},
         line_hz=frequency,

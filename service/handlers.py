@@ -4,7 +4,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 
-from service.problems import MEDIA_TYPE, Refusal, from_validation, invalid_input
+from service.problems import Refusal, from_validation, invalid_input
 from underskin import InvalidInput
 
 
@@ -19,12 +19,9 @@ def install_handlers(api: FastAPI) -> None:
 
 async def _handle(request: Request, error: Exception) -> Response:
     refusal = _as_refusal(request, error)
-    return Response(
-        refusal.body(request.scope.get("request_id", "")),
-        refusal.status,
-        headers=refusal.headers,
-        media_type=MEDIA_TYPE,
-    )
+    path = request.scope["path"]
+    content = refusal.body(path, request.scope["request_id"])
+    return Response(content, refusal.status_for(path), headers=refusal.headers, media_type=refusal.media_type(path))
 
 
 def _as_refusal(request: Request, error: Exception) -> Refusal:

@@ -41,20 +41,31 @@ class Refusal(Exception):
         status: int,
         detail: str,
         *,
-        kind: str | None = None,
+        title: str | None = None,
         errors: Sequence[Mapping[str, Any]] = (),
         headers: Mapping[str, str] | None = None,
     ) -> None:
         self.status = status
         self.detail = detail
-        self.title = kind or HTTPStatus(status).phrase
+        self.title = title or HTTPStatus(status).phrase
         self.errors = errors
         self.headers = dict(headers or {})
         super().__init__(detail)
 
-    def body(self, request_id: str) -> bytes:
-        """The problem document."""
-        name = self.title.lower().replace(" ", "-").replace("'", "")
+    def status_for(self, path: str) -> int:
+        """Status of the answer to `path`: UM-Bridge knows 400 only for what is wrong with a request's content."""
+        return 400 if self.status == 422 and _is_umbridge(path) else self.status
+
+    def media_type(self, path: str) -> str:
+        """Content-Type of the answer to `path`."""
+        return "application/json" if _is_umbridge(path) else MEDIA_TYPE
+
+    def body(self, path: str, request_id: str) -> bytes:
+        """The problem document, or under /umbridge what that protocol says instead."""
+        if _is_umbridge(path):
+            error = {"type": self.title.title().replace(" ", ""), "message": self.detail}
+            return orjson.dumps({"error": error})
+        name = self.title.lower().replace(" ", "-")
         return orjson.dumps(
             {
                 "type": f"urn:underskin:problem:{name}",
@@ -67,13 +78,17 @@ class Refusal(Exception):
         )
 
 
+def _is_umbridge(path: str) -> bool:
+    return path.startswith("/umbridge/")
+
+
 def invalid_input(errors: Iterable[InvalidInput]) -> Refusal:
     """The problem of values that cannot be used: 422."""
     found = list(errors)
     entries = [
         {"field": error.field, "index": error.index, "value": error.value, "allowed": error.allowed} for error in found
     ]
-    return Refusal(422, "; ".join(str(error) for error in found), kind="Invalid input", errors=entries)
+    return Refusal(422, "; ".join(str(error) for error in found), title="Invalid input", errors=entries)
 
 
 def from_validation(errors: ValidationError | Sequence[Any]) -> Refusal:

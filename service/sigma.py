@@ -1,14 +1,17 @@
 """σ: one point (GET) or columns of points (POST)."""
 
 from typing import Annotated, Any, Literal
+from urllib.parse import parse_qsl
 
 import numpy as np
 from fastapi import APIRouter, Query, Response
+from orjson import dumps, loads
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.answers import Accept, AnswerInColumns, Columns, respond
+from service.answers import Accept, AnswerInColumns, Columns, origin_headers, respond
 from service.columns import ColumnsRequest, NonNegative, Status, non_negative, rows
 from service.dependencies import Table, columns_body, columns_route
+from service.front import HotRoute, are_numbers
 from underskin import half_space
 from underskin.surrogate import Sigma, SigmaTable
 
@@ -88,17 +91,23 @@ class OneSigma(BaseModel):
     status: Status = Field(description="`ok`, or `out_of_domain`.")
 
 
-def one(table: SigmaTable, a_over_h: float, rt_over_h: float, load_parameter: float) -> dict[str, Any]:
-    """σ of the layer at one point, as `OneSigma` says, without the cost of arrays."""
-    found = table.at(a_over_h, rt_over_h, load_parameter)
-    sigma, rel_error = found or (None, None)
-    return {
-        "model": "layer",
-        "table_sha256": table.sha256,
-        "sigma": sigma,
-        "rel_error": rel_error,
-        "status": "ok" if found else "out_of_domain",
-    }
+def hot_route(table: SigmaTable) -> HotRoute:
+    """The plain case of `sigma_one`: the layer, inside the domain."""
+
+    def one(query: bytes) -> bytes | None:
+        try:
+            point = {name: loads(value) for name, value in parse_qsl(query.decode(), strict_parsing=True)}
+            found = table.at(**point) if are_numbers(point.values()) else None
+        except (ValueError, TypeError):
+            return None
+        if found is None:
+            return None
+        sigma, rel_error = found
+        return dumps({**origin, "sigma": sigma, "rel_error": rel_error, "status": "ok"})
+
+    origin = {"model": "layer", "table_sha256": table.sha256}
+    headers = origin_headers("layer", table.sha256)
+    return HotRoute(one, tuple((name.lower().encode(), value.encode()) for name, value in headers.items()))
 
 
 @router.get(

@@ -48,10 +48,10 @@ class PressedSkinColumns(ColumnsRequest):
 class PressedSkinAnswer(AnswerInColumns):
     """What reaches the sensor, row by row."""
 
-    contact_radius_mm: list[float] = Field(description="Hertz contact radius a [mm].")
-    a_over_h: list[float] = Field(description="a/h [-].")
-    rt_over_h: list[float] = Field(description="rT/h [-].")
-    load_parameter: list[float] = Field(description="L = F/(R² E) [-].")
+    contact_radius_mm: list[float | None] = Field(description="Hertz contact radius a [mm].")
+    a_over_h: list[float | None] = Field(description="a/h [-].")
+    rt_over_h: list[float | None] = Field(description="rT/h [-].")
+    load_parameter: list[float | None] = Field(description="L = F/(R² E) [-].")
     sigma: list[float | None] = Field(description="σ [-].")
     rel_error: list[float | None] = Field(description="Bound on σ's relative error [-].")
     mean_stress_mpa: list[float | None] = Field(

@@ -63,3 +63,28 @@ def transmission(table: SigmaTable, skin: Skin, indenter: Indenter, preload: Arr
         mean_stress=response.mean_stress(force, sigma, h),
         inside=inside,
     )
+
+
+def frf_gradient(
+    table: SigmaTable, skin: Skin, indenter: Indenter, preload: ArrayLike, d33: ArrayLike
+) -> dict[str, Floats]:
+    """∂FRF/∂ each of thickness, youngs_modulus, sensor_radius, indenter_radius, preload and d33, in SI.
+
+    FRF = d33 · (3/2) ρ² σ(α, ρ, L) with α = a/h, ρ = rT/h, and by Hertz α ∝ (F R/E)^(1/3)/h, L = F/(R² E). NaN where
+    the row is outside the table.
+    """
+    reached = transmission(table, skin, indenter, preload)
+    rho = reached.rt_over_h
+    scale = response.frf(d33, 1.0, rho)
+    slopes = table.gradient(reached.a_over_h, rho, reached.load_parameter)
+    # ∂FRF/∂ of the logarithm of each dimensionless number; d33's is FRF itself.
+    in_a, in_load = scale * slopes[0] * reached.a_over_h, scale * slopes[2] * reached.load_parameter
+    in_rho = scale * (2 * reached.sigma + slopes[1] * rho)
+    return {
+        "thickness": -(in_a + in_rho) / skin.thickness,
+        "youngs_modulus": -(in_a / 3 + in_load) / skin.youngs_modulus,
+        "sensor_radius": in_rho / skin.sensor_radius,
+        "indenter_radius": (in_a / 3 - 2 * in_load) / indenter.radius,
+        "preload": (in_a / 3 + in_load) / np.asarray(preload, dtype=float),
+        "d33": response.gain(reached.sigma, rho),
+    }

@@ -1,0 +1,77 @@
+"""Who may pass: known Host, own Origin, a key where keys are needed, a body within the limit."""
+
+from collections.abc import Mapping
+
+from service.keys import Key, KeyStore
+from service.problems import Refusal
+
+_LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
+OPEN = frozenset({"/health", "/ready"})
+_SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
+
+
+class Gate:
+    """Refuses what must not reach a route."""
+
+    def __init__(self, *, host_names: frozenset[str], keys: KeyStore, keys_always: bool, max_body_bytes: int) -> None:
+        """`keys_always`: bound to more than loopback, so that no request passes without a key, even when all
+        keys have been revoked; otherwise keys are needed once there are any."""
+        self._hosts = frozenset(name.encode() for name in host_names | _LOOPBACK_NAMES)
+        self._keys = keys
+        self._keys_always = keys_always
+        self._max_body_bytes = max_body_bytes
+
+    def check(self, method: str, path: str, headers: Mapping[bytes, bytes]) -> Key | None:
+        """The key that came with the request, None where none is needed; raises Refusal."""
+        host = headers.get(b"host", b"")
+        if _name(host) not in self._hosts:
+            raise Refusal(
+                421, f"The service is not known as {host.decode('latin-1')!r}; UNDERSKIN_HOSTS lists its names."
+            )
+        if method not in _SAFE:
+            _check_origin(headers.get(b"origin"), host)
+            self.check_size(_number(headers.get(b"content-length", b"")))
+        return None if path in OPEN else self._check_key(headers.get(b"authorization", b""))
+
+    def keys_needed(self) -> bool:
+        """Whether a request without a key is refused."""
+        return self._keys_always or bool(self._keys.entries())
+
+    def check_size(self, size: int) -> None:
+        """Refuses a body of more bytes than allowed."""
+        if size > self._max_body_bytes:
+            limit = f"{self._max_body_bytes / 1e6:g} MB (UNDERSKIN_MAX_BODY_MB)"
+            raise Refusal(413, f"The body exceeds {limit}; send fewer rows a request.", headers={"Connection": "close"})
+
+    def _check_key(self, authorization: bytes) -> Key | None:
+        if not self.keys_needed():
+            return None
+        scheme, _, token = authorization.partition(b" ")
+        key = self._keys.find(token.strip()) if scheme.lower() == b"bearer" else None
+        if key is None:
+            raise Refusal(
+                401,
+                "A key is needed: send Authorization: Bearer KEY (`underskin key create` makes one).",
+                headers={"WWW-Authenticate": "Bearer"},
+            )
+        return key
+
+
+def _check_origin(origin: bytes | None, host: bytes) -> None:
+    """A page of another origin must not change anything here, nor spend this machine's time."""
+    if origin is not None and origin.lower().partition(b"://")[2] != host.lower():
+        raise Refusal(
+            403,
+            f"Pages of {origin.decode('latin-1')!r} may not call this service; its own are of "
+            f"{host.decode('latin-1')!r}.",
+        )
+
+
+def _name(host: bytes) -> bytes:
+    """A Host header without its port, in lower case."""
+    name, colon, port = host.rpartition(b":")
+    return (name if colon and port.isdigit() else host).lower()
+
+
+def _number(content_length: bytes) -> int:
+    return int(content_length) if content_length.isdigit() else 0

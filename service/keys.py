@@ -1,0 +1,106 @@
+"""API keys: 256 random bits each, kept as SHA-256, which suffices for tokens that cannot be guessed."""
+
+import fcntl
+import hmac
+import json
+import os
+import secrets
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from hashlib import sha256
+from pathlib import Path
+from typing import Literal
+
+from underskin import InvalidInput
+
+Scope = Literal["read", "write"]
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key as it is kept. Scope `write` includes `read`."""
+
+    name: str
+    scope: Scope
+    created: str
+    sha256: str
+
+
+class KeyStore:
+    """The keys in `folder`/keys.json, read again when the file changes, so that revoking needs no restart."""
+
+    def __init__(self, folder: Path) -> None:
+        """Nothing is read yet."""
+        self.path = folder / "keys.json"
+        self._stamp: tuple[int, int, int] | None = None
+        self._keys: tuple[Key, ...] = ()
+
+    def entries(self) -> tuple[Key, ...]:
+        """All keys; raises ValueError when the file is damaged."""
+        try:
+            status = self.path.stat()
+        except FileNotFoundError:
+            self._stamp, self._keys = None, ()
+            return ()
+        stamp = (status.st_mtime_ns, status.st_ino, status.st_size)
+        if stamp != self._stamp:
+            self._keys = _read(self.path)
+            self._stamp = stamp
+        return self._keys
+
+    def find(self, token: bytes) -> Key | None:
+        """The key that `token` is, compared in constant time."""
+        digest = sha256(token).hexdigest()
+        found = None
+        for key in self.entries():
+            if hmac.compare_digest(digest, key.sha256):
+                found = key
+        return found
+
+    def create(self, name: str, scope: Scope) -> str:
+        """Keep a new key and return its token, which is shown once and kept nowhere."""
+        token = "us_" + secrets.token_urlsafe(32)
+        created = datetime.now(UTC).isoformat(timespec="seconds")
+        with self._changing() as keys:
+            if any(key.name == name for key in keys):
+                raise InvalidInput("name", name, "must not be the name of another key; revoke that one first")
+            keys.append(Key(name, scope, created, sha256(token.encode()).hexdigest()))
+        return token
+
+    def revoke(self, name: str) -> None:
+        """Forget a key; raises InvalidInput where there is none of that name."""
+        with self._changing() as keys:
+            kept = [key for key in keys if key.name != name]
+            if len(kept) == len(keys):
+                raise InvalidInput("name", name, f"must be one of {[key.name for key in keys]}")
+            keys[:] = kept
+
+    @contextmanager
+    def _changing(self) -> Iterator[list[Key]]:
+        """The keys, to be changed in place by one process at a time; written whole or not at all."""
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        with self.path.with_suffix(".lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            keys = list(self.entries())
+            yield keys
+            _write(self.path, keys)
+
+
+def _read(path: Path) -> tuple[Key, ...]:
+    try:
+        return tuple(Key(**entry) for entry in json.loads(path.read_text())["keys"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"the keys in {path} cannot be read: {error!r}") from error
+
+
+def _write(path: Path, keys: list[Key]) -> None:
+    text = json.dumps({"keys": [asdict(key) for key in keys]}, indent=1)
+    descriptor, partial = tempfile.mkstemp(dir=path.parent, prefix="keys-")  # mode 600
+    with os.fdopen(descriptor, "w") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    Path(partial).replace(path)
