@@ -4,10 +4,13 @@ PYTHON := $(VENV)/bin/python
 PORT   ?= 8000
 TESTS  ?= tests
 
+# From Debian: the proxy with TLS, its certificate, and what runs the MATLAB examples.
+TEST_PACKAGES = nginx openssl octave
+
 PIP_INSTALL = $(PYTHON) -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test check tables paper bench soak lock system clean
+.PHONY: help serve test check tables paper bench soak lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -15,10 +18,12 @@ help: ## this list
 serve: $(VENV)/.runtime ## serve on http://127.0.0.1:8000 (PORT=...)
 	@$(VENV)/bin/underskin serve --port $(PORT)
 
-test: $(VENV)/.dev system ## run the tests at reduced counts (TESTS=tests/test_x.py for some of them)
+test: $(VENV)/.dev ## run the tests at reduced counts (TESTS=tests/test_x.py for some of them)
+	@scripts/system-packages.sh $(TEST_PACKAGES)
 	$(PYTHON) -m pytest $(TESTS)
 
-soak: $(VENV)/.dev system ## run the tests at full counts, the long ones included
+soak: $(VENV)/.dev ## run the tests at full counts, the long ones included
+	@scripts/system-packages.sh $(TEST_PACKAGES)
 	UNDERSKIN_SOAK=1 $(PYTHON) -m pytest $(TESTS)
 
 check: $(VENV)/.dev ## format, lint, strict types, import direction
@@ -34,6 +39,7 @@ paper: $(VENV)/.dev ## regenerate docs/paper.md and its figures
 	$(PYTHON) -m docs.paper
 
 bench: $(VENV)/.dev $(VENV)-tesseract/.installed ## measure speed, as ratios against peers in the same run
+	@scripts/system-packages.sh wrk
 	$(PYTHON) -m bench
 
 lock: $(VENV)/.dev ## resolve pyproject.toml into the lock files
@@ -42,9 +48,6 @@ lock: $(VENV)/.dev ## resolve pyproject.toml into the lock files
 clean: ## remove the environment and all caches
 	rm -rf $(VENV) $(VENV)-tesseract build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -prune -exec rm -rf {} +
-
-system: # Debian packages that some tests use
-	@scripts/system-packages.sh
 
 $(VENV)/.created: scripts/make-venv.sh
 	@scripts/make-venv.sh $(VENV)

@@ -1,18 +1,25 @@
 #!/bin/sh
-# The Debian packages that some tests use: nginx (the TLS proxy) and GNU Octave (the examples). Installs what is missing
-# where it may; where it may not, says so, and the tests that need them are reported as skipped. Nothing else is affected.
+# Debian packages that tests and benchmarks use. Installs what is missing where it may; where it may not, says so, and
+# goes on: what needs a missing one says so too (a test is skipped). Usage: scripts/system-packages.sh PACKAGE...
 set -eu
 
+command_of() { # PACKAGE
+    case $1 in
+        octave) echo octave-cli ;;
+        *) echo "$1" ;;
+    esac
+}
+
+PATH=$PATH:/usr/sbin
 missing=
-for command in nginx openssl octave-cli; do
-    command -v "$command" >/dev/null 2>&1 || PATH=$PATH:/usr/sbin command -v "$command" >/dev/null 2>&1 ||
-        missing="$missing ${command%-cli}"
+for package in "$@"; do
+    command -v "$(command_of "$package")" >/dev/null 2>&1 || missing="$missing $package"
 done
 [ -n "$missing" ] || exit 0
 
-not_installed() {
-    echo "Not installed:$missing ($1). The tests that need them will be skipped." >&2
-    echo "To run them: apt-get install --no-install-recommends$missing" >&2
+not_installed() { # REASON
+    echo "Not installed:$missing ($1). What needs them is left out." >&2
+    echo "To have it: apt-get install --no-install-recommends$missing" >&2
     exit 0
 }
 
@@ -25,7 +32,7 @@ else
     not_installed "that takes root, or sudo without a password"
 fi
 
-echo "Installing for the tests:$missing ..."
+echo "Installing$missing ..."
 export DEBIAN_FRONTEND=noninteractive
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
