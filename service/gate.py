@@ -38,10 +38,14 @@ class Gate:
         return self._keys_always or bool(self._keys.entries())
 
     def check_size(self, size: int) -> None:
-        """Refuses a body of more bytes than allowed."""
+        """Refuses a body of more bytes than allowed.
+
+        The connection stays open, so that the server reads and drops what is still under way: a client, or a proxy,
+        that cannot finish sending would report a broken connection instead of the refusal.
+        """
         if size > self._max_body_bytes:
             limit = f"{self._max_body_bytes / 1e6:g} MB (UNDERSKIN_MAX_BODY_MB)"
-            raise Refusal(413, f"The body exceeds {limit}; send fewer rows a request.", headers={"Connection": "close"})
+            raise Refusal(413, f"The body exceeds {limit}; send fewer rows a request.")
 
     def _check_key(self, authorization: bytes) -> Key | None:
         if not self.keys_needed():
