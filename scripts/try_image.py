@@ -69,9 +69,7 @@ def run(arguments: list[str]) -> subprocess.CompletedProcess[str]:
 
 def status(path: str, key: str | None = None) -> int:
     """HTTP status of a GET."""
-    request = urllib.request.Request(
-        ADDRESS + path, headers={"Authorization": f"Bearer {key}"} if key else {}
-    )
+    request = urllib.request.Request(ADDRESS + path, headers={"Authorization": f"Bearer {key}"} if key else {})
     try:
         with urllib.request.urlopen(request, timeout=10) as response:
             return int(response.status)
@@ -107,9 +105,7 @@ def try_server(key: str) -> None:
 assemble()
 refused = run(ENTRYPOINT + CMD)
 check("no start without keys", refused.returncode not in (0, 124), refused.stdout)
-check(
-    "... and the reason names keys", "key" in refused.stderr.lower() + refused.stdout.lower(), refused.stderr
-)
+check("... and the reason names keys", "key" in refused.stderr.lower() + refused.stdout.lower(), refused.stderr)
 check("the user is not root", run(["id", "-u"]).stdout.strip() not in ("", "0"))
 check("the root is read-only", run(["touch", "/app/written"]).returncode != 0)
 check("the data folder is not", run(["touch", "/data/written"]).returncode == 0)
