@@ -89,32 +89,34 @@ def running_service() -> Iterator[httpx.Client]:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    with tempfile.TemporaryDirectory() as data:
-        server = subprocess.Popen(
-            [Path(sys.executable).with_name("underskin"), "serve", "--port", str(port)],
-            env={**os.environ, "UNDERSKIN_DATA": data},
-        )
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "log"
+        with log.open("wb") as stderr:
+            server = subprocess.Popen(
+                [Path(sys.executable).with_name("underskin"), "serve", "--port", str(port)],
+                env={**os.environ, "UNDERSKIN_DATA": folder},
+                stderr=stderr,
+            )
         try:
             with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=_START_S) as client:
-                _wait_until_ready(client, server)
+                if not _becomes_ready(client, server):
+                    raise RuntimeError(f"the server did not become ready:\n{log.read_text()}")
                 yield client
         finally:
             server.terminate()
             server.wait()
 
 
-def _wait_until_ready(client: httpx.Client, server: subprocess.Popen[bytes]) -> None:
+def _becomes_ready(client: httpx.Client, server: subprocess.Popen[bytes]) -> bool:
     end = time.monotonic() + _START_S
-    while time.monotonic() < end:
-        if server.poll() is not None:
-            raise RuntimeError(f"the server ended with status {server.returncode} before it was ready")
+    while server.poll() is None and time.monotonic() < end:
         try:
             if client.get("/ready").is_success:
-                return
+                return True
         except httpx.TransportError:
             pass  # not listening yet
         time.sleep(0.1)
-    raise RuntimeError(f"the server was not ready within {_START_S:g} s")
+    return False
 
 
 def _post(client: httpx.Client, path: str, body: dict[str, object]) -> dict[str, Any]:
