@@ -56,7 +56,8 @@ class BaseStress:
         """The even spline on |r| ≤ `PROFILE_END` nearest to a stress at the integration points, weighted with r."""
         kept = self._r <= PROFILE_END
         r, root = self._r[kept], np.sqrt(self._weight[kept])
-        inner = np.linspace(-PROFILE_END, PROFILE_END, round(2 * PROFILE_END / _KNOT_SPACING) + 1)[1:-1]
+        positive = np.concatenate([np.arange(1, 28) * _KNOT_SPACING, np.arange(4.5, PROFILE_END, 0.5)])
+        inner = np.concatenate([-positive[::-1], [0.0], positive])
         ends = np.full(_DEGREE + 1, PROFILE_END)
         mirrored = np.concatenate([-r[::-1], r])
         values = np.concatenate([stress[kept][::-1], stress[kept]])

@@ -81,14 +81,14 @@ class Discretisation:
 def discretise(mesh: MeshQuad, order: int) -> Discretisation:
     """The discretisation of a tensor mesh (all elements oriented alike, as the odd edge modes need)."""
     basis = Basis(mesh, ElementQuadP(order), intorder=2 * order + 1)
-    r = basis.global_coordinates().value[0]
+    r = np.asarray(basis.global_coordinates())[0]
     n = basis.Nbfun
     gradient = np.zeros((mesh.nelements, r.shape[1], 5, 2 * n))
     for i in range(n):
         shape = basis.basis[i][0]
         gradient[:, :, 0:2, 2 * i] = np.moveaxis(np.broadcast_to(shape.grad, (2, *r.shape)), 0, -1)
         gradient[:, :, 2:4, 2 * i + 1] = gradient[:, :, 0:2, 2 * i]
-        gradient[:, :, 4, 2 * i] = shape.value / r
+        gradient[:, :, 4, 2 * i] = np.asarray(shape) / r
     scalars = basis.element_dofs.T
     numbers = np.stack([2 * scalars, 2 * scalars + 1], axis=-1).reshape(len(scalars), -1)
     return Discretisation(basis, order, gradient, _pressure_modes(basis, order), basis.dx * r, numbers)

@@ -8,6 +8,7 @@ claims half of that factor.
 """
 
 import shutil
+import sys
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -17,16 +18,31 @@ import numpy as np
 from scipy.interpolate import NdBSpline
 from scipy.ndimage import maximum_filter
 
+from tablegen import base_stress, discretisation, faces, mesh, neo_hookean, newton
+from tablegen import sigma as sigma_solve
 from tablegen.base_stress import PROFILE_END
 from tablegen.mesh import RIM, layer_mesh
 from tablegen.sigma import Column, Nodes, solve_column
 from tablegen.sweep import Arrays, run_pieces, sources_hash
-from underskin import linear_layer
+from underskin import hankel, hertz, linear_layer
 from underskin.surrogate import interpolation_coefficients
 from underskin.table_format import SIGMA_SCHEMA, Dataset, data_hash, write_table
 from underskin.units import Floats
 
 ORDER = 5
+SOURCES = (
+    mesh,
+    neo_hookean,
+    discretisation,
+    newton,
+    faces,
+    base_stress,
+    sigma_solve,
+    hankel,
+    hertz,
+    linear_layer,
+    sys.modules[__name__],
+)
 _SPLINE_GAIN = 8.0
 
 DEFAULT_NODES = Nodes(
@@ -43,7 +59,7 @@ def make_sigma_table(path: Path, nodes: Nodes = DEFAULT_NODES, scheduler: str | 
     Resumes from what an interrupted run left in `path`.parts. Raises SolverError that names the point when a solve
     fails; the table is then not written.
     """
-    sources = sources_hash()
+    sources = sources_hash(SOURCES)
     parts = path.with_name(path.name + ".parts")
     pieces = {
         f"order{order}-{number:03d}": partial(solve_piece, float(a), nodes, order)

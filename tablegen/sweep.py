@@ -6,13 +6,15 @@ name holds a hash of the sources and settings: pieces of another version are nev
 """
 
 import hashlib
+import inspect
 import multiprocessing
 import os
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -32,14 +34,11 @@ Arrays = Mapping[str, Floats]
 Piece = Callable[[], Arrays]
 
 
-def sources_hash() -> str:
-    """SHA-256 of the sources that decide a table's numbers: this package and the physics it uses."""
-    here = Path(__file__).parent
-    physics = here.parent / "underskin"
-    files = sorted(here.glob("*.py")) + [physics / name for name in ("hankel.py", "hertz.py", "linear_layer.py")]
+def sources_hash(modules: Sequence[ModuleType]) -> str:
+    """SHA-256 of the sources of the modules that decide a table's numbers."""
     digest = hashlib.sha256()
-    for file in files:
-        digest.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
+    for module in modules:
+        digest.update(module.__name__.encode() + b"\0" + inspect.getsource(module).encode() + b"\0")
     return digest.hexdigest()
 
 

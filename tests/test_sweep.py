@@ -94,7 +94,7 @@ def test_a_failed_piece_stops_the_sweep_and_keeps_the_others(tmp_path: Path) -> 
 
 
 def test_no_table_is_written_when_a_point_fails(tmp_path: Path) -> None:
-    hopeless = Nodes(a=SMALL.a, rho=SMALL.rho, cbrt_load=np.linspace(0, 6, 7), r=SMALL.r)
+    hopeless = Nodes(a=np.array([0.0, 3.0]), rho=SMALL.rho, cbrt_load=np.array([0.0, 8.0]), r=SMALL.r)
     with pytest.raises(SolverError, match="a/h"):
         make_sigma_table(tmp_path / "sigma.h5", hopeless)
     assert not (tmp_path / "sigma.h5").exists()
