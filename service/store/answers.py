@@ -1,0 +1,59 @@
+"""What was answered to requests with an Idempotency-Key, kept in the transaction that kept what they brought."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection, select
+from sqlalchemy.dialects import postgresql, sqlite
+
+from service.store.codec import compressed, decompressed
+from service.store.tables import answers
+from service.store.times import now
+
+
+@dataclass(frozen=True)
+class Request:
+    """A request that may come again: who sent it, under which key, and the digest of what it carried."""
+
+    sender: str
+    idempotency_key: str
+    request_sha256: str
+
+
+class OtherRequest(ValueError):
+    """The key was used for a request that carried something else."""
+
+
+def replayed(connection: Connection, request: Request) -> Any | None:
+    """The answer given before; None where there is none. Raises OtherRequest."""
+    query = select(answers.c.request_sha256, answers.c.answer).where(
+        answers.c.sender == request.sender, answers.c.idempotency_key == request.idempotency_key
+    )
+    row = connection.execute(query).first()
+    if row is None:
+        return None
+    if row.request_sha256 != request.request_sha256:
+        raise OtherRequest(f"Idempotency-Key {request.idempotency_key!r} was used for another request.")
+    return decompressed(row.answer)
+
+
+def claim(connection: Connection, request: Request) -> bool:
+    """Take the key for this transaction; False where another request has it, which by then has ended.
+
+    A second request with the same key waits here for the first one's transaction.
+    """
+    dialect = sqlite if connection.dialect.name == "sqlite" else postgresql
+    row = {
+        "sender": request.sender,
+        "idempotency_key": request.idempotency_key,
+        "request_sha256": request.request_sha256,
+        "answer": b"",
+        "answered_at": now(),
+    }
+    return connection.execute(dialect.insert(answers).on_conflict_do_nothing(), row).rowcount == 1
+
+
+def keep(connection: Connection, request: Request, answer: Any) -> None:
+    """Fill in the answer of a claimed key."""
+    this = (answers.c.sender == request.sender) & (answers.c.idempotency_key == request.idempotency_key)
+    connection.execute(answers.update().where(this).values(answer=compressed(answer)))

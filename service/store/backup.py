@@ -1,0 +1,99 @@
+"""Backup and restore of the whole store in one file, while servers run.
+
+SQLite: a copy by its online backup, an ordinary database file. PostgreSQL: pg_dump's custom format. Either is read back
+before it counts: SQLite's integrity_check, pg_restore's list of contents.
+"""
+
+import os
+import shutil
+import sqlite3
+import subprocess
+from contextlib import closing
+from pathlib import Path
+
+from service.store.engine import Database, StoreError
+
+
+def suffix(database: Database) -> str:
+    """Of the names of backup files."""
+    return ".sqlite3" if database.is_sqlite else ".pgdump"
+
+
+def make(database: Database, file: Path) -> None:
+    """Write a verified backup; what bears that name is replaced only by a whole one. Raises StoreError, OSError."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    part = file.with_name(file.name + ".part")
+    part.unlink(missing_ok=True)
+    try:
+        if database.is_sqlite:
+            _copy_sqlite(_sqlite_file(database), part)
+        else:
+            _pg("pg_dump", database, "--format=custom", "--no-owner", "--file", str(part))
+        verify(database, part)
+        with part.open("rb") as written:
+            os.fsync(written.fileno())
+        part.replace(file)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def verify(database: Database, file: Path) -> None:
+    """Read a backup through; raises StoreError where it is not one, or damaged."""
+    if not file.is_file():
+        raise StoreError(f"{file} is not a file")
+    if database.is_sqlite:
+        with closing(_open_sqlite(file)) as copy:
+            try:
+                found = copy.execute("PRAGMA integrity_check").fetchone()[0]
+                copy.execute("SELECT version_num FROM alembic_version").fetchone()
+            except sqlite3.DatabaseError as error:
+                raise StoreError(f"{file} is not a backup of an SQLite store: {error}") from error
+        if found != "ok":
+            raise StoreError(f"{file} is damaged: {found}")
+    elif "alembic_version" not in _run("pg_restore", "--list", str(file)):
+        raise StoreError(f"{file} is not a backup of a store")
+
+
+def replace_with(database: Database, file: Path) -> None:
+    """Put a backup in place of the store in one transaction; running servers see it from their next request on."""
+    verify(database, file)
+    if database.is_sqlite:
+        _copy_sqlite(file, _sqlite_file(database))
+    else:
+        flags = ("--clean", "--if-exists", "--no-owner", "--single-transaction", "--exit-on-error")
+        _pg("pg_restore", database, *flags, str(file))
+
+
+def _copy_sqlite(source: Path, target: Path) -> None:
+    try:
+        with closing(_open_sqlite(source)) as origin, closing(sqlite3.connect(target, timeout=60)) as copy:
+            origin.backup(copy)  # in one step: a store in use is replaced whole, and its writers do not disturb a copy
+    except sqlite3.Error as error:
+        raise StoreError(f"{source} cannot be copied to {target}: {error}") from error
+
+
+def _open_sqlite(file: Path) -> sqlite3.Connection:
+    return sqlite3.connect(f"{file.absolute().as_uri()}?mode=rw", uri=True, timeout=60)
+
+
+def _sqlite_file(database: Database) -> Path:
+    assert database.url.database is not None
+    return Path(database.url.database)
+
+
+def _pg(program: str, database: Database, *arguments: str) -> None:
+    url = database.url.set(drivername="postgresql")
+    password = {} if url.password is None else {"PGPASSWORD": str(url.password)}
+    address = url.set(password=None).render_as_string()
+    _run(program, "--dbname", address, *arguments, environment=password)
+
+
+def _run(program: str, *arguments: str, environment: dict[str, str] | None = None) -> str:
+    if shutil.which(program) is None:
+        raise StoreError(f"{program}, which backs up and restores PostgreSQL, is not installed (postgresql-client)")
+    done = subprocess.run(
+        [program, *arguments], env=os.environ | (environment or {}), capture_output=True, text=True, check=False
+    )
+    if done.returncode != 0:
+        raise StoreError(f"{program} failed: {done.stderr.strip()[-500:]}")
+    return done.stdout

@@ -1,0 +1,206 @@
+"""Campaigns and their recordings: kept, listed, read back, withdrawn, corrected; recordings excluded."""
+
+import secrets
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from sqlalchemy import Connection, Row, Select, func, insert, select, update
+
+from service.store import codec, skins
+from service.store.tables import campaigns, recordings
+from service.store.times import now
+from underskin.recordings.campaign import Campaign, Recording
+
+State = Literal["current", "corrected", "withdrawn"]
+
+# All that lists show of a recording: not its arrays.
+_LISTED = [column for column in recordings.c if column.name not in ("campaign", "position", "arrays")]
+CURRENT = campaigns.c.withdrawn_at.is_(None) & campaigns.c.corrected_by.is_(None)
+
+
+class Missing(LookupError):
+    """There is no such campaign, recording or skin."""
+
+
+class Conflict(ValueError):
+    """What was asked does not fit the state of what is kept."""
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """A campaign as it came: what was refused of it, what its reader remarked, where it came from."""
+
+    campaign: Campaign
+    skin_id: str | None
+    refused: Sequence[dict[str, Any]] = ()
+    notes: Sequence[str] = ()
+    source: str | None = None
+    received_from: str | None = None
+
+
+@dataclass(frozen=True)
+class Filters:
+    """Which campaigns a list shows; None does not filter. Times in the store's form."""
+
+    skin: str | None = None
+    state: State | None = None
+    name_contains: str | None = None
+    recorded_from: str | None = None
+    recorded_to: str | None = None
+
+
+@dataclass(frozen=True)
+class Excluded:
+    """A recording that figures leave out, and why."""
+
+    recording: str
+    reason: str
+    at: str
+
+
+def add(
+    connection: Connection, arrival: Arrival, *, corrects: str | None = None, reason: str | None = None
+) -> tuple[str, str]:
+    """Keep a campaign; its id and its skin's. A correction takes the place of the other and, unless told, its skin."""
+    replaced = None if corrects is None else _changeable(connection, corrects)
+    campaign = arrival.campaign
+    named = arrival.skin_id or campaign.skin.id or (replaced.skin_id if replaced else None)
+    campaign_id, skin_id = f"c-{secrets.token_hex(8)}", skins.require(connection, named)
+    times = [time for recording in campaign.recordings if (time := codec.recorded_at(recording))]
+    row = {
+        "id": campaign_id,
+        "skin_id": skin_id,
+        "name": campaign.name,
+        "about": codec.about(campaign),
+        "notes": list(arrival.notes),
+        "refused": list(arrival.refused),
+        "source": arrival.source,
+        "received_at": now(),
+        "received_from": arrival.received_from,
+        "recorded_at": min(times, default=None),
+        "recordings": len(campaign.recordings),
+        "excluded": 0,
+        "revision": 0,
+        "corrects": corrects,
+        "correct_reason": reason,
+    }
+    number = connection.execute(insert(campaigns).returning(campaigns.c.number), row).scalar_one()
+    connection.execute(insert(recordings), rows_of(number, campaign.recordings))
+    if replaced is not None:
+        _change(connection, replaced.number, corrected_by=campaign_id)
+    return campaign_id, skin_id
+
+
+def rows_of(number: int, kept: Sequence[Recording]) -> list[dict[str, Any]]:
+    """Rows of the recordings of the campaign `number`."""
+    return [
+        {"campaign": number, "position": position, **codec.recording_columns(recording)}
+        for position, recording in enumerate(kept)
+    ]
+
+
+def find(connection: Connection, campaign_id: str) -> Row[Any]:
+    """The row of a campaign; raises Missing."""
+    row = connection.execute(select(campaigns).where(campaigns.c.id == campaign_id)).first()
+    if row is None:
+        raise Missing(f"There is no campaign {campaign_id!r}.")
+    return row
+
+
+def listed(connection: Connection, filters: Filters, before: int | None, limit: int) -> Sequence[Row[Any]]:
+    """Rows of campaigns, the latest arrival first, those that arrived before the number `before`."""
+    query = _filtered(select(campaigns), filters)
+    if before is not None:
+        query = query.where(campaigns.c.number < before)
+    return connection.execute(query.order_by(campaigns.c.number.desc()).limit(limit)).all()
+
+
+def state(row: Row[Any]) -> State:
+    """Whether figures use it."""
+    if row.withdrawn_at is not None:
+        return "withdrawn"
+    return "current" if row.corrected_by is None else "corrected"
+
+
+def recordings_of(connection: Connection, number: int) -> Sequence[Row[Any]]:
+    """The recordings of a campaign without their arrays, in order."""
+    query = select(*_LISTED).where(recordings.c.campaign == number)
+    return connection.execute(query.order_by(recordings.c.position)).all()
+
+
+def excluded_of(connection: Connection, number: int) -> list[Excluded]:
+    """The recordings of a campaign that figures leave out."""
+    query = select(recordings.c.id, recordings.c.exclude_reason, recordings.c.excluded_at)
+    query = query.where(recordings.c.campaign == number, recordings.c.excluded_at.is_not(None))
+    return [Excluded(*row) for row in connection.execute(query.order_by(recordings.c.position))]
+
+
+def load(connection: Connection, row: Row[Any], *, with_excluded: bool = True) -> Campaign:
+    """The campaign as it came, arrays and all; without what was excluded where asked."""
+    query = select(recordings.c.kind, recordings.c.scalars, recordings.c.arrays)
+    query = query.where(recordings.c.campaign == row.number).order_by(recordings.c.position)
+    if not with_excluded:
+        query = query.where(recordings.c.excluded_at.is_(None))
+    return codec.campaign_of(row.about, tuple(map(codec.recording_of, connection.execute(query))))
+
+
+def withdraw(connection: Connection, campaign_id: str, reason: str) -> None:
+    """Take a campaign out of all figures; raises Missing, Conflict."""
+    row = _changeable(connection, campaign_id)
+    _change(connection, row.number, withdrawn_at=now(), withdraw_reason=reason)
+
+
+def exclude(connection: Connection, campaign_id: str, recording_id: str, reason: str) -> None:
+    """Leave a recording out of all figures; raises Missing, Conflict."""
+    row = _changeable(connection, campaign_id)
+    this = (recordings.c.campaign == row.number) & (recordings.c.id == recording_id)
+    found = connection.execute(select(recordings.c.excluded_at, recordings.c.exclude_reason).where(this)).first()
+    if found is None:
+        raise Missing(f"Campaign {campaign_id!r} has no recording {recording_id!r}.")
+    if found.excluded_at is not None:
+        raise Conflict(f"Recording {recording_id!r} is excluded already: {found.exclude_reason}")
+    connection.execute(update(recordings).where(this).values(excluded_at=now(), exclude_reason=reason))
+    _change(connection, row.number, excluded=campaigns.c.excluded + 1)
+
+
+def of_skin(connection: Connection, root: str) -> Iterator[Row[Any]]:
+    """Rows of all campaigns of a skin and of those joined to it, in order of arrival."""
+    query = select(campaigns).where(campaigns.c.skin_id.in_(skins.members(root))).order_by(campaigns.c.number)
+    yield from connection.execute(query)
+
+
+def _changeable(connection: Connection, campaign_id: str) -> Row[Any]:
+    """The row, locked until the transaction ends; raises Missing, or Conflict where it is no longer current."""
+    query = select(campaigns).where(campaigns.c.id == campaign_id).with_for_update()
+    row = connection.execute(query).first()
+    if row is None:
+        raise Missing(f"There is no campaign {campaign_id!r}.")
+    if row.withdrawn_at is not None:
+        raise Conflict(f"Campaign {campaign_id!r} was withdrawn: {row.withdraw_reason}")
+    if row.corrected_by is not None:
+        raise Conflict(f"Campaign {campaign_id!r} was corrected: change its newer version, {row.corrected_by!r}.")
+    return row
+
+
+def _change(connection: Connection, number: int, **values: Any) -> None:
+    values["revision"] = campaigns.c.revision + 1
+    connection.execute(update(campaigns).where(campaigns.c.number == number).values(**values))
+
+
+def _filtered(query: Select[Any], filters: Filters) -> Select[Any]:
+    if filters.skin is not None:
+        query = query.where(campaigns.c.skin_id.in_(skins.members(skins.root_of(filters.skin))))
+    if filters.state == "current":
+        query = query.where(CURRENT)
+    if filters.state == "corrected":
+        query = query.where(campaigns.c.corrected_by.is_not(None), campaigns.c.withdrawn_at.is_(None))
+    if filters.state == "withdrawn":
+        query = query.where(campaigns.c.withdrawn_at.is_not(None))
+    if filters.name_contains is not None:
+        query = query.where(func.lower(campaigns.c.name).contains(filters.name_contains.lower(), autoescape=True))
+    if filters.recorded_from is not None:
+        query = query.where(campaigns.c.recorded_at >= filters.recorded_from)
+    if filters.recorded_to is not None:
+        query = query.where(campaigns.c.recorded_at < filters.recorded_to)
+    return query

@@ -1,0 +1,66 @@
+"""Between the campaign model and the store's rows, without loss."""
+
+import zlib
+from dataclasses import asdict, fields
+from typing import Any
+
+import numpy as np
+import orjson
+from sqlalchemy import Row
+
+from service.store.arrays import pack, unpack
+from service.store.times import stored
+from underskin.recordings.campaign import KINDS, Campaign, Recording, Sensor, SkinDescription
+
+
+def about(campaign: Campaign) -> dict[str, Any]:
+    """The campaign without its recordings."""
+    return {"name": campaign.name, "skin": asdict(campaign.skin), "units_checked": campaign.units_checked}
+
+
+def campaign_of(about: dict[str, Any], recordings: tuple[Recording, ...]) -> Campaign:
+    """The inverse of `about`."""
+    sensors = tuple(Sensor(**sensor) for sensor in about["skin"]["sensors"])
+    skin = SkinDescription(**{**about["skin"], "sensors": sensors})
+    return Campaign(about["name"], skin, recordings, about["units_checked"])
+
+
+def recording_columns(recording: Recording) -> dict[str, Any]:
+    """A recording as columns of its table."""
+    values = {field.name: getattr(recording, field.name) for field in fields(recording)}
+    arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+    scalars = {name: value for name, value in values.items() if name not in arrays and value is not None}
+    return {
+        "id": recording.id,
+        "kind": recording.kind,
+        "sensor": values.get("sensor"),
+        "recorded_at": recorded_at(recording),
+        "scalars": scalars,
+        "arrays": pack(arrays),
+    }
+
+
+def recording_of(row: Row[Any]) -> Recording:
+    """The inverse of `recording_columns`, from a row with kind, scalars and arrays."""
+    scalars = dict(row.scalars)
+    if "position_mm" in scalars:
+        scalars["position_mm"] = tuple(scalars["position_mm"])
+    return KINDS[row.kind](**scalars, **unpack(row.arrays))
+
+
+def recorded_at(recording: Recording) -> str | None:
+    """When it was recorded, in the store's form; None where the recording does not say, or not usably."""
+    try:
+        return None if recording.recorded_at is None else stored(recording.recorded_at)
+    except ValueError:
+        return None
+
+
+def compressed(document: Any) -> bytes:
+    """JSON, deflated."""
+    return zlib.compress(orjson.dumps(document), 1)
+
+
+def decompressed(blob: bytes) -> Any:
+    """The inverse of `compressed`."""
+    return orjson.loads(zlib.decompress(blob))

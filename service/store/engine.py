@@ -1,0 +1,111 @@
+"""The database behind the store: SQLite in the data folder, or PostgreSQL by URL."""
+
+import errno
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import orjson
+from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
+from sqlalchemy.exc import ArgumentError, DBAPIError
+
+SQLITE_FILE = "underskin.sqlite3"
+_BUSY_S = 60.0  # how long a write waits for another process's write
+_PG_DISK_FULL = "53100"
+_SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
+
+
+class StoreError(Exception):
+    """The store cannot be used; the message says why and what to do."""
+
+
+class StorageFull(Exception):
+    """There is no room to keep more; nothing of the request was kept."""
+
+
+class Database:
+    """Transactions on one engine: a write is there for good once its block has ended, or not at all."""
+
+    def __init__(self, url: URL) -> None:
+        """Opens no connection yet."""
+        self.url = url
+        self.is_sqlite = url.get_backend_name() == "sqlite"
+        self.engine = _engine(url)
+
+    @contextmanager
+    def reading(self) -> Iterator[Connection]:
+        """A connection that sees one state of the store."""
+        with self.engine.connect() as connection:
+            if not self.is_sqlite:
+                connection.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
+            yield connection
+
+    @contextmanager
+    def writing(self) -> Iterator[Connection]:
+        """A transaction that commits at the end of the block; raises StorageFull where there was no room."""
+        try:
+            with self.engine.connect().execution_options(write=True) as connection, connection.begin():
+                yield connection
+        except (DBAPIError, OSError) as error:
+            if is_full(error):
+                raise StorageFull(str(error)) from error
+            raise
+
+    def close(self) -> None:
+        """Close all connections."""
+        self.engine.dispose()
+
+
+def database(database_url: str, folder: Path) -> Database:
+    """The database at `database_url`, or SQLite in `folder` where that is empty; raises StoreError."""
+    if not database_url:
+        return Database(URL.create("sqlite", database=str(folder / SQLITE_FILE)))
+    try:
+        url = make_url(database_url)
+    except ArgumentError:
+        raise StoreError("UNDERSKIN_DATABASE_URL is not a URL like postgresql://user:password@host/database") from None
+    if url.drivername not in _SCHEMES:
+        allowed = "postgresql; leave it out for SQLite in the data folder"
+        raise StoreError(f"UNDERSKIN_DATABASE_URL names {url.drivername!r}; allowed: {allowed}")
+    return Database(url.set(drivername="postgresql+psycopg"))
+
+
+def is_full(error: BaseException) -> bool:
+    """Whether an error, or what caused it, says that the disk is full."""
+    if isinstance(error, DBAPIError):
+        original = error.orig
+        code = getattr(original, "sqlite_errorcode", 0) & 0xFF
+        return code == sqlite3.SQLITE_FULL or getattr(original, "sqlstate", None) == _PG_DISK_FULL
+    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
+def _engine(url: URL) -> Engine:
+    def deserialise(text: str) -> Any:
+        return orjson.loads(text)
+
+    def serialise(value: Any) -> str:
+        return orjson.dumps(value).decode()
+
+    options: dict[str, Any] = {"json_serializer": serialise, "json_deserializer": deserialise}
+    if url.get_backend_name() == "sqlite":
+        engine = create_engine(url, connect_args={"timeout": _BUSY_S}, **options)
+        event.listen(engine, "connect", _prepare_sqlite)
+        event.listen(engine, "begin", _begin_sqlite)
+        return engine
+    # A commit waits for the disk whatever the server's default. No statement is prepared: a restore replaces tables.
+    durable = {"options": "-c synchronous_commit=on -c timezone=UTC", "prepare_threshold": None, "connect_timeout": 10}
+    return create_engine(url, connect_args=durable, pool_pre_ping=True, **options)
+
+
+def _prepare_sqlite(connection: sqlite3.Connection, _: object) -> None:
+    connection.isolation_level = None  # we say BEGIN ourselves: Python would say it too late
+    for pragma in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
+        connection.execute(f"PRAGMA {pragma}")
+
+
+def _begin_sqlite(connection: Connection) -> None:
+    """A write takes the lock at once: one that began as a read could not wait for another's end."""
+    write = connection.get_execution_options().get("write", False)
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if write else "BEGIN")

@@ -1,0 +1,77 @@
+"""d33 derived from campaigns, kept so that lists and histories need no recording."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from sqlalchemy import Connection, Row, delete, insert, select
+
+from service.store import skins
+from service.store.codec import compressed, decompressed
+from service.store.tables import campaigns, inversions, sensor_d33
+
+
+def find(connection: Connection, campaign: Row[Any], table_sha256: str) -> Any | None:
+    """The answer kept for a campaign as it is now, with this table; None where there is none."""
+    query = select(inversions.c.document).where(
+        inversions.c.campaign == campaign.number,
+        inversions.c.revision == campaign.revision,
+        inversions.c.table_sha256 == table_sha256,
+    )
+    blob = connection.execute(query).scalar()
+    return None if blob is None else decompressed(blob)
+
+
+def keep(
+    connection: Connection,
+    campaign: Row[Any],
+    table_sha256: str,
+    document: Any,
+    sensors: Mapping[str, tuple[float, float]],
+) -> None:
+    """Keep an answer and d33 with its standard uncertainty [pC/N] by sensor, unless the campaign changed since."""
+    query = select(campaigns.c.revision).where(campaigns.c.number == campaign.number).with_for_update()
+    if connection.execute(query).scalar() != campaign.revision:
+        return
+    for table in (inversions, sensor_d33):
+        connection.execute(delete(table).where(table.c.campaign == campaign.number))
+    row = {"revision": campaign.revision, "table_sha256": table_sha256, "document": compressed(document)}
+    connection.execute(insert(inversions), {"campaign": campaign.number, **row})
+    values = [
+        {"campaign": campaign.number, "sensor": name, "d33_pc_per_n": value, "d33_uncertainty_pc_per_n": uncertainty}
+        for name, (value, uncertainty) in sensors.items()
+    ]
+    if values:
+        connection.execute(insert(sensor_d33), values)
+
+
+def missing_of_skin(connection: Connection, root: str, table_sha256: str) -> Sequence[Row[Any]]:
+    """Rows of the skin's current campaigns whose d33 is not kept as they are now."""
+    fresh = (
+        (inversions.c.campaign == campaigns.c.number)
+        & (inversions.c.revision == campaigns.c.revision)
+        & (inversions.c.table_sha256 == table_sha256)
+    )
+    query = select(campaigns).outerjoin(inversions, fresh).where(inversions.c.campaign.is_(None), *_current(root))
+    return connection.execute(query.order_by(campaigns.c.number)).all()
+
+
+def history(connection: Connection, root: str) -> Sequence[Row[Any]]:
+    """d33 by sensor of all current campaigns of a skin and of those joined to it, in order of arrival."""
+    query = (
+        select(
+            campaigns.c.id,
+            campaigns.c.recorded_at,
+            campaigns.c.received_at,
+            sensor_d33.c.sensor,
+            sensor_d33.c.d33_pc_per_n,
+            sensor_d33.c.d33_uncertainty_pc_per_n,
+        )
+        .join(sensor_d33, sensor_d33.c.campaign == campaigns.c.number)
+        .where(*_current(root))
+    )
+    return connection.execute(query.order_by(campaigns.c.number, sensor_d33.c.sensor)).all()
+
+
+def _current(root: str) -> tuple[Any, ...]:
+    current = (campaigns.c.withdrawn_at.is_(None), campaigns.c.corrected_by.is_(None))
+    return (campaigns.c.skin_id.in_(skins.members(root)), *current)

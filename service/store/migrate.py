@@ -1,0 +1,85 @@
+"""The schema at start: made, or brought up to date after a verified backup; a newer one is refused."""
+
+import fcntl
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+
+from sqlalchemy import Connection, inspect, text
+
+from service.store import backup
+from service.store.engine import Database, StoreError
+
+VERSIONS = ("0001",)  # oldest first; one file each in migrations/versions
+_LOCK = 7236411  # any number, the same for all servers of a database
+
+
+def migrate(database: Database, folder: Path) -> None:
+    """Bring the schema to the newest version; raises StoreError where that cannot be done safely."""
+    if version(database) == VERSIONS[-1]:
+        return
+    with _one_at_a_time(database, folder):
+        found = version(database)
+        if found == VERSIONS[-1]:
+            return
+        if found is not None:
+            require_known(found)
+            backup.make(database, folder / "backups" / f"before-{VERSIONS[-1]}-{_stamp()}{backup.suffix(database)}")
+        _upgrade(database)
+
+
+def version(database: Database) -> str | None:
+    """The version of the schema; None where there is none yet."""
+    with database.reading() as connection:
+        return version_of(connection)
+
+
+def version_of(connection: Connection) -> str | None:
+    """As `version`, on a connection."""
+    if not inspect(connection).has_table("alembic_version"):
+        return None
+    found = connection.execute(text("SELECT version_num FROM alembic_version")).scalar()
+    return None if found is None else str(found)
+
+
+def require_known(found: str) -> None:
+    """Refuses the schema of a newer underskin."""
+    if found not in VERSIONS:
+        raise StoreError(
+            f"the store has schema {found}, which this underskin does not know (newest: {VERSIONS[-1]}): "
+            "it was written by a newer one. Run that one, or restore a backup made before it."
+        )
+
+
+def _upgrade(database: Database) -> None:
+    # Imported here: a start that finds the schema up to date needs no Alembic.
+    from alembic import command
+    from alembic.config import Config
+
+    config = Config()
+    config.set_main_option("script_location", str(Path(__file__).parent / "migrations"))
+    config.set_main_option("path_separator", "os")
+    with database.writing() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, VERSIONS[-1])
+
+
+@contextmanager
+def _one_at_a_time(database: Database, folder: Path) -> Iterator[None]:
+    """Servers that start together migrate once."""
+    if database.is_sqlite:
+        with (folder / "migration.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield
+    else:
+        with database.engine.connect() as connection:
+            connection.execute(text("SELECT pg_advisory_lock(:number)"), {"number": _LOCK})
+            try:
+                yield
+            finally:
+                connection.execute(text("SELECT pg_advisory_unlock(:number)"), {"number": _LOCK})
+
+
+def _stamp() -> str:
+    return datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")

@@ -1,0 +1,90 @@
+"""Skins: made by the first campaign that names them, joined where two names mean one skin."""
+
+import secrets
+from collections.abc import Sequence
+from typing import Any
+
+from sqlalchemy import Connection, Row, ScalarSelect, Select, exists, func, insert, select, update
+from sqlalchemy.dialects import postgresql, sqlite
+
+from service.store.tables import campaigns, rigs, skins
+from service.store.times import now
+
+
+def require(connection: Connection, skin_id: str | None) -> str:
+    """`skin_id`, or a new one where there is none; the skin is there afterwards."""
+    skin_id = skin_id or f"skin-{secrets.token_hex(6)}"
+    dialect = sqlite if connection.dialect.name == "sqlite" else postgresql
+    row = {"id": skin_id, "root_id": skin_id, "created_at": now()}
+    connection.execute(dialect.insert(skins).on_conflict_do_nothing(), row)
+    return skin_id
+
+
+def find(connection: Connection, skin_id: str) -> Row[Any] | None:
+    """The row of a skin."""
+    return connection.execute(select(skins).where(skins.c.id == skin_id)).first()
+
+
+def root_of(skin_id: str) -> ScalarSelect[Any]:
+    """The id of the skin that `skin_id` was joined to in the end, or its own."""
+    return select(skins.c.root_id).where(skins.c.id == skin_id).scalar_subquery()
+
+
+def members(root: str | ScalarSelect[Any]) -> Select[Any]:
+    """Ids of a skin and of all joined to it."""
+    return select(skins.c.id).where(skins.c.root_id == root)
+
+
+def joined_to(connection: Connection, root: str) -> Sequence[Row[Any]]:
+    """Rows of the skins that were joined to `root`."""
+    query = select(skins).where(skins.c.root_id == root, skins.c.id != root).order_by(skins.c.id)
+    return connection.execute(query).all()
+
+
+def listed(connection: Connection, contains: str | None, after: str | None, limit: int) -> Sequence[Row[Any]]:
+    """Skins by id, without those joined to another, with how many campaigns each has."""
+    member = skins.alias("member")
+    counted = (
+        select(func.count(campaigns.c.number))
+        .select_from(campaigns.join(member, campaigns.c.skin_id == member.c.id))
+        .where(member.c.root_id == skins.c.id)
+        .scalar_subquery()
+    )
+    query = select(skins, counted.label("campaigns")).where(skins.c.root_id == skins.c.id)
+    if contains is not None:
+        query = query.where(func.lower(skins.c.id).contains(contains.lower(), autoescape=True))
+    if after is not None:
+        query = query.where(skins.c.id > after)
+    return connection.execute(query.order_by(skins.c.id).limit(limit)).all()
+
+
+def join(connection: Connection, skin_id: str, other: str, reason: str) -> None:
+    """Count `other`, and all joined to it, as `skin_id` from now on; both are their own roots."""
+    connection.execute(update(skins).where(skins.c.root_id == other).values(root_id=skin_id))
+    joined = {"joined_to": skin_id, "joined_at": now(), "join_reason": reason}
+    connection.execute(update(skins).where(skins.c.id == other).values(**joined))
+
+
+def lock(connection: Connection, ids: Sequence[str]) -> dict[str, Row[Any]]:
+    """Rows of skins by id, locked until the transaction ends."""
+    query = select(skins).where(skins.c.id.in_(ids)).order_by(skins.c.id).with_for_update()
+    return {row.id: row for row in connection.execute(query)}
+
+
+def keep_rig(connection: Connection, skin_id: str, document: str) -> None:
+    """Keep a rig description with a skin, unless it is the one already in use."""
+    if rig_of(connection, skin_id) != document:
+        row = {"skin_id": skin_id, "document": document, "created_at": now()}
+        connection.execute(insert(rigs), row)
+
+
+def rig_of(connection: Connection, skin_id: str) -> str | None:
+    """The latest rig description of a skin, or of those it is joined with; None where there is none."""
+    query = select(rigs.c.document).where(rigs.c.skin_id.in_(members(root_of(skin_id))))
+    document: str | None = connection.execute(query.order_by(rigs.c.number.desc()).limit(1)).scalar()
+    return document
+
+
+def is_known(connection: Connection, skin_id: str) -> bool:
+    """Whether there is such a skin."""
+    return bool(connection.execute(select(exists().where(skins.c.id == skin_id))).scalar())

@@ -1,0 +1,120 @@
+"""The tables of the store. What a table of an older version lacks is added by service/store/migrations.
+
+Times are text, ISO 8601 in UTC with microseconds (`2017-05-03T09:00:00.000000Z`): they sort as text on every database.
+Nothing is deleted: a campaign is withdrawn or corrected, a recording excluded, a skin joined to another, each with the
+reason, and the rows stay.
+"""
+
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    Column,
+    Float,
+    ForeignKey,
+    Index,
+    Integer,
+    LargeBinary,
+    MetaData,
+    String,
+    Table,
+    Text,
+    UniqueConstraint,
+)
+
+metadata = MetaData()
+
+_Number = BigInteger().with_variant(Integer(), "sqlite")  # SQLite counts up only what it calls INTEGER
+
+skins = Table(
+    "skins",
+    metadata,
+    Column("id", String, primary_key=True),
+    Column("root_id", String, ForeignKey("skins.id"), nullable=False, index=True),  # itself, or what it was joined to
+    Column("created_at", String, nullable=False),
+    Column("joined_to", String, ForeignKey("skins.id")),
+    Column("joined_at", String),
+    Column("join_reason", Text),
+)
+
+rigs = Table(
+    "rigs",
+    metadata,
+    Column("number", _Number, primary_key=True),
+    Column("skin_id", String, ForeignKey("skins.id"), nullable=False),
+    Column("document", Text, nullable=False),  # as the user wrote it
+    Column("created_at", String, nullable=False),
+    Index("rigs_of_skin", "skin_id", "number"),
+)
+
+campaigns = Table(
+    "campaigns",
+    metadata,
+    Column("number", _Number, primary_key=True),  # the order of arrival
+    Column("id", String, nullable=False, unique=True),
+    Column("skin_id", String, ForeignKey("skins.id"), nullable=False),
+    Column("name", Text, nullable=False),
+    Column("about", JSON, nullable=False),  # the campaign document without its recordings
+    Column("notes", JSON, nullable=False),  # what the reader remarked, a list of texts
+    Column("refused", JSON, nullable=False),  # recordings that were sent and not kept, with their errors
+    Column("source", Text),  # the name of the file that it came in
+    Column("received_at", String, nullable=False),
+    Column("received_from", Text),  # name of the API key
+    Column("recorded_at", String),  # of the earliest recording that says so
+    Column("recordings", Integer, nullable=False),
+    Column("excluded", Integer, nullable=False),
+    Column("revision", Integer, nullable=False),  # counts what changed in it since it arrived
+    Column("corrects", String),  # id of the campaign that this one replaces
+    Column("correct_reason", Text),
+    Column("corrected_by", String),  # id of the campaign that replaces this one
+    Column("withdrawn_at", String),
+    Column("withdraw_reason", Text),
+    Index("campaigns_of_skin", "skin_id", "number"),
+)
+
+recordings = Table(
+    "recordings",
+    metadata,
+    Column("campaign", _Number, ForeignKey("campaigns.number"), primary_key=True),
+    Column("position", Integer, primary_key=True),  # in the campaign document
+    Column("id", Text, nullable=False),
+    Column("kind", String, nullable=False),
+    Column("sensor", Text),
+    Column("recorded_at", String),
+    Column("excluded_at", String),
+    Column("exclude_reason", Text),
+    Column("scalars", JSON, nullable=False),  # the recording's document without its arrays
+    Column("arrays", LargeBinary, nullable=False),  # service/store/arrays.py; last, so that lists never read it
+    UniqueConstraint("campaign", "id", name="recording_of_campaign"),
+)
+
+# Derived from a campaign at one revision with one table of σ; computed again when either has changed.
+inversions = Table(
+    "inversions",
+    metadata,
+    Column("campaign", _Number, ForeignKey("campaigns.number"), primary_key=True),
+    Column("revision", Integer, nullable=False),
+    Column("table_sha256", String, nullable=False),
+    Column("document", LargeBinary, nullable=False),  # the answer of /v1/campaigns/{id}/d33, compressed JSON
+)
+
+sensor_d33 = Table(
+    "sensor_d33",
+    metadata,
+    Column("campaign", _Number, ForeignKey("campaigns.number"), primary_key=True),
+    Column("sensor", String, primary_key=True),
+    Column("d33_pc_per_n", Float, nullable=False),
+    Column("d33_uncertainty_pc_per_n", Float, nullable=False),
+    sqlite_with_rowid=False,
+)
+
+# What was answered to a POST that carried an Idempotency-Key.
+answers = Table(
+    "answers",
+    metadata,
+    Column("sender", String, primary_key=True),  # name of the API key, or empty
+    Column("idempotency_key", String, primary_key=True),
+    Column("request_sha256", String, nullable=False),
+    Column("answer", LargeBinary, nullable=False),  # compressed JSON
+    Column("answered_at", String, nullable=False),
+    sqlite_with_rowid=False,
+)

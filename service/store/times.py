@@ -1,0 +1,21 @@
+"""Times as the store writes them: ISO 8601 in UTC with microseconds, which sort as text."""
+
+from datetime import UTC, datetime
+
+
+def now() -> str:
+    """This moment."""
+    return _text(datetime.now(UTC))
+
+
+def stored(text: str) -> str:
+    """A time as a lab or a user wrote it; without a zone it is taken as UTC. Raises ValueError."""
+    moment = datetime.fromisoformat(text)
+    try:
+        return _text(moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC))
+    except OverflowError:
+        raise ValueError(f"{text} is outside the years 1 to 9999") from None
+
+
+def _text(moment: datetime) -> str:
+    return moment.isoformat(timespec="microseconds").replace("+00:00", "Z")
