@@ -8,7 +8,7 @@ from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 
-from bench import batch, newton_step, single_requests, start
+from bench import accuracy, batch, newton_step, orderings, single_requests, start
 from bench.figures import Figure
 
 PARTS = {
@@ -16,6 +16,8 @@ PARTS = {
     "batch": batch.measure,
     "start": start.measure,
     "newton": newton_step.measure,
+    "orderings": orderings.measure,
+    "accuracy": accuracy.measure,
 }
 RESULTS = Path(__file__).parent.parent / "docs" / "bench-results.json"
 _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem")
