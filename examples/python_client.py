@@ -1,12 +1,18 @@
 """The service from Python. Needs a running service (`make serve`); UNDERSKIN_URL and UNDERSKIN_API_KEY name another."""
 
 import os
+from typing import Any
 
 import numpy as np
 
 import underskin
 
-PROTOTYPE = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16.0, "sensor_radius_mm": 1.5, "indenter_radius_mm": 4.0}
+PROTOTYPE: dict[str, Any] = {
+    "thickness_mm": 2.5,
+    "youngs_modulus_mpa": 16.0,
+    "sensor_radius_mm": 1.5,
+    "indenter_radius_mm": 4.0,
+}
 PRELOADS_N = np.array([0.5, 1.0, 2.0, 3.0])
 
 url = os.environ.get("UNDERSKIN_URL", "http://127.0.0.1:8000")
