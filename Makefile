@@ -4,8 +4,8 @@ PYTHON := $(VENV)/bin/python
 PORT   ?= 8000
 TESTS  ?= tests
 
-# From Debian: the proxy with TLS, its certificate, and what runs the MATLAB examples.
-TEST_PACKAGES = nginx openssl octave
+# From Debian: the proxy with TLS, its certificate, and what runs the examples.
+TEST_PACKAGES = nginx openssl octave curl
 
 PIP_INSTALL = $(PYTHON) -m pip install --quiet --disable-pip-version-check
 

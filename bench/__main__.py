@@ -4,11 +4,12 @@ import json
 import os
 import platform
 import sys
+import time
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 
-from bench import batch, newton_step, single_requests, start
+from bench import accuracy, batch, newton_step, orderings, single_requests, start
 from bench.figures import Figure
 
 PARTS = {
@@ -16,6 +17,8 @@ PARTS = {
     "batch": batch.measure,
     "start": start.measure,
     "newton": newton_step.measure,
+    "orderings": orderings.measure,
+    "accuracy": accuracy.measure,
 }
 RESULTS = Path(__file__).parent.parent / "docs" / "bench-results.json"
 _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem")
@@ -23,10 +26,12 @@ _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scik
 
 def main(names: list[str]) -> None:
     """Measure the parts named, or all; only a full run is written down."""
+    about = machine()
+    print(f"{about['processor']}, {about['cores']} cores, {about['idle_percent']} % idle before the start\n")
     figures = [figure for name in names or PARTS for figure in PARTS[name]()]
     print(markdown(figures))
     if not names:
-        record = {"machine": machine(), "figures": [asdict(figure) | {"met": figure.met} for figure in figures]}
+        record = {"machine": about, "figures": [asdict(figure) | {"met": figure.met} for figure in figures]}
         RESULTS.write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n")
 
 
@@ -51,9 +56,24 @@ def machine() -> dict[str, str | int]:
     return {
         "processor": processor,
         "cores": len(os.sched_getaffinity(0)),
+        "idle_percent": idle_percent(),
         "python": platform.python_version(),
         "packages": packages,
     }
+
+
+def idle_percent() -> int:
+    """How much of all cores nobody used during three seconds: other work disturbs even ratios."""
+    idle, total = _processor_times()
+    time.sleep(3)
+    later_idle, later_total = _processor_times()
+    return round(100 * (later_idle - idle) / (later_total - total))
+
+
+def _processor_times() -> tuple[int, int]:
+    """Idle and all ticks since boot."""
+    times = [int(ticks) for ticks in Path("/proc/stat").read_text().split()[1:9]]
+    return times[3] + times[4], sum(times)
 
 
 def _rounded(value: float) -> str:

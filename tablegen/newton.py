@@ -54,6 +54,16 @@ class Layer:
         weighted = stress(f, p) * self.discretisation.weight[..., None]
         return self.discretisation.assemble_vector(self._times_gradient(weighted))
 
+    def element_matrices(self, state: State) -> tuple[Floats, Floats]:
+        """K (elements, 2 n, 2 n) and C (elements, m, 2 n) of one Newton step, before anything is eliminated."""
+        f, p = self._fields(state)
+        return self._stiffness(f, p), self._constraint_gradient(f)
+
+    def condensed_matrix(self, state: State) -> csc_matrix:
+        """K + κ Cᵀ M⁻¹ C of the free displacements."""
+        stiffness, c = self.element_matrices(state)
+        return self.discretisation.assemble_matrix(stiffness + np.swapaxes(c, 1, 2) @ self._scaled(c))
+
     def volume_change(self, state: State) -> float:
         """The largest coefficient of J − 1, projected on the pressures of each element."""
         constraint = self._constraint(self._fields(state)[0])
@@ -92,16 +102,13 @@ class Layer:
     def _increment(self, state: State, load: Floats) -> tuple[Floats, Floats]:
         """One Newton increment (du, dp)."""
         d = self.discretisation
-        f, p = self._fields(state)
-        constraint = self._constraint(f)
-        c = self._constraint_gradient(f)  # (elements, m, 2 n)
-        scaled = _AUGMENTATION * self._inverse_mass @ c
-        stiffness = self._stiffness(f, p) + np.swapaxes(c, 1, 2) @ scaled
-        factors = factorise(d.assemble_matrix(stiffness))
+        stiffness, c = self.element_matrices(state)
+        scaled = self._scaled(c)
+        factors = factorise(d.assemble_matrix(stiffness + np.swapaxes(c, 1, 2) @ scaled))
         residual = load - self.internal_force(state)
         du = np.zeros(d.size)
         dp = np.zeros_like(state.pressure)
-        defect = constraint
+        defect = self._constraint(self._fields(state)[0])
         for _ in range(_SOLVES_PER_FACTORISATION):
             push = d.assemble_vector(np.einsum("eln,el->en", scaled, defect))
             step = np.zeros(d.size)
@@ -112,6 +119,10 @@ class Layer:
             defect = defect + change
             residual = np.zeros(d.size)  # the momentum balance holds after the first solve
         return du, dp
+
+    def _scaled(self, c: Floats) -> Floats:
+        """κ M⁻¹ C."""
+        return _AUGMENTATION * self._inverse_mass @ c
 
     def _fields(self, state: State) -> tuple[Floats, Floats]:
         """F (elements, points, 5) and p (elements, points)."""

@@ -1,13 +1,20 @@
 """What is happening under the skin: stress, FRF and d33 of piezoelectric electronic skin."""
 
-from underskin.errors import InvalidInput, ServiceError, SolverError, TableError, UnderskinError
-from underskin.prediction import Transmission, transmission
-from underskin.skin import Indenter, Skin
-from underskin.surrogate import Sigma, SigmaTable, load_table
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from underskin.errors import InvalidInput, ServiceError, SolverError, TableError, UnderskinError, Unreachable
+
+if TYPE_CHECKING:
+    from underskin.client import Client
+    from underskin.prediction import Transmission, transmission
+    from underskin.skin import Indenter, Skin
+    from underskin.surrogate import Sigma, SigmaTable, load_table
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "Client",
     "Indenter",
     "InvalidInput",
     "ServiceError",
@@ -18,6 +25,26 @@ __all__ = [
     "TableError",
     "Transmission",
     "UnderskinError",
+    "Unreachable",
     "load_table",
     "transmission",
 ]
+
+# Imported on first use: SciPy takes longer to load than `underskin --help` to answer.
+_MODULES = {
+    "Client": "client",
+    "Indenter": "skin",
+    "Sigma": "surrogate",
+    "SigmaTable": "surrogate",
+    "Skin": "skin",
+    "Transmission": "prediction",
+    "load_table": "surrogate",
+    "transmission": "prediction",
+}
+
+if not TYPE_CHECKING:  # or a type checker would believe in every name
+
+    def __getattr__(name: str) -> Any:
+        if name not in _MODULES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)

@@ -5,7 +5,8 @@ UnderskinError
 ├── FileError         a file that cannot be read: names the file and the place in it
 ├── TableError        a table that is missing, damaged, altered or of another schema
 ├── SolverError       a finite-element solve that did not converge: names the point
-└── ServiceError      an answer of the server that is not a success (raised by the client)
+├── ServiceError      an answer of the server that is not a success (raised by the client)
+└── Unreachable       no answer from the server: nothing listens there, or time ran out (raised by the client)
 """
 
 from typing import Any
@@ -60,3 +61,7 @@ class ServiceError(UnderskinError):
         self.status = status
         self.problem = problem
         super().__init__(f"{status} {problem.get('title', '')}: {problem.get('detail', '')}")
+
+
+class Unreachable(UnderskinError):
+    """No answer came from the service; the message names its address and the reason."""

@@ -56,8 +56,14 @@ def data_hash(data: Mapping[str, Floats]) -> str:
 def write_table(
     path: Path, schema: str, groups: Mapping[str, Group], signals: Mapping[str, str], about: Mapping[str, Any]
 ) -> str:
-    """Write a table beside `path`, flush it to the disk and move it into place; returns its hash."""
+    """Write a table beside `path`, flush it to the disk and move it into place; returns its hash.
+
+    Raises TableError, and writes nothing, when a value is not finite.
+    """
     data = {f"{group}/{name}": d.values for group, datasets in groups.items() for name, d in datasets.items()}
+    for name, values in data.items():
+        if not np.isfinite(values).all():
+            raise TableError(f"table {path} is not written: {name} would hold values that are not finite")
     digest = data_hash(data)
     partial = path.with_name(path.name + ".partial")
     with h5py.File(partial, "w") as file:

@@ -1,0 +1,78 @@
+"""The README keeps its word: its commands print what it shows, its links lead somewhere, its lists are complete."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from service.settings import Settings
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+ADDRESS = "http://127.0.0.1:8000"
+
+
+def blocks(language: str) -> list[str]:
+    """Contents of the code blocks of a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
+
+
+def sessions() -> list[tuple[str, str]]:
+    """Commands of the console blocks, each with the output that is shown for it.
+
+    A command ends where its quotes and here-documents are closed, as bash sees it.
+    """
+    pairs = []
+    for block in blocks("console"):
+        for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
+            lines = part.splitlines()
+            length = next(n for n in range(1, len(lines) + 1) if is_complete("\n".join(lines[:n])))
+            pairs.append(("\n".join(lines[:length]), "\n".join(lines[length:])))
+    return pairs
+
+
+def is_complete(command: str) -> bool:
+    """Whether bash would wait for no further line; an unclosed here-document is only a warning."""
+    return subprocess.run(["bash", "-n", "-c", command], capture_output=True).stderr == b""
+
+
+def pattern(shown: str) -> str:
+    """What is shown, with any white space and with … for anything, as a regular expression."""
+    return ".*".join(re.escape(re.sub(r"\s", "", piece)) for piece in shown.split("…"))
+
+
+@pytest.mark.parametrize(("command", "shown"), sessions())
+def test_command_prints_what_the_readme_shows(command: str, shown: str, server_url: str) -> None:
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    live = command.replace(ADDRESS, server_url).replace(".venv/bin/python", sys.executable)
+    answer = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", live], env=os.environ | {"PATH": path}, capture_output=True, text=True
+    )
+    assert answer.returncode == 0, answer.stderr
+    printed = re.sub(r"\s", "", answer.stdout)
+    assert re.fullmatch(pattern(shown), printed), f"{command}\nprints\n{answer.stdout}"
+
+
+def test_python_block_runs_and_prints_what_its_comment_says(server_url: str) -> None:
+    (block,) = blocks("python")
+    shown = re.search(r"print\(.*\)  # (.*)", block)
+    assert shown is not None
+    live = block.replace(ADDRESS, server_url)
+    answer = subprocess.run([sys.executable, "-c", live], capture_output=True, text=True, check=True)
+    assert re.fullmatch(pattern(shown[1]), re.sub(r"\s", "", answer.stdout)), answer.stdout
+
+
+def test_links_lead_to_files() -> None:
+    links = set(re.findall(r"\]\(([^)#:]+)\)", README))
+    assert len(links) > 5
+    assert [link for link in sorted(links) if not (ROOT / link).exists()] == []
+
+
+def test_every_make_target_and_setting_is_listed() -> None:
+    targets = re.findall(r"^(\w+):.*## ", (ROOT / "Makefile").read_text(), flags=re.MULTILINE)
+    wanted = [f"`make {target}`" for target in targets if target != "help"]
+    wanted += [f"`UNDERSKIN_{name.upper()}`" for name in Settings.model_fields]
+    assert [name for name in wanted if f"| {name} |" not in README] == []

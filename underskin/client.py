@@ -1,0 +1,288 @@
+"""A client of the service: columns of numbers in, columns of numbers out.
+
+    with underskin.Client() as client:
+        answer = client.sigma(a_over_h=[0.1, 0.3], rt_over_h=0.6)
+        answer.sigma, answer.status
+
+Fields are named and meant as in the HTTP interface, in lab units. A single number holds for all rows; arrays must be
+equally long. Answers have one entry a row, or shape () where only single numbers were given; a row outside the model's
+domain has the status `out_of_domain` and NaN in all that depends on σ.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from types import TracebackType
+from typing import Any, Literal, Self, TypeVar
+
+import httpx
+import numpy as np
+import orjson
+from numpy.typing import ArrayLike, NDArray
+
+from underskin.errors import ServiceError, Unreachable
+from underskin.units import Floats
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What every answer in columns says: the model, the table's hash (None where none was read), status per row."""
+
+    model: str
+    table_sha256: str | None
+    status: NDArray[np.str_]
+
+
+@dataclass(frozen=True)
+class SigmaAnswer(Answer):
+    """σ and the bound on its relative error."""
+
+    sigma: Floats
+    rel_error: Floats
+
+
+@dataclass(frozen=True)
+class PressedSkinAnswer(Answer):
+    """What reaches the sensor; units as the names say, the rest dimensionless."""
+
+    contact_radius_mm: Floats
+    a_over_h: Floats
+    rt_over_h: Floats
+    load_parameter: Floats
+    sigma: Floats
+    rel_error: Floats
+    mean_stress_mpa: Floats
+
+
+@dataclass(frozen=True)
+class FrfAnswer(PressedSkinAnswer):
+    """The FRF on the plateau and, where frequencies were given, its parts with one more axis for them."""
+
+    frf_pc_per_n: Floats
+    frequency_hz: Floats | None = None
+    frf_re_pc_per_n: Floats | None = None
+    frf_im_pc_per_n: Floats | None = None
+
+
+@dataclass(frozen=True)
+class D33Answer(PressedSkinAnswer):
+    """d33 with its standard uncertainty, and the plateau that was inverted."""
+
+    frf_pc_per_n: Floats
+    frf_uncertainty_pc_per_n: Floats
+    d33_pc_per_n: Floats
+    d33_uncertainty_pc_per_n: Floats
+    frf_im_pc_per_n: Floats | None = None
+
+
+@dataclass(frozen=True)
+class TableAxis:
+    """One axis of a table: limits (included) and the number of nodes."""
+
+    name: str
+    low: float
+    high: float
+    nodes: int
+
+
+@dataclass(frozen=True)
+class TableEntry:
+    """A table in use: its quantity, format, hash, axes, and how it was made."""
+
+    name: str
+    table_schema: str
+    table_sha256: str
+    axes: tuple[TableAxis, ...]
+    about: Mapping[str, Any]
+
+
+_Answer = TypeVar("_Answer", bound=Answer)
+
+
+class Client:
+    """The service at `base_url`. All methods raise ServiceError (it refused or failed) and Unreachable (no answer)."""
+
+    def __init__(
+        self, base_url: str = "http://127.0.0.1:8000", api_key: str | None = None, timeout: float = 60.0
+    ) -> None:
+        """`api_key` where the service asks for one; `timeout` in seconds, for connecting and between bytes."""
+        headers = {"Content-Type": "application/json", "Accept": "application/json"}
+        if api_key is not None:
+            headers["Authorization"] = f"Bearer {api_key}"
+        self._http = httpx.Client(base_url=base_url, headers=headers, timeout=timeout)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._http.close()
+
+    def sigma(
+        self,
+        a_over_h: ArrayLike,
+        rt_over_h: ArrayLike,
+        load_parameter: ArrayLike = 0.0,
+        model: Literal["layer", "half_space"] = "layer",
+    ) -> SigmaAnswer:
+        """σ(a/h, rT/h, L) of the layer on a rigid base, or of the half space."""
+        columns = {"a_over_h": a_over_h, "rt_over_h": rt_over_h, "load_parameter": load_parameter}
+        return self._columns("sigma", SigmaAnswer, columns, {"model": model})
+
+    def frf(
+        self,
+        *,
+        thickness_mm: ArrayLike,
+        youngs_modulus_mpa: ArrayLike,
+        sensor_radius_mm: ArrayLike,
+        indenter_radius_mm: ArrayLike,
+        preload_n: ArrayLike,
+        d33_pc_per_n: ArrayLike,
+        poisson_ratio: ArrayLike = 0.5,
+        frequency_hz: ArrayLike | None = None,
+        units_checked: bool = False,
+    ) -> FrfAnswer:
+        """The FRF of a skin under a sphere; `frequency_hz` (a list for all rows) adds spectra.
+
+        `units_checked` accepts magnitudes that look like a slip of units.
+        """
+        columns = {
+            "thickness_mm": thickness_mm,
+            "youngs_modulus_mpa": youngs_modulus_mpa,
+            "sensor_radius_mm": sensor_radius_mm,
+            "poisson_ratio": poisson_ratio,
+            "indenter_radius_mm": indenter_radius_mm,
+            "preload_n": preload_n,
+            "d33_pc_per_n": d33_pc_per_n,
+        }
+        shared = {"frequency_hz": frequency_hz, "units_checked": units_checked}
+        return self._columns("frf", FrfAnswer, columns, shared)
+
+    def d33(
+        self,
+        *,
+        thickness_mm: ArrayLike,
+        youngs_modulus_mpa: ArrayLike,
+        sensor_radius_mm: ArrayLike,
+        indenter_radius_mm: ArrayLike,
+        preload_n: ArrayLike,
+        frf_pc_per_n: ArrayLike | None = None,
+        frf_uncertainty_pc_per_n: ArrayLike | None = None,
+        poisson_ratio: ArrayLike = 0.5,
+        frequency_hz: ArrayLike | None = None,
+        frf_re_pc_per_n: ArrayLike | None = None,
+        frf_im_pc_per_n: ArrayLike | None = None,
+        band_hz: tuple[float, float] | None = None,
+        units_checked: bool = False,
+    ) -> D33Answer:
+        """d33 from plateau values `frf_pc_per_n`, or from lines averaged over a band.
+
+        For lines give `frequency_hz` (for all rows), `frf_re_pc_per_n` and, if measured, `frf_im_pc_per_n` (rows ×
+        lines), and `band_hz`. `units_checked` accepts magnitudes that look like a slip of units.
+        """
+        columns = {
+            "thickness_mm": thickness_mm,
+            "youngs_modulus_mpa": youngs_modulus_mpa,
+            "sensor_radius_mm": sensor_radius_mm,
+            "poisson_ratio": poisson_ratio,
+            "indenter_radius_mm": indenter_radius_mm,
+            "preload_n": preload_n,
+            "frf_pc_per_n": frf_pc_per_n,
+            "frf_uncertainty_pc_per_n": frf_uncertainty_pc_per_n,
+        }
+        lines = {
+            "frequency_hz": frequency_hz,
+            "frf_re_pc_per_n": frf_re_pc_per_n,
+            "frf_im_pc_per_n": frf_im_pc_per_n,
+            "band_hz": band_hz,
+            "units_checked": units_checked,
+        }
+        return self._columns("d33", D33Answer, columns, lines)
+
+    def tables(self) -> tuple[TableEntry, ...]:
+        """The tables that answers come from."""
+        document = self._request("GET", "/v1/tables")
+        return tuple(
+            TableEntry(**{**entry, "axes": tuple(TableAxis(**axis) for axis in entry["axes"])})
+            for entry in document["tables"]
+        )
+
+    def health(self) -> str:
+        """`ok` while the process answers; needs no key."""
+        return str(self._request("GET", "/health")["status"])
+
+    def ready(self) -> str:
+        """The hash of the table in use, once the service can do its work; needs no key."""
+        return str(self._request("GET", "/ready")["table_sha256"])
+
+    def _columns(
+        self, noun: str, kind: type[_Answer], columns: Mapping[str, ArrayLike | None], shared: Mapping[str, Any]
+    ) -> _Answer:
+        arrays = {name: _array(value) for name, value in columns.items() if value is not None}
+        others = {name: _shared(name, value) for name, value in shared.items() if value is not None}
+        document = self._request("POST", f"/v1/{noun}", {**arrays, **others})
+        single = all(array.ndim == 0 for array in arrays.values()) and not any(
+            np.ndim(value) > 1 for value in shared.values() if value is not None
+        )
+        return kind(**{field.name: _field(field.name, document, single) for field in fields(kind)})
+
+    def _request(self, method: str, path: str, body: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        content = None if body is None else orjson.dumps(body, _number, orjson.OPT_SERIALIZE_NUMPY)
+        try:
+            response = self._http.request(method, path, content=content)
+        except httpx.TransportError as error:
+            reason = "no answer in time" if isinstance(error, httpx.TimeoutException) else error
+            raise Unreachable(f"the service at {self._http.base_url} cannot be reached: {reason}") from error
+        if not response.is_success:
+            raise ServiceError(response.status_code, _document(response) or _foreign(response))
+        document = _document(response)
+        if document is None:
+            raise ServiceError(response.status_code, _foreign(response))
+        return document
+
+
+# Rows × lines; a single list is one row.
+_LINES = ("frf_re_pc_per_n", "frf_im_pc_per_n")
+
+
+def _array(value: Any) -> Floats:
+    return np.asarray(value, dtype=float, order="C")
+
+
+def _number(array: Floats) -> float:
+    """A single number, which orjson does not take as an array."""
+    return float(array)
+
+
+def _shared(name: str, value: Any) -> Any:
+    """A value that is not a column, as the interface has it."""
+    if isinstance(value, bool | str):
+        return value
+    return np.atleast_2d(_array(value)) if name in _LINES else _array(value)
+
+
+def _field(name: str, document: Mapping[str, Any], single: bool) -> Any:
+    """A field of the answer: an array, without its rows' axis where single numbers were given."""
+    value = document.get(name)
+    if not isinstance(value, list):
+        return value
+    array = np.array(value) if name == "status" else np.array(value, dtype=float)  # None becomes NaN
+    return array[0, ...] if single and name != "frequency_hz" else array
+
+
+def _document(response: httpx.Response) -> dict[str, Any] | None:
+    """The JSON object of an answer; None where it is something else."""
+    try:
+        document = orjson.loads(response.content)
+    except orjson.JSONDecodeError:
+        return None
+    return document if isinstance(document, dict) else None
+
+
+def _foreign(response: httpx.Response) -> dict[str, Any]:
+    """A problem for an answer that another program gave, such as a proxy."""
+    return {"title": response.reason_phrase, "detail": f"not an answer of underskin: {response.text[:200]!r}"}
