@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from underskin.errors import InvalidInput
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,13 @@ LAB: dict[str, LabField] = {
         LabField("youngs_modulus_mpa", "MPa", 1e6, (1e-3, 1e4)),
         LabField("sensor_radius_mm", "mm", 1e-3, (0.01, 100.0)),
         LabField("indenter_radius_mm", "mm", 1e-3, (0.05, 1000.0)),
+        LabField("width_mm", "mm", 1e-3, (0.1, 10000.0)),
+        LabField("length_mm", "mm", 1e-3, (0.1, 10000.0)),
+        LabField("sample_height_mm", "mm", 1e-3, (0.1, 1000.0)),
+        LabField("sample_diameter_mm", "mm", 1e-3, (0.1, 1000.0)),
+        LabField("displacement_mm", "mm", 1e-3, signed=True),
+        LabField("force_n", "N", 1.0, signed=True),
+        LabField("charge_pc", "pC", 1e-12, signed=True),
         LabField("preload_n", "N", 1.0, (1e-3, 1e3)),
         LabField("d33_pc_per_n", "pC/N", 1e-12, (1e-2, 1e4), signed=True),
         LabField("frf_pc_per_n", "pC/N", 1e-12, signed=True),
