@@ -1,0 +1,1 @@
+"""What a lab records, in the formats its instruments write, as one campaign model."""
