@@ -3,18 +3,20 @@
 from fastapi import APIRouter, FastAPI, Security
 from starlette.types import ASGIApp
 
-from service import d33, frf, health, metrics, openapi, sigma, tables, umbridge
+from service import campaigns, d33, frf, health, metrics, openapi, sigma, skins, tables, umbridge
 from service.dependencies import authorised
 from service.front import Front
 from service.gate import Gate
 from service.handlers import install_handlers
 from service.settings import Settings
+from service.store import Database
+from service.uploads import UploadFolder
 from underskin import __version__
 from underskin.surrogate import SigmaTable
 
 
-def create_api(settings: Settings, table: SigmaTable, gate: Gate) -> FastAPI:
-    """All routes, with the table they answer from."""
+def create_api(settings: Settings, table: SigmaTable, gate: Gate, store: Database) -> FastAPI:
+    """All routes, with the table they answer from and the store."""
     api = FastAPI(
         title="underskin",
         version=__version__,
@@ -26,19 +28,21 @@ def create_api(settings: Settings, table: SigmaTable, gate: Gate) -> FastAPI:
     api.state.settings = settings
     api.state.table = table
     api.state.gate = gate
+    api.state.store = store
+    api.state.uploads = UploadFolder(settings.data_folder)
     install_handlers(api)
     v1 = APIRouter(prefix="/v1", dependencies=[Security(authorised, scopes=["read"])])
-    for noun in (sigma, frf, d33, tables):
+    for noun in (sigma, frf, d33, tables, campaigns, skins):
         v1.include_router(noun.router)
     for router in (v1, umbridge.router, health.router, metrics.router, openapi.router):
         api.include_router(router)
     return api
 
 
-def create_app(settings: Settings, table: SigmaTable, gate: Gate) -> ASGIApp:
+def create_app(settings: Settings, table: SigmaTable, gate: Gate, store: Database) -> ASGIApp:
     """What the server runs."""
     hot = {
         ("GET", "/v1/sigma"): sigma.hot_route(table),
         ("POST", "/umbridge/Evaluate"): umbridge.hot_route(table),
     }
-    return Front(create_api(settings, table, gate), gate, hot)
+    return Front(create_api(settings, table, gate, store), gate, hot)

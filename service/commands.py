@@ -15,6 +15,7 @@ from service.gate import Gate
 from service.keys import KeyStore, Scope
 from service.log import configure_logging
 from service.settings import Settings
+from service.store import StoreError, open_store
 from underskin import TableError, UnderskinError
 from underskin.surrogate import SIGMA_TABLE, load_table
 
@@ -26,7 +27,7 @@ def serve(
     port: Annotated[int, typer.Option(help="Port to listen on.", min=0, max=65535)] = 8000,
 ) -> None:
     """Serve σ, FRF and d33 over HTTP."""
-    settings = _settings()
+    settings = read_settings()
     keys = KeyStore(settings.data_folder)
     loopback = _is_loopback(host)
     try:
@@ -34,8 +35,9 @@ def serve(
         if not loopback and not keys.entries():
             _fail(f"refusing to listen on {host} without API keys: make one with `underskin key create NAME`")
         table = load_table(settings.tables / SIGMA_TABLE)
+        store = open_store(settings.database_url, settings.data_folder)
         listener = _listen(host, port)
-    except (TableError, OSError, ValueError) as error:
+    except (TableError, StoreError, OSError, ValueError) as error:
         _fail(str(error))
     configure_logging()
     gate = Gate(
@@ -43,9 +45,10 @@ def serve(
         keys=keys,
         keys_always=not loopback,
         max_body_bytes=settings.max_body_bytes,
+        max_upload_bytes=settings.max_upload_bytes,
     )
     config = uvicorn.Config(
-        create_app(settings, table, gate),
+        create_app(settings, table, gate, store),
         access_log=False,
         log_config=None,
         server_header=False,
@@ -90,7 +93,8 @@ def _fail(reason: str) -> NoReturn:
     raise typer.Exit(1)
 
 
-def _settings() -> Settings:
+def read_settings() -> Settings:
+    """The settings; a wrong one ends the command."""
     try:
         return Settings()
     except ValidationError as error:
@@ -99,7 +103,7 @@ def _settings() -> Settings:
 
 
 def _keys() -> KeyStore:
-    return KeyStore(_settings().data_folder)
+    return KeyStore(read_settings().data_folder)
 
 
 def _require_writable(folder: Path) -> None:

@@ -12,6 +12,7 @@ from service.answers import Accept, Columns, respond
 from service.columns import ColumnsRequest, parse
 from service.keys import Key
 from service.problems import Refusal
+from service.store import Database
 from underskin.surrogate import SigmaTable
 
 
@@ -21,6 +22,14 @@ def _table(request: Request) -> SigmaTable:
 
 
 Table = Annotated[SigmaTable, Depends(_table)]
+
+
+def _store(request: Request) -> Database:
+    store: Database = request.app.state.store
+    return store
+
+
+Store = Annotated[Database, Depends(_store)]
 
 
 def authorised(scopes: SecurityScopes, request: Request) -> None:

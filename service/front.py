@@ -88,7 +88,7 @@ class Front:
         """Pass the gate, then a hot route or the API."""
         method, path = scope["method"], scope["path"]
         scope["key"] = self._gate.check(method, path, headers)
-        receive = self._limited(receive)
+        receive = self._limited(receive, self._gate.takes_files(path, headers))
         hot = self._hot.get((method, path))
         if hot is not None and b"csv" not in headers.get(b"accept", b""):
             if method == "GET":
@@ -102,7 +102,7 @@ class Front:
                 return
         await self._api(scope, receive, exchange.send)
 
-    def _limited(self, receive: Receive) -> Receive:
+    def _limited(self, receive: Receive, files: bool) -> Receive:
         """`receive`, refusing the body once it exceeds the limit, whatever its Content-Length said."""
         size = 0
 
@@ -110,7 +110,7 @@ class Front:
             nonlocal size
             message = await receive()
             size += len(message.get("body", b""))
-            self._gate.check_size(size)
+            self._gate.check_size(size, files)
             return message
 
         return counted

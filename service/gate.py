@@ -7,19 +7,29 @@ from service.problems import Refusal
 
 _LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 OPEN = frozenset({"/health", "/ready"})
+_UPLOADS = frozenset({"/v1/campaigns", "/v1/skins/import"})
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
 class Gate:
     """Refuses what must not reach a route."""
 
-    def __init__(self, *, host_names: frozenset[str], keys: KeyStore, keys_always: bool, max_body_bytes: int) -> None:
+    def __init__(
+        self,
+        *,
+        host_names: frozenset[str],
+        keys: KeyStore,
+        keys_always: bool,
+        max_body_bytes: int,
+        max_upload_bytes: int,
+    ) -> None:
         """`keys_always`: bound to more than loopback, so that no request passes without a key, even when all
         keys have been revoked; otherwise keys are needed once there are any."""
         self._hosts = frozenset(name.encode() for name in host_names | _LOOPBACK_NAMES)
         self._keys = keys
         self._keys_always = keys_always
         self._max_body_bytes = max_body_bytes
+        self._max_upload_bytes = max_upload_bytes
 
     def check(self, method: str, path: str, headers: Mapping[bytes, bytes]) -> Key | None:
         """The key that came with the request, None where none is needed; raises Refusal."""
@@ -30,22 +40,29 @@ class Gate:
             )
         if method not in _SAFE:
             _check_origin(headers.get(b"origin"), host)
-            self.check_size(_number(headers.get(b"content-length", b"")))
+            self.check_size(_number(headers.get(b"content-length", b"")), self.takes_files(path, headers))
         return None if path in OPEN else self._check_key(headers.get(b"authorization", b""))
 
     def keys_needed(self) -> bool:
         """Whether a request without a key is refused."""
         return self._keys_always or bool(self._keys.entries())
 
-    def check_size(self, size: int) -> None:
+    def takes_files(self, path: str, headers: Mapping[bytes, bytes]) -> bool:
+        """Whether a body may be as large as uploads may: files do not go through memory, JSON does."""
+        return path in _UPLOADS and not headers.get(b"content-type", b"").startswith(b"application/json")
+
+    def check_size(self, size: int, files: bool) -> None:
         """Refuses a body of more bytes than allowed.
 
         The connection stays open, so that the server reads and drops what is still under way: a client, or a proxy,
         that cannot finish sending would report a broken connection instead of the refusal.
         """
-        if size > self._max_body_bytes:
-            limit = f"{self._max_body_bytes / 1e6:g} MB (UNDERSKIN_MAX_BODY_MB)"
-            raise Refusal(413, f"The body exceeds {limit}; send fewer rows a request.")
+        if size > (self._max_upload_bytes if files else self._max_body_bytes):
+            if files:
+                limit, smaller = f"{self._max_upload_bytes / 1e6:g} MB (UNDERSKIN_MAX_UPLOAD_MB)", "fewer files"
+            else:
+                limit, smaller = f"{self._max_body_bytes / 1e6:g} MB (UNDERSKIN_MAX_BODY_MB)", "fewer rows"
+            raise Refusal(413, f"The body exceeds {limit}; send {smaller} a request.")
 
     def _check_key(self, authorization: bytes) -> Key | None:
         if not self.keys_needed():

@@ -1,11 +1,19 @@
 """Every error that a route raises, as a problem."""
 
+import logging
+
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
+from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
 
 from service.problems import Refusal, from_validation, invalid_input
+from service.store.answers import OtherRequest
+from service.store.campaigns import Conflict, Missing
+from service.store.engine import StorageFull
 from underskin import InvalidInput
+
+logger = logging.getLogger("underskin")
 
 
 def install_handlers(api: FastAPI) -> None:
@@ -14,7 +22,8 @@ def install_handlers(api: FastAPI) -> None:
     api.add_exception_handler(InvalidInput, _handle)
     api.add_exception_handler(RequestValidationError, _handle)
     api.add_exception_handler(HTTPException, _handle)
-    api.add_exception_handler(Exception, _handle)
+    for kind in (*_STATUS, StorageFull, OperationalError, Exception):
+        api.add_exception_handler(kind, _handle)
 
 
 async def _handle(request: Request, error: Exception) -> Response:
@@ -39,4 +48,19 @@ def _as_refusal(request: Request, error: Exception) -> Refusal:
         case HTTPException():
             return Refusal(error.status_code, str(error.detail), headers=error.headers)
         case _:
-            return Refusal(500, "Something went wrong in the server; its log has the request's id.")
+            return _of_the_store(request, error)
+
+
+_STATUS = {Missing: 404, Conflict: 409, OtherRequest: 422}
+
+
+def _of_the_store(request: Request, error: Exception) -> Refusal:
+    """What the store raises, and what nobody expected."""
+    if type(error) in _STATUS:
+        return Refusal(_STATUS[type(error)], str(error))
+    if isinstance(error, StorageFull):
+        return Refusal(507, "The disk is full: nothing of this request was kept. What is kept can be read.")
+    if isinstance(error, OperationalError):
+        logger.error("the store failed: %s", error, extra={"fields": {"request_id": request.scope["request_id"]}})
+        return Refusal(503, "The store does not answer; try again in a while.", headers={"Retry-After": "5"})
+    return Refusal(500, "Something went wrong in the server; its log has the request's id.")

@@ -5,8 +5,10 @@ from typing import Literal
 
 from fastapi import APIRouter, Request
 from pydantic import BaseModel, Field
+from sqlalchemy import text
+from sqlalchemy.exc import DBAPIError
 
-from service.dependencies import Table
+from service.dependencies import Store, Table
 from service.problems import Refusal
 
 router = APIRouter(tags=["health"])
@@ -32,9 +34,14 @@ async def health() -> Health:
 
 
 @router.get("/ready", operation_id="ready", summary="Can it do its work?")
-async def ready(request: Request, table: Table) -> Ready:
-    """Table loaded and data folder writable; 503 where not."""
+def ready(request: Request, table: Table, store: Store) -> Ready:
+    """Table loaded, data folder writable and the store answering; 503 where not."""
     folder = request.app.state.settings.data_folder
     if not os.access(folder, os.W_OK):
         raise Refusal(503, f"The data folder {folder} is not writable.")
+    try:
+        with store.reading() as connection:
+            connection.execute(text("SELECT 1"))
+    except DBAPIError:
+        raise Refusal(503, "The store does not answer.") from None
     return Ready(status="ready", table_sha256=table.sha256)

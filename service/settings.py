@@ -15,7 +15,8 @@ class Settings(BaseSettings):
 
     data: Path = Field(
         default=Path("~/.local/share/underskin"),
-        description="Folder of what the service keeps: API keys. Made at start if missing; must be writable.",
+        description="Folder of what the service keeps: API keys, the SQLite store, backups made before migrations. "
+        "Made at start if missing; must be writable.",
     )
     tables: Path = Field(
         default_factory=tables_folder,
@@ -23,6 +24,16 @@ class Settings(BaseSettings):
     )
     max_body_mb: float = Field(
         default=64, gt=0, description="Largest request body in MB (10^6 bytes), counted as it streams in."
+    )
+    max_upload_mb: float = Field(
+        default=1024,
+        gt=0,
+        description="Largest upload of files in MB (10^6 bytes), counted as it streams in; JSON has max_body_mb.",
+    )
+    database_url: str = Field(
+        default="",
+        description="Where campaigns are kept: postgresql://user:password@host/database. Left out: SQLite in the data "
+        "folder.",
     )
     hosts: str = Field(
         default="",
@@ -39,6 +50,11 @@ class Settings(BaseSettings):
     def max_body_bytes(self) -> int:
         """`max_body_mb` in bytes."""
         return int(self.max_body_mb * 1e6)
+
+    @property
+    def max_upload_bytes(self) -> int:
+        """`max_upload_mb` in bytes."""
+        return int(self.max_upload_mb * 1e6)
 
     @property
     def host_names(self) -> frozenset[str]:

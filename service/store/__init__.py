@@ -4,17 +4,17 @@ from pathlib import Path
 
 from sqlalchemy.exc import DBAPIError
 
+from service.store import migrate
 from service.store.engine import Database, StoreError, database
-from service.store.migrate import migrate
 
-__all__ = ["Database", "StoreError", "open_store"]
+__all__ = ["Database", "StoreError", "database", "open_store"]
 
 
 def open_store(database_url: str, folder: Path) -> Database:
     """The store, its schema up to date; raises StoreError that says what is wrong."""
     store = database(database_url, folder)
     try:
-        migrate(store, folder)
+        migrate.migrate(store, folder)
     except DBAPIError as error:
         raise StoreError(f"the store at {store.url} cannot be used: {str(error.orig).strip()}") from error
     return store

@@ -50,7 +50,8 @@ def claim(connection: Connection, request: Request) -> bool:
         "answer": b"",
         "answered_at": now(),
     }
-    return connection.execute(dialect.insert(answers).on_conflict_do_nothing(), row).rowcount == 1
+    claimed = dialect.insert(answers).on_conflict_do_nothing().returning(answers.c.idempotency_key)
+    return connection.execute(claimed, row).first() is not None
 
 
 def keep(connection: Connection, request: Request, answer: Any) -> None:

@@ -1,7 +1,7 @@
 """Backup and restore of the whole store in one file, while servers run.
 
 SQLite: a copy by its online backup, an ordinary database file. PostgreSQL: pg_dump's custom format. Either is read back
-before it counts: SQLite's integrity_check, pg_restore's list of contents.
+whole before it counts: by SQLite's integrity_check, by pg_restore into nothing.
 """
 
 import os
@@ -50,7 +50,13 @@ def verify(database: Database, file: Path) -> None:
                 raise StoreError(f"{file} is not a backup of an SQLite store: {error}") from error
         if found != "ok":
             raise StoreError(f"{file} is damaged: {found}")
-    elif "alembic_version" not in _run("pg_restore", "--list", str(file)):
+        return
+    try:
+        run("pg_restore", "--file=/dev/null", str(file))
+        tables = run("pg_restore", "--list", str(file))
+    except StoreError as error:
+        raise StoreError(f"{file} is not a backup of a PostgreSQL store, or damaged: {error}") from error
+    if "alembic_version" not in tables:
         raise StoreError(f"{file} is not a backup of a store")
 
 
@@ -85,10 +91,11 @@ def _pg(program: str, database: Database, *arguments: str) -> None:
     url = database.url.set(drivername="postgresql")
     password = {} if url.password is None else {"PGPASSWORD": str(url.password)}
     address = url.set(password=None).render_as_string()
-    _run(program, "--dbname", address, *arguments, environment=password)
+    run(program, "--dbname", address, *arguments, environment=password)
 
 
-def _run(program: str, *arguments: str, environment: dict[str, str] | None = None) -> str:
+def run(program: str, *arguments: str, environment: dict[str, str] | None = None) -> str:
+    """What a program of PostgreSQL printed; raises StoreError with what it complained of."""
     if shutil.which(program) is None:
         raise StoreError(f"{program}, which backs up and restores PostgreSQL, is not installed (postgresql-client)")
     done = subprocess.run(

@@ -12,6 +12,7 @@ from service.store import backup
 from service.store.engine import Database, StoreError
 
 VERSIONS = ("0001",)  # oldest first; one file each in migrations/versions
+SCRIPTS = Path(__file__).parent / "migrations"
 _LOCK = 7236411  # any number, the same for all servers of a database
 
 
@@ -58,7 +59,7 @@ def _upgrade(database: Database) -> None:
     from alembic.config import Config
 
     config = Config()
-    config.set_main_option("script_location", str(Path(__file__).parent / "migrations"))
+    config.set_main_option("script_location", str(SCRIPTS))
     config.set_main_option("path_separator", "os")
     with database.writing() as connection:
         config.attributes["connection"] = connection

@@ -1,0 +1,114 @@
+"""POST /v1/campaigns: from uploads to what is kept, in one transaction, answered the same when asked again."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection
+
+from service.problems import Refusal
+from service.reading import Arrived, first_letter, read, require_usable
+from service.store import answers, campaigns
+from service.store.engine import Database
+from service.uploads import Upload
+from underskin import InvalidInput
+
+
+@dataclass(frozen=True)
+class Terms:
+    """What the client says about its uploads beside them."""
+
+    skin: str | None
+    corrects: str | None
+    reason: str | None
+    all_or_nothing: bool
+    idempotency_key: str | None
+    sender: str | None
+    most_json_bytes: int
+
+    def __post_init__(self) -> None:
+        """Raises InvalidInput."""
+        if (self.corrects is None) != (self.reason is None):
+            missing = "reason" if self.reason is None else "corrects"
+            raise InvalidInput(missing, None, "corrects and reason go together")
+        if self.skin is not None:
+            require_usable("skin", self.skin)
+
+    def request(self, uploads: Sequence[Upload]) -> answers.Request | None:
+        """What makes a repetition of this request recognisable."""
+        if self.idempotency_key is None:
+            return None
+        told = [self.skin, self.corrects, self.reason, self.all_or_nothing]
+        sent = [[upload.field, upload.label, upload.sha256] for upload in uploads]
+        digest = hashlib.sha256(repr([told, sent]).encode()).hexdigest()
+        return answers.Request(self.sender or "", self.idempotency_key, digest)
+
+
+def accept(store: Database, uploads: Sequence[Upload], terms: Terms) -> dict[str, Any]:
+    """Keep what is good; the answer is a CampaignResult, or a BatchResult for a form or a list.
+
+    Raises Refusal where nothing is kept.
+    """
+    request = terms.request(uploads)
+    if request is not None:
+        with store.reading() as connection:
+            before = answers.replayed(connection, request)
+        if before is not None:
+            return dict(before)
+    arrived = [found for upload in uploads for found in read(upload, terms.most_json_bytes)]
+    _require_keepable(arrived, terms)
+    with store.writing() as connection:
+        if request is not None and not answers.claim(connection, request):
+            return dict(answers.replayed(connection, request) or {})
+        results = [_kept(connection, found, terms) for found in arrived]
+        answer = {"campaigns": results} if _is_batch(uploads) else results[0]
+        if request is not None:
+            answers.keep(connection, request, answer)
+    return answer
+
+
+def _is_batch(uploads: Sequence[Upload]) -> bool:
+    return uploads[0].field is not None or first_letter(uploads[0]) == b"["
+
+
+def _require_keepable(arrived: Sequence[Arrived], terms: Terms) -> None:
+    good = [found for found in arrived if found.campaign is not None]
+    if terms.corrects is not None and len(arrived) > 1:
+        raise InvalidInput("corrects", terms.corrects, f"needs one campaign in its place, not {len(arrived)}")
+    spoilt = any(found.campaign is None or found.refused for found in arrived)
+    if good and not (terms.all_or_nothing and spoilt):
+        return
+    errors = [error for found in arrived for error in _flat(found, many=len(arrived) > 1)]
+    count = len({error["field"] for error in errors})
+    detail = f"Nothing was kept: {errors[0]['field']} {errors[0]['allowed']}" if errors else "No campaign was sent."
+    raise Refusal(422, detail + (f"; and {count - 1} more" if count > 1 else ""), title="Invalid input", errors=errors)
+
+
+def _flat(found: Arrived, *, many: bool) -> list[dict[str, Any]]:
+    """All errors of a campaign as a problem lists them."""
+    prefix = f"{found.file}: " if many and found.file else ""
+    own = [{**error, "index": None, "field": prefix + error["field"]} for error in found.errors]
+    nested = [
+        {**error, "index": None, "field": f"{prefix}{_place(entry['id'])}.{error['field']}"}
+        for entry in found.refused
+        for error in entry["errors"]
+    ]
+    return nested + own
+
+
+def _place(recording: str) -> str:
+    return recording if recording.startswith("recordings[") else f"recordings[{recording}]"
+
+
+def _kept(connection: Connection, found: Arrived, terms: Terms) -> dict[str, Any]:
+    refused = [{"id": entry["id"], "status": "refused", "errors": entry["errors"]} for entry in found.refused]
+    result = {"file": found.file, "errors": found.errors, "notes": found.notes}
+    if found.campaign is None:
+        return {**result, "status": "refused", "id": None, "skin_id": None, "recordings": refused}
+    arrival = campaigns.Arrival(
+        found.campaign, terms.skin, refused, found.notes, source=found.file, received_from=terms.sender
+    )
+    campaign_id, skin_id = campaigns.add(connection, arrival, corrects=terms.corrects, reason=terms.reason)
+    kept = [{"id": recording.id, "status": "ok", "errors": []} for recording in found.campaign.recordings]
+    return {**result, "status": "ok", "id": campaign_id, "skin_id": skin_id, "recordings": kept + refused}

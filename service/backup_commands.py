@@ -1,0 +1,40 @@
+"""Commands on the store as a whole: backup and restore, while servers run."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from service.commands import read_settings
+from service.store import StoreError, database
+from service.store import backup as backups
+from service.store import restore as restoring
+from underskin import UnderskinError
+
+
+def backup(
+    file: Annotated[Path, typer.Argument(help="Where to write it; a file of that name is replaced.")],
+) -> None:
+    """Write all that the store keeps into one file, read back to be sure, while servers run."""
+    settings = read_settings()
+    try:
+        backups.make(database(settings.database_url, settings.data_folder), file)
+    except (StoreError, OSError) as error:
+        raise UnderskinError(str(error)) from error
+    typer.echo(f"{file}: {file.stat().st_size / 1e6:.1f} MB, read back and whole")
+
+
+def restore(
+    file: Annotated[Path, typer.Argument(help="A file that `underskin backup` wrote.")],
+) -> None:
+    """Put a backup in place of the store, while servers run; what was there is backed up first."""
+    settings = read_settings()
+    try:
+        store = database(settings.database_url, settings.data_folder)
+        stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+        before = settings.data_folder / "backups" / f"before-restore-{stamp}{backups.suffix(store)}"
+        restoring.restore(store, file, before)
+    except (StoreError, OSError) as error:
+        raise UnderskinError(str(error)) from error
+    typer.echo(f"restored {file}" + (f"; what was there before is in {before}" if before.exists() else ""))

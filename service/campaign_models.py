@@ -1,0 +1,114 @@
+"""What the routes of campaigns answer and take."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+State = Literal["current", "corrected", "withdrawn"]
+
+Reason = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=1000)]
+
+
+class Refused(BaseModel):
+    """What is wrong with one value."""
+
+    field: str = Field(description="The field, with its row where it is a column.", examples=["preload_n"])
+    value: Any = Field(description="What was sent; null where nothing was.")
+    allowed: str = Field(description="What would be accepted.")
+
+
+class RecordingResult(BaseModel):
+    """What became of one recording."""
+
+    id: str = Field(description="Its id in the campaign, or its place where it has none.", examples=["r1"])
+    status: Literal["ok", "refused"] = Field(description="`ok`: kept.")
+    errors: list[Refused] = Field(description="Why it was refused; empty where it was kept.")
+
+
+class CampaignResult(BaseModel):
+    """What became of one campaign."""
+
+    file: str | None = Field(description="The name of the file that it came in, where it had one.")
+    status: Literal["ok", "refused"] = Field(description="`ok`: kept, with the recordings that are `ok`.")
+    id: str | None = Field(description="Names the campaign from now on; null where it was refused.")
+    skin_id: str | None = Field(description="The skin that it is of; null where it was refused.")
+    recordings: list[RecordingResult] = Field(description="One entry a recording: those kept, then those refused.")
+    errors: list[Refused] = Field(description="Why the campaign as a whole was refused; empty where it was kept.")
+    notes: list[str] = Field(description="What its reader remarked, such as a file that ends too early.")
+
+
+class BatchResult(BaseModel):
+    """What became of several campaigns sent together."""
+
+    campaigns: list[CampaignResult] = Field(description="One entry a campaign, in the order sent.")
+
+
+class CampaignEntry(BaseModel):
+    """A campaign without its recordings."""
+
+    id: str = Field(description="Its name in this interface.")
+    skin_id: str = Field(description="The skin that it was sent for; that may have been joined to another since.")
+    name: str = Field(description="What the lab calls it.")
+    state: State = Field(description="Figures use `current` ones only.")
+    received_at: str = Field(description="When it arrived, UTC.")
+    received_from: str | None = Field(description="Name of the API key that it came with.")
+    recorded_at: str | None = Field(description="When its earliest recording was made, UTC, where recordings say so.")
+    file: str | None = Field(description="The name of the file that it came in, where it had one.")
+    recordings: int = Field(description="How many recordings it has.")
+    excluded: int = Field(description="How many of them figures leave out.")
+    corrects: str | None = Field(description="The campaign that it replaces.")
+    correct_reason: str | None = Field(description="Why it was corrected.")
+    corrected_by: str | None = Field(description="The campaign that replaces it.")
+    withdrawn_at: str | None = Field(description="When it was withdrawn, UTC.")
+    withdraw_reason: str | None = Field(description="Why.")
+
+
+class CampaignList(BaseModel):
+    """A page of campaigns, the latest arrival first."""
+
+    campaigns: list[CampaignEntry] = Field(description="At most `limit` of them.")
+    next: str | None = Field(description="Send it as `cursor` for the next page; null on the last.")
+
+
+class RecordingEntry(BaseModel):
+    """A recording without its arrays."""
+
+    id: str = Field(description="Its id in the campaign.")
+    kind: str = Field(description="`frf`, `indentation` or `compression`.")
+    sensor: str | None = Field(description="The sensor, where it has one.")
+    recorded_at: str | None = Field(description="When it was made, UTC.")
+    excluded_at: str | None = Field(description="When it was excluded, UTC; null where figures use it.")
+    exclude_reason: str | None = Field(description="Why it was excluded.")
+    scalars: dict[str, Any] = Field(description="Its fields that are single values, as in campaign/1.")
+
+
+class CampaignDetail(CampaignEntry):
+    """A campaign and its recordings, without their arrays."""
+
+    skin: dict[str, Any] = Field(description="The skin as the campaign declares it.")
+    entries: list[RecordingEntry] = Field(description="Its recordings.")
+    refused: list[RecordingResult] = Field(description="Recordings that were sent with it and not kept.")
+    notes: list[str] = Field(description="What its reader remarked.")
+
+
+class _Request(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class Withdrawal(_Request):
+    """Takes a campaign out of all figures; it stays."""
+
+    reason: Reason = Field(description="Why; shown with every figure that leaves it out.")
+
+
+class Exclusion(_Request):
+    """Takes a recording out of all figures; it stays."""
+
+    recording: str = Field(description="Its id in the campaign.", examples=["r1"])
+    reason: Reason = Field(description="Why; shown with every figure that leaves it out.")
+
+
+def entry(row: Any, state: State) -> dict[str, Any]:
+    """The fields of CampaignEntry from a row of the store."""
+    names = set(CampaignEntry.model_fields) - {"state", "file"}
+    return {name: getattr(row, name) for name in names} | {"state": state, "file": row.source}

@@ -1,0 +1,206 @@
+"""Campaigns: sent, listed, read, withdrawn, corrected, their recordings excluded, their d33."""
+
+import asyncio
+from typing import Annotated, Any, Literal
+
+import orjson
+from fastapi import APIRouter, Header, Query, Request, Response, Security
+from sqlalchemy import Connection
+from starlette.concurrency import run_in_threadpool
+
+from service import campaign_models as models
+from service import inverting
+from service.accepting import Terms, accept
+from service.d33_models import D33
+from service.dependencies import Store, Table, authorised
+from service.store import campaigns
+from service.store.times import stored
+from service.uploads import received
+from underskin import InvalidInput
+from underskin.recordings import json_file
+
+router = APIRouter(tags=["campaigns"])
+
+WRITE = [Security(authorised, scopes=["write"])]
+# Reading a campaign takes memory many times its size: few at a time, the others wait.
+_heavy = asyncio.Semaphore(2)
+
+_FILE: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
+_BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "description": "One campaign as JSON (`campaign/1`), a JSON list of them, one file as the whole body, or a "
+        "form with any number of files; its part `rig` is a rig description, for files that do not say what their "
+        "channels are.",
+        "content": {
+            "application/json": {"schema": {"type": "object", "description": "campaign/1"}},
+            "application/octet-stream": _FILE,
+            "multipart/form-data": {
+                "schema": {
+                    "type": "object",
+                    "properties": {"file": {"type": "array", "items": _FILE["schema"]}, "rig": {"type": "string"}},
+                }
+            },
+        },
+    }
+}
+
+
+@router.post(
+    "/campaigns",
+    operation_id="post_campaigns",
+    summary="Send campaigns",
+    status_code=201,
+    dependencies=WRITE,
+    openapi_extra=_BODY,
+    responses={201: {"model": models.CampaignResult | models.BatchResult}},
+)
+async def post(
+    request: Request,
+    store: Store,
+    table: Table,
+    skin: Annotated[str | None, Query(description="The skin that they are of, whatever they say.")] = None,
+    corrects: Annotated[str | None, Query(description="The campaign that this one replaces; it stays, unused.")] = None,
+    reason: Annotated[models.Reason | None, Query(description="Why it is corrected.")] = None,
+    all_or_nothing: Annotated[bool, Query(description="Keep nothing where any recording is refused.")] = False,
+    idempotency_key: Annotated[
+        str | None,
+        Header(
+            min_length=1,
+            max_length=255,
+            description="A text of your own: the same request under the same key is answered the same and kept once.",
+        ),
+    ] = None,
+) -> Response:
+    """Keeps the good recordings and says of each of the others what was wrong. What is answered is on the disk.
+
+    One campaign is answered with its own entry, a form or a list with one entry a campaign.
+    """
+    settings = request.app.state.settings
+    key = request.scope["key"]
+    sender = None if key is None else key.name
+    terms = Terms(skin, corrects, reason, all_or_nothing, idempotency_key, sender, settings.max_body_bytes)
+    async with received(request, request.app.state.uploads) as uploads, _heavy:
+        answer = await run_in_threadpool(accept, store, uploads, terms)
+        await run_in_threadpool(inverting.derive, store, table, _ids(answer))
+    return Response(orjson.dumps(answer), status_code=201, media_type="application/json")
+
+
+def _ids(answer: dict[str, Any]) -> list[str]:
+    """Of the campaigns that were kept."""
+    return [result["id"] for result in answer.get("campaigns", [answer]) if result["id"] is not None]
+
+
+@router.get("/campaigns", operation_id="campaigns", summary="Campaigns, the latest first")
+def listed(
+    store: Store,
+    skin: Annotated[str | None, Query(description="Of this skin and of those joined with it.")] = None,
+    state: Annotated[models.State | Literal["all"], Query(description="Only those of this state.")] = "current",
+    name_contains: Annotated[str | None, Query(description="Only those whose name contains this.")] = None,
+    recorded_from: Annotated[str | None, Query(description="Only those recorded at this time or later.")] = None,
+    recorded_to: Annotated[str | None, Query(description="Only those recorded before this time.")] = None,
+    limit: Annotated[int, Query(ge=1, le=200, description="How many on a page.")] = 50,
+    cursor: Annotated[str | None, Query(description="`next` of the page before.")] = None,
+) -> models.CampaignList:
+    """Without their recordings; a page holds `limit` of them."""
+    filters = campaigns.Filters(
+        skin=skin,
+        state=None if state == "all" else state,
+        name_contains=name_contains,
+        recorded_from=_time("recorded_from", recorded_from),
+        recorded_to=_time("recorded_to", recorded_to),
+    )
+    with store.reading() as connection:
+        rows = campaigns.listed(connection, filters, _before(cursor), limit + 1)
+    page = [models.CampaignEntry(**models.entry(row, campaigns.state(row))) for row in rows[:limit]]
+    return models.CampaignList(campaigns=page, next=str(rows[limit - 1].number) if len(rows) > limit else None)
+
+
+@router.get("/campaigns/{campaign_id}", operation_id="campaign", summary="One campaign")
+def one(campaign_id: str, store: Store) -> models.CampaignDetail:
+    """With its recordings, without their arrays."""
+    with store.reading() as connection:
+        return _detail(connection, campaign_id)
+
+
+@router.get(
+    "/campaigns/{campaign_id}/document",
+    operation_id="campaign_document",
+    summary="One campaign as campaign/1",
+    response_class=Response,
+    responses={200: {"content": {"application/json": {"schema": {"type": "object", "description": "campaign/1"}}}}},
+)
+def document(campaign_id: str, store: Store) -> Response:
+    """All recordings that were kept, arrays and all, those excluded later included."""
+    with store.reading() as connection:
+        campaign = campaigns.load(connection, campaigns.find(connection, campaign_id))
+    return Response(json_file.write(campaign), media_type="application/json")
+
+
+@router.get("/campaigns/{campaign_id}/d33", operation_id="campaign_d33", summary="d33 of each sensor")
+def d33(
+    campaign_id: str,
+    store: Store,
+    table: Table,
+    band_low_hz: Annotated[float | None, Query(gt=0, description="Average from here, not over the flat zone.")] = None,
+    band_high_hz: Annotated[float | None, Query(gt=0, description="Average up to here.")] = None,
+) -> D33:
+    """By sensor, indenter and preload, with uncertainty, and what it leaves out."""
+    if (band_low_hz is None) != (band_high_hz is None):
+        raise InvalidInput("band_low_hz", band_low_hz, "band_low_hz and band_high_hz go together")
+    band = None if band_low_hz is None or band_high_hz is None else (band_low_hz, band_high_hz)
+    with store.reading() as connection:
+        row = campaigns.find(connection, campaign_id)
+    return D33(**inverting.answer(store, table, row, band))
+
+
+@router.post(
+    "/campaigns/{campaign_id}/withdraw", operation_id="withdraw_campaign", summary="Withdraw it", dependencies=WRITE
+)
+def withdraw(campaign_id: str, withdrawal: models.Withdrawal, store: Store) -> models.CampaignDetail:
+    """Figures no longer use it; it can still be read."""
+    with store.writing() as connection:
+        campaigns.withdraw(connection, campaign_id, withdrawal.reason)
+        return _detail(connection, campaign_id)
+
+
+@router.post(
+    "/campaigns/{campaign_id}/exclusions",
+    operation_id="exclude_recording",
+    summary="Exclude a recording",
+    dependencies=WRITE,
+)
+def exclude(campaign_id: str, exclusion: models.Exclusion, store: Store, table: Table) -> models.CampaignDetail:
+    """Figures no longer use it; it can still be read. A correction is the way back."""
+    with store.writing() as connection:
+        campaigns.exclude(connection, campaign_id, exclusion.recording, exclusion.reason)
+        detail = _detail(connection, campaign_id)
+    inverting.derive(store, table, [campaign_id])
+    return detail
+
+
+def _detail(connection: Connection, campaign_id: str) -> models.CampaignDetail:
+    row = campaigns.find(connection, campaign_id)
+    kept = campaigns.recordings_of(connection, row.number)
+    return models.CampaignDetail(
+        **models.entry(row, campaigns.state(row)),
+        skin=row.about["skin"],
+        entries=[models.RecordingEntry(**recording._mapping) for recording in kept],
+        refused=[models.RecordingResult(**refused) for refused in row.refused],
+        notes=row.notes,
+    )
+
+
+def _time(name: str, text: str | None) -> str | None:
+    try:
+        return None if text is None else stored(text)
+    except ValueError:
+        raise InvalidInput(name, text, "must be a date and time like 2017-05-03T09:00:00Z") from None
+
+
+def _before(cursor: str | None) -> int | None:
+    if cursor is None:
+        return None
+    if not cursor.isascii() or not cursor.isdigit() or len(cursor) > 18:
+        raise InvalidInput("cursor", cursor, "must be the `next` of the page before")
+    return int(cursor)

@@ -1,0 +1,100 @@
+"""d33 of a skin's sensors over time: points, trends, and what they leave out."""
+
+from collections.abc import Iterable, Sequence
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import Connection, Row
+
+from service import skin_models as models
+from service.store import campaigns, inversions, skins
+from underskin.trend import SIGNIFICANT, Trend, holm, trend
+
+_YEAR_S = 365.25 * 86400
+
+
+def history(connection: Connection, root: str) -> models.History:
+    """The history of a skin and of those joined to it, from what is kept."""
+    by_sensor: dict[str, list[models.Point]] = {}
+    for row in inversions.history(connection, root):
+        by_sensor.setdefault(row.sensor, []).append(_point(row))
+    for points in by_sensor.values():
+        points.sort(key=lambda point: point.time)
+    names = sorted(by_sensor)
+    used = {point.campaign_id for points in by_sensor.values() for point in points}
+    campaigns_out, recordings_out = _left_out(connection, root, used)
+    return models.History(
+        skin_id=root,
+        joined=[joined(row) for row in skins.joined_to(connection, root)],
+        sensors=[
+            models.SensorHistory(sensor=name, points=by_sensor[name], trend=found)
+            for name, found in zip(names, _trends([by_sensor[name] for name in names]), strict=True)
+        ],
+        left_out_campaigns=campaigns_out,
+        left_out_recordings=recordings_out,
+    )
+
+
+def joined(row: Row[Any]) -> models.JoinedSkin:
+    """A row of a skin that was joined to another."""
+    return models.JoinedSkin(id=row.id, joined_to=row.joined_to, joined_at=row.joined_at, reason=row.join_reason)
+
+
+def _point(row: Row[Any]) -> models.Point:
+    return models.Point(
+        campaign_id=row.id,
+        time=row.recorded_at or row.received_at,
+        time_is="received" if row.recorded_at is None else "recorded",
+        d33_pc_per_n=row.d33_pc_per_n,
+        d33_uncertainty_pc_per_n=row.d33_uncertainty_pc_per_n,
+    )
+
+
+def _trends(sensors: Sequence[Sequence[models.Point]]) -> list[models.TrendAnswer | None]:
+    found = [_line(points) for points in sensors]
+    adjusted = iter(holm([line.p_value for line in found if line is not None]))
+    return [None if line is None else _answer(line, next(adjusted)) for line in found]
+
+
+def _line(points: Sequence[models.Point]) -> Trend | None:
+    return trend(
+        [datetime.fromisoformat(point.time).timestamp() / _YEAR_S for point in points],
+        [point.d33_pc_per_n for point in points],
+        [point.d33_uncertainty_pc_per_n for point in points],
+    )
+
+
+def _answer(line: Trend, adjusted: float) -> models.TrendAnswer:
+    return models.TrendAnswer(
+        slope_pc_per_n_per_year=line.slope,
+        slope_uncertainty_pc_per_n_per_year=line.slope_uncertainty,
+        p_value=line.p_value,
+        p_value_adjusted=adjusted,
+        significant=adjusted < SIGNIFICANT,
+    )
+
+
+def _left_out(
+    connection: Connection, root: str, used: Iterable[str]
+) -> tuple[list[models.LeftOutCampaign], list[models.LeftOutRecording]]:
+    whole, single = [], []
+    for row in campaigns.of_skin(connection, root):
+        reason = _why_unused(row, row.id in used)
+        if reason is not None:
+            whole.append(models.LeftOutCampaign(campaign_id=row.id, reason=reason))
+        elif row.excluded:
+            single += [
+                models.LeftOutRecording(campaign_id=row.id, recording=left.recording, reason=left.reason)
+                for left in campaigns.excluded_of(connection, row.number)
+            ]
+    return whole, single
+
+
+def _why_unused(row: Row[Any], is_used: bool) -> str | None:
+    match campaigns.state(row):
+        case "withdrawn":
+            return f"withdrawn: {row.withdraw_reason}"
+        case "corrected":
+            return f"corrected by {row.corrected_by}"
+        case _:
+            return None if is_used else "no d33 can be told from it; its /d33 says why"

@@ -1,0 +1,81 @@
+"""d33 of campaigns in the store: computed once for each state of a campaign, and kept."""
+
+import logging
+from collections.abc import Sequence
+from typing import Any
+
+from sqlalchemy import Row
+
+from service.d33_models import of_inversion
+from service.store import campaigns, inversions
+from service.store.engine import Database, StorageFull
+from underskin import InvalidInput
+from underskin.inversion import invert
+from underskin.recordings.campaign import Campaign
+from underskin.surrogate import SigmaTable
+
+logger = logging.getLogger("underskin")
+
+Band = tuple[float, float]
+
+_NOTHING: dict[str, Any] = dict.fromkeys(
+    ("band", "array", "sensor_spread_percent", "gain_scatter_percent", "position_scatter_mm", "declared_percent")
+)
+
+
+def answer(store: Database, table: SigmaTable, row: Row[Any], band_hz: Band | None) -> dict[str, Any]:
+    """The d33 of a campaign as it is now (fields of D33), over its flat zone or a band of the user's own."""
+    with store.reading() as connection:
+        kept = inversions.find(connection, row, table.sha256) if band_hz is None else None
+        if kept is not None:
+            return dict(kept)
+        campaign = campaigns.load(connection, row, with_excluded=False)
+        excluded = campaigns.excluded_of(connection, row.number)
+    found = _inverted(campaign, table, band_hz)
+    found["left_out"] = [{"recording": left.recording, "reason": left.reason} for left in excluded] + found["left_out"]
+    document = {"campaign_id": row.id, "table_sha256": table.sha256, **found}
+    if band_hz is None:
+        _keep(store, row, document)
+    return document
+
+
+def derive(store: Database, table: SigmaTable, campaign_ids: Sequence[str]) -> None:
+    """Compute and keep; what fails is logged, and tried again when it is asked for."""
+    for campaign_id in campaign_ids:
+        try:
+            with store.reading() as connection:
+                row = campaigns.find(connection, campaign_id)
+            answer(store, table, row, None)
+        except Exception:  # the campaign itself is kept, and that is what was promised
+            logger.exception("no d33 from a campaign", extra={"fields": {"campaign": campaign_id}})
+
+
+def complete(store: Database, table: SigmaTable, root: str) -> None:
+    """Compute and keep what is missing of a skin's current campaigns."""
+    with store.reading() as connection:
+        missing = inversions.missing_of_skin(connection, root, table.sha256)
+    derive(store, table, [row.id for row in missing])
+
+
+def _inverted(campaign: Campaign, table: SigmaTable, band_hz: Band | None) -> dict[str, Any]:
+    try:
+        found = invert(campaign, table, band_hz)
+    except InvalidInput as error:
+        if band_hz is not None and error.field == "band_hz":
+            raise
+        return {**_NOTHING, "status": "none", "reason": str(error), "sensors": [], "cells": [], "left_out": []}
+    left_out = [{"recording": None, "reason": reason} for reason in found.left_out]
+    return {**of_inversion(found), "left_out": left_out}
+
+
+def _keep(store: Database, row: Row[Any], document: dict[str, Any]) -> None:
+    sensors = {
+        entry["sensor"]: (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"])
+        for entry in document["sensors"]
+        if entry["d33_pc_per_n"] is not None
+    }
+    try:
+        with store.writing() as connection:
+            inversions.keep(connection, row, document["table_sha256"], document, sensors)
+    except StorageFull:
+        logger.warning("no room to keep the d33 of a campaign", extra={"fields": {"campaign": row.id}})

@@ -1,0 +1,110 @@
+"""What the routes of skins answer and take."""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.campaign_models import Reason
+
+
+class JoinedSkin(BaseModel):
+    """A skin that counts as another."""
+
+    id: str = Field(description="Its own id; campaigns sent for it keep it.")
+    joined_to: str = Field(description="The skin it was joined to.")
+    joined_at: str = Field(description="When, UTC.")
+    reason: str = Field(description="Why.")
+
+
+class SkinEntry(BaseModel):
+    """A skin."""
+
+    id: str = Field(description="Its id.")
+    created_at: str = Field(description="When its first campaign arrived, UTC.")
+    campaigns: int = Field(description="How many campaigns it and the skins joined to it have, in any state.")
+
+
+class SkinList(BaseModel):
+    """A page of skins, by id."""
+
+    skins: list[SkinEntry] = Field(description="At most `limit` of them; those joined to another are under that one.")
+    next: str | None = Field(description="Send it as `cursor` for the next page; null on the last.")
+
+
+class SkinDetail(BaseModel):
+    """A skin and what was joined to it."""
+
+    id: str = Field(description="Its id.")
+    created_at: str = Field(description="When its first campaign arrived, UTC.")
+    joined: list[JoinedSkin] = Field(description="Skins that count as this one.")
+    rig: str | None = Field(description="The rig description in use for its files, as it was sent.")
+
+
+class Join(BaseModel):
+    """Says that two ids mean one skin."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    skin_id: str = Field(description="The skin that counts as this one from now on.", examples=["palm-3b"])
+    reason: Reason = Field(description="Why.")
+
+
+class Point(BaseModel):
+    """One campaign's d33 of a sensor."""
+
+    campaign_id: str = Field(description="The campaign.")
+    time: str = Field(description="When it was recorded, or else received, UTC.")
+    time_is: Literal["recorded", "received"] = Field(description="Which of the two.")
+    d33_pc_per_n: float = Field(description="d33 [pC/N].")
+    d33_uncertainty_pc_per_n: float = Field(description="Its standard uncertainty [pC/N].")
+
+
+class TrendAnswer(BaseModel):
+    """A straight line through the points: weighted least squares, its scatter counted where it exceeds the weights."""
+
+    slope_pc_per_n_per_year: float = Field(description="Slope [pC/N a year].")
+    slope_uncertainty_pc_per_n_per_year: float = Field(description="Its standard uncertainty.")
+    p_value: float = Field(description="Of a slope this far from 0 where there is none (Student's t, two-sided).")
+    p_value_adjusted: float = Field(description="The same, adjusted for the number of sensors looked at (Holm).")
+    significant: bool = Field(description="Whether p_value_adjusted is below 0.05.")
+
+
+class SensorHistory(BaseModel):
+    """d33 of one sensor over time."""
+
+    sensor: str = Field(description="Its id.")
+    points: list[Point] = Field(description="By time.")
+    trend: TrendAnswer | None = Field(description="Null for fewer than three points, or points of one time.")
+
+
+class LeftOutCampaign(BaseModel):
+    """A campaign that figures do not use."""
+
+    campaign_id: str = Field(description="The campaign.")
+    reason: str = Field(description="Why.")
+
+
+class LeftOutRecording(BaseModel):
+    """A recording that figures do not use."""
+
+    campaign_id: str = Field(description="Its campaign.")
+    recording: str = Field(description="Its id there.")
+    reason: str = Field(description="Why.")
+
+
+class History(BaseModel):
+    """d33 of each sensor over time, and what that leaves out."""
+
+    skin_id: str = Field(description="The skin; the one it was joined to, where it was.")
+    joined: list[JoinedSkin] = Field(description="Skins that are counted in.")
+    sensors: list[SensorHistory] = Field(description="By id.")
+    left_out_campaigns: list[LeftOutCampaign] = Field(description="Withdrawn, corrected, or without d33.")
+    left_out_recordings: list[LeftOutRecording] = Field(description="Excluded from campaigns that are used.")
+
+
+class Imported(BaseModel):
+    """What an import brought."""
+
+    skin_id: str = Field(description="The skin.")
+    campaigns: Annotated[int, Field(description="How many campaigns were kept.")]
+    present: Annotated[int, Field(description="How many were there already, the same.")]

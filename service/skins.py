@@ -1,0 +1,88 @@
+"""Skins: listed, joined, their d33 over time; all that is kept of one as a file, and back."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Security
+from sqlalchemy import Connection, Row
+
+from service import histories, inverting
+from service import skin_models as models
+from service.dependencies import Store, Table, authorised
+from service.problems import Refusal
+from service.store import skins
+from service.store.campaigns import Missing
+from underskin import InvalidInput
+
+router = APIRouter(tags=["skins"])
+
+WRITE = [Security(authorised, scopes=["write"])]
+
+
+@router.get("/skins", operation_id="skins", summary="Skins, by id")
+def listed(
+    store: Store,
+    id_contains: Annotated[str | None, Query(description="Only those whose id contains this.")] = None,
+    limit: Annotated[int, Query(ge=1, le=200, description="How many on a page.")] = 50,
+    cursor: Annotated[str | None, Query(description="`next` of the page before.")] = None,
+) -> models.SkinList:
+    """Those joined to another are under that one."""
+    with store.reading() as connection:
+        rows = skins.listed(connection, id_contains, cursor, limit + 1)
+    page = [models.SkinEntry(id=row.id, created_at=row.created_at, campaigns=row.campaigns) for row in rows[:limit]]
+    return models.SkinList(skins=page, next=rows[limit - 1].id if len(rows) > limit else None)
+
+
+@router.get("/skins/{skin_id}", operation_id="skin", summary="One skin")
+def one(skin_id: str, store: Store) -> models.SkinDetail:
+    """With what was joined to it; of a joined skin, the one that it counts as."""
+    with store.reading() as connection:
+        return _detail(connection, skin_id)
+
+
+@router.post("/skins/{skin_id}/join", operation_id="join_skins", summary="Join another skin to it", dependencies=WRITE)
+def join(skin_id: str, join: models.Join, store: Store) -> models.SkinDetail:
+    """Two ids turned out to mean one skin: from now on figures of this one use the campaigns of both."""
+    if skin_id == join.skin_id:
+        raise InvalidInput("skin_id", join.skin_id, "must be another skin")
+    with store.writing() as connection:
+        found = skins.lock(connection, [skin_id, join.skin_id])
+        for name in (skin_id, join.skin_id):
+            if name not in found:
+                raise Missing(f"There is no skin {name!r}.")
+            if found[name].root_id != name:
+                raise Refusal(
+                    409, f"Skin {name!r} was joined to {found[name].joined_to!r}: use {found[name].root_id!r}."
+                )
+        skins.join(connection, skin_id, join.skin_id, join.reason)
+        return _detail(connection, skin_id)
+
+
+@router.get("/skins/{skin_id}/history", operation_id="skin_history", summary="d33 over time")
+def history(skin_id: str, store: Store, table: Table) -> models.History:
+    """d33 of each sensor in every current campaign, its trend and whether that is significant."""
+    with store.reading() as connection:
+        root = _root(connection, skin_id)
+    inverting.complete(store, table, root)
+    with store.reading() as connection:
+        return histories.history(connection, root)
+
+
+def _root(connection: Connection, skin_id: str) -> str:
+    return str(_row(connection, skin_id).root_id)
+
+
+def _row(connection: Connection, skin_id: str) -> Row[Any]:
+    row = skins.find(connection, skin_id)
+    if row is None:
+        raise Missing(f"There is no skin {skin_id!r}.")
+    return row
+
+
+def _detail(connection: Connection, skin_id: str) -> models.SkinDetail:
+    row = _row(connection, _root(connection, skin_id))
+    return models.SkinDetail(
+        id=row.id,
+        created_at=row.created_at,
+        joined=[histories.joined(other) for other in skins.joined_to(connection, row.id)],
+        rig=skins.rig_of(connection, row.id),
+    )

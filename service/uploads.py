@@ -1,0 +1,201 @@
+"""What a request uploads, streamed into files of our own naming; its limits hold as it comes in.
+
+A file's own name is kept as a label. It never becomes a path, and says nothing about the file's type.
+"""
+
+import fcntl
+import hashlib
+import shutil
+import tempfile
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+from fastapi import Request
+from python_multipart import MultipartParser
+from python_multipart.exceptions import MultipartParseError
+from python_multipart.multipart import parse_options_header
+
+from service.problems import Refusal
+from service.store.engine import StorageFull, is_full
+
+FOLDER = "uploads"  # in the data folder: on the disk that the store is on
+_MOST_PARTS = 1000
+_LONGEST_HEADER = 4096
+_LONGEST_LABEL = 200
+
+
+@dataclass(frozen=True)
+class Upload:
+    """One file: where it was put, what the client calls it, which field of the form it was, its digest."""
+
+    path: Path
+    label: str | None
+    field: str | None
+    sha256: str
+
+
+class UploadFolder:
+    """This server's folder of uploads under way; what servers that were killed left behind is removed."""
+
+    def __init__(self, data_folder: Path) -> None:
+        parent = data_folder / FOLDER
+        parent.mkdir(parents=True, exist_ok=True)
+        with (parent / ".lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            for left in parent.iterdir():
+                if left.is_dir() and _nobody_uses(left):
+                    shutil.rmtree(left)
+            self.path = Path(tempfile.mkdtemp(dir=parent))
+            self._in_use = (self.path / ".lock").open("w")  # held as long as the process lives
+            fcntl.flock(self._in_use, fcntl.LOCK_EX)
+
+
+def _nobody_uses(folder: Path) -> bool:
+    try:
+        with (folder / ".lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+@asynccontextmanager
+async def received(request: Request, parent: UploadFolder) -> AsyncIterator[list[Upload]]:
+    """The files of a multipart form, or the whole body as one file; gone at the end of the block.
+
+    Raises Refusal (400) where a form cannot be read, StorageFull where the disk is full.
+    """
+    with _full_disk_said(), tempfile.TemporaryDirectory(dir=parent.path) as folder:
+        content_type, options = parse_options_header(request.headers.get("content-type", ""))
+        if content_type == b"multipart/form-data":
+            yield await _parts(request, Path(folder), options.get(b"boundary", b""))
+        else:
+            yield [await _whole(request, Path(folder))]
+
+
+@contextmanager
+def _full_disk_said() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        if is_full(error):
+            raise StorageFull(str(error)) from error
+        raise
+
+
+async def _whole(request: Request, folder: Path) -> Upload:
+    part = _Part(folder / "0")
+    try:
+        async for chunk in request.stream():
+            part.write(chunk)
+    finally:
+        part.close()
+    return part.upload()
+
+
+async def _parts(request: Request, folder: Path, boundary: bytes) -> list[Upload]:
+    form = _Form(folder)
+    try:
+        parser = MultipartParser(boundary, form.callbacks())
+        async for chunk in request.stream():
+            parser.write(chunk)
+        parser.finalize()
+    except MultipartParseError as error:
+        raise Refusal(400, f"The multipart form cannot be read: {error}.") from None
+    finally:
+        form.close()
+    if not form.ended:
+        raise Refusal(400, "The multipart form ends in the middle of a part.")
+    return [part.upload() for part in form.parts]
+
+
+@dataclass
+class _Part:
+    """A file under way."""
+
+    path: Path
+    headers: dict[bytes, bytes] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._file: BinaryIO = self.path.open("xb")
+        self._digest = hashlib.sha256()
+
+    def write(self, data: bytes) -> None:
+        self._file.write(data)
+        self._digest.update(data)
+
+    def close(self) -> None:
+        self._file.close()
+
+    def upload(self) -> Upload:
+        _, options = parse_options_header(self.headers.get(b"content-disposition", b""))
+        label, name = options.get(b"filename"), options.get(b"name")
+        return Upload(self.path, _text(label), _text(name), self._digest.hexdigest())
+
+
+class _Form:
+    """Takes the parser's callbacks: a part's headers, then its data."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._name = b""
+        self._value = b""
+        self.parts: list[_Part] = []
+        self.ended = False
+
+    def callbacks(self) -> dict[str, object]:
+        """By the names that the parser has for them."""
+        return {
+            "on_part_begin": self._begin,
+            "on_header_field": self._header_field,
+            "on_header_value": self._header_value,
+            "on_header_end": self._header_end,
+            "on_part_data": self._data,
+            "on_part_end": self._end,
+            "on_end": self._finish,
+        }
+
+    def close(self) -> None:
+        for part in self.parts:
+            part.close()
+
+    def _begin(self) -> None:
+        if len(self.parts) == _MOST_PARTS:
+            raise Refusal(413, f"The form has more than {_MOST_PARTS} parts; send fewer files a request.")
+        self.parts.append(_Part(self._folder / str(len(self.parts))))
+
+    def _header_field(self, data: bytes, start: int, end: int) -> None:
+        self._name = _short(self._name + data[start:end])
+
+    def _header_value(self, data: bytes, start: int, end: int) -> None:
+        self._value = _short(self._value + data[start:end])
+
+    def _header_end(self) -> None:
+        self.parts[-1].headers[self._name.lower()] = self._value
+        self._name = self._value = b""
+
+    def _data(self, data: bytes, start: int, end: int) -> None:
+        self.parts[-1].write(data[start:end])
+
+    def _end(self) -> None:
+        self.parts[-1].close()
+
+    def _finish(self) -> None:
+        self.ended = True
+
+
+def _short(header: bytes) -> bytes:
+    if len(header) > _LONGEST_HEADER:
+        raise Refusal(400, f"A header of a part is longer than {_LONGEST_HEADER} bytes.")
+    return header
+
+
+def _text(value: bytes | None) -> str | None:
+    """What a client calls something, as a label: printable and short."""
+    if value is None:
+        return None
+    text = "".join(letter for letter in value.decode("utf-8", "replace") if letter.isprintable())
+    return text[:_LONGEST_LABEL]

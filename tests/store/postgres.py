@@ -1,0 +1,76 @@
+"""A real PostgreSQL server of the tests' own: fresh cluster, free port, run by the user postgres where we are root."""
+
+import os
+import pwd
+import shutil
+import socket
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+_BIN = os.pathsep.join(map(str, sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)))
+_PATH = os.pathsep.join([_BIN, os.environ["PATH"]])
+INITDB = shutil.which("initdb", path=_PATH)
+USER = "postgres"
+
+
+def available() -> bool:
+    """Whether PostgreSQL is installed, and its user there where we need it."""
+    return INITDB is not None and (os.geteuid() != 0 or _has_user())
+
+
+def _has_user() -> bool:
+    try:
+        pwd.getpwnam(USER)
+    except KeyError:
+        return False
+    return True
+
+
+def _run(*command: str) -> subprocess.CompletedProcess[str]:
+    as_user = ["setpriv", f"--reuid={USER}", f"--regid={USER}", "--init-groups"] if os.geteuid() == 0 else []
+    environment = {"PATH": _PATH, "LC_ALL": "C.UTF-8"}
+    done = subprocess.run([*as_user, *command], env=environment, capture_output=True, text=True, cwd="/")
+    assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
+    return done
+
+
+class Cluster:
+    """A running server; `new_database` gives the URL of an empty database."""
+
+    def __init__(self, port: int, user: str) -> None:
+        self._base = f"postgresql://{user}@127.0.0.1:{port}"
+        self._psql = ["psql", "--no-psqlrc", "--host=127.0.0.1", f"--port={port}", f"--username={user}"]
+        self._count = 0
+
+    def new_database(self) -> str:
+        self._count += 1
+        name = f"test{self._count}"
+        self.run_sql("postgres", f"CREATE DATABASE {name}")
+        return f"{self._base}/{name}"
+
+    def run_sql(self, database: str, statement: str) -> str:
+        return _run(*self._psql, f"--dbname={database}", "--command", statement).stdout
+
+
+@contextmanager
+def running() -> Iterator[Cluster]:
+    """A cluster in a folder that is gone at the end."""
+    folder = Path(tempfile.mkdtemp(prefix="underskin-postgres-"))
+    if os.geteuid() == 0:
+        shutil.chown(folder, USER, USER)
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+    data = str(folder / "data")
+    try:
+        _run("initdb", "--auth=trust", f"--username={USER}", "--encoding=UTF8", "--no-sync", f"--pgdata={data}")
+        options = f"-c listen_addresses=127.0.0.1 -c port={port} -c unix_socket_directories={folder}"
+        _run("pg_ctl", "start", "--wait", f"--pgdata={data}", f"--log={folder}/log", f"--options={options}")
+        try:
+            yield Cluster(port, USER)
+        finally:
+            _run("pg_ctl", "stop", "--mode=immediate", f"--pgdata={data}")
+    finally:
+        shutil.rmtree(folder)

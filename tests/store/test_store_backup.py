@@ -1,0 +1,77 @@
+"""Backup and restore while the server runs; migrations after a backup; a newer schema."""
+
+import sqlite3
+import subprocess
+from contextlib import closing
+from pathlib import Path
+
+from tests.store.server import Place, Server, campaign, running
+
+
+def names(server: Server) -> set[str]:
+    return {entry["name"] for entry in server.http.get("/v1/campaigns?limit=200&state=all").json()["campaigns"]}
+
+
+def send(server: Server, name: str) -> None:
+    assert server.http.post("/v1/campaigns", json=campaign(name)).status_code == 201
+
+
+def test_a_backup_brings_back_what_was_there(place: Place, server: Server, tmp_path: Path) -> None:
+    file = tmp_path / "kept.backup"
+    send(server, "before")
+    done = place.command("backup", str(file))
+    assert done.returncode == 0, done.stderr
+    send(server, "after")
+    done = place.command("restore", str(file))
+    assert done.returncode == 0, done.stderr
+    assert names(server) == {"before"}
+    send(server, "later")
+    assert names(server) == {"before", "later"}
+    (undo,) = (place.folder / "backups").iterdir()
+    assert place.command("restore", str(undo)).returncode == 0
+    assert names(server) == {"before", "after"}
+
+
+def test_a_backup_moves_to_another_machine(place: Place, server: Server, tmp_path: Path) -> None:
+    if place.database_url:
+        return  # the other machine would be another database: the next line's restore is the same
+    send(server, "moved")
+    assert place.command("backup", str(tmp_path / "b")).returncode == 0
+    other = Place(tmp_path / "other")
+    other.folder.mkdir()
+    assert other.command("restore", str(tmp_path / "b")).returncode == 0
+    with running(other) as there:
+        assert names(there) == {"moved"}
+
+
+def test_what_is_no_backup_is_refused_and_changes_nothing(place: Place, server: Server, tmp_path: Path) -> None:
+    send(server, "kept")
+    good = tmp_path / "good"
+    assert place.command("backup", str(good)).returncode == 0
+    cut = tmp_path / "cut"
+    cut.write_bytes(good.read_bytes()[: good.stat().st_size // 2])
+    foreign = tmp_path / "foreign"
+    foreign.write_text("not a backup")
+    for file in (cut, foreign, tmp_path / "absent"):
+        done = place.command("restore", str(file))
+        assert (done.returncode, str(file) in done.stderr) == (2, True), done.stderr
+    assert names(server) == {"kept"}
+
+
+def test_a_newer_schema_refuses_to_start(place: Place) -> None:
+    with running(place) as server:
+        send(server, "kept")
+    _execute(place, "UPDATE alembic_version SET version_num = '9999'")
+    done = place.command("serve", "--port", "0")
+    assert done.returncode != 0
+    assert "9999" in done.stderr
+    assert "newer" in done.stderr
+
+
+def _execute(place: Place, statement: str) -> None:
+    if place.database_url:
+        subprocess.run(["psql", place.database_url, "--command", statement], check=True, capture_output=True)
+    else:
+        with closing(sqlite3.connect(place.folder / "underskin.sqlite3")) as connection:
+            connection.execute(statement)
+            connection.commit()
