@@ -9,7 +9,7 @@ from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 
-from bench import accuracy, batch, newton_step, orderings, single_requests, start
+from bench import accuracy, batch, newton_step, orderings, single_requests, start, store
 from bench.figures import Figure
 
 PARTS = {
@@ -19,6 +19,7 @@ PARTS = {
     "newton": newton_step.measure,
     "orderings": orderings.measure,
     "accuracy": accuracy.measure,
+    "store": store.measure,
 }
 RESULTS = Path(__file__).parent.parent / "docs" / "bench-results.json"
 _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem")

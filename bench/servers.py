@@ -38,23 +38,31 @@ class Server:
 
     def post(self, path: str, body: object) -> Any:
         """The answer to one JSON request."""
+        return self._request("POST", path, json.dumps(body))
+
+    def get(self, path: str) -> Any:
+        """The JSON at `path`."""
+        return self._request("GET", path, None)
+
+    def _request(self, method: str, path: str, body: str | None) -> Any:
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=30)
-        connection.request("POST", path, json.dumps(body), {"Content-Type": "application/json"})
+        connection.request(method, path, body, {"Content-Type": "application/json"})
         response = connection.getresponse()
         text = response.read()
         connection.close()
-        if response.status != 200:
+        if response.status not in (200, 201):
             raise RuntimeError(f"{path} answered {response.status}: {text[:500].decode()}")
         return json.loads(text)
 
 
 @contextmanager
-def underskin() -> Iterator[Server]:
-    """Our service as `make serve` starts it."""
+def underskin(data: Path | None = None) -> Iterator[Server]:
+    """Our service as `make serve` starts it; what it keeps is in `data`, or gone at the end."""
     port = _free_port()
     command = [str(Path(sys.executable).with_name("underskin")), "serve", "--port", str(port)]
-    with _running(command, port, "/ready") as server:
-        yield server
+    with tempfile.TemporaryDirectory() as scratch:
+        with _running(command, port, "/ready", {"UNDERSKIN_DATA": str(data or scratch)}) as server:
+            yield server
 
 
 @contextmanager
