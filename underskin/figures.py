@@ -14,6 +14,7 @@ from underskin.units import Floats
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 _MARKERS = ("circle", "square", "diamond", "triangle-up", "cross", "x", "star")
+_HOVER_INTERVAL = "%{text}<br>d33 %{y:.3g} pC/N<br>%{customdata[0]:.3g} to %{customdata[1]:.3g} (95 %)<extra></extra>"
 _HOVER_D33 = "%{text}<br>d33 %{customdata[0]:.3g} ± %{customdata[1]:.2g} pC/N"
 
 
@@ -150,7 +151,7 @@ def response_per_sensor(
             name=name,
             text=[_with_reason(sensors[row], reasons[row]) for row in np.flatnonzero(chosen).tolist()],
             customdata=np.column_stack([low, high])[chosen],
-            hovertemplate="%{text}<br>d33 %{y:.3g} pC/N<br>95 % %{customdata[0]:.3g} to %{customdata[1]:.3g}<extra></extra>",
+            hovertemplate=_HOVER_INTERVAL,
             marker={"color": _COLOURS[style], "symbol": _MARKERS[(0, 5)[style]], "size": 9},
         )
     figure.update_layout(title="Response of each sensor")

@@ -7,7 +7,7 @@ declared and the base model as it stands: `declared_percent` says by how much d3
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from underskin.offset import PositionedSigma, positioned_sigma
 from underskin.prediction import Transmission, frf_gradient, transmission
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.flat_zone import FlatZone, band_average, flat_zone, stacked
-from underskin.recordings.frf_estimation import lines_of
+from underskin.recordings.frf_estimation import Frf, lines_of
 from underskin.response import gain
 from underskin.sensor_flags import Flag, standing_out, unfit
 from underskin.skin import Indenter, Skin
@@ -74,6 +74,7 @@ class Inversion:
     gain: Estimate | None
     position: Estimate | None
     left_out: tuple[str, ...]  # in words, each sensor or recording that the campaign's d33 does without
+    findings: tuple[str, ...]  # in words, what was wrong with time series that were used all the same
     declared_percent: float  # change of d33 for E 2 % and h 1 % off, in quadrature
 
 
@@ -85,7 +86,10 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
     recorded = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
     if not recorded:
         raise InvalidInput("recordings", campaign.name, "must hold at least one recording of kind frf")
-    frfs = stacked([lines_of(recording) for recording in recorded])
+    measured, recorded, refused = _measured(recorded)
+    if not recorded:
+        raise InvalidInput("recordings", campaign.name, f"must hold one whose FRF can be estimated; {refused[0]}")
+    frfs = stacked(measured)
     zone = flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
     contact = _Contact.of(campaign, recorded, table)
@@ -110,7 +114,25 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
         d33_uncertainty=np.where(inside, uncertainty, np.nan),
         inside=inside,
     )
-    return _estimated(ids, rows, contact, zone)
+    found = _estimated(ids, rows, contact, zone)
+    findings = (
+        f"recording {item.id}: {defect.statement}"
+        for item, frf in zip(recorded, measured, strict=True)
+        for defect in frf.found
+    )
+    return replace(found, left_out=(*refused, *found.left_out), findings=tuple(findings))
+
+
+def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfRecording], list[str]]:
+    """The FRF of each recording that has one, those recordings, and in words why the others have none."""
+    frfs, kept, refused = [], [], []
+    for recording in recorded:
+        try:
+            frfs.append(lines_of(recording))
+            kept.append(recording)
+        except InvalidInput as error:
+            refused.append(f"recording {recording.id}: {error}")
+    return frfs, kept, refused
 
 
 @dataclass(frozen=True)
@@ -193,6 +215,7 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
         gain=model.gain if model else None,
         position=model.position if model else None,
         left_out=_left_out(ids, rows, misfits),
+        findings=(),
         declared_percent=100 * float(np.nanmedian(contact.declared[good])),
     )  # fmt: skip
 

@@ -134,12 +134,14 @@ def band_average(stacks: Sequence[Stack], zone: FlatZone) -> tuple[Floats, Float
         weight = near * _line_weights(stack.coherence[:, inside])
         total = weight.sum(axis=1)
         value = (weight * real).sum(axis=1) / total
-        kept = near.sum(axis=1)
+        rest = real - value[:, None]
         with np.errstate(divide="ignore", invalid="ignore"):
-            spread = np.sqrt((weight * (real - value[:, None]) ** 2).sum(axis=1) / total * kept / (kept - 1))
+            effective = total**2 / (weight**2).sum(axis=1)
+            unbiased = effective / (effective - 1)
             mean[stack.rows] = value
-            uncertainty[stack.rows] = spread * np.sqrt((weight**2).sum(axis=1)) / total
-            scatter[stack.rows] = spread / np.abs(value)
+            # From the scatter itself, so that weights that are off cost accuracy and not honesty.
+            uncertainty[stack.rows] = np.sqrt((weight**2 * rest**2).sum(axis=1) * unbiased) / total
+            scatter[stack.rows] = np.sqrt((weight * rest**2).sum(axis=1) / total * unbiased) / np.abs(value)
     return mean, _where_one_line(mean, uncertainty, scatter), scatter
 
 
