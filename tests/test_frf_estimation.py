@@ -1,6 +1,8 @@
 """FRF estimation: right on systems whose FRF is known, at least as accurate as pyFRF, honest about its uncertainty."""
 
+import os
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -203,6 +205,41 @@ def test_damage_is_named_and_left_out(kind: str) -> None:
     assert kind in {defect.kind for defect in frf.found}
     if kind != "jump":  # after lost samples of one channel, the phase is off for good
         np.testing.assert_allclose(frf.values, known_frf(frf.frequency), rtol=5e-3)
+
+
+def test_a_spike_is_a_defect_and_a_blow_is_not() -> None:
+    random = np.random.default_rng(11)
+    force = 0.001 * random.standard_normal(8192)
+    spiked = force.copy()
+    spiked[3000] = 5.0
+    assert [defect.kind for defect in broadband(spiked, 1e-12 * force, RATE).found] == ["jump"]
+    force[3000:3005] += np.hanning(7)[1:-1]
+    frf = broadband(force, answer_to(force), RATE, block_samples=8192, window="boxcar")
+    assert frf.found == ()
+    struck = frf.frequency < 300  # the blow's own spectrum ends at 670 Hz
+    assert rms_error(Frf(frf.frequency[struck], frf.values[struck])) < 0.03
+
+
+@pytest.mark.skipif("UNDERSKIN_RECORDINGS" not in os.environ, reason="UNDERSKIN_RECORDINGS does not name the folder")
+@pytest.mark.parametrize(
+    ("channel", "peaks", "median"),
+    [(1, {21.1: None}, 0.024), (2, {19.7: 27.2, 40.0: 3.3, 160.7: 6.8, 461.3: 4.7}, 0.43)],
+)
+def test_a_hammer_blow_on_a_structure(channel: int, peaks: dict[float, float | None], median: float) -> None:
+    """Resonances of a measured response as the folder's description gives them, in the file's units."""
+    path = Path(os.environ["UNDERSKIN_RECORDINGS"]) / "impact-hammer-lvm" / "long_single_header_multi_ch.lvm"
+    lines = path.read_text(encoding="latin-1").split("X_Value", 1)[1].splitlines()[1:]
+    values = np.array([line.split("\t")[1:4] for line in lines if line], dtype=float)
+    frf = broadband(values[:, 0], values[:, channel], 1 / 0.000977, block_samples=8192, overlap=0, window="boxcar")
+    size = np.abs(frf.values)
+    for peak, height in peaks.items():
+        near = np.flatnonzero(np.abs(frf.frequency - peak) < 1)
+        top = near[np.argmax(size[near])]
+        assert frf.frequency[top] == pytest.approx(peak, abs=0.15)
+        if height is not None:
+            assert size[top] == pytest.approx(height, rel=0.02)
+    low = (frf.frequency > 5) & (frf.frequency < 50)
+    assert np.median(size[low]) == pytest.approx(median, rel=0.02)
 
 
 def test_a_recording_with_time_series_gives_lines_in_si() -> None:

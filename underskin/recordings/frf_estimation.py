@@ -18,7 +18,7 @@ from scipy.signal import get_window
 
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.signal_check import Defect, damaged, defects
+from underskin.recordings.signal_check import Defect, damaged, defects_of_pair
 from underskin.recordings.stepped_sine import find_steps, settled, step_amplitudes
 from underskin.units import Complexes, Floats, to_si
 
@@ -103,7 +103,7 @@ def broadband(
         raise InvalidInput("overlap", overlap, "must be 0 or greater and less than 1")
     step = max(1, round(size * (1 - overlap)))
     taper = np.asarray(get_window(window, size), dtype=np.float64)
-    found = [*defects("force_n", force), *defects("charge_pc", charge)]
+    found = defects_of_pair(force, charge)
     whole = ~np.lib.stride_tricks.sliding_window_view(damaged(found, len(force)), size)[::step].any(axis=1)
     if not whole.any():
         raise InvalidInput("force_n", f"{len(found)} defects", f"no undamaged block: {found[0].statement}")
@@ -127,7 +127,7 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
     steps = find_steps(force, sample_rate)
     found = [
         defect
-        for defect in [*defects("force_n", force), *defects("charge_pc", charge)]
+        for defect in defects_of_pair(force, charge)
         if any(settled(step, sample_rate) <= defect.first_sample < step.last - 1 for step in steps)
     ]  # between the steps a jump is the step itself
     bad = damaged(found, len(force))

@@ -15,6 +15,7 @@ _CLIPPED_RATIO = 5.0  # a quantised sine's top level holds at most 1/(√2 − 1
 _HELD_RUN = 5  # samples in a row of one value
 _COARSE = 0.2  # share of samples that equal the one before, above which the levels are coarse
 _JUMP = 12.0  # second difference over its scale among neighbours; a sine stays below 1.5, noise below 6
+_BLOW, _ANSWER = 20.0, 6.0  # kurtosis; a sine has 1.5, noise 3, a hammer's blow hundreds, what rings after it tens
 _LOCAL = 64  # samples that make a neighbourhood
 
 
@@ -36,6 +37,20 @@ class Defect:
             "jump": "break the signal's course: samples were dropped, or a spike",
         }[self.kind]
         return f"{self.channel}: {self.samples} samples from sample {self.first_sample} {reason}"
+
+
+def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
+    """Every defect of force and charge; where the force is a blow that the charge answers, its jumps are no defect."""
+    found = [*defects("force_n", force), *defects("charge_pc", charge)]
+    if _kurtosis(force) > _BLOW and _kurtosis(charge) > _ANSWER:
+        return [defect for defect in found if defect.kind != "jump"]
+    return found
+
+
+def _kurtosis(signal: Floats) -> float:
+    centred = signal - signal.mean()
+    power = float(np.mean(centred**2))
+    return float(np.mean(centred**4)) / power**2 if power > 0 else 0.0
 
 
 def defects(channel: str, signal: Floats) -> list[Defect]:
