@@ -49,6 +49,15 @@ LAB: dict[str, LabField] = {
         LabField("contact_radius_mm", "mm", 1e-3),
         LabField("mean_stress_mpa", "MPa", 1e6),
         LabField("d33_uncertainty_pc_per_n", "pC/N", 1e-12),
+        LabField("dynamic_force_n", "N", 1.0),
+        LabField("force_n", "N", 1.0, signed=True),
+        LabField("charge_pc", "pC", 1e-12, signed=True),
+        LabField("displacement_mm", "mm", 1e-3, signed=True),
+        LabField("time_s", "s", 1.0),
+        LabField("dwell_s", "s", 1.0),
+        LabField("sample_rate_hz", "Hz", 1.0),
+        LabField("frf_re_pc_per_n", "pC/N", 1e-12, signed=True),
+        LabField("frf_im_pc_per_n", "pC/N", 1e-12, signed=True),
     )
 }
 

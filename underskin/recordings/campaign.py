@@ -126,6 +126,16 @@ KINDS: dict[str, type[Recording]] = {
     "indentation": IndentationRecording,
     "compression": CompressionRecording,
 }
+COLUMNS = (
+    "frequency_hz",
+    "frf_re_pc_per_n",
+    "frf_im_pc_per_n",
+    "coherence",
+    "force_n",
+    "charge_pc",
+    "displacement_mm",
+    "time_s",
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 """Campaigns as JSON (`campaign/1`), the format all others are turned into."""
 
-from typing import Any
+from typing import Any, BinaryIO
 
 import orjson
 
@@ -8,6 +8,12 @@ from underskin.errors import FileError
 from underskin.recordings.campaign import Campaign, to_dict
 
 _BOM = b"\xef\xbb\xbf"
+
+
+def read(stream: BinaryIO, file: str) -> Any:
+    """The JSON document of an open file; raises FileError that names line and column."""
+    stream.seek(0)
+    return document(stream.read(), file)
 
 
 def document(data: bytes, file: str) -> Any:
