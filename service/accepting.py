@@ -5,14 +5,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import orjson
 from sqlalchemy import Connection
 
 from service.problems import Refusal
 from service.reading import Arrived, first_letter, read, require_usable
-from service.store import answers, campaigns
+from service.store import answers, campaigns, skins
 from service.store.engine import Database
 from service.uploads import Upload
 from underskin import InvalidInput
+from underskin.errors import FileError
+from underskin.recordings.rig_description import RigDescription, from_dict
+from underskin.recordings.rig_description import parse as parse_rig
+
+RIG = "rig"  # name of the form's part that is a rig description
 
 
 @dataclass(frozen=True)
@@ -56,16 +62,33 @@ def accept(store: Database, uploads: Sequence[Upload], terms: Terms) -> dict[str
             before = answers.replayed(connection, request)
         if before is not None:
             return dict(before)
-    arrived = [found for upload in uploads for found in read(upload, terms.most_json_bytes)]
+    rig = _rig(store, uploads, terms)
+    files = [upload for upload in uploads if upload.field != RIG]
+    arrived = [found for upload in files for found in read(upload, rig, terms.most_json_bytes)]
     _require_keepable(arrived, terms)
     with store.writing() as connection:
         if request is not None and not answers.claim(connection, request):
             return dict(answers.replayed(connection, request) or {})
-        results = [_kept(connection, found, terms) for found in arrived]
+        results = [_kept(connection, found, terms, rig) for found in arrived]
         answer = {"campaigns": results} if _is_batch(uploads) else results[0]
         if request is not None:
             answers.keep(connection, request, answer)
     return answer
+
+
+def _rig(store: Database, uploads: Sequence[Upload], terms: Terms) -> RigDescription | None:
+    """The rig description that was sent, or else the one kept with the skin."""
+    for upload in uploads:
+        if upload.field == RIG:
+            try:
+                return parse_rig(upload.path.read_bytes(), upload.label or RIG)
+            except FileError as error:
+                raise InvalidInput(RIG, upload.label, f"{error.place}: {error.reason}".lstrip(": ")) from None
+    if terms.skin is None:
+        return None
+    with store.reading() as connection:
+        kept = skins.rig_of(connection, terms.skin)
+    return None if kept is None else from_dict(orjson.loads(kept))
 
 
 def _is_batch(uploads: Sequence[Upload]) -> bool:
@@ -101,7 +124,7 @@ def _place(recording: str) -> str:
     return recording if recording.startswith("recordings[") else f"recordings[{recording}]"
 
 
-def _kept(connection: Connection, found: Arrived, terms: Terms) -> dict[str, Any]:
+def _kept(connection: Connection, found: Arrived, terms: Terms, rig: RigDescription | None) -> dict[str, Any]:
     refused = [{"id": entry["id"], "status": "refused", "errors": entry["errors"]} for entry in found.refused]
     result = {"file": found.file, "errors": found.errors, "notes": found.notes}
     if found.campaign is None:
@@ -110,5 +133,7 @@ def _kept(connection: Connection, found: Arrived, terms: Terms) -> dict[str, Any
         found.campaign, terms.skin, refused, found.notes, source=found.file, received_from=terms.sender
     )
     campaign_id, skin_id = campaigns.add(connection, arrival, corrects=terms.corrects, reason=terms.reason)
+    if found.by_rig and rig is not None:
+        skins.keep_rig(connection, skin_id, orjson.dumps(rig.document).decode())
     kept = [{"id": recording.id, "status": "ok", "errors": []} for recording in found.campaign.recordings]
     return {**result, "status": "ok", "id": campaign_id, "skin_id": skin_id, "recordings": kept + refused}

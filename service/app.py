@@ -3,7 +3,7 @@
 from fastapi import APIRouter, FastAPI, Security
 from starlette.types import ASGIApp
 
-from service import campaigns, d33, frf, health, metrics, openapi, sigma, skins, tables, umbridge
+from service import campaigns, d33, exports, frf, health, metrics, openapi, sigma, skins, tables, umbridge
 from service.dependencies import authorised
 from service.front import Front
 from service.gate import Gate
@@ -32,7 +32,7 @@ def create_api(settings: Settings, table: SigmaTable, gate: Gate, store: Databas
     api.state.uploads = UploadFolder(settings.data_folder)
     install_handlers(api)
     v1 = APIRouter(prefix="/v1", dependencies=[Security(authorised, scopes=["read"])])
-    for noun in (sigma, frf, d33, tables, campaigns, skins):
+    for noun in (sigma, frf, d33, tables, campaigns, exports, skins):
         v1.include_router(noun.router)
     for router in (v1, umbridge.router, health.router, metrics.router, openapi.router):
         api.include_router(router)

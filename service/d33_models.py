@@ -1,13 +1,15 @@
 """What is answered on the d33 of a campaign, and how an inversion is put into it."""
 
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, Field
 
-from underskin.inversion import Inversion
-from underskin.mixed_model import Estimate
 from underskin.units import to_lab
+
+if TYPE_CHECKING:
+    from underskin.inversion import Inversion
+    from underskin.mixed_model import Estimate
 
 
 class D33Value(BaseModel):
@@ -80,18 +82,18 @@ class D33(BaseModel):
     gain_scatter_percent: Scatter | None = Field(description="Standard deviation of a recording's gain.")
     position_scatter_mm: Scatter | None = Field(description="Standard deviation of the sphere's position, each axis.")
     declared_percent: float | None = Field(
-        description="How far d33 would move if the declared modulus were 2 % and the thickness 1 % off; intervals omit it."
+        description="How far d33 moves where the declared modulus is 2 % and the thickness 1 % off; not in intervals."
     )
     sensors: list[SensorD33] = Field(description="One entry a sensor that was recorded.")
     cells: list[CellD33] = Field(description="One entry a sensor, indenter and preload that was recorded.")
     left_out: list[LeftOut] = Field(description="What the figures do without.")
 
 
-def of_inversion(found: Inversion) -> dict[str, Any]:
+def of_inversion(found: "Inversion") -> dict[str, Any]:
     """The fields of `D33` that come from an inversion."""
     zone, cells = found.zone, found.cells
     names = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
-    flags = {name: [] for name in found.sensor_ids} | _flags(found)
+    flags = _flags(found)
     radii = to_lab("indenter_radius_mm", cells.indenter_radius).tolist()
     return {
         "status": "ok",
@@ -109,7 +111,7 @@ def of_inversion(found: Inversion) -> dict[str, Any]:
         "position_scatter_mm": _scatter(found.position, 1e3),
         "declared_percent": _finite(found.declared_percent),
         "sensors": [
-            {"sensor": name, "flags": flags[name], **dict(zip(names, row, strict=True))}
+            {"sensor": name, "flags": flags.get(name, []), **dict(zip(names, row, strict=True))}
             for name, row in zip(found.sensor_ids, _columns(found.sensors), strict=True)
         ],
         "cells": [
@@ -128,20 +130,20 @@ def of_inversion(found: Inversion) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _columns(estimate: Estimate) -> list[list[float | None]]:
+def _columns(estimate: "Estimate") -> list[list[float | None]]:
     """Value, uncertainty, low and high [pC/N] of each entry."""
     parts = (estimate.value, estimate.uncertainty, estimate.low, estimate.high)
     columns = np.stack([np.atleast_1d(to_lab("d33_pc_per_n", part)) for part in parts], axis=-1)
     return [[_finite(value) for value in row] for row in columns.tolist()]
 
 
-def _scatter(estimate: Estimate | None, factor: float) -> dict[str, float] | None:
+def _scatter(estimate: "Estimate | None", factor: float) -> dict[str, float] | None:
     if estimate is None:
         return None
     return {name: factor * float(getattr(estimate, name)) for name in ("value", "low", "high")}
 
 
-def _flags(found: Inversion) -> dict[str, list[dict[str, str]]]:
+def _flags(found: "Inversion") -> dict[str, list[dict[str, str]]]:
     by_sensor: dict[str, list[dict[str, str]]] = {}
     for flag in found.flags:
         by_sensor.setdefault(flag.sensor, []).append({"code": flag.code, "reason": flag.reason})

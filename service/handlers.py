@@ -9,8 +9,8 @@ from starlette.exceptions import HTTPException
 
 from service.problems import Refusal, from_validation, invalid_input
 from service.store.answers import OtherRequest
-from service.store.campaigns import Conflict, Missing
 from service.store.engine import StorageFull
+from service.store.errors import Conflict, Missing
 from underskin import InvalidInput
 
 logger = logging.getLogger("underskin")

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable, Sequence
 from datetime import datetime
-from typing import Any
 
-from sqlalchemy import Connection, Row
+from sqlalchemy import Connection
 
 from service import skin_models as models
 from service.store import campaigns, inversions, skins
+from service.store.tables import AnyRow
 from underskin.trend import SIGNIFICANT, Trend, holm, trend
 
 _YEAR_S = 365.25 * 86400
@@ -35,12 +35,12 @@ def history(connection: Connection, root: str) -> models.History:
     )
 
 
-def joined(row: Row[Any]) -> models.JoinedSkin:
+def joined(row: AnyRow) -> models.JoinedSkin:
     """A row of a skin that was joined to another."""
     return models.JoinedSkin(id=row.id, joined_to=row.joined_to, joined_at=row.joined_at, reason=row.join_reason)
 
 
-def _point(row: Row[Any]) -> models.Point:
+def _point(row: AnyRow) -> models.Point:
     return models.Point(
         campaign_id=row.id,
         time=row.recorded_at or row.received_at,
@@ -90,7 +90,7 @@ def _left_out(
     return whole, single
 
 
-def _why_unused(row: Row[Any], is_used: bool) -> str | None:
+def _why_unused(row: AnyRow, is_used: bool) -> str | None:
     match campaigns.state(row):
         case "withdrawn":
             return f"withdrawn: {row.withdraw_reason}"

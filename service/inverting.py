@@ -4,13 +4,11 @@ import logging
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import Row
-
 from service.d33_models import of_inversion
 from service.store import campaigns, inversions
 from service.store.engine import Database, StorageFull
+from service.store.tables import AnyRow
 from underskin import InvalidInput
-from underskin.inversion import invert
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate import SigmaTable
 
@@ -23,7 +21,7 @@ _NOTHING: dict[str, Any] = dict.fromkeys(
 )
 
 
-def answer(store: Database, table: SigmaTable, row: Row[Any], band_hz: Band | None) -> dict[str, Any]:
+def answer(store: Database, table: SigmaTable, row: AnyRow, band_hz: Band | None) -> dict[str, Any]:
     """The d33 of a campaign as it is now (fields of D33), over its flat zone or a band of the user's own."""
     with store.reading() as connection:
         kept = inversions.find(connection, row, table.sha256) if band_hz is None else None
@@ -58,6 +56,9 @@ def complete(store: Database, table: SigmaTable, root: str) -> None:
 
 
 def _inverted(campaign: Campaign, table: SigmaTable, band_hz: Band | None) -> dict[str, Any]:
+    # Imported here: statistics take half a second to load, which a start need not wait for.
+    from underskin.inversion import invert
+
     try:
         found = invert(campaign, table, band_hz)
     except InvalidInput as error:
@@ -68,7 +69,7 @@ def _inverted(campaign: Campaign, table: SigmaTable, band_hz: Band | None) -> di
     return {**of_inversion(found), "left_out": left_out}
 
 
-def _keep(store: Database, row: Row[Any], document: dict[str, Any]) -> None:
+def _keep(store: Database, row: AnyRow, document: dict[str, Any]) -> None:
     sensors = {
         entry["sensor"]: (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"])
         for entry in document["sensors"]

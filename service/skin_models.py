@@ -1,6 +1,6 @@
 """What the routes of skins answer and take."""
 
-from typing import Annotated, Literal
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -37,7 +37,7 @@ class SkinDetail(BaseModel):
     id: str = Field(description="Its id.")
     created_at: str = Field(description="When its first campaign arrived, UTC.")
     joined: list[JoinedSkin] = Field(description="Skins that count as this one.")
-    rig: str | None = Field(description="The rig description in use for its files, as it was sent.")
+    rig: dict[str, Any] | None = Field(description="The rig description in use for its files (`rig/1`).")
 
 
 class Join(BaseModel):
@@ -100,11 +100,3 @@ class History(BaseModel):
     sensors: list[SensorHistory] = Field(description="By id.")
     left_out_campaigns: list[LeftOutCampaign] = Field(description="Withdrawn, corrected, or without d33.")
     left_out_recordings: list[LeftOutRecording] = Field(description="Excluded from campaigns that are used.")
-
-
-class Imported(BaseModel):
-    """What an import brought."""
-
-    skin_id: str = Field(description="The skin.")
-    campaigns: Annotated[int, Field(description="How many campaigns were kept.")]
-    present: Annotated[int, Field(description="How many were there already, the same.")]

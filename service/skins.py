@@ -1,16 +1,17 @@
 """Skins: listed, joined, their d33 over time; all that is kept of one as a file, and back."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
+import orjson
 from fastapi import APIRouter, Query, Security
-from sqlalchemy import Connection, Row
+from sqlalchemy import Connection
 
 from service import histories, inverting
 from service import skin_models as models
 from service.dependencies import Store, Table, authorised
 from service.problems import Refusal
 from service.store import skins
-from service.store.campaigns import Missing
+from service.store.errors import Missing
 from underskin import InvalidInput
 
 router = APIRouter(tags=["skins"])
@@ -61,28 +62,19 @@ def join(skin_id: str, join: models.Join, store: Store) -> models.SkinDetail:
 def history(skin_id: str, store: Store, table: Table) -> models.History:
     """d33 of each sensor in every current campaign, its trend and whether that is significant."""
     with store.reading() as connection:
-        root = _root(connection, skin_id)
+        root = skins.require_root(connection, skin_id)
     inverting.complete(store, table, root)
     with store.reading() as connection:
         return histories.history(connection, root)
 
 
-def _root(connection: Connection, skin_id: str) -> str:
-    return str(_row(connection, skin_id).root_id)
-
-
-def _row(connection: Connection, skin_id: str) -> Row[Any]:
-    row = skins.find(connection, skin_id)
-    if row is None:
-        raise Missing(f"There is no skin {skin_id!r}.")
-    return row
-
-
 def _detail(connection: Connection, skin_id: str) -> models.SkinDetail:
-    row = _row(connection, _root(connection, skin_id))
+    row = skins.find(connection, skins.require_root(connection, skin_id))
+    assert row is not None
+    rig = skins.rig_of(connection, row.id)
     return models.SkinDetail(
         id=row.id,
         created_at=row.created_at,
         joined=[histories.joined(other) for other in skins.joined_to(connection, row.id)],
-        rig=skins.rig_of(connection, row.id),
+        rig=None if rig is None else orjson.loads(rig),
     )

@@ -11,7 +11,7 @@ from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from fastapi import Request
 from python_multipart import MultipartParser
@@ -20,6 +20,9 @@ from python_multipart.multipart import parse_options_header
 
 from service.problems import Refusal
 from service.store.engine import StorageFull, is_full
+
+if TYPE_CHECKING:
+    from python_multipart.multipart import MultipartCallbacks
 
 FOLDER = "uploads"  # in the data folder: on the disk that the store is on
 _MOST_PARTS = 1000
@@ -68,7 +71,7 @@ async def received(request: Request, parent: UploadFolder) -> AsyncIterator[list
 
     Raises Refusal (400) where a form cannot be read, StorageFull where the disk is full.
     """
-    with _full_disk_said(), tempfile.TemporaryDirectory(dir=parent.path) as folder:
+    with full_disk_said(), tempfile.TemporaryDirectory(dir=parent.path) as folder:
         content_type, options = parse_options_header(request.headers.get("content-type", ""))
         if content_type == b"multipart/form-data":
             yield await _parts(request, Path(folder), options.get(b"boundary", b""))
@@ -77,7 +80,8 @@ async def received(request: Request, parent: UploadFolder) -> AsyncIterator[list
 
 
 @contextmanager
-def _full_disk_said() -> Iterator[None]:
+def full_disk_said() -> Iterator[None]:
+    """Turns the system's error for a full disk into StorageFull."""
     try:
         yield
     except OSError as error:
@@ -146,7 +150,7 @@ class _Form:
         self.parts: list[_Part] = []
         self.ended = False
 
-    def callbacks(self) -> dict[str, object]:
+    def callbacks(self) -> "MultipartCallbacks":
         """By the names that the parser has for them."""
         return {
             "on_part_begin": self._begin,

@@ -6,7 +6,8 @@
 
 Fields are named and meant as in the HTTP interface, in lab units. A single number holds for all rows; arrays must be
 equally long. Answers have one entry a row, or shape () where only single numbers were given; a row outside the model's
-domain has the status `out_of_domain` and NaN in all that depends on σ.
+domain has the status `out_of_domain` and NaN in all that depends on σ. Campaigns and skins: `client.campaigns` and
+`client.skins` (underskin.campaign_client).
 """
 
 from collections.abc import Mapping
@@ -14,12 +15,12 @@ from dataclasses import dataclass, fields
 from types import TracebackType
 from typing import Any, Literal, Self, TypeVar
 
-import httpx
 import numpy as np
 import orjson
 from numpy.typing import ArrayLike, NDArray
 
-from underskin.errors import ServiceError, Unreachable
+from underskin.campaign_client import Campaigns, Skins
+from underskin.http_session import Session
 from underskin.units import Floats
 
 
@@ -105,10 +106,9 @@ class Client:
         self, base_url: str = "http://127.0.0.1:8000", api_key: str | None = None, timeout: float = 60.0
     ) -> None:
         """`api_key` where the service asks for one; `timeout` in seconds, for connecting and between bytes."""
-        headers = {"Content-Type": "application/json", "Accept": "application/json"}
-        if api_key is not None:
-            headers["Authorization"] = f"Bearer {api_key}"
-        self._http = httpx.Client(base_url=base_url, headers=headers, timeout=timeout)
+        self._session = Session(base_url, api_key, timeout)
+        self.campaigns = Campaigns(self._session)
+        self.skins = Skins(self._session)
 
     def __enter__(self) -> Self:
         return self
@@ -120,7 +120,7 @@ class Client:
 
     def close(self) -> None:
         """Close the connections."""
-        self._http.close()
+        self._session.http.close()
 
     def sigma(
         self,
@@ -232,17 +232,7 @@ class Client:
 
     def _request(self, method: str, path: str, body: Mapping[str, Any] | None = None) -> dict[str, Any]:
         content = None if body is None else orjson.dumps(body, _number, orjson.OPT_SERIALIZE_NUMPY)
-        try:
-            response = self._http.request(method, path, content=content)
-        except httpx.TransportError as error:
-            reason = "no answer in time" if isinstance(error, httpx.TimeoutException) else error
-            raise Unreachable(f"the service at {self._http.base_url} cannot be reached: {reason}") from error
-        if not response.is_success:
-            raise ServiceError(response.status_code, _document(response) or _foreign(response))
-        document = _document(response)
-        if document is None:
-            raise ServiceError(response.status_code, _foreign(response))
-        return document
+        return self._session.json(method, path, content=content, headers={"Content-Type": "application/json"})
 
 
 # Rows × lines; a single list is one row.
@@ -272,17 +262,3 @@ def _field(name: str, document: Mapping[str, Any], single: bool) -> Any:
         return value
     array = np.array(value) if name == "status" else np.array(value, dtype=float)  # None becomes NaN
     return array[0, ...] if single and name != "frequency_hz" else array
-
-
-def _document(response: httpx.Response) -> dict[str, Any] | None:
-    """The JSON object of an answer; None where it is something else."""
-    try:
-        document = orjson.loads(response.content)
-    except orjson.JSONDecodeError:
-        return None
-    return document if isinstance(document, dict) else None
-
-
-def _foreign(response: httpx.Response) -> dict[str, Any]:
-    """A problem for an answer that another program gave, such as a proxy."""
-    return {"title": response.reason_phrase, "detail": f"not an answer of underskin: {response.text[:200]!r}"}

@@ -22,7 +22,7 @@ def pack(arrays: Mapping[str, Floats]) -> bytes:
     header = orjson.dumps([[name, len(values)] for name, values in arrays.items()])
     together = np.concatenate([np.asarray(values, "<f8") for values in arrays.values()]) if arrays else np.empty(0)
     shuffled = np.ascontiguousarray(together.view(np.uint8).reshape(-1, 8).T)
-    return struct.pack("<I", len(header)) + header + zlib.compress(shuffled, _LEVEL)
+    return struct.pack("<I", len(header)) + header + zlib.compress(shuffled.data, _LEVEL)
 
 
 def unpack(blob: bytes) -> dict[str, Floats]:

@@ -5,10 +5,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from sqlalchemy import Connection, Row, Select, func, insert, select, update
+from sqlalchemy import Connection, Select, func, insert, select, update
 
 from service.store import codec, skins
-from service.store.tables import campaigns, recordings
+from service.store.errors import Conflict, Missing
+from service.store.tables import AnyRow, campaigns, recordings
 from service.store.times import now
 from underskin.recordings.campaign import Campaign, Recording
 
@@ -17,14 +18,6 @@ State = Literal["current", "corrected", "withdrawn"]
 # All that lists show of a recording: not its arrays.
 _LISTED = [column for column in recordings.c if column.name not in ("campaign", "position", "arrays")]
 CURRENT = campaigns.c.withdrawn_at.is_(None) & campaigns.c.corrected_by.is_(None)
-
-
-class Missing(LookupError):
-    """There is no such campaign, recording or skin."""
-
-
-class Conflict(ValueError):
-    """What was asked does not fit the state of what is kept."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +93,7 @@ def rows_of(number: int, kept: Sequence[Recording]) -> list[dict[str, Any]]:
     ]
 
 
-def find(connection: Connection, campaign_id: str) -> Row[Any]:
+def find(connection: Connection, campaign_id: str) -> AnyRow:
     """The row of a campaign; raises Missing."""
     row = connection.execute(select(campaigns).where(campaigns.c.id == campaign_id)).first()
     if row is None:
@@ -108,7 +101,7 @@ def find(connection: Connection, campaign_id: str) -> Row[Any]:
     return row
 
 
-def listed(connection: Connection, filters: Filters, before: int | None, limit: int) -> Sequence[Row[Any]]:
+def listed(connection: Connection, filters: Filters, before: int | None, limit: int) -> Sequence[AnyRow]:
     """Rows of campaigns, the latest arrival first, those that arrived before the number `before`."""
     query = _filtered(select(campaigns), filters)
     if before is not None:
@@ -116,14 +109,14 @@ def listed(connection: Connection, filters: Filters, before: int | None, limit: 
     return connection.execute(query.order_by(campaigns.c.number.desc()).limit(limit)).all()
 
 
-def state(row: Row[Any]) -> State:
+def state(row: AnyRow) -> State:
     """Whether figures use it."""
     if row.withdrawn_at is not None:
         return "withdrawn"
     return "current" if row.corrected_by is None else "corrected"
 
 
-def recordings_of(connection: Connection, number: int) -> Sequence[Row[Any]]:
+def recordings_of(connection: Connection, number: int) -> Sequence[AnyRow]:
     """The recordings of a campaign without their arrays, in order."""
     query = select(*_LISTED).where(recordings.c.campaign == number)
     return connection.execute(query.order_by(recordings.c.position)).all()
@@ -136,7 +129,7 @@ def excluded_of(connection: Connection, number: int) -> list[Excluded]:
     return [Excluded(*row) for row in connection.execute(query.order_by(recordings.c.position))]
 
 
-def load(connection: Connection, row: Row[Any], *, with_excluded: bool = True) -> Campaign:
+def load(connection: Connection, row: AnyRow, *, with_excluded: bool = True) -> Campaign:
     """The campaign as it came, arrays and all; without what was excluded where asked."""
     query = select(recordings.c.kind, recordings.c.scalars, recordings.c.arrays)
     query = query.where(recordings.c.campaign == row.number).order_by(recordings.c.position)
@@ -164,13 +157,13 @@ def exclude(connection: Connection, campaign_id: str, recording_id: str, reason:
     _change(connection, row.number, excluded=campaigns.c.excluded + 1)
 
 
-def of_skin(connection: Connection, root: str) -> Iterator[Row[Any]]:
+def of_skin(connection: Connection, root: str) -> Iterator[AnyRow]:
     """Rows of all campaigns of a skin and of those joined to it, in order of arrival."""
     query = select(campaigns).where(campaigns.c.skin_id.in_(skins.members(root))).order_by(campaigns.c.number)
     yield from connection.execute(query)
 
 
-def _changeable(connection: Connection, campaign_id: str) -> Row[Any]:
+def _changeable(connection: Connection, campaign_id: str) -> AnyRow:
     """The row, locked until the transaction ends; raises Missing, or Conflict where it is no longer current."""
     query = select(campaigns).where(campaigns.c.id == campaign_id).with_for_update()
     row = connection.execute(query).first()

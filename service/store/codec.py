@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import orjson
-from sqlalchemy import Row
 
 from service.store.arrays import pack, unpack
+from service.store.tables import AnyRow
 from service.store.times import stored
 from underskin.recordings.campaign import KINDS, Campaign, Recording, Sensor, SkinDescription
 
@@ -40,12 +40,12 @@ def recording_columns(recording: Recording) -> dict[str, Any]:
     }
 
 
-def recording_of(row: Row[Any]) -> Recording:
+def recording_of(row: AnyRow) -> Recording:
     """The inverse of `recording_columns`, from a row with kind, scalars and arrays."""
-    scalars = dict(row.scalars)
-    if "position_mm" in scalars:
-        scalars["position_mm"] = tuple(scalars["position_mm"])
-    return KINDS[row.kind](**scalars, **unpack(row.arrays))
+    values: dict[str, Any] = {**row.scalars, **unpack(row.arrays)}
+    if "position_mm" in values:
+        values["position_mm"] = tuple(values["position_mm"])
+    return KINDS[row.kind](**values)
 
 
 def recorded_at(recording: Recording) -> str | None:

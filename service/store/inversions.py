@@ -3,14 +3,14 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import Connection, Row, delete, insert, select
+from sqlalchemy import Connection, delete, insert, select
 
 from service.store import skins
 from service.store.codec import compressed, decompressed
-from service.store.tables import campaigns, inversions, sensor_d33
+from service.store.tables import AnyRow, campaigns, inversions, sensor_d33
 
 
-def find(connection: Connection, campaign: Row[Any], table_sha256: str) -> Any | None:
+def find(connection: Connection, campaign: AnyRow, table_sha256: str) -> Any | None:
     """The answer kept for a campaign as it is now, with this table; None where there is none."""
     query = select(inversions.c.document).where(
         inversions.c.campaign == campaign.number,
@@ -23,7 +23,7 @@ def find(connection: Connection, campaign: Row[Any], table_sha256: str) -> Any |
 
 def keep(
     connection: Connection,
-    campaign: Row[Any],
+    campaign: AnyRow,
     table_sha256: str,
     document: Any,
     sensors: Mapping[str, tuple[float, float]],
@@ -44,7 +44,7 @@ def keep(
         connection.execute(insert(sensor_d33), values)
 
 
-def missing_of_skin(connection: Connection, root: str, table_sha256: str) -> Sequence[Row[Any]]:
+def missing_of_skin(connection: Connection, root: str, table_sha256: str) -> Sequence[AnyRow]:
     """Rows of the skin's current campaigns whose d33 is not kept as they are now."""
     fresh = (
         (inversions.c.campaign == campaigns.c.number)
@@ -55,7 +55,7 @@ def missing_of_skin(connection: Connection, root: str, table_sha256: str) -> Seq
     return connection.execute(query.order_by(campaigns.c.number)).all()
 
 
-def history(connection: Connection, root: str) -> Sequence[Row[Any]]:
+def history(connection: Connection, root: str) -> Sequence[AnyRow]:
     """d33 by sensor of all current campaigns of a skin and of those joined to it, in order of arrival."""
     query = (
         select(

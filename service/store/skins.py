@@ -4,10 +4,11 @@ import secrets
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import Connection, Row, ScalarSelect, Select, exists, func, insert, select, update
+from sqlalchemy import Connection, ScalarSelect, Select, exists, func, insert, select, update
 from sqlalchemy.dialects import postgresql, sqlite
 
-from service.store.tables import campaigns, rigs, skins
+from service.store.errors import Missing
+from service.store.tables import AnyRow, campaigns, rigs, skins
 from service.store.times import now
 
 
@@ -20,9 +21,17 @@ def require(connection: Connection, skin_id: str | None) -> str:
     return skin_id
 
 
-def find(connection: Connection, skin_id: str) -> Row[Any] | None:
+def find(connection: Connection, skin_id: str) -> AnyRow | None:
     """The row of a skin."""
     return connection.execute(select(skins).where(skins.c.id == skin_id)).first()
+
+
+def require_root(connection: Connection, skin_id: str) -> str:
+    """The id of the skin that `skin_id` counts as; raises Missing."""
+    row = find(connection, skin_id)
+    if row is None:
+        raise Missing(f"There is no skin {skin_id!r}.")
+    return str(row.root_id)
 
 
 def root_of(skin_id: str) -> ScalarSelect[Any]:
@@ -35,13 +44,13 @@ def members(root: str | ScalarSelect[Any]) -> Select[Any]:
     return select(skins.c.id).where(skins.c.root_id == root)
 
 
-def joined_to(connection: Connection, root: str) -> Sequence[Row[Any]]:
+def joined_to(connection: Connection, root: str) -> Sequence[AnyRow]:
     """Rows of the skins that were joined to `root`."""
     query = select(skins).where(skins.c.root_id == root, skins.c.id != root).order_by(skins.c.id)
     return connection.execute(query).all()
 
 
-def listed(connection: Connection, contains: str | None, after: str | None, limit: int) -> Sequence[Row[Any]]:
+def listed(connection: Connection, contains: str | None, after: str | None, limit: int) -> Sequence[AnyRow]:
     """Skins by id, without those joined to another, with how many campaigns each has."""
     member = skins.alias("member")
     counted = (
@@ -65,7 +74,7 @@ def join(connection: Connection, skin_id: str, other: str, reason: str) -> None:
     connection.execute(update(skins).where(skins.c.id == other).values(**joined))
 
 
-def lock(connection: Connection, ids: Sequence[str]) -> dict[str, Row[Any]]:
+def lock(connection: Connection, ids: Sequence[str]) -> dict[str, AnyRow]:
     """Rows of skins by id, locked until the transaction ends."""
     query = select(skins).where(skins.c.id.in_(ids)).order_by(skins.c.id).with_for_update()
     return {row.id: row for row in connection.execute(query)}

@@ -5,6 +5,8 @@ Nothing is deleted: a campaign is withdrawn or corrected, a recording excluded, 
 reason, and the rows stay.
 """
 
+from typing import Any, TypeAlias
+
 from sqlalchemy import (
     JSON,
     BigInteger,
@@ -15,11 +17,14 @@ from sqlalchemy import (
     Integer,
     LargeBinary,
     MetaData,
+    Row,
     String,
     Table,
     Text,
     UniqueConstraint,
 )
+
+AnyRow: TypeAlias = Row[*tuple[Any, ...]]
 
 metadata = MetaData()
 
@@ -41,7 +46,7 @@ rigs = Table(
     metadata,
     Column("number", _Number, primary_key=True),
     Column("skin_id", String, ForeignKey("skins.id"), nullable=False),
-    Column("document", Text, nullable=False),  # as the user wrote it
+    Column("document", Text, nullable=False),  # rig/1 as JSON
     Column("created_at", String, nullable=False),
     Index("rigs_of_skin", "skin_id", "number"),
 )

@@ -1,5 +1,7 @@
 """Skins: joined, and every figure over time with what it leaves out."""
 
+from typing import Any
+
 import pytest
 
 from tests.store.server import Place, Server, campaign, running
@@ -14,7 +16,7 @@ def post(server: Server, skin: str, name: str, d33: float = 14.0, year: int = 20
     return str(answer.json()["id"])
 
 
-def history(server: Server, skin: str) -> dict:
+def history(server: Server, skin: str) -> dict[str, Any]:
     answer = server.http.get(f"/v1/skins/{skin}/history")
     assert answer.status_code == 200, answer.text
     return dict(answer.json())

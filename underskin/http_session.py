@@ -1,0 +1,60 @@
+"""Requests to the service, and their errors as ours."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import httpx
+import orjson
+
+from underskin.errors import ServiceError, Unreachable
+
+
+class Session:
+    """The service at `base_url`; every request raises ServiceError (refused or failed) or Unreachable (no answer)."""
+
+    def __init__(self, base_url: str, api_key: str | None, timeout: float) -> None:
+        headers = {"Accept": "application/json"}
+        if api_key is not None:
+            headers["Authorization"] = f"Bearer {api_key}"
+        self.http = httpx.Client(base_url=base_url, headers=headers, timeout=timeout)
+
+    def json(self, method: str, path: str, **options: Any) -> dict[str, Any]:
+        """The JSON object of the answer; `options` as httpx has them."""
+        with self._reaching():
+            response = self.http.request(method, path, **options)
+        document = _document(response)
+        if document is None or not response.is_success:
+            raise ServiceError(response.status_code, document or _foreign(response))
+        return document
+
+    @contextmanager
+    def stream(self, method: str, path: str, **options: Any) -> Iterator[httpx.Response]:
+        """An answer of any type, to be read as it comes."""
+        with self._reaching(), self.http.stream(method, path, **options) as response:
+            if not response.is_success:
+                response.read()
+                raise ServiceError(response.status_code, _document(response) or _foreign(response))
+            yield response
+
+    @contextmanager
+    def _reaching(self) -> Iterator[None]:
+        try:
+            yield
+        except httpx.TransportError as error:
+            reason = "no answer in time" if isinstance(error, httpx.TimeoutException) else error
+            raise Unreachable(f"the service at {self.http.base_url} cannot be reached: {reason}") from error
+
+
+def _document(response: httpx.Response) -> dict[str, Any] | None:
+    """The JSON object of an answer; None where it is something else."""
+    try:
+        document = orjson.loads(response.content)
+    except orjson.JSONDecodeError:
+        return None
+    return document if isinstance(document, dict) else None
+
+
+def _foreign(response: httpx.Response) -> dict[str, Any]:
+    """A problem for an answer that another program gave, such as a proxy."""
+    return {"title": response.reason_phrase, "detail": f"not an answer of underskin: {response.text[:200]!r}"}

@@ -1,0 +1,130 @@
+"""All that a service keeps of a skin in one HDF5 file, `skin-export/1`.
+
+/                     attributes schema, skin
+/skins, /rigs         JSON text: what is kept of skins and their rigs, a list of objects
+/campaigns/<id>       JSON text `about` (an object) and `recordings` (a list of objects, without arrays); for each
+                      array the values of all recordings one behind another in `arrays/<name>`, how many of them
+                      are whose in `lengths/<name>`, 0 for a recording without it
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import h5py
+import numpy as np
+import orjson
+
+from underskin.errors import FileError
+from underskin.recordings.hdf5_links import refuse_outside
+from underskin.recordings.sandbox import call_apart
+from underskin.units import Floats
+
+SCHEMA = "skin-export/1"
+_NOTHING = np.empty(0)
+
+
+@dataclass(frozen=True, eq=False)
+class ExportedCampaign:
+    """What is kept of a campaign, of its recordings, and their arrays."""
+
+    about: dict[str, Any]
+    recordings: list[dict[str, Any]]
+    arrays: list[dict[str, Floats]]
+
+    def same_as(self, other: "ExportedCampaign") -> bool:
+        """Whether both say the same, to the last digit."""
+        return (self.about, self.recordings) == (other.about, other.recordings) and all(
+            mine.keys() == others.keys() and all(np.array_equal(mine[name], others[name]) for name in mine)
+            for mine, others in zip(self.arrays, other.arrays, strict=True)
+        )
+
+
+@dataclass(frozen=True)
+class Overview:
+    """The skin, what is kept of it and of those joined to it, their rigs, and the ids of campaigns."""
+
+    skin: str
+    skins: list[dict[str, Any]]
+    rigs: list[dict[str, Any]]
+    campaigns: list[str]
+
+
+@contextmanager
+def writing(file: Path, overview: Overview) -> Iterator[Any]:
+    """A new file; the block adds the campaigns by `write_campaign`, one in memory at a time."""
+    with h5py.File(file, "w", libver="latest") as target:
+        target.attrs["schema"], target.attrs["skin"] = SCHEMA, overview.skin
+        _write_text(target, "skins", overview.skins)
+        _write_text(target, "rigs", overview.rigs)
+        target.create_group("campaigns", track_order=True)
+        yield target
+
+
+def write_campaign(target: Any, name: str, campaign: ExportedCampaign) -> None:
+    """Add a campaign to an open file."""
+    group = target["campaigns"].create_group(name)
+    _write_text(group, "about", campaign.about)
+    _write_text(group, "recordings", campaign.recordings)
+    for column in dict.fromkeys(column for arrays in campaign.arrays for column in arrays):
+        parts = [arrays.get(column, _NOTHING) for arrays in campaign.arrays]
+        group[f"lengths/{column}"] = np.array([len(part) for part in parts], dtype=np.int64)
+        group.create_dataset(f"arrays/{column}", data=np.concatenate(parts), compression="gzip", shuffle=True)
+
+
+def read_overview(stream: BinaryIO, file: str) -> Overview:
+    """What an export holds, read in a child process; raises FileError where it is none, or damaged."""
+    return Overview(**call_apart(f"{__name__}:_overview", stream, file, what=SCHEMA))
+
+
+def read_campaigns(stream: BinaryIO, file: str, names: Sequence[str]) -> list[ExportedCampaign]:
+    """Some campaigns of an export, read in a child process; raises FileError."""
+    told = call_apart(f"{__name__}:_campaigns", stream, file, orjson.dumps(names).decode(), what=SCHEMA)
+    return [ExportedCampaign(**campaign) for campaign in told["campaigns"]]
+
+
+def _overview(stream: BinaryIO) -> dict[str, Any]:
+    with _opened(stream) as source:
+        rows = {name: _text(source, name) for name in ("skins", "rigs")}
+        return {"skin": str(source.attrs["skin"]), **rows, "campaigns": list(source["campaigns"])}
+
+
+def _campaigns(stream: BinaryIO, names: str) -> dict[str, Any]:
+    with _opened(stream) as source:
+        return {"campaigns": [_campaign(source["campaigns"][name]) for name in orjson.loads(names)]}
+
+
+@contextmanager
+def _opened(stream: BinaryIO) -> Iterator[Any]:
+    try:
+        with h5py.File(stream, "r") as source:
+            refuse_outside(source, "")
+            if source.attrs.get("schema") != SCHEMA:
+                raise FileError("", "/", f"is no export of a skin: it needs the attribute schema = {SCHEMA}")
+            yield source
+    except (MemoryError, FileError):
+        raise
+    except Exception as error:  # h5py lets any exception of a damaged file through
+        raise FileError("", "", f"the export is damaged: {type(error).__name__}: {error}") from None
+
+
+def _campaign(group: Any) -> dict[str, Any]:
+    recordings = _text(group, "recordings")
+    arrays: list[dict[str, Floats]] = [{} for _ in recordings]
+    for column in group.get("arrays", ()):
+        ends = np.cumsum(group["lengths"][column][()])
+        parts = np.split(group["arrays"][column][()].astype(np.float64), ends[:-1])
+        for own, part in zip(arrays, parts, strict=True):
+            if len(part):
+                own[column] = part
+    return {"about": _text(group, "about"), "recordings": recordings, "arrays": arrays}
+
+
+def _text(group: Any, name: str) -> Any:
+    return orjson.loads(group[name][()].tobytes())
+
+
+def _write_text(group: Any, name: str, document: Any) -> None:
+    group[name] = np.frombuffer(orjson.dumps(document), np.uint8)
