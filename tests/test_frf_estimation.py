@@ -137,7 +137,7 @@ def test_at_least_as_accurate_as_pyfrf(estimator: str, drift: float) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from pyFRF import FRF
-    random = np.random.default_rng(6)
+    random = np.random.default_rng(60)
     force, charge = shaken(6)
     force, charge = (x + 0.04 * np.std(x) * random.standard_normal(len(x)) for x in (force, charge))
     charge = charge + GAIN * drift * np.arange(len(force)) / RATE
@@ -155,7 +155,7 @@ def test_at_least_as_accurate_as_pyfrf(estimator: str, drift: float) -> None:
     )
     theirs = Frf(ours.frequency, peer.get_FRF(frf_estimator=estimator)[0, 0, 1:1000] * 1e-12)
     assert len(peer.get_f_axis()) == 1001
-    assert rms_error(ours) <= 1.01 * rms_error(theirs)  # chance alone moves the ratio by a percent
+    assert rms_error(ours) <= 1.005 * rms_error(theirs)  # what chance alone may do
     if drift:
         assert rms_error(ours) < 0.6 * rms_error(theirs)
 

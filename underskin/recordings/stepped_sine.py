@@ -109,13 +109,15 @@ def _rising_crossings(signal: Floats) -> Floats:
 
 def _even_runs(crossings: Floats) -> list[tuple[float, float, int]]:
     """First and last crossing and number of cycles of each run of nearly equal periods."""
-    periods = np.diff(crossings)
+    places = crossings.tolist()
     runs, start = [], 0
-    for index in range(1, len(periods) + 1):
-        if index < len(periods) and abs(periods[index] / np.median(periods[start:index]) - 1) < _SAME_PERIOD:
-            continue
+    for index in range(1, len(places)):
+        if index + 1 < len(places):
+            mean = (places[index] - places[start]) / (index - start)
+            if abs(places[index + 1] - places[index] - mean) < _SAME_PERIOD * mean:
+                continue
         if index - start >= _FEWEST_CYCLES:
-            runs.append((float(crossings[start]), float(crossings[index]), index - start))
+            runs.append((places[start], places[index], index - start))
         start = index
     return runs
 
