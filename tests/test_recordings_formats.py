@@ -272,9 +272,9 @@ def matlab_73(variables: dict[str, Any]) -> bytes:
     return head.ljust(512, b"\0") + buffer.getvalue()[512:]
 
 
-def matlab_5(variables: dict[str, Any]) -> bytes:
+def matlab_5(variables: dict[str, Any], compressed: bool = True) -> bytes:
     buffer = io.BytesIO()
-    scipy.io.savemat(cast("Any", buffer), variables, do_compression=True)
+    scipy.io.savemat(cast("Any", buffer), variables, do_compression=compressed)
     return buffer.getvalue()
 
 
