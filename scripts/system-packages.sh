@@ -6,11 +6,15 @@ set -eu
 command_of() { # PACKAGE
     case $1 in
         octave) echo octave-cli ;;
+        postgresql) echo initdb ;;
         *) echo "$1" ;;
     esac
 }
 
 PATH=$PATH:/usr/sbin
+for folder in /usr/lib/postgresql/*/bin; do
+    PATH=$PATH:$folder # Debian keeps the server's programs there
+done
 missing=
 for package in "$@"; do
     command -v "$(command_of "$package")" >/dev/null 2>&1 || missing="$missing $package"

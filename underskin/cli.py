@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from underskin import cli_store
 from underskin.errors import UnderskinError
 
 if TYPE_CHECKING:
@@ -171,6 +172,10 @@ def _answer(
         columns.write_table(everything, answer.inside, count)
         if not answer.inside.all():
             typer.echo(f"The domain is {answer.domain}.")
+
+
+app.command("import", no_args_is_help=True)(cli_store.import_files)
+app.command("export", no_args_is_help=True)(cli_store.export_skin)
 
 
 def _add_commands_of_other_packages() -> None:

@@ -109,7 +109,9 @@ def _spoil_array(file: h5py.File) -> None:
 
 
 @pytest.mark.parametrize("spoil", [_link_out, _drop_rows, _spoil_array])
-def test_a_file_that_was_tampered_with_is_refused(server: Server, elsewhere: Server, tmp_path: Path, spoil: Any) -> None:
+def test_a_file_that_was_tampered_with_is_refused(
+    server: Server, elsewhere: Server, tmp_path: Path, spoil: Any
+) -> None:
     server.http.post("/v1/campaigns?skin=palm", json=campaign("one"))
     file = tmp_path / "palm.h5"
     file.write_bytes(server.http.get("/v1/skins/palm/export").content)

@@ -1,0 +1,88 @@
+"""The Python client and the command line, on all that the store does."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import orjson
+import pytest
+
+from tests.store.server import Place, Server, campaign, running
+from underskin import Client, ServiceError
+from underskin.recordings.campaign import parse, to_dict
+
+
+@pytest.fixture
+def client(server: Server) -> Iterator[Client]:
+    with Client(str(server.http.base_url)) as opened:
+        yield opened
+
+
+def test_a_campaign_there_and_back(client: Client) -> None:
+    sent = parse(campaign("array"))
+    answer = client.campaigns.post(sent, skin="palm")
+    assert to_dict(client.campaigns.load(answer["id"])) == to_dict(sent)
+    assert client.campaigns.get(answer["id"])["recordings"] == 6
+    assert [entry["id"] for entry in client.campaigns.all(skin="palm")] == [answer["id"]]
+    d33 = client.campaigns.d33(answer["id"])
+    assert {entry["sensor"] for entry in d33["sensors"]} == {"s0", "s1", "s2"}
+    chosen = client.campaigns.d33(answer["id"], band_hz=(20, 80))
+    assert (chosen["band"]["low_hz"], chosen["band"]["chosen_by_user"]) == (20, True)
+
+
+def test_corrections_exclusions_and_withdrawals(client: Client) -> None:
+    first = client.campaigns.post(campaign("first"), skin="palm")["id"]
+    second = client.campaigns.post(campaign("second"), corrects=first, reason="typing slip")["id"]
+    assert client.campaigns.exclude(second, "s0-1N", "cable loose")["excluded"] == 1
+    client.campaigns.withdraw(second, "fell down")
+    assert list(client.campaigns.all(skin="palm")) == []
+    assert {entry["id"] for entry in client.campaigns.all(skin="palm", state="all")} == {first, second}
+    with pytest.raises(ServiceError, match="fell down"):
+        client.campaigns.withdraw(second, "again")
+
+
+def test_pages_are_turned(client: Client) -> None:
+    for number in range(3):
+        documents = [campaign(f"{number}-{index}", sensors=1, lines=3) for index in range(70)]
+        assert client._session.json("POST", "/v1/campaigns", json=documents)["campaigns"]
+    assert len({entry["id"] for entry in client.campaigns.all()}) == 210
+    assert len({entry["id"] for entry in client.skins.all()}) == 210
+
+
+def test_skins(client: Client, tmp_path: Path) -> None:
+    for skin in ("a", "b"):
+        client.campaigns.post(campaign(skin), skin=skin)
+    assert [entry["id"] for entry in client.skins.join("a", "b", "one skin")["joined"]] == ["b"]
+    assert len(client.skins.history("b")["sensors"][0]["points"]) == 2
+    client.skins.export("a", tmp_path / "a.h5")
+    assert client.skins.load(tmp_path / "a.h5")["present"] == 2
+    assert client.skins.get("b")["id"] == "a"
+    with pytest.raises(ServiceError, match="404"):
+        client.skins.export("none", tmp_path / "none.h5")
+    assert [path.name for path in tmp_path.glob("*.h5*")] == ["a.h5"]
+
+
+def test_the_commands_import_and_export(place: Place, server: Server, tmp_path: Path) -> None:
+    good, mixed, bad = tmp_path / "good.json", tmp_path / "mixed.json", tmp_path / "bad.json"
+    good.write_bytes(orjson.dumps(campaign("good")))
+    spoilt = campaign("mixed")
+    spoilt["recordings"][0]["preload_n"] = -1
+    mixed.write_bytes(orjson.dumps(spoilt))
+    bad.write_text("{")
+    there = ["--url", str(server.http.base_url)]
+    done = place.command("import", str(good), "--skin", "palm", *there)
+    assert (done.returncode, "6 recordings" in done.stderr + done.stdout) == (0, True), done.stderr
+    done = place.command("import", str(mixed), str(bad), str(good), "--skin", "palm", *there)
+    assert done.returncode == 2
+    told = done.stdout + done.stderr
+    assert "preload_n = -1" in told
+    assert "bad.json" in told
+    assert len(server.http.get("/v1/campaigns?skin=palm").json()["campaigns"]) == 3
+    file = tmp_path / "palm.h5"
+    done = place.command("export", "palm", str(file), *there)
+    assert done.returncode == 0, done.stderr
+    other = Place(tmp_path / "other")
+    other.folder.mkdir()
+    with running(other) as elsewhere:
+        done = place.command("import", str(file), "--url", str(elsewhere.http.base_url))
+        assert done.returncode == 0, done.stderr
+        assert len(elsewhere.http.get("/v1/campaigns?skin=palm").json()["campaigns"]) == 3

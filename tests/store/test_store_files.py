@@ -1,0 +1,119 @@
+"""Files as uploads: by their content, under limits that hold as they stream, with a rig description that is kept."""
+
+import io
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import orjson
+import pytest
+
+from tests.store.server import Place, Server, campaign, running
+from underskin.recordings import hdf5_file
+from underskin.recordings.campaign import parse
+
+RIG = """\
+schema: rig/1
+kind: indentation
+skin: {poisson_ratio: 0.5}
+recording: {indenter_radius_mm: 2.5}
+channels:
+  displacement_mm: {channel: Z (mm)}
+  force_n: {channel: Load (N)}
+"""
+CSV = "Z (mm);Load (N)\n0,0;0,0\n0,1;0,5\n0,2;1,4\n0,3;2,6\n"
+
+
+def hdf5(name: str) -> bytes:
+    stream = io.BytesIO()
+    hdf5_file.write(parse(campaign(name)), stream)
+    return stream.getvalue()
+
+
+def test_a_file_is_told_by_its_content(server: Server) -> None:
+    answer = server.http.post("/v1/campaigns", content=hdf5("array"), headers={"Content-Type": "text/plain"})
+    assert answer.status_code == 201, answer.text
+    document = server.http.get(f"/v1/campaigns/{answer.json()['id']}/document").json()
+    assert document["recordings"] == campaign("array")["recordings"]
+    lying = server.http.post("/v1/campaigns", files={"file": ("array.h5", CSV.encode(), "application/x-hdf5")})
+    assert lying.status_code == 422
+    assert "rig description" in lying.json()["detail"]
+
+
+def test_a_rig_description_is_kept_with_the_skin_and_used_again(server: Server) -> None:
+    form = [("rig", ("bench.yaml", RIG)), ("file", ("cut.csv", CSV))]
+    first = server.http.post("/v1/campaigns?skin=gel", files=form)
+    assert first.status_code == 201, first.text
+    assert server.http.get("/v1/skins/gel").json()["rig"]["channels"]["force_n"]["channel"] == "Load (N)"
+    second = server.http.post("/v1/campaigns?skin=gel", files=[("file", ("next.csv", CSV))])
+    assert second.status_code == 201, second.text
+    name = second.json()["campaigns"][0]["id"]
+    (recording,) = server.http.get(f"/v1/campaigns/{name}/document").json()["recordings"]
+    assert (recording["kind"], recording["force_n"]) == ("indentation", [0.0, 0.5, 1.4, 2.6])
+    assert server.http.post("/v1/campaigns", files=[("file", ("next.csv", CSV))]).status_code == 422
+
+
+def test_a_bad_rig_description_says_where(server: Server) -> None:
+    bad = RIG.replace("kind: indentation", "kind: bending")
+    answer = server.http.post("/v1/campaigns", files=[("rig", ("r.yaml", bad)), ("file", ("cut.csv", CSV))])
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["field"] == "kind"
+
+
+def test_limits_hold_as_the_upload_streams(place: Place) -> None:
+    with running(place, UNDERSKIN_MAX_BODY_MB="1", UNDERSKIN_MAX_UPLOAD_MB="3") as server:
+        document = orjson.dumps(campaign("padded")).ljust(1_500_000)
+        whole = server.http.post("/v1/campaigns", content=document, headers={"Content-Type": "application/json"})
+        assert (whole.status_code, "UNDERSKIN_MAX_BODY_MB" in whole.json()["detail"]) == (413, True)
+        as_file = server.http.post("/v1/campaigns", files={"file": ("a.json", document)})
+        assert (as_file.status_code, "UNDERSKIN_MAX_BODY_MB" in as_file.json()["detail"]) == (413, True)
+
+        streamed = server.http.post("/v1/campaigns", content=iter([b" " * 100_000] * 50))
+        assert (streamed.status_code, "UNDERSKIN_MAX_UPLOAD_MB" in streamed.json()["detail"]) == (413, True)
+        assert server.http.post("/v1/campaigns", json=campaign("fits")).status_code == 201
+        assert not list((place.folder / "uploads").glob("*/tmp*"))
+
+
+def test_a_broken_form_is_refused(server: Server) -> None:
+    headers = {"Content-Type": "multipart/form-data; boundary=x"}
+    for body in (b"", b"no form", b'--x\r\nContent-Disposition: form-data; name="file"; filename="a"\r\n\r\nhalf'):
+        answer = server.http.post("/v1/campaigns", content=body, headers=headers)
+        assert answer.status_code in (400, 422), answer.text
+
+
+def test_what_a_killed_server_was_sent_is_cleared_away(place: Place) -> None:
+    uploads = place.folder / "uploads"
+    under_way = threading.Event()
+
+    def slow() -> Iterator[bytes]:
+        yield b" " * 1_000_000
+        under_way.wait(30)
+        yield b" "
+
+    def send(http: httpx.Client) -> None:
+        with pytest.raises(httpx.TransportError):
+            http.post("/v1/campaigns", content=slow())
+
+    with running(place) as server:
+        sender = threading.Thread(target=send, args=(server.http,))
+        sender.start()
+        while not list(uploads.glob("*/*/0")):
+            time.sleep(0.01)
+        server.kill()
+        under_way.set()
+        sender.join()
+    assert list(uploads.glob("*/*/0"))
+    with running(place):
+        assert not list(uploads.glob("*/*/0"))
+
+
+def test_no_name_from_a_client_becomes_a_path(server: Server, place: Place, tmp_path: Path) -> None:
+    target = tmp_path / "planted"
+    name = "/".join([".."] * 12) + str(target)
+    answer = server.http.post("/v1/campaigns", files={"file": (name, orjson.dumps(campaign("x")))})
+    assert answer.status_code == 201
+    assert not target.exists()
+    kept = {path.name for path in place.folder.iterdir()}
+    assert kept <= {"underskin.sqlite3", "underskin.sqlite3-wal", "underskin.sqlite3-shm", "uploads", "migration.lock"}
