@@ -60,9 +60,11 @@ def underskin(data: Path | None = None) -> Iterator[Server]:
     """Our service as `make serve` starts it; what it keeps is in `data`, or gone at the end."""
     port = _free_port()
     command = [str(Path(sys.executable).with_name("underskin")), "serve", "--port", str(port)]
-    with tempfile.TemporaryDirectory() as scratch:
-        with _running(command, port, "/ready", {"UNDERSKIN_DATA": str(data or scratch)}) as server:
-            yield server
+    with (
+        tempfile.TemporaryDirectory() as scratch,
+        _running(command, port, "/ready", {"UNDERSKIN_DATA": str(data or scratch)}) as server,
+    ):
+        yield server
 
 
 @contextmanager

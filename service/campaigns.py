@@ -1,6 +1,7 @@
 """Campaigns: sent, listed, read, withdrawn, corrected, their recordings excluded, their d33."""
 
 import asyncio
+import io
 from typing import Annotated, Any, Literal
 
 import orjson
@@ -17,7 +18,7 @@ from service.store import campaigns
 from service.store.times import stored
 from service.uploads import received
 from underskin import InvalidInput
-from underskin.recordings import json_file
+from underskin.recordings import hdf5_file, json_file
 
 router = APIRouter(tags=["campaigns"])
 
@@ -128,13 +129,28 @@ def one(campaign_id: str, store: Store) -> models.CampaignDetail:
     operation_id="campaign_document",
     summary="One campaign as campaign/1",
     response_class=Response,
-    responses={200: {"content": {"application/json": {"schema": {"type": "object", "description": "campaign/1"}}}}},
+    responses={
+        200: {
+            "content": {
+                "application/json": {"schema": {"type": "object", "description": "campaign/1"}},
+                "application/x-hdf5": _FILE,
+            }
+        }
+    },
 )
-def document(campaign_id: str, store: Store) -> Response:
+def document(
+    campaign_id: str,
+    store: Store,
+    file_format: Annotated[Literal["json", "hdf5"], Query(alias="format", description="JSON or HDF5.")] = "json",
+) -> Response:
     """All recordings that were kept, arrays and all, those excluded later included."""
     with store.reading() as connection:
         campaign = campaigns.load(connection, campaigns.find(connection, campaign_id))
-    return Response(json_file.write(campaign), media_type="application/json")
+    if file_format == "json":
+        return Response(json_file.write(campaign), media_type="application/json")
+    stream = io.BytesIO()
+    hdf5_file.write(campaign, stream)
+    return Response(stream.getvalue(), media_type="application/x-hdf5")
 
 
 @router.get("/campaigns/{campaign_id}/d33", operation_id="campaign_d33", summary="d33 of each sensor")

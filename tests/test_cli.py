@@ -214,7 +214,7 @@ def test_wheel_alone_computes_from_the_table_inside_it(wheel: Path) -> None:
 
 
 def test_wheel_alone_says_where_the_other_commands_are(wheel: Path) -> None:
-    assert run_alone(wheel, "--help").stdout.count("(runs from a checkout or the image)") == 3
+    assert run_alone(wheel, "--help").stdout.count("(runs from a checkout or the image)") == 5
     refusal = run_alone(wheel, "serve", "--port", "1")
     assert refusal.returncode == 2
     assert refusal.stderr == "underskin: this command runs from a checkout or the image (No module named 'service')\n"

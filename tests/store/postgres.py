@@ -45,10 +45,12 @@ class Cluster:
         self._psql = ["psql", "--no-psqlrc", "--host=127.0.0.1", f"--port={port}", f"--username={user}"]
         self._count = 0
 
-    def new_database(self) -> str:
+    def new_database(self, tablespace: Path | None = None) -> str:
         self._count += 1
         name = f"test{self._count}"
-        self.run_sql("postgres", f"CREATE DATABASE {name}")
+        if tablespace is not None:
+            self.run_sql("postgres", f"CREATE TABLESPACE {name} LOCATION '{tablespace}'")
+        self.run_sql("postgres", f"CREATE DATABASE {name}" + (f" TABLESPACE {name}" if tablespace else ""))
         return f"{self._base}/{name}"
 
     def run_sql(self, database: str, statement: str) -> str:

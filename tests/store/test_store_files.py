@@ -37,6 +37,9 @@ def test_a_file_is_told_by_its_content(server: Server) -> None:
     assert answer.status_code == 201, answer.text
     document = server.http.get(f"/v1/campaigns/{answer.json()['id']}/document").json()
     assert document["recordings"] == campaign("array")["recordings"]
+    back = server.http.get(f"/v1/campaigns/{answer.json()['id']}/document?format=hdf5")
+    again = server.http.post("/v1/campaigns", content=back.content).json()["id"]
+    assert server.http.get(f"/v1/campaigns/{again}/document").json() == document
     lying = server.http.post("/v1/campaigns", files={"file": ("array.h5", CSV.encode(), "application/x-hdf5")})
     assert lying.status_code == 422
     assert "rig description" in lying.json()["detail"]
