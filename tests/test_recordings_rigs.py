@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.test_recordings_campaign import FRF, document
-from tests.test_recordings_formats import COMMON, EXAMPLES, rig, tdms
+from tests.instrument_files import COMMON, EXAMPLES, SKIN, rig, tdms
 from underskin.errors import FileError, InvalidInput
 from underskin.recordings import Reading, read_contents, read_file, rig_description
 from underskin.recordings.campaign import CompressionRecording, FrfRecording, IndentationRecording
@@ -210,7 +209,7 @@ def test_silicone_compression() -> None:
         linear = (strain > 0.02) & (strain < 0.1)
         slope_kpa = 1e3 * np.polyfit(strain[linear], stress[linear], 1)[0]
         low, high = {"EF10": (61.0, 63.6), "EF30": (110.7, 116.5), "EF50": (175.1, 188.9)}[file.name[:4]]
-        assert low - 0.05 < slope_kpa < high + 0.05  # as SOURCE.md states them, rounded
+        assert low - 0.05 < slope_kpa < high + 0.05  # as the data's source states them, rounded
 
 
 def test_the_nanoindenters_depth_is_the_piezo_less_the_cantilever() -> None:
@@ -292,4 +291,4 @@ def test_other_universal_files() -> None:
     assert (frequency.unit, len(density.values)) == ("Hz", 3201)
     assert frequency.values == pytest.approx(np.arange(3201.0))
     with pytest.raises(FileError, match=r"no part holds the rig's channels force, amplifier; it has .*Pressure|Mic|Hz"):
-        read_file(spectrum, spectrum.name, rig(skin=document(FRF)["skin"]))
+        read_file(spectrum, spectrum.name, rig(skin=SKIN))

@@ -12,8 +12,8 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.instrument_files import hdf5, tdms
 from tests.test_recordings_campaign import EVERYTHING
-from tests.test_recordings_formats import hdf5, tdms
 from underskin.errors import FileError
 from underskin.recordings import read_contents, read_file
 from underskin.recordings.channels import Contents

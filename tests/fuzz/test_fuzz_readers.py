@@ -17,14 +17,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests import test_recordings_formats as examples
+from tests import instrument_files as examples
 from tests.test_recordings_campaign import EVERYTHING
 from underskin.recordings import json_file
 from underskin.recordings.campaign import parse
 from underskin.recordings.formats import MODULES
 
 COUNT = 100_000 if os.environ.get("UNDERSKIN_SOAK") == "1" else 500
-# These are read by libraries in C, which damage can make crash, loop or ask for all memory: what the process apart is for.
+# Read by libraries in C, which damage can make crash, loop or ask for all memory: what the process apart is for.
 FOREIGN = ("HDF5", "MATLAB")
 CONTAINED = ("no memory", f"died: {-signal.SIGSEGV}", f"died: {-signal.SIGABRT}", f"died: {-signal.SIGALRM}")
 ROOT = Path(__file__).parent.parent.parent

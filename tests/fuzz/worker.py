@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 from typing import BinaryIO
 
-from tests.test_recordings_formats import rig
+from tests.instrument_files import rig
 from underskin.errors import FileError, InvalidInput
 from underskin.recordings import formats, rig_mapping
 from underskin.recordings.campaign import from_dict

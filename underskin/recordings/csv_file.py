@@ -38,7 +38,7 @@ def read(stream: BinaryIO, file: str) -> Contents:
         raise FileError(file, "", "holds no table of numbers of at least two columns and two rows")
     rows, end = _rows(lines, table, file)
     for index in range(end, len(lines)):
-        first = _cells(lines[index], table.separator)[0]
+        first = text.cells(lines[index], table.separator)[0]
         if text.number(first, table.decimal) is not None:
             raise _no_row(lines, index, table, file)
     columns = np.array(rows, dtype=np.float64).T.copy()
@@ -69,18 +69,11 @@ def _longest_run(lines: list[str], separator: str, decimal: str) -> tuple[int, i
     return best
 
 
-def _cells(line: str, separator: str) -> list[str]:
-    cells = [cell.strip().strip('"') for cell in line.split(separator)]
-    while len(cells) > 1 and not cells[-1]:
-        cells.pop()
-    return cells
-
-
 def _numbers(line: str, separator: str, decimal: str) -> list[float] | None:
     if separator not in line:
         return None
     numbers = []
-    for cell in _cells(line, separator):
+    for cell in text.cells(line, separator):
         value = text.number(cell, decimal)
         if value is None:
             return None
@@ -110,7 +103,7 @@ def _no_row(lines: list[str], index: int, table: _Table, file: str) -> FileError
 
 def _headings(lines: list[str], table: _Table) -> list[tuple[str, str]]:
     """Names and units of the columns, from the line above the numbers, or from two: names, and units under them."""
-    above = [_cells(line, table.separator) for line in lines[: table.start] if line.strip()]
+    above = [text.cells(line, table.separator) for line in lines[: table.start] if line.strip()]
     last, before = ([[], [], *above][-1], [[], [], *above][-2])
     if not _is_heading(last, table.width):
         return [(f"column {number}", "") for number in range(1, table.width + 1)]

@@ -40,12 +40,12 @@ def read(stream: BinaryIO, file: str) -> dict[str, Any]:
     separator = _separator(content)
     if separator is None:
         raise FileError(file, "line 1", f"must be schema,{SCHEMA}")
-    return _Template(file, [_cells(line, separator) for line in text.lines(content)], separator).document()
+    return _Template(file, [text.cells(line, separator) for line in text.lines(content)], separator).document()
 
 
 def _separator(content: str) -> str | None:
     first = text.lines(content[:_FIRST_LINE])[0]
-    return next((mark for mark in _SEPARATORS if _cells(first, mark)[:2] == ["schema", SCHEMA]), None)
+    return next((mark for mark in _SEPARATORS if text.cells(first, mark)[:2] == ["schema", SCHEMA]), None)
 
 
 class _Template:
@@ -129,10 +129,3 @@ class _Template:
             return None
         number = None if field in _TEXTS else text.number(cell, self.decimal)
         return cell if number is None else number * factor
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    cells = [cell.strip().strip('"') for cell in line.split(separator)]
-    while len(cells) > 1 and not cells[-1]:
-        cells.pop()
-    return cells

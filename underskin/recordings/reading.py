@@ -15,7 +15,7 @@ from underskin.recordings.channels import Contents
 from underskin.recordings.rig_description import RigDescription
 from underskin.recordings.sandbox import parse_apart
 
-_LARGEST_TEXT = 8_000_000  # larger ones are parsed under the limits of binary files
+_LARGEST_TEXT = 8_000_000  # larger tables are parsed under the limits of binary files
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def read_contents(source: Path | str | bytes, name: str) -> Contents | dict[str,
     with _opened(source, name) as stream:
         kind = formats.detect(stream, name)
         size = stream.seek(0, io.SEEK_END)
-        if kind in formats.BINARY or size > _LARGEST_TEXT:
+        if kind in formats.BINARY or (kind != "JSON" and size > _LARGEST_TEXT):
             return parse_apart(kind, stream, name)
         return formats.parse(kind, stream, name)
 

@@ -45,6 +45,14 @@ def lines(text: str) -> list[str]:
     return _LINE_END.split(text)
 
 
+def cells(line: str, separator: str) -> list[str]:
+    """The cells of a line, without quotes and without the empty ones at its end; at least one."""
+    found = [cell.strip().strip('"') for cell in line.split(separator)]
+    while len(found) > 1 and not found[-1]:
+        found.pop()
+    return found
+
+
 def number(cell: str, decimal: str) -> float | None:
     """The number in a cell, or None where it holds something else."""
     cell = cell.strip()
