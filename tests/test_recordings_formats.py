@@ -116,6 +116,8 @@ def test_an_instruments_table(separator: str, decimal: str) -> None:
 def test_a_table_with_a_row_that_does_not_fit_is_refused_by_line() -> None:
     with pytest.raises(FileError, match=r"a\.csv: line 4: must be a row of 2 numbers.*'3;x'"):
         read_contents(b"a;b\n1;2\n2;3\n3;x\n4;5\n5;6", "a.csv")
+    with pytest.raises(FileError, match=r"a\.csv: line 3: must be a row of 2 numbers.*'x;3'"):
+        read_contents(b"a;b\n1;2\nx;3\n3;4\n4;5\n5;6", "a.csv")
     with pytest.raises(FileError, match=r"a\.csv: line 4: must be a row of 2 numbers"):
         read_contents(b"a;b\n1;2\n2;3\n3", "a.csv")
 

@@ -7,6 +7,7 @@ headings and under the numbers that hold a name and a value become properties. S
 
 import re
 from dataclasses import dataclass
+from itertools import groupby
 from typing import BinaryIO
 
 import numpy as np
@@ -47,26 +48,20 @@ def read(stream: BinaryIO, file: str) -> Contents:
 
 
 def _table(lines: list[str]) -> _Table | None:
+    """The style with the longest run of rows; the table starts at its first row, though a bad one may be between."""
     longest, best = 1, None
     for separator, decimal in _STYLES:
-        start, length, width = _longest_run(lines, separator, decimal)
+        widths = [len(_numbers(line, separator, decimal) or ()) for line in lines]
+        width, length = _longest_run(widths)
         if length > longest:
-            longest, best = length, _Table(start, separator, decimal, width)
+            longest, best = length, _Table(widths.index(width), separator, decimal, width)
     return best
 
 
-def _longest_run(lines: list[str], separator: str, decimal: str) -> tuple[int, int, int]:
-    """First line, length and width of the longest run of rows of equally many numbers (at least two)."""
-    best = (0, 0, 0)
-    start = width = 0
-    for index, line in enumerate([*lines, ""]):
-        numbers = _numbers(line, separator, decimal)
-        now = len(numbers) if numbers is not None and len(numbers) > 1 else 0
-        if now != width:
-            if width and index - start > best[1]:
-                best = (start, index - start, width)
-            start, width = index, now
-    return best
+def _longest_run(widths: list[int]) -> tuple[int, int]:
+    """Width and length of the longest run of rows of equally many numbers, at least two."""
+    runs = ((width, sum(1 for _ in run)) for width, run in groupby(widths) if width > 1)
+    return max(runs, key=lambda run: run[1], default=(0, 0))
 
 
 def _numbers(line: str, separator: str, decimal: str) -> list[float] | None:
