@@ -193,3 +193,21 @@ def test_two_corrections_at_once_leave_one_current(server: Server) -> None:
 def test_a_skin_that_no_address_can_name_is_refused(server: Server, skin: str) -> None:
     assert server.http.post("/v1/campaigns", json=campaign("x"), params={"skin": skin}).status_code == 422
     assert server.http.post("/v1/campaigns", json=campaign("x", id=skin)).status_code == 422
+
+
+def test_odd_texts_are_refused_and_break_nothing(server: Server) -> None:
+    name = post(server, campaign("x"), skin="a")["id"]
+    for path in ("campaigns/%00", "campaigns/%F0%9F%90%9F/d33", "skins/%00", "skins/%00/history", "skins/.%2e/export"):
+        assert server.http.get(f"/v1/{path}").status_code in (404, 422), path
+    for query in ("skin=%00", "name_contains=%00%25", "cursor=-1", "cursor=9" + 30 * "9", "state=gone", "limit=0"):
+        assert server.http.get(f"/v1/campaigns?{query}").status_code in (200, 422), query
+    for band in ("inf", "nan", "1e308", "-1"):
+        answer = server.http.get(f"/v1/campaigns/{name}/d33?band_low_hz=1&band_high_hz={band}")
+        assert answer.status_code in (200, 422), band
+    for text in ("\x00", "\U0001f600", "x" * 1001):
+        body = {"recording": text, "reason": text}
+        assert server.http.post(f"/v1/campaigns/{name}/exclusions", json=body).status_code in (404, 422)
+    assert (
+        server.http.post("/v1/campaigns", json=campaign("y"), headers={"Idempotency-Key": "k" * 256}).status_code == 422
+    )
+    assert len(listed(server)) == 1

@@ -25,6 +25,7 @@ class Stream:
         self._count = 0
         self.acknowledged: dict[str, str] = {}  # name of a campaign, its id
         self.in_flight: list[dict[str, Any]] | None = None
+        self.flowing = threading.Event()  # since this server's start, something was acknowledged
         self.key = ""
 
     def send(self, http: httpx.Client) -> None:
@@ -43,33 +44,38 @@ class Stream:
             for document, result in zip(self.in_flight, answer.json()["campaigns"], strict=True):
                 self.acknowledged[document["name"]] = result["id"]
             self.in_flight = None
+            self.flowing.set()
 
 
 def test_what_was_acknowledged_survives_any_kill(place: Place) -> None:
     backend = "postgresql" if place.database_url else "sqlite"
     moments = random.Random(7)
     streams = [Stream(sender) for sender in range(SENDERS)]
-    for _ in range(KILLS[backend]):
+    for kill in range(KILLS[backend]):
         with running(place) as server:
             threads = [threading.Thread(target=stream.send, args=(server.http,)) for stream in streams]
             for thread in threads:
                 thread.start()
+            if kill % 4:  # mostly amid the stream, else before or as it sets in
+                streams[0].flowing.wait(20)
             time.sleep(moments.uniform(0.0, 0.6))
             server.kill()
             for thread in threads:
                 thread.join()
+            for stream in streams:
+                stream.flowing.clear()
     with running(place) as server:
-        _check(server, streams)
+        _check(server, streams, KILLS[backend])
 
 
-def _check(server: Server, streams: list[Stream]) -> None:
+def _check(server: Server, streams: list[Stream], kills: int) -> None:
     kept = _all_campaigns(server)
     names = [entry["name"] for entry in kept.values()]
     assert len(names) == len(set(names)), "a campaign is there twice"
     for stream in streams:
         for name, campaign_id in stream.acknowledged.items():
             assert kept[campaign_id]["name"] == name, "an acknowledged campaign is gone"
-    assert sum(len(stream.acknowledged) for stream in streams) >= BATCH, "nothing was ever acknowledged"
+    assert len(names) >= BATCH * kills, "the stream hardly flowed"
     in_flight = {document["name"] for stream in streams for document in stream.in_flight or ()}
     acknowledged = {name for stream in streams for name in stream.acknowledged}
     assert set(names) <= acknowledged | in_flight
