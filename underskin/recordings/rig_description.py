@@ -9,7 +9,7 @@
       force_n: {channel: Corrected_Force(N), sign: -1}
 
 `skin` and `recording` hold campaign fields that are the same for all files; `{property: ...}` takes one from what the
-file says about itself. `channels` says for each campaign field which channel holds it.
+file, or the block, says about itself. `channels` says for each campaign field which channel holds it.
 """
 
 import re
@@ -27,6 +27,7 @@ from underskin.recordings.fields import mapping, shown
 
 SCHEMA = "rig/1"
 _LARGEST_BYTES = 1_000_000
+BLOCK_NAME = "block"  # a property that every part of a file has: a TDMS group, a MATLAB structure
 COMPLEX_FRF = "frf_pc_per_n"  # a channel of complex numbers, both parts of the FRF
 
 

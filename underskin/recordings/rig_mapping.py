@@ -11,7 +11,7 @@ from underskin.recordings import text
 from underskin.recordings.campaign import SCHEMA
 from underskin.recordings.channels import Block, Channel, Contents, Values
 from underskin.recordings.fields import LONGEST_NAME, shown
-from underskin.recordings.rig_description import COMPLEX_FRF, ChannelMapping, Property, RigDescription
+from underskin.recordings.rig_description import BLOCK_NAME, COMPLEX_FRF, ChannelMapping, Property, RigDescription
 from underskin.recordings.unit_labels import field_unit, labelled_unit, unit
 from underskin.units import LAB, Floats
 
@@ -36,7 +36,8 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> tuple[dict[str,
     recordings = []
     for number, block in enumerate(blocks, start=1):
         label = f"{stem} {_printable(block.name) or number}" if len(blocks) > 1 else stem
-        common = {name: _common(name, value, contents, file) for name, value in rig.recording.items()}
+        stated = _stated(contents, block)
+        common = {name: _common(name, value, stated, file) for name, value in rig.recording.items()}
         recordings.append({"id": label, "kind": rig.kind, **common, **_Mapped(rig, block, file, warnings).fields()})
     document = {"schema": SCHEMA, "name": stem, "skin": rig.skin, "recordings": recordings}
     return {**document, "units_checked": rig.units_checked}, list(dict.fromkeys(warnings))
@@ -46,17 +47,24 @@ def _printable(name: str) -> str:
     return "".join(letter for letter in name if letter.isprintable())[:LONGEST_NAME].strip()
 
 
-def _common(name: str, value: Any | Property, contents: Contents, file: str) -> Any:
-    """A field that all recordings share: as the rig says, or as the file says, in the field's unit."""
+def _stated(contents: Contents, block: Block) -> dict[str, str | float]:
+    """What the file says about itself; of the block its own properties (`run.preload` is `preload`) and its name."""
+    own = f"{block.name}."
+    about_block = {name.removeprefix(own): value for name, value in contents.properties.items() if name.startswith(own)}
+    return {BLOCK_NAME: block.name, **contents.properties, **about_block}
+
+
+def _common(name: str, value: Any | Property, stated: Mapping[str, str | float], file: str) -> Any:
+    """A field that the rig says, or that the file says under the rig's name for it, in the field's unit."""
     if not isinstance(value, Property):
         return value
-    if value.property not in contents.properties:
-        known = ", ".join(list(contents.properties)[:20]) or "nothing"
+    if value.property not in stated:
+        known = ", ".join(list(stated)[:20])
         raise FileError(file, f"property {value.property!r}", f"is not in the file, which states {known}")
-    stated = contents.properties[value.property]
-    number = text.number(stated, ".") if isinstance(stated, str) else stated
+    found = stated[value.property]
+    number = text.number(found, ".") if isinstance(found, str) else found
     if name not in LAB or number is None:
-        return stated
+        return found
     label = labelled_unit(value.property)
     return number * _factor(label, name, file, f"property {value.property!r}") if label else number
 
