@@ -1,12 +1,18 @@
 """Every store test runs on SQLite and on a real PostgreSQL."""
 
-from collections.abc import Iterator
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
+from service.store import database
+from service.store.tables import metadata
 from tests.store import postgres
 from tests.store.server import Place, Server, running
+
+BACKENDS = ("sqlite", "postgresql")
 
 
 @pytest.fixture(scope="session")
@@ -18,18 +24,50 @@ def cluster() -> Iterator[postgres.Cluster]:
         yield started
 
 
-@pytest.fixture(params=["sqlite", "postgresql"])
+@pytest.fixture(params=BACKENDS)
 def place(request: pytest.FixtureRequest, tmp_path: Path) -> Place:
-    """An empty store."""
+    """An empty store, for tests that start and end servers."""
     folder = tmp_path / "data"
     folder.mkdir()
-    if request.param == "sqlite":
-        return Place(folder)
-    return Place(folder, request.getfixturevalue("cluster").new_database())
+    return Place(folder, "" if request.param == "sqlite" else request.getfixturevalue("cluster").new_database())
+
+
+@pytest.fixture(scope="session")
+def servers(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Callable[[str], Server]]:
+    """Servers by name, started when first asked for: to start one takes longer than most tests."""
+    started: dict[str, Server] = {}
+    with ExitStack() as stack:
+
+        def server(name: str) -> Server:
+            if name not in started:
+                folder = tmp_path_factory.mktemp(name)
+                url = request.getfixturevalue("cluster").new_database() if name == "postgresql" else ""
+                started[name] = stack.enter_context(running(Place(folder, url)))
+            return started[name]
+
+        yield server
+
+
+@pytest.fixture(params=BACKENDS)
+def server(request: pytest.FixtureRequest, servers: Callable[[str], Server]) -> Server:
+    """A running server, its store emptied."""
+    return emptied(servers(request.param))
 
 
 @pytest.fixture
-def server(place: Place) -> Iterator[Server]:
-    """A server over the empty store."""
-    with running(place) as started:
-        yield started
+def elsewhere(servers: Callable[[str], Server]) -> Server:
+    """Another one."""
+    return emptied(servers("elsewhere"))
+
+
+def emptied(server: Server) -> Server:
+    """The server without anything kept."""
+    store = database(server.place.database_url, server.place.folder)
+    with store.writing() as connection:
+        for table in reversed(metadata.sorted_tables):
+            connection.execute(table.delete())
+    store.close()
+    shutil.rmtree(server.place.folder / "backups", ignore_errors=True)
+    return server

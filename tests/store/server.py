@@ -42,6 +42,7 @@ class Server:
 
     process: "subprocess.Popen[bytes]"
     http: httpx.Client
+    place: Place
 
     def kill(self) -> None:
         """As when the power fails."""
@@ -62,14 +63,14 @@ def running(place: Place, *, key: str | None = None, **settings: str) -> Iterato
     try:
         with httpx.Client(base_url=f"http://127.0.0.1:{port}", headers=headers, timeout=60) as client:
             _wait_until_ready(client, process, log)
-            yield Server(process, client)
+            yield Server(process, client, place)
     finally:
         process.kill()
         process.wait()
 
 
 def _wait_until_ready(client: httpx.Client, process: "subprocess.Popen[bytes]", log: Path) -> None:
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + 120  # a machine may be busy
     while time.monotonic() < deadline:
         assert process.poll() is None, log.read_text()[-2000:]
         try:

@@ -16,27 +16,27 @@ def send(server: Server, name: str) -> None:
     assert server.http.post("/v1/campaigns", json=campaign(name)).status_code == 201
 
 
-def test_a_backup_brings_back_what_was_there(place: Place, server: Server, tmp_path: Path) -> None:
+def test_a_backup_brings_back_what_was_there(server: Server, tmp_path: Path) -> None:
     file = tmp_path / "kept.backup"
     send(server, "before")
-    done = place.command("backup", str(file))
+    done = server.place.command("backup", str(file))
     assert done.returncode == 0, done.stderr
     send(server, "after")
-    done = place.command("restore", str(file))
+    done = server.place.command("restore", str(file))
     assert done.returncode == 0, done.stderr
     assert names(server) == {"before"}
     send(server, "later")
     assert names(server) == {"before", "later"}
-    (undo,) = (place.folder / "backups").iterdir()
-    assert place.command("restore", str(undo)).returncode == 0
+    (undo,) = (server.place.folder / "backups").iterdir()
+    assert server.place.command("restore", str(undo)).returncode == 0
     assert names(server) == {"before", "after"}
 
 
-def test_a_backup_moves_to_another_machine(place: Place, server: Server, tmp_path: Path) -> None:
-    if place.database_url:
+def test_a_backup_moves_to_another_machine(server: Server, tmp_path: Path) -> None:
+    if server.place.database_url:
         return  # the other machine would be another database: the next line's restore is the same
     send(server, "moved")
-    assert place.command("backup", str(tmp_path / "b")).returncode == 0
+    assert server.place.command("backup", str(tmp_path / "b")).returncode == 0
     other = Place(tmp_path / "other")
     other.folder.mkdir()
     assert other.command("restore", str(tmp_path / "b")).returncode == 0
@@ -44,16 +44,16 @@ def test_a_backup_moves_to_another_machine(place: Place, server: Server, tmp_pat
         assert names(there) == {"moved"}
 
 
-def test_what_is_no_backup_is_refused_and_changes_nothing(place: Place, server: Server, tmp_path: Path) -> None:
+def test_what_is_no_backup_is_refused_and_changes_nothing(server: Server, tmp_path: Path) -> None:
     send(server, "kept")
     good = tmp_path / "good"
-    assert place.command("backup", str(good)).returncode == 0
+    assert server.place.command("backup", str(good)).returncode == 0
     cut = tmp_path / "cut"
     cut.write_bytes(good.read_bytes()[: good.stat().st_size // 2])
     foreign = tmp_path / "foreign"
     foreign.write_text("not a backup")
     for file in (cut, foreign, tmp_path / "absent"):
-        done = place.command("restore", str(file))
+        done = server.place.command("restore", str(file))
         assert (done.returncode, str(file) in done.stderr) == (2, True), done.stderr
     assert names(server) == {"kept"}
 

@@ -61,7 +61,7 @@ def test_skins(client: Client, tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.glob("*.h5*")] == ["a.h5"]
 
 
-def test_the_commands_import_and_export(place: Place, server: Server, tmp_path: Path) -> None:
+def test_the_commands_import_and_export(server: Server, tmp_path: Path) -> None:
     good, mixed, bad = tmp_path / "good.json", tmp_path / "mixed.json", tmp_path / "bad.json"
     good.write_bytes(orjson.dumps(campaign("good")))
     spoilt = campaign("mixed")
@@ -69,20 +69,20 @@ def test_the_commands_import_and_export(place: Place, server: Server, tmp_path: 
     mixed.write_bytes(orjson.dumps(spoilt))
     bad.write_text("{")
     there = ["--url", str(server.http.base_url)]
-    done = place.command("import", str(good), "--skin", "palm", *there)
+    done = server.place.command("import", str(good), "--skin", "palm", *there)
     assert (done.returncode, "6 recordings" in done.stderr + done.stdout) == (0, True), done.stderr
-    done = place.command("import", str(mixed), str(bad), str(good), "--skin", "palm", *there)
+    done = server.place.command("import", str(mixed), str(bad), str(good), "--skin", "palm", *there)
     assert done.returncode == 2
     told = done.stdout + done.stderr
     assert "preload_n = -1" in told
     assert "bad.json" in told
     assert len(server.http.get("/v1/campaigns?skin=palm").json()["campaigns"]) == 3
     file = tmp_path / "palm.h5"
-    done = place.command("export", "palm", str(file), *there)
+    done = server.place.command("export", "palm", str(file), *there)
     assert done.returncode == 0, done.stderr
     other = Place(tmp_path / "other")
     other.folder.mkdir()
     with running(other) as elsewhere:
-        done = place.command("import", str(file), "--url", str(elsewhere.http.base_url))
+        done = server.place.command("import", str(file), "--url", str(elsewhere.http.base_url))
         assert done.returncode == 0, done.stderr
         assert len(elsewhere.http.get("/v1/campaigns?skin=palm").json()["campaigns"]) == 3

@@ -1,22 +1,12 @@
 """A skin as one file: elsewhere it is as it was here, to the last digit."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import h5py
 import pytest
 
-from tests.store.server import Place, Server, campaign, running
-
-
-@pytest.fixture
-def elsewhere(tmp_path: Path) -> Iterator[Server]:
-    """Another server, its store empty."""
-    folder = tmp_path / "elsewhere"
-    folder.mkdir()
-    with running(Place(folder)) as started:
-        yield started
+from tests.store.server import Server, campaign
 
 
 def fill(server: Server) -> None:

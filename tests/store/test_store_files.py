@@ -112,11 +112,11 @@ def test_what_a_killed_server_was_sent_is_cleared_away(place: Place) -> None:
         assert not list(uploads.glob("*/*/0"))
 
 
-def test_no_name_from_a_client_becomes_a_path(server: Server, place: Place, tmp_path: Path) -> None:
+def test_no_name_from_a_client_becomes_a_path(server: Server, tmp_path: Path) -> None:
     target = tmp_path / "planted"
     name = "/".join([".."] * 12) + str(target)
     answer = server.http.post("/v1/campaigns", files={"file": (name, orjson.dumps(campaign("x")))})
     assert answer.status_code == 201
     assert not target.exists()
-    kept = {path.name for path in place.folder.iterdir()}
+    kept = {path.name for path in server.place.folder.iterdir()}
     assert kept <= {"underskin.sqlite3", "underskin.sqlite3-wal", "underskin.sqlite3-shm", "uploads", "migration.lock"}
