@@ -174,6 +174,24 @@ def test_commands_of_other_packages_get_their_arguments(tmp_path: Path) -> None:
     assert "Invalid value for '--port'" in refused("serve", "--port", "seven")
 
 
+def test_terminal_without_greek_letters() -> None:
+    answer = run("sigma", "--a-over-h", "0.3", "--rt-over-h", "0.6", PYTHONIOENCODING="ascii")
+    assert (answer.returncode, answer.stderr) == (0, "")
+    assert "0.93651" in answer.stdout
+
+
+def test_reader_that_goes_away() -> None:
+    """As `underskin … | head` does."""
+    many = ",".join(["1"] * 20_000)
+    command = [str(COMMAND), *FRF, "--preload-n", many, "--csv"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.readline()
+        process.stdout.close()
+        assert process.stderr.read() == b""
+
+
 def test_python_m() -> None:
     shown = subprocess.run(
         [sys.executable, "-m", "underskin", "sigma", "--a-over-h", "0.3", "--rt-over-h", "0.6"],

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from importlib.metadata import EntryPoint, entry_points
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,6 +28,7 @@ _ELSEWHERE = "runs from a checkout or the image"
 
 app = typer.Typer(
     add_completion=False,
+    no_args_is_help=True,
     rich_markup_mode="markdown",  # or [mm] is taken for a style
     help="Stress, FRF and d33 of piezoelectric electronic skin.",
 )
@@ -226,6 +228,9 @@ def _run(command: typer.Typer, arguments: Sequence[str], name: str) -> int:
 
 def main() -> None:
     """Run the command line; an error is one line on stderr and exit status 2."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal may know no σ
     _add_commands_of_other_packages()
     try:
         sys.exit(_run(app, sys.argv[1:], "underskin"))
