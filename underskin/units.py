@@ -98,9 +98,7 @@ def _slip(field: LabField, size: float) -> str:
             return f"{text}; {size:g} {unit} is {size * factor:g} {field.unit}: was it given in {unit}?"
     for power in (3, 6, 9, 12, -3, -6, -9, -12):
         if _usual(size * 10.0**power, low, high):
-            return (
-                f"{text}; off by a factor of 10^{-power}? {size * 10.0**power:g} {field.unit} would be usual"
-            )
+            return f"{text}; off by a factor of 10^{-power}? {size * 10.0**power:g} {field.unit} would be usual"
     return text
 
 
