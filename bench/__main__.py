@@ -1,16 +1,14 @@
-"""Run the benchmarks: python -m bench [PART ...]. A full run is written to docs/bench-results.json."""
+"""Run the benchmarks: python -m bench [PART ...]. A full run writes docs/validation.md."""
 
-import json
 import os
 import platform
 import sys
 import time
-from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 
 from bench import accuracy, batch, newton_step, orderings, single_requests, start
-from bench.figures import Figure
+from bench.page import markdown, write
 
 PARTS = {
     "requests": single_requests.measure,
@@ -20,7 +18,6 @@ PARTS = {
     "orderings": orderings.measure,
     "accuracy": accuracy.measure,
 }
-RESULTS = Path(__file__).parent.parent / "docs" / "bench-results.json"
 _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem")
 
 
@@ -28,21 +25,12 @@ def main(names: list[str]) -> None:
     """Measure the parts named, or all; only a full run is written down."""
     about = machine()
     print(f"{about['processor']}, {about['cores']} cores, {about['idle_percent']} % idle before the start\n")
-    figures = [figure for name in names or PARTS for figure in PARTS[name]()]
-    print(markdown(figures))
+    figures = {}
+    for name in names or PARTS:
+        figures[name] = PARTS[name]()
+        print(markdown(figures[name]), flush=True)
     if not names:
-        record = {"machine": about, "figures": [asdict(figure) | {"met": figure.met} for figure in figures]}
-        RESULTS.write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n")
-
-
-def markdown(figures: list[Figure]) -> str:
-    """The figures as a table."""
-    lines = ["| what | measured | target | met |", "|---|---|---|---|"]
-    for f in figures:
-        target = "" if f.target is None else f"{'≥' if f.better == 'higher' else '≤'} {f.target:,.10g}"
-        met = {None: "", True: "yes", False: "**no**"}[f.met]
-        lines.append(f"| {f.name} | {_rounded(f.value)} {f.unit} | {target} | {met} |")
-    return "\n".join(lines)
+        write(about, figures)
 
 
 def machine() -> dict[str, str | int]:
@@ -74,11 +62,6 @@ def _processor_times() -> tuple[int, int]:
     """Idle and all ticks since boot."""
     times = [int(ticks) for ticks in Path("/proc/stat").read_text().split()[1:9]]
     return times[3] + times[4], sum(times)
-
-
-def _rounded(value: float) -> str:
-    """Three significant digits, thousands separated."""
-    return f"{value:,.0f}" if value >= 1000 else f"{value:.3g}"
 
 
 main(sys.argv[1:])
