@@ -1,9 +1,12 @@
 """The application: routes by noun on FastAPI, behind the front."""
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
 from fastapi import APIRouter, FastAPI, Security
 from starlette.types import ASGIApp
 
-from service import d33, frf, health, metrics, openapi, sigma, tables, umbridge
+from service import d33, frf, health, log, metrics, openapi, sigma, tables, umbridge
 from service.dependencies import authorised
 from service.front import Front
 from service.gate import Gate
@@ -11,6 +14,12 @@ from service.handlers import install_handlers
 from service.settings import Settings
 from underskin import __version__
 from underskin.surrogate import SigmaTable
+
+
+@asynccontextmanager
+async def _lifespan(_: FastAPI) -> AsyncIterator[None]:
+    yield
+    log.flush()
 
 
 def create_api(settings: Settings, table: SigmaTable, gate: Gate) -> FastAPI:
@@ -22,6 +31,7 @@ def create_api(settings: Settings, table: SigmaTable, gate: Gate) -> FastAPI:
         docs_url=None,
         redoc_url=None,
         openapi_url=None,
+        lifespan=_lifespan,
     )
     api.state.settings = settings
     api.state.table = table

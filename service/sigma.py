@@ -1,14 +1,13 @@
 """σ: one point (GET) or columns of points (POST)."""
 
 from typing import Annotated, Any, Literal
-from urllib.parse import parse_qsl
 
 import numpy as np
 from fastapi import APIRouter, Query, Response
 from orjson import dumps, loads
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.answers import Accept, AnswerInColumns, Columns, origin_headers, respond
+from service.answers import Accept, AnswerInColumns, Columns, respond
 from service.columns import ColumnsRequest, NonNegative, Status, non_negative, rows
 from service.dependencies import Table, columns_body, columns_route
 from service.front import HotRoute, are_numbers
@@ -96,7 +95,8 @@ def hot_route(table: SigmaTable) -> HotRoute:
 
     def one(query: bytes) -> bytes | None:
         try:
-            point = {name: loads(value) for name, value in parse_qsl(query.decode(), strict_parsing=True)}
+            pairs = [part.partition(b"=") for part in query.split(b"&")]
+            point = {name.decode(): loads(value) for name, _, value in pairs}
             found = table.at(**point) if are_numbers(point.values()) else None
         except (ValueError, TypeError):
             return None
@@ -106,8 +106,7 @@ def hot_route(table: SigmaTable) -> HotRoute:
         return dumps({**origin, "sigma": sigma, "rel_error": rel_error, "status": "ok"})
 
     origin = {"model": "layer", "table_sha256": table.sha256}
-    headers = origin_headers("layer", table.sha256)
-    return HotRoute(one, tuple((name.lower().encode(), value.encode()) for name, value in headers.items()))
+    return one
 
 
 @router.get(

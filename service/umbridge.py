@@ -235,7 +235,7 @@ def hot_route(table: SigmaTable) -> HotRoute:
             return None
         return None if found is None else dumps({"output": [[found[0]]]})
 
-    return HotRoute(one)
+    return one
 
 
 def _model(request: _Named) -> _Model:
