@@ -37,7 +37,7 @@ def create_api(settings: Settings, table: SigmaTable, gate: Gate) -> FastAPI:
     api.state.table = table
     api.state.gate = gate
     install_handlers(api)
-    v1 = APIRouter(prefix="/v1", dependencies=[Security(authorised, scopes=["read"])])
+    v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"])])
     for noun in (sigma, frf, d33, tables):
         v1.include_router(noun.router)
     for router in (v1, umbridge.router, health.router, metrics.router, openapi.router):

@@ -22,7 +22,7 @@ from underskin import InvalidInput, response
 from underskin.surrogate import SigmaTable
 from underskin.units import Floats, to_lab, to_si
 
-router = APIRouter(tags=["d33"])
+router = APIRouter(prefix="/v1", tags=["d33"])
 
 
 class D33Columns(PressedSkinColumns):

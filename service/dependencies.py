@@ -61,13 +61,20 @@ def columns_route(
 def columns_body(kind: type[ColumnsRequest], examples: dict[str, Any]) -> dict[str, Any]:
     """OpenAPI's description of a body in columns."""
     schema = kind.model_json_schema()
-    csv_text = ",".join(examples) + "\r\n" + ",".join(str(value) for value in examples.values()) + "\r\n"
     return {
         "requestBody": {
             "required": True,
             "content": {
                 "application/json": {"schema": schema, "example": examples},
-                "text/csv": {"schema": {"type": "string"}, "example": csv_text},
+                "text/csv": {"schema": {"type": "string"}, "example": _as_csv(examples)},
             },
         }
     }
+
+
+def _as_csv(examples: dict[str, Any]) -> str:
+    """The same columns as CSV, single numbers repeated in every row."""
+    count = max((len(value) for value in examples.values() if isinstance(value, list)), default=1)
+    columns = [value if isinstance(value, list) else [value] * count for value in examples.values()]
+    lines = [examples, *zip(*columns, strict=True)]
+    return "".join(",".join(map(str, line)) + "\r\n" for line in lines)

@@ -21,7 +21,7 @@ from underskin import InvalidInput
 from underskin.surrogate import SigmaTable
 from underskin.units import Floats, checked, to_lab
 
-router = APIRouter(tags=["frf"])
+router = APIRouter(prefix="/v1", tags=["frf"])
 
 # A spectrum a row multiplies the answer; this is some 20 MB of JSON.
 _LARGEST_SPECTRA = 1_000_000

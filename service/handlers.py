@@ -4,6 +4,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 
+from service.openapi import methods
 from service.problems import Refusal, from_validation, invalid_input
 from underskin import InvalidInput
 
@@ -35,7 +36,8 @@ def _as_refusal(request: Request, error: Exception) -> Refusal:
         case HTTPException(status_code=404):
             return Refusal(404, f"There is nothing at {request.url.path}; /openapi.json lists all routes.")
         case HTTPException(status_code=405):
-            return Refusal(405, f"{request.url.path} does not take {request.method}.", headers=error.headers)
+            allowed = {"Allow": ", ".join(methods(request.app, request.scope["route"].path))}
+            return Refusal(405, f"{request.url.path} does not take {request.method}.", headers=allowed)
         case HTTPException():
             return Refusal(error.status_code, str(error.detail), headers=error.headers)
         case _:

@@ -14,7 +14,7 @@ from service.front import HotRoute, are_numbers
 from underskin import half_space
 from underskin.surrogate import Sigma, SigmaTable
 
-router = APIRouter(tags=["sigma"])
+router = APIRouter(prefix="/v1", tags=["sigma"])
 
 Model = Literal["layer", "half_space"]
 
