@@ -121,6 +121,8 @@ def _from_csv(kind: type[ColumnsRequest], body: bytes) -> dict[str, Any]:
     header = [name.strip() for name in lines[0]]
     if len(set(header)) != len(header):
         raise Refusal(400, "The header names a field twice.")
+    if len(header) == 1 and any(separator in header[0] for separator in ";\t"):
+        raise Refusal(400, "The header has no comma; separate cells by commas and write numbers with a point.")
     for number, line in enumerate(lines[1:]):
         if len(line) != len(header):
             raise Refusal(400, f"Row {number} has {len(line)} cells; the header has {len(header)}.")

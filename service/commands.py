@@ -11,7 +11,7 @@ import uvicorn
 from pydantic import ValidationError
 
 from service.app import create_app
-from service.gate import Gate
+from service.gate import LOOPBACK_NAMES, Gate
 from service.keys import KeyStore, Scope
 from service.log import configure_logging
 from service.settings import Settings
@@ -28,20 +28,23 @@ def serve(
     """Serve σ, FRF and d33 over HTTP."""
     settings = _settings()
     keys = KeyStore(settings.data_folder)
-    loopback = _is_loopback(host)
+    # Other names than loopback's mean a proxy in front, which lets other machines in.
+    private = _is_loopback(host) and settings.host_names <= LOOPBACK_NAMES
     try:
         _require_writable(settings.data_folder)
-        if not loopback and not keys.entries():
-            _fail(f"refusing to listen on {host} without API keys: make one with `underskin key create NAME`")
+        if not private and not keys.entries():
+            where = f"as {settings.hosts}" if _is_loopback(host) else f"on {host}"
+            _fail(f"refusing to serve {where} without API keys: make one with `underskin key create NAME`")
         table = load_table(settings.tables / SIGMA_TABLE)
         listener = _listen(host, port)
     except (TableError, OSError, ValueError) as error:
         _fail(str(error))
     configure_logging()
+    typer.echo(f"underskin serves on http://{_host_name(host)}:{listener.getsockname()[1]} (Ctrl+C ends it)")
     gate = Gate(
         host_names=settings.host_names | {_host_name(host)},
         keys=keys,
-        keys_always=not loopback,
+        keys_always=not private,
         max_body_bytes=settings.max_body_bytes,
     )
     config = uvicorn.Config(

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from service.keys import Key, KeyStore
 from service.problems import Refusal
 
-_LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
+LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 OPEN = frozenset({"/health", "/ready"})
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
@@ -14,9 +14,9 @@ class Gate:
     """Refuses what must not reach a route."""
 
     def __init__(self, *, host_names: frozenset[str], keys: KeyStore, keys_always: bool, max_body_bytes: int) -> None:
-        """`keys_always`: bound to more than loopback, so that no request passes without a key, even when all
-        keys have been revoked; otherwise keys are needed once there are any."""
-        self._hosts = frozenset(name.encode() for name in host_names | _LOOPBACK_NAMES)
+        """`keys_always`: to be reached from other machines, so that no request passes without a key; otherwise
+        keys are needed once one has been made."""
+        self._hosts = frozenset(name.encode() for name in host_names | LOOPBACK_NAMES)
         self._keys = keys
         self._keys_always = keys_always
         self._max_body_bytes = max_body_bytes
@@ -35,7 +35,7 @@ class Gate:
 
     def keys_needed(self) -> bool:
         """Whether a request without a key is refused."""
-        return self._keys_always or bool(self._keys.entries())
+        return self._keys_always or self._keys.in_use()
 
     def check_size(self, size: int) -> None:
         """Refuses a body of more bytes than allowed.
@@ -53,9 +53,10 @@ class Gate:
         scheme, _, token = authorization.partition(b" ")
         key = self._keys.find(token.strip()) if scheme.lower() == b"bearer" else None
         if key is None:
+            known = "This key is not known; it may have been revoked." if authorization else "A key is needed."
             raise Refusal(
                 401,
-                "A key is needed: send Authorization: Bearer KEY (`underskin key create` makes one).",
+                f"{known} Send Authorization: Bearer KEY (`underskin key create` makes one).",
                 headers={"WWW-Authenticate": "Bearer"},
             )
         return key

@@ -43,6 +43,11 @@ class KeyStore:
         self._keys: tuple[Key, ...] = ()
         self._fresh_until = 0.0
 
+    def in_use(self) -> bool:
+        """Whether a key was ever made here: revoking the last one must not open the service to all."""
+        self.entries()
+        return self._stamp is not None
+
     def entries(self) -> tuple[Key, ...]:
         """All keys; raises ValueError when the file is damaged."""
         now = time.monotonic()

@@ -133,7 +133,7 @@ def test_bad_input_is_one_line_and_status_2(arguments: list[str], says: str) -> 
     [
         ("", "must have a header of field names and at least one row"),
         ("preload_n,frf_pc_per_n\n", "at least one row"),
-        ("preload_n;frf_pc_per_n\n1;7\n", "has the column 'preload_n;frf_pc_per_n'; allowed, once each: thickness_mm"),
+        ("preload_n;frf_pc_per_n\n1;7\n", "must separate cells by commas"),
         ("preload_n,preload_n\n1,7\n", "has the column 'preload_n'; allowed, once each"),
         ("preload_n,frf_pc_per_n\n1,7\n1\n", "has 1 cells in row 1, but 2 in the header"),
         ("preload_n,frf_pc_per_n\n1,7\n3,-\n", "frf_pc_per_n[1] = '-': must be a number"),

@@ -1,7 +1,7 @@
 """What the commands answer: columns in lab units in and out; a single number holds for all rows."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -12,7 +12,7 @@ from underskin.errors import InvalidInput
 from underskin.prediction import Transmission, transmission
 from underskin.skin import Indenter, Skin
 from underskin.surrogate import SigmaTable
-from underskin.units import Floats, checked, to_lab, to_si
+from underskin.units import Finding, Floats, checked, findings, to_lab, to_si
 
 Model = Literal["layer", "half_space"]
 
@@ -27,6 +27,7 @@ class Answer:
     columns: Mapping[str, Floats]
     inside: NDArray[np.bool_]
     domain: str
+    findings: Sequence[Finding] = ()
 
 
 def sigma(table: SigmaTable, given: Mapping[str, Floats], model: Model) -> Answer:
@@ -53,10 +54,12 @@ def d33(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> 
     """d33 and its standard uncertainty from a measured FRF, and what leads to them; raises InvalidInput."""
     reached = _pressed(table, given, units_checked)
     _accepted("frf_pc_per_n", given["frf_pc_per_n"], negative=True)
-    _accepted("frf_uncertainty_pc_per_n", given["frf_uncertainty_pc_per_n"], negative=False)
+    if not np.isnan(given["frf_uncertainty_pc_per_n"]).all():  # unknown: then d33's is NaN
+        _accepted("frf_uncertainty_pc_per_n", given["frf_uncertainty_pc_per_n"], negative=False)
     measured = (to_si(name, given[name]) for name in ("frf_pc_per_n", "frf_uncertainty_pc_per_n"))
     value, uncertainty = reached.d33(*measured)
-    return _skin_answer(table, reached, {"d33_pc_per_n": value, "d33_uncertainty_pc_per_n": uncertainty})
+    answer = _skin_answer(table, reached, {"d33_pc_per_n": value, "d33_uncertainty_pc_per_n": uncertainty})
+    return replace(answer, findings=findings("frf_pc_per_n", given["frf_pc_per_n"]))
 
 
 def _pressed(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Transmission:

@@ -6,6 +6,7 @@ The other packages (the server, the table generator) hand in theirs through the 
 
 import ast
 import importlib.util
+import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
@@ -127,7 +128,7 @@ def d33(
     preload_n: PreloadN = None,
     frf_pc_per_n: Annotated[_Given, _column("Measured FRF on the plateau, real part [pC/N].")] = None,
     frf_uncertainty_pc_per_n: Annotated[
-        _Given, _column("Standard uncertainty of the measured FRF [pC/N], 0 if left out.")
+        _Given, _column("Standard uncertainty of the measured FRF [pC/N]; without it d33 has none.")
     ] = None,
     poisson_ratio: PoissonRatio = None,
     units_checked: UnitsChecked = False,
@@ -147,7 +148,7 @@ def d33(
         "frf_pc_per_n": frf_pc_per_n,
         "frf_uncertainty_pc_per_n": frf_uncertainty_pc_per_n,
     }
-    defaults = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": 0.0}
+    defaults = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": math.nan}
     _answer(given, defaults, input_file, csv, lambda table, columns: answers.d33(table, columns, units_checked))
 
 
@@ -167,6 +168,8 @@ def _answer(
     table = load_table()
     answer = compute(table, gathered)
     everything = {**gathered, **answer.columns}
+    for finding in answer.findings:
+        typer.echo(f"underskin: look at {finding.field}: {finding.statement}", err=True)
     if as_csv:
         columns.write_csv(everything, answer.inside, count)
     else:

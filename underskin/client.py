@@ -20,7 +20,7 @@ import orjson
 from numpy.typing import ArrayLike, NDArray
 
 from underskin.errors import ServiceError, Unreachable
-from underskin.units import Floats
+from underskin.units import Finding, Floats
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,7 @@ class D33Answer(PressedSkinAnswer):
     frf_uncertainty_pc_per_n: Floats
     d33_pc_per_n: Floats
     d33_uncertainty_pc_per_n: Floats
+    findings: tuple[Finding, ...] = ()
     frf_im_pc_per_n: Floats | None = None
 
 
@@ -268,6 +269,8 @@ def _shared(name: str, value: Any) -> Any:
 def _field(name: str, document: Mapping[str, Any], single: bool) -> Any:
     """A field of the answer: an array, without its rows' axis where single numbers were given."""
     value = document.get(name)
+    if name == "findings":
+        return tuple(Finding(**finding) for finding in value or ())
     if not isinstance(value, list):
         return value
     array = np.array(value) if name == "status" else np.array(value, dtype=float)  # None becomes NaN

@@ -80,6 +80,8 @@ def _from_csv(path: str, allowed: Sequence[str]) -> dict[str, Floats]:
     if len(lines) < 2:
         raise InvalidInput("input", path, "must have a header of field names and at least one row")
     header = [name.strip() for name in lines[0]]
+    if len(header) == 1 and any(separator in header[0] for separator in ";\t"):
+        raise InvalidInput("input", path, "must separate cells by commas and write numbers with a point")
     for name in header:
         if name not in allowed or header.count(name) > 1:
             raise InvalidInput("input", path, f"has the column {name!r}; allowed, once each: {', '.join(allowed)}")
