@@ -33,7 +33,7 @@ class PointSpline:
         """Where the point lies, or None outside the spline's nodes (NaN included)."""
         x_nodes, y_nodes, z_nodes = self._nodes
         inside = x_nodes[0] <= x <= x_nodes[-1] and y_nodes[0] <= y <= y_nodes[-1] and z_nodes[0] <= z <= z_nodes[-1]
-        return (_cell(x_nodes, x), _cell(y_nodes, y), _cell(z_nodes, z)) if inside else None
+        return (cell_of(x_nodes, x), cell_of(y_nodes, y), cell_of(z_nodes, z)) if inside else None
 
     def value(self, cell: Cell, x: float, y: float, z: float) -> float:
         """s(x, y, z) in its cell."""
@@ -61,7 +61,8 @@ def _basis(knots: Floats) -> list[Basis]:
     return [tuple(map(tuple, cubics[cell][cell : cell + 4])) for cell in range(count - _DEGREE)]
 
 
-def _cell(nodes: list[float], value: float) -> int:
+def cell_of(nodes: list[float], value: float) -> int:
+    """Between which two nodes a value inside them lies: at a node above it, at the last one below it."""
     return bisect_right(nodes, value, 1, len(nodes) - 1) - 1
 
 

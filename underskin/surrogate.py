@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import NdBSpline, make_interp_spline
 
 from underskin.errors import TableError
-from underskin.point_spline import PointSpline
+from underskin.point_spline import PointSpline, cell_of
 from underskin.table_format import SIGMA_SCHEMA, read_table
 from underskin.units import Floats
 
@@ -45,6 +45,7 @@ class SigmaTable:
             self.axes = tuple(data[f"sigma/{name}"] for name in ("a_over_h", "rt_over_h", "cbrt_load_parameter"))
             self._sigma = _spline(self.axes, data["sigma/sigma"])
             self._point_sigma = PointSpline(self._sigma)
+            self._point_axes = [axis.tolist() for axis in self.axes]
             self._cell_error = _largest_at_corners(
                 data["sigma/discretisation_error"] + data["sigma/interpolation_error"]
             )
@@ -79,7 +80,11 @@ class SigmaTable:
         """σ and the bound on its relative error at one point, without the cost of arrays; None outside the domain."""
         point = (a_over_h, rt_over_h, math.cbrt(load_parameter))
         cell = self._point_sigma.cell(*point)
-        return None if cell is None else (self._point_sigma.value(cell, *point), float(self._cell_error[cell]))
+        if cell is None:
+            return None
+        # The spline's cells are not the table's: next to its ends one spans two of them (not-a-knot).
+        a, rho, x = map(cell_of, self._point_axes, point)
+        return self._point_sigma.value(cell, *point), float(self._cell_error[a, rho, x])
 
     def gradient(
         self, a_over_h: ArrayLike, rt_over_h: ArrayLike, load_parameter: ArrayLike = 0.0
