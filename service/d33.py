@@ -85,7 +85,8 @@ def answer(table: SigmaTable, request: D33Columns) -> Columns:
     require_known_model(request)
     measured = _plateau(request) if request.frf_pc_per_n is None else _given(request)
     columns = {name: request.column(name) for name in FIELDS} | measured
-    count = rows(columns)
+    sent = {"frf_pc_per_n": "frf_re_pc_per_n"} if request.frf_pc_per_n is None else {}
+    count = rows({sent.get(name, name): values for name, values in columns.items()})
     reached = pressed(table, request, columns)
     d33, uncertainty = reached.d33(
         *(to_si(name, measured[name]) for name in ("frf_pc_per_n", "frf_uncertainty_pc_per_n"))
