@@ -8,20 +8,19 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from service.answers import Columns
-from service.columns import NonNegative, Numbers, NumbersPerRow, Signed, finite, non_negative, rows
+from service.columns import NonNegative, Numbers, NumbersPerRow, Signed, rows
 from service.dependencies import columns_body, columns_route
 from service.frf import EXAMPLE as FRF_EXAMPLE
 from service.skin_columns import (
     FIELDS,
     PressedSkinAnswer,
     PressedSkinColumns,
-    lab_columns,
-    pressed,
     require_known_model,
 )
 from underskin import InvalidInput, response
+from underskin.answers import lab_columns, pressed
 from underskin.surrogate import SigmaTable
-from underskin.units import Floats, findings, to_lab, to_si
+from underskin.units import Floats, findings, finite, non_negative, to_lab, to_si
 
 router = APIRouter(prefix="/v1", tags=["d33"])
 
@@ -87,7 +86,7 @@ def answer(table: SigmaTable, request: D33Columns) -> Columns:
     columns = {name: request.column(name) for name in FIELDS} | measured
     sent = {"frf_pc_per_n": "frf_re_pc_per_n"} if request.frf_pc_per_n is None else {}
     count = rows({sent.get(name, name): values for name, values in columns.items()})
-    reached = pressed(table, request, columns)
+    reached = pressed(table, columns, request.units_checked)
     d33, uncertainty = reached.d33(
         *(to_si(name, measured[name]) for name in ("frf_pc_per_n", "frf_uncertainty_pc_per_n"))
     )

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from scipy.integrate import quad
 from scipy.special import j1
 
-from service.sigma import HALF_SPACE_END, HALF_SPACE_ERROR
 from tests.oracle import NEEDS_ORACLE, linear_layer_values
 from underskin import half_space, load_table
 from underskin.units import Floats
@@ -258,17 +257,17 @@ def half_space_answer(http: httpx.Client, a: ArrayLike, rho: ArrayLike) -> tuple
 
 
 def test_the_half_spaces_error_is_as_reported(http: httpx.Client) -> None:
-    end = HALF_SPACE_END
+    end = half_space.DOMAIN_END
     corners = np.array([(0.0, 0.0), (end, 0.0), (0.0, end), (end, end), (end, 1e-3), (1e-3, end)])
     a, rho = np.concatenate([corners, GENERATOR.uniform(0, end, (60, 2))]).T
     sigma, rel_error = half_space_answer(http, a, rho)
     exact = np.array([integrated(*pair) for pair in zip(a.tolist(), rho.tolist(), strict=True)])
     assert (np.abs(sigma / exact - 1) <= rel_error).all()
-    assert set(rel_error) == {HALF_SPACE_ERROR}
+    assert set(rel_error) == {half_space.REL_ERROR}
 
 
 def test_the_half_spaces_closed_forms(http: httpx.Client) -> None:
-    size = np.linspace(0.01, HALF_SPACE_END, 200)
+    size = np.linspace(0.01, half_space.DOMAIN_END, 200)
     point_sensor, rel_error = half_space_answer(http, size, 0.0)
     assert (np.abs(point_sensor * (1 + size**2) - 1) <= rel_error).all()
     point_load, rel_error = half_space_answer(http, 0.0, size)
@@ -277,7 +276,7 @@ def test_the_half_spaces_closed_forms(http: httpx.Client) -> None:
 
 
 def test_the_half_space_ends_and_knows_no_strain(http: httpx.Client) -> None:
-    beyond = math.nextafter(HALF_SPACE_END, math.inf)
+    beyond = math.nextafter(half_space.DOMAIN_END, math.inf)
     answer = posted(
         http, a_over_h=[10, beyond, 1, 1], rt_over_h=[10, 1, beyond, 1], load_parameter=9, model="half_space"
     )

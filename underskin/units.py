@@ -82,6 +82,24 @@ def checked(name: str, value: ArrayLike, *, units_checked: bool = False) -> Floa
     return values * field.to_si
 
 
+def non_negative(name: str, values: Floats) -> Floats:
+    """`values`, after refusing what is not finite or below 0 (InvalidInput with the first such row)."""
+    return _accepted(name, values, np.isfinite(values) & (values >= 0), "must be finite and at least 0")
+
+
+def finite(name: str, values: Floats) -> Floats:
+    """`values`, after refusing what is not finite (InvalidInput with the first such row)."""
+    return _accepted(name, values, np.isfinite(values), "must be finite")
+
+
+def _accepted(name: str, values: Floats, good: NDArray[np.bool_], allowed: str) -> Floats:
+    if not good.all():
+        first = int(np.argmin(good.ravel()))
+        row = int(np.unravel_index(first, values.shape)[0]) if values.ndim else None
+        raise InvalidInput(name, float(values.flat[first]), allowed, index=row)
+    return values
+
+
 @dataclass(frozen=True)
 class Finding:
     """A measured value that looks wrong but is used all the same: the row, and what to look at."""
