@@ -103,7 +103,7 @@ def wants_csv(accept: str) -> bool:
         media_type, *parameters = (piece.strip() for piece in part.lower().split(";"))
         weight = next((value[2:] for value in parameters if value.startswith("q=")), "1")
         if media_type in weights:
-            weights[media_type] = float(weight) if weight.replace(".", "", 1).isdigit() else 0.0
+            weights[media_type] = float(weight) if weight.replace(".", "", 1).isdecimal() else 0.0
     csv_weight = weights.pop("text/csv")
     return csv_weight > 0 and csv_weight >= max(weights.values())
 

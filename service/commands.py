@@ -27,12 +27,13 @@ def serve(
 ) -> None:
     """Serve σ, FRF and d33 over HTTP."""
     settings = _settings()
-    keys = KeyStore(settings.data_folder)
+    keys = KeyStore(settings.data)
     # Other names than loopback's mean a proxy in front, which lets other machines in.
     private = _is_loopback(host) and settings.host_names <= LOOPBACK_NAMES
     try:
-        _require_writable(settings.data_folder)
-        if not private and not keys.entries():
+        _require_writable(settings.data)
+        known = keys.entries()  # a damaged file ends the start, not every request
+        if not private and not known:
             where = f"as {settings.hosts}" if _is_loopback(host) else f"on {host}"
             _fail(f"refusing to serve {where} without API keys: make one with `underskin key create NAME`")
         table = load_table(settings.tables / SIGMA_TABLE)
@@ -99,11 +100,12 @@ def _settings() -> Settings:
         return Settings()
     except ValidationError as error:
         first = error.errors()[0]
-        _fail(f"UNDERSKIN_{str(first['loc'][0]).upper()} = {first['input']!r}: {first['msg'].lower()}")
+        reason = first["msg"].removeprefix("Value error, ")
+        _fail(f"UNDERSKIN_{str(first['loc'][0]).upper()} = {first['input']!r}: {reason[:1].lower()}{reason[1:]}")
 
 
 def _keys() -> KeyStore:
-    return KeyStore(_settings().data_folder)
+    return KeyStore(_settings().data)
 
 
 def _require_writable(folder: Path) -> None:

@@ -18,7 +18,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from service.gate import Gate
 from service.log import log_request
 from service.metrics import observe
-from service.problems import Refusal
+from service.problems import Refusal, unexpected
 
 logger = logging.getLogger("underskin")
 
@@ -65,7 +65,7 @@ class Front:
         except Exception:
             logger.exception("request failed", extra={"fields": {"request_id": request_id}})
             if not exchange.status:
-                await exchange.refuse(Refusal(500, "Something went wrong in the server."))
+                await exchange.refuse(unexpected())
         seconds = time.perf_counter() - start
         method, path = scope["method"], scope["path"]
         route = path if exchange.hot else getattr(scope.get("route"), "path", "none")

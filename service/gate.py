@@ -45,7 +45,7 @@ class Gate:
         """
         if size > self._max_body_bytes:
             limit = f"{self._max_body_bytes / 1e6:g} MB (UNDERSKIN_MAX_BODY_MB)"
-            raise Refusal(413, f"The body exceeds {limit}; send fewer rows a request.")
+            raise Refusal(413, f"The body exceeds {limit}; send fewer rows a request.", title="Body too large")
 
     def _check_key(self, authorization: bytes) -> Key | None:
         if not self.keys_needed():

@@ -5,7 +5,7 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 
 from service.openapi import methods
-from service.problems import Refusal, from_validation, invalid_input
+from service.problems import Refusal, from_validation, invalid_input, unexpected
 from underskin import InvalidInput
 
 
@@ -29,6 +29,8 @@ def _as_refusal(request: Request, error: Exception) -> Refusal:
     match error:
         case Refusal():
             return error
+        case HTTPException(__cause__=Refusal() as refusal):  # FastAPI wraps what ends the reading of a body
+            return refusal
         case InvalidInput():
             return invalid_input([error])
         case RequestValidationError():
@@ -41,4 +43,4 @@ def _as_refusal(request: Request, error: Exception) -> Refusal:
         case HTTPException():
             return Refusal(error.status_code, str(error.detail), headers=error.headers)
         case _:
-            return Refusal(500, "Something went wrong in the server; its log has the request's id.")
+            return unexpected()

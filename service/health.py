@@ -34,7 +34,7 @@ async def health() -> Health:
 @router.get("/ready", operation_id="ready", summary="Can it do its work?")
 async def ready(request: Request, table: Table) -> Ready:
     """Table loaded and data folder writable; 503 where not."""
-    folder = request.app.state.settings.data_folder
+    folder = request.app.state.settings.data
     if not os.access(folder, os.W_OK):
         raise Refusal(503, f"The data folder {folder} is not writable.")
     return Ready(status="ready", table_sha256=table.sha256)
