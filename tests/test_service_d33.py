@@ -90,7 +90,7 @@ def test_without_an_uncertainty_d33s_is_unknown(http: httpx.Client) -> None:
 
 
 @pytest.mark.parametrize(
-    ("frf", "index", "said"), [([7.4, 7.4e-12], 1, "C/N"), ([0.0, 7.4], 0, "dead sensor"), (74000.0, None, "fC/N")]
+    ("frf", "index", "said"), [([7.4, 7.4e-12], 1, "C/N"), ([0.0, 7.4], 0, "dead sensor"), (740000.0, None, "fC/N")]
 )
 def test_what_looks_wrong_is_used_and_said(http: httpx.Client, frf: Any, index: int | None, said: str) -> None:
     answer = posted(http, preload_n=1, frf_pc_per_n=frf)
