@@ -38,8 +38,9 @@ def test_models_and_what_they_support(server_url: str) -> None:
 
 def test_sigma_is_the_tables(server_url: str) -> None:
     served = model(server_url, "sigma")
-    for a, rho, load in [*POINTS["sigma"], [0, 0, 0], [3, 3, 0.1]]:
-        ((value,),) = served([[a, rho, load]])
+    corners = [[0.0, 0.0, 0.0], [3.0, 3.0, 0.1]]
+    for a, rho, load in POINTS["sigma"] + corners:
+        [[value]] = served([[a, rho, load]])
         assert value == pytest.approx(float(TABLE.sigma(a, rho, load).sigma), rel=1e-13)
 
 
@@ -49,7 +50,7 @@ def test_frf_is_the_librarys(server_url: str) -> None:
         thickness, modulus, sensor_radius, indenter_radius, preload, d33 = point
         skin = Skin.from_lab(thickness_mm=thickness, youngs_modulus_mpa=modulus, sensor_radius_mm=sensor_radius)
         reached = transmission(TABLE, skin, Indenter.from_lab(indenter_radius_mm=indenter_radius), preload)
-        ((value,),) = served([point])
+        [[value]] = served([point])
         assert value == pytest.approx(to_lab("frf_pc_per_n", reached.frf(to_si("d33_pc_per_n", d33))), rel=1e-12)
 
 
