@@ -80,7 +80,7 @@ def test_what_waits_is_written_when_the_server_stops(tmp_path: Path) -> None:
 
 def test_the_key_is_named_and_never_written(tmp_path: Path) -> None:
     environment = {"UNDERSKIN_DATA": str(tmp_path / "data")}
-    command = [UNDERSKIN, "key", "create", "bench-7"]
+    command = [str(UNDERSKIN), "key", "create", "bench-7"]
     made = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     token = made.stdout.split()[-1]
     with running(tmp_path) as started:
