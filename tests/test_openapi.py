@@ -1,0 +1,175 @@
+"""The OpenAPI document and the settings: complete, true, and hard to break."""
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from pydantic_core import PydanticUndefined
+
+from service.app import create_api
+from service.gate import Gate
+from service.keys import KeyStore
+from service.settings import Settings
+from tests.conftest import Server, running
+from underskin import load_table
+
+ROOT = Path(__file__).parents[1]
+UNITS = {"_mm": "mm", "_mpa": "MPa", "_n": "N", "_pc_per_n": "pC/N", "_hz": "Hz"}
+# Generated clients name their functions after these: to change one breaks them.
+OPERATIONS = {
+    ("get", "/v1/sigma"): "sigma_one",
+    ("post", "/v1/sigma"): "sigma_columns",
+    ("post", "/v1/frf"): "frf_columns",
+    ("post", "/v1/d33"): "d33_columns",
+    ("get", "/v1/tables"): "tables",
+    ("get", "/umbridge/Info"): "umbridge_info",
+    ("post", "/umbridge/ModelInfo"): "umbridge_model_info",
+    ("post", "/umbridge/InputSizes"): "umbridge_input_sizes",
+    ("post", "/umbridge/OutputSizes"): "umbridge_output_sizes",
+    ("post", "/umbridge/Evaluate"): "umbridge_evaluate",
+    ("post", "/umbridge/Gradient"): "umbridge_gradient",
+    ("post", "/umbridge/ApplyJacobian"): "umbridge_apply_jacobian",
+    ("post", "/umbridge/ApplyHessian"): "umbridge_apply_hessian",
+    ("get", "/health"): "health",
+    ("get", "/ready"): "ready",
+    ("get", "/metrics"): "metrics",
+    ("get", "/openapi.json"): "openapi",
+}
+
+
+@pytest.fixture(scope="module")
+def document(http: httpx.Client) -> dict[str, Any]:
+    answer: dict[str, Any] = http.get("/openapi.json").json()
+    return answer
+
+
+def operations(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    for path, methods in document["paths"].items():
+        for method, operation in methods.items():
+            yield method, path, operation
+
+
+def fields_of(schema: dict[str, Any], document: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The properties of an object, wherever it is defined."""
+    if "$ref" in schema:
+        schema = document["components"]["schemas"][schema["$ref"].rsplit("/", 1)[1]]
+    fields: dict[str, dict[str, Any]] = schema.get("properties", {})
+    return fields
+
+
+def test_operation_ids_are_stable(document: dict[str, Any]) -> None:
+    assert {(method, path): operation["operationId"] for method, path, operation in operations(document)} == OPERATIONS
+
+
+def test_every_route_of_the_application_is_in_the_document(document: dict[str, Any], tmp_path: Path) -> None:
+    gate = Gate(host_names=frozenset(), keys=KeyStore(tmp_path), keys_always=False, max_body_bytes=1)
+    api = create_api(Settings(data=tmp_path), load_table(), gate)
+    assert set(api.openapi()["paths"]) == set(document["paths"])
+    assert not [route for route in api.routes if not getattr(route, "include_in_schema", True)]
+
+
+def test_every_operation_is_described(document: dict[str, Any]) -> None:
+    for method, path, operation in operations(document):
+        place = f"{method} {path}"
+        assert operation["summary"], place
+        assert operation["tags"], place
+        assert operation["responses"]["200"]["description"], place
+        assert operation["responses"]["200"]["content"], place
+        problem = "UmbridgeProblem" if path.startswith("/umbridge/") else "Problem"
+        for status in ("4XX", "5XX"):
+            (content,) = operation["responses"][status]["content"].values()
+            assert content["schema"]["$ref"].endswith(f"/{problem}"), place
+
+
+def test_every_field_is_described_with_its_unit(document: dict[str, Any]) -> None:
+    described = 0
+    for method, path, operation in operations(document):
+        fields = {parameter["name"]: parameter for parameter in operation.get("parameters", [])}
+        for content in (operation.get("requestBody", {}), *operation["responses"].values()):
+            for media in content["content"].values() if content else []:
+                fields |= fields_of(media.get("schema", {}), document)
+        for name, field in fields.items():
+            if name == "error":
+                continue
+            described += 1
+            assert field.get("description"), f"{method} {path}: {name}"
+            suffix = next((suffix for suffix in sorted(UNITS, key=len, reverse=True) if name.endswith(suffix)), None)
+            if suffix is not None and path.startswith("/v1/"):
+                assert f"[{UNITS[suffix]}]" in field["description"], f"{method} {path}: {name}"
+    assert described > 60
+
+
+def test_the_examples_are_accepted_and_answered_as_described(http: httpx.Client, document: dict[str, Any]) -> None:
+    tried = 0
+    for method, path, operation in operations(document):
+        for media_type, content in operation.get("requestBody", {}).get("content", {}).items():
+            if "example" not in content:
+                continue
+            tried += 1
+            sent = {"content": content["example"]} if media_type == "text/csv" else {"json": content["example"]}
+            answer = http.request(method, path, headers={"Content-Type": media_type}, **sent)
+            assert answer.status_code == 200, answer.text
+            promised = fields_of(operation["responses"]["200"]["content"]["application/json"]["schema"], document)
+            assert set(answer.json()) <= set(promised), path
+            assert set(answer.json()["status"]) == {"ok"}
+    assert tried == 6
+
+
+def test_a_key_is_asked_for_in_the_document_where_one_is_needed(document: dict[str, Any], locked: Server) -> None:
+    assert "security" not in document
+    with httpx.Client(base_url=locked.url, headers=authorization(locked)) as client:
+        described = client.get("/openapi.json").json()
+    assert described["security"] == [{"key": []}]
+    assert described["components"]["securitySchemes"]["key"]["scheme"] == "bearer"
+    for path in ("/health", "/ready"):
+        assert described["paths"][path]["get"]["security"] == []
+        assert httpx.get(locked.url + path).status_code == 200
+    for method, path, operation in operations(described):
+        if "security" not in operation:
+            assert httpx.request(method, locked.url + path).status_code == 401, path
+
+
+def test_every_setting_is_documented_with_its_default() -> None:
+    text = (ROOT / "docs" / "settings.md").read_text()
+    sections = dict(re.findall(r"^## `(UNDERSKIN_\w+)`\n(.*?)(?=^## |\Z)", text, flags=re.MULTILINE | re.DOTALL))
+    for name, field in Settings.model_fields.items():
+        section = sections.pop(f"UNDERSKIN_{name.upper()}")
+        assert len(section.split()) > 10, name
+        if field.default is not PydanticUndefined and str(field.default):
+            assert f"Default: `{field.default}`" in section, name
+    assert not sections
+
+
+@pytest.fixture(scope="module")
+def locked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A server that has a key."""
+    folder = tmp_path_factory.mktemp("locked")
+    (folder / "token").write_text(KeyStore(folder / "data").create("fuzzer", "read"))
+    with running(folder) as started:
+        yield started
+
+
+def authorization(server: Server) -> dict[str, str]:
+    return {"Authorization": f"Bearer {(server.log.parent / 'token').read_text()}"}
+
+
+@pytest.mark.parametrize("with_key", [False, True])
+def test_schemathesis_finds_nothing(server: Server, locked: Server, with_key: bool, tmp_path: Path) -> None:
+    asked = locked if with_key else server
+    examples = "2000" if os.environ.get("UNDERSKIN_SOAK") else "15"
+    command = [
+        *(sys.executable, "-m", "schemathesis.cli", "--config-file", str(ROOT / "schemathesis.toml")),
+        *("run", f"{asked.url}/openapi.json", "--max-examples", examples, "--seed", "20180208", "--no-color"),
+    ]
+    if with_key:
+        command += ["--header", f"Authorization: {authorization(asked)['Authorization']}"]
+    found = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert found.returncode == 0, found.stdout[-6000:] + found.stderr[-2000:]
+    assert "16 selected / 16 total" in found.stdout or "17 selected / 17 total" in found.stdout, found.stdout
+    assert asked.process.poll() is None
