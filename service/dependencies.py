@@ -43,6 +43,7 @@ def columns_route(
     """An endpoint that reads a request in columns, answers it and writes it as the client accepts it."""
 
     async def endpoint(request: Request, table: Table, accept: Accept = "application/json") -> Response:
+        """In columns: a list has an entry a row, a single number holds for all rows. Accept: text/csv gives CSV."""
         body = await request.body()
         content_type = request.headers.get("content-type", "")
 

@@ -96,14 +96,16 @@ _EXAMPLE = [[0.3, 0.6, 0.01]]
 _Name = Annotated[str, WithJsonSchema({"type": "string", "enum": list(_MODELS)})]
 
 
-class _Named(BaseModel):
+class ModelRequest(BaseModel):
+    """Which model is asked."""
+
     model_config = ConfigDict(extra="ignore")
 
     name: _Name = Field(description="Which model.", examples=["sigma"])
     config: dict[str, Any] = Field(default_factory=dict, description="Not used by these models.")
 
 
-class Evaluation(_Named):
+class Evaluation(ModelRequest):
     """Where to evaluate."""
 
     input: list[_Vector] = Field(
@@ -130,7 +132,7 @@ class JacobianRequest(_Derivative):
     vec: _Vector = Field(description="Direction in the space of inputs.", examples=[[1.0, 0.0, 0.0]])
 
 
-class HessianRequest(_Named):
+class HessianRequest(ModelRequest):
     """Not supported by these models."""
 
 
@@ -178,20 +180,20 @@ async def info() -> Info:
 
 
 @router.post("/ModelInfo", operation_id="umbridge_model_info", summary="What a model supports")
-async def model_info(request: _Named) -> ModelInfo:
+async def model_info(request: ModelRequest) -> ModelInfo:
     """Values and first derivatives."""
     _model(request)
     return ModelInfo(support={"Evaluate": True, "Gradient": True, "ApplyJacobian": True, "ApplyHessian": False})
 
 
 @router.post("/InputSizes", operation_id="umbridge_input_sizes", summary="Lengths of the inputs")
-async def input_sizes(request: _Named) -> InputSizes:
+async def input_sizes(request: ModelRequest) -> InputSizes:
     """One vector."""
     return InputSizes(inputSizes=[len(_model(request).inputs)])
 
 
 @router.post("/OutputSizes", operation_id="umbridge_output_sizes", summary="Lengths of the outputs")
-async def output_sizes(request: _Named) -> OutputSizes:
+async def output_sizes(request: ModelRequest) -> OutputSizes:
     """One number."""
     _model(request)
     return OutputSizes(outputSizes=[1])
@@ -244,7 +246,7 @@ def hot_route(table: SigmaTable) -> HotRoute:
     return one
 
 
-def _model(request: _Named) -> _Model:
+def _model(request: ModelRequest) -> _Model:
     if request.name not in _MODELS:
         raise Refusal(400, f"There is no model {request.name!r}; there are {list(_MODELS)}.", title="Model not found")
     return _MODELS[request.name]

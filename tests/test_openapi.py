@@ -1,7 +1,7 @@
-"""The OpenAPI document and the settings: complete, true, and hard to break."""
+"""The OpenAPI document: complete, true, and nothing for schemathesis to find."""
 
+import json
 import os
-import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import jsonschema_rs
 import pytest
-from pydantic_core import PydanticUndefined
 
 from service.app import create_api
 from service.gate import Gate
@@ -78,6 +78,7 @@ def test_every_operation_is_described(document: dict[str, Any]) -> None:
     for method, path, operation in operations(document):
         place = f"{method} {path}"
         assert operation["summary"], place
+        assert operation["description"], place
         assert operation["tags"], place
         assert operation["responses"]["200"]["description"], place
         assert operation["responses"]["200"]["content"], place
@@ -105,20 +106,65 @@ def test_every_field_is_described_with_its_unit(document: dict[str, Any]) -> Non
     assert described > 60
 
 
-def test_the_examples_are_accepted_and_answered_as_described(http: httpx.Client, document: dict[str, Any]) -> None:
+def test_every_schema_is_described_and_has_valid_examples(document: dict[str, Any]) -> None:
     tried = 0
+    bodies = [operation["requestBody"] for *_, operation in operations(document) if "requestBody" in operation]
+    inline = [body["content"]["application/json"]["schema"] for body in bodies]
+    for schema in [*document["components"]["schemas"].values(), *inline]:
+        assert "$ref" in schema or schema["description"], schema["title"]
+        for name, field in fields_of(schema, document).items():
+            for example in field.get("examples", []):
+                tried += 1
+                validator(field, document).validate(example)
+                assert field["description"], name
+    assert tried > 10
+
+
+def validator(schema: dict[str, Any], document: dict[str, Any]) -> jsonschema_rs.Draft202012Validator:
+    """Of a schema that refers to the document's components."""
+    return jsonschema_rs.Draft202012Validator(schema | {"components": document["components"]})
+
+
+def examples(operation: dict[str, Any], document: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Media type and example of each body; one that has no example of its own has those of its fields."""
+    for media_type, content in operation.get("requestBody", {}).get("content", {}).items():
+        example = content.get("example")
+        if example is None:
+            fields = fields_of(content["schema"], document).items()
+            example = {name: field["examples"][0] for name, field in fields if "examples" in field}
+        if media_type == "application/json":
+            validator(content["schema"], document).validate(example)
+        yield media_type, example if isinstance(example, str) else json.dumps(example)
+
+
+def query(operation: dict[str, Any]) -> dict[str, Any]:
+    schemas = {parameter["name"]: parameter["schema"] for parameter in operation.get("parameters", [])}
+    return {name: schema["examples"][0] for name, schema in schemas.items() if "examples" in schema}
+
+
+def test_the_examples_are_accepted_and_answered_as_described(http: httpx.Client, document: dict[str, Any]) -> None:
     for method, path, operation in operations(document):
-        for media_type, content in operation.get("requestBody", {}).get("content", {}).items():
-            if "example" not in content:
-                continue
-            tried += 1
-            sent = {"content": content["example"]} if media_type == "text/csv" else {"json": content["example"]}
-            answer = http.request(method, path, headers={"Content-Type": media_type}, **sent)
-            assert answer.status_code == 200, answer.text
-            promised = fields_of(operation["responses"]["200"]["content"]["application/json"]["schema"], document)
-            assert set(answer.json()) <= set(promised), path
-            assert set(answer.json()["status"]) == {"ok"}
-    assert tried == 6
+        for media_type, body in [*examples(operation, document)] or [("", "")]:
+            headers = {"Content-Type": media_type} if body else {}
+            answer = http.request(method, path, params=query(operation), content=body, headers=headers)
+            refused = path == "/umbridge/ApplyHessian"  # which these models do not support, and say so
+            assert answer.status_code == (400 if refused else 200), f"{method} {path}: {answer.text}"
+            promised = operation["responses"]["4XX" if refused else "200"]["content"]
+            schema = promised[answer.headers["content-type"].split(";")[0]]["schema"]
+            if answer.headers["content-type"] == "application/json":
+                validator(schema, document).validate(answer.json())
+
+
+@pytest.mark.parametrize("path", ["/v1/sigma", "/v1/frf", "/v1/d33"])
+def test_the_examples_in_json_and_csv_are_the_same(http: httpx.Client, document: dict[str, Any], path: str) -> None:
+    bodies = examples(document["paths"][path]["post"], document)
+    first, second = (http.post(path, content=body, headers={"Content-Type": kind}).json() for kind, body in bodies)
+    assert first == second
+    assert set(first["status"]) == {"ok"}
+
+
+def test_the_document_stays_the_same(http: httpx.Client, document: dict[str, Any]) -> None:
+    assert http.get("/openapi.json").json() == document
 
 
 def test_a_key_is_asked_for_in_the_document_where_one_is_needed(document: dict[str, Any], locked: Server) -> None:
@@ -133,17 +179,6 @@ def test_a_key_is_asked_for_in_the_document_where_one_is_needed(document: dict[s
     for method, path, operation in operations(described):
         if "security" not in operation:
             assert httpx.request(method, locked.url + path).status_code == 401, path
-
-
-def test_every_setting_is_documented_with_its_default() -> None:
-    text = (ROOT / "docs" / "settings.md").read_text()
-    sections = dict(re.findall(r"^## `(UNDERSKIN_\w+)`\n(.*?)(?=^## |\Z)", text, flags=re.MULTILINE | re.DOTALL))
-    for name, field in Settings.model_fields.items():
-        section = sections.pop(f"UNDERSKIN_{name.upper()}")
-        assert len(section.split()) > 10, name
-        if field.default is not PydanticUndefined and str(field.default):
-            assert f"Default: `{field.default}`" in section, name
-    assert not sections
 
 
 @pytest.fixture(scope="module")
@@ -171,5 +206,6 @@ def test_schemathesis_finds_nothing(server: Server, locked: Server, with_key: bo
         command += ["--header", f"Authorization: {authorization(asked)['Authorization']}"]
     found = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert found.returncode == 0, found.stdout[-6000:] + found.stderr[-2000:]
-    assert "16 selected / 16 total" in found.stdout or "17 selected / 17 total" in found.stdout, found.stdout
+    every_other = len(OPERATIONS) - 1  # than the one that gives the document
+    assert f"{every_other} selected / {every_other} total" in found.stdout, found.stdout
     assert asked.process.poll() is None
