@@ -1,4 +1,4 @@
-"""Run the benchmarks: python -m bench [PART ...]. A full run writes docs/validation.md."""
+"""Run the benchmarks: python -m bench [PART ...]. What was measured is written to docs/validation.md."""
 
 import os
 import platform
@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from bench import accuracy, batch, newton_step, orderings, single_requests, start
-from bench.page import markdown, write
+from bench.page import keep, markdown, write
 
 PARTS = {
     "requests": single_requests.measure,
@@ -22,15 +22,14 @@ _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scik
 
 
 def main(names: list[str]) -> None:
-    """Measure the parts named, or all; only a full run is written down."""
-    about = machine()
-    print(f"{about['processor']}, {about['cores']} cores, {about['idle_percent']} % idle before the start\n")
-    figures = {}
+    """Measure the parts named, or all, and write the page with what is new in it."""
     for name in names or PARTS:
-        figures[name] = PARTS[name]()
-        print(markdown(figures[name]), flush=True)
-    if not names:
-        write(about, figures)
+        about = machine()
+        print(f"{name}: {about}", flush=True)
+        figures = PARTS[name]()
+        print(markdown(figures), flush=True)
+        keep(name, about, figures)
+    write()
 
 
 def machine() -> dict[str, str | int]:

@@ -1,16 +1,22 @@
-"""docs/validation.md, written by a full run of `make bench` from what it measured."""
+"""docs/validation.md, written from what `make bench` or one of its parts measured last (docs/bench-results.json)."""
 
+import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from bench.figures import Figure
 
-PAGE = Path(__file__).parent.parent / "docs" / "validation.md"
+_DOCS = Path(__file__).parent.parent / "docs"
+PAGE, RESULTS = _DOCS / "validation.md", _DOCS / "bench-results.json"
 
 _INTRODUCTION = """# Accuracy and speed, measured
 
-Written by `make bench` on {machine}. Ratios were taken in turns within one run, medians over the rounds; single times
-depend on the machine. A target is what the project holds itself to; **no** marks a target that is not met.
+Written by `make bench`, or by the command named at each section, which says where it was measured. Ratios were taken
+in turns within one run, medians over the rounds; single times depend on the machine, and other work on it disturbs even
+ratios: `idle_percent` is how idle it was before the start. A target is what the project holds itself to; **no** marks
+one that was not met.
 """
 
 _SECTIONS = {
@@ -34,12 +40,28 @@ server and Tesseract Core's runtime, each serving the same spline.""",
 }
 
 
-def write(machine: Mapping[str, object], figures: Mapping[str, Sequence[Figure]]) -> None:
-    """Write the page for the figures of every part."""
-    text = _INTRODUCTION.format(machine=", ".join(f"{name}: {value}" for name, value in machine.items()))
+def keep(part: str, machine: Mapping[str, object], figures: Sequence[Figure]) -> None:
+    """Put one part's figures in the place of its last ones."""
+    results = _results()
+    results[part] = {"machine": dict(machine), "figures": [asdict(figure) for figure in figures]}
+    RESULTS.write_text(json.dumps(results, indent=1, ensure_ascii=False, sort_keys=True) + "\n")
+
+
+def write() -> None:
+    """Write the page from all that was kept."""
+    text = _INTRODUCTION
+    results = _results()
     for part, title in _SECTIONS.items():
-        text += f"\n## {title}\n\n`python -m bench {part}`. {_EXPLANATIONS[part]}\n\n{markdown(figures[part])}\n"
+        if part in results:
+            figures = [Figure(**figure) for figure in results[part]["figures"]]
+            machine = ", ".join(f"{name} {value}" for name, value in results[part]["machine"].items())
+            text += f"\n## {title}\n\n`python -m bench {part}`. {_EXPLANATIONS[part]}\n\n"
+            text += f"{markdown(figures)}\n\nMeasured on: {machine}.\n"
     PAGE.write_text(text)
+
+
+def _results() -> dict[str, Any]:
+    return json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
 
 
 def markdown(figures: Sequence[Figure]) -> str:
