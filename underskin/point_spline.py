@@ -6,6 +6,8 @@ cubic in the distance from the cell's lower node. The values agree with scipy's 
 
 import math
 from bisect import bisect_right
+from collections.abc import Sequence
+from struct import Struct
 
 import numpy as np
 from scipy.interpolate import BSpline, NdBSpline
@@ -13,10 +15,11 @@ from scipy.interpolate import BSpline, NdBSpline
 from underskin.units import Floats
 
 _DEGREE = 3
+_FOUR_CUBICS = Struct("<16d").unpack_from
 
 # Highest power first; the cubics of a cell's four basis functions.
-Cubic = tuple[float, ...]
-Basis = tuple[Cubic, ...]
+Cubic = Sequence[float]
+Basis = Sequence[Cubic]
 Cell = tuple[int, int, int]
 
 
@@ -24,10 +27,14 @@ class PointSpline:
     """The three-dimensional cubic `spline`, for one point at a time."""
 
     def __init__(self, spline: NdBSpline) -> None:
-        """Take the basis functions apart into cubics, cell by cell."""
+        """Take the spline apart: along z into cubics, along x and y into cubic basis functions, cell by cell."""
         self._nodes = [knots[_DEGREE:-_DEGREE].tolist() for knots in spline.t]
-        self._basis = [_basis(np.asarray(knots)) for knots in spline.t]
-        self._coefficients = np.asarray(spline.c).tolist()
+        in_x, in_y, in_z = (_basis_functions(np.asarray(knots)) for knots in spline.t)
+        self._basis_x, self._basis_y = _of_cells(in_x), _of_cells(in_y)
+        # [i, cell of z, j, power]: the cubic in z that goes with b_i(x) b_j(y); four of them in a row are read at once.
+        cubics = np.einsum("ijk,ckp->icjp", spline.c, in_z)
+        self._cubics = cubics.astype("<f8").tobytes()
+        self._strides = cubics.astype("<f8", order="C").strides
 
     def cell(self, x: float, y: float, z: float) -> Cell | None:
         """Where the point lies, or None outside the spline's nodes (NaN included)."""
@@ -38,27 +45,35 @@ class PointSpline:
     def value(self, cell: Cell, x: float, y: float, z: float) -> float:
         """s(x, y, z) in its cell."""
         i, j, k = cell
-        in_x, in_y, in_z = self._basis
-        z0, z1, z2, z3 = _values(in_z[k], z - self._nodes[2][k])
-        weights_y = _values(in_y[j], y - self._nodes[1][j])
+        x_nodes, y_nodes, z_nodes = self._nodes
+        u = z - z_nodes[k]
+        y0, y1, y2, y3 = _values(self._basis_y[j], y - y_nodes[j])
         total = 0.0
-        for weight_x, plane in zip(_values(in_x[i], x - self._nodes[0][i]), self._coefficients[i : i + 4], strict=True):
-            in_plane = 0.0
-            for weight_y, line in zip(weights_y, plane[j : j + 4], strict=True):
-                c0, c1, c2, c3 = line[k : k + 4]
-                in_plane += weight_y * (c0 * z0 + c1 * z1 + c2 * z2 + c3 * z3)
-            total += weight_x * in_plane
+        next_i, next_cell, next_j, _ = self._strides
+        offset = i * next_i + k * next_cell + j * next_j
+        for weight in _values(self._basis_x[i], x - x_nodes[i]):
+            a3, a2, a1, a0, b3, b2, b1, b0, c3, c2, c1, c0, d3, d2, d1, d0 = _FOUR_CUBICS(self._cubics, offset)
+            total += weight * (
+                y0 * (((a3 * u + a2) * u + a1) * u + a0)
+                + y1 * (((b3 * u + b2) * u + b1) * u + b0)
+                + y2 * (((c3 * u + c2) * u + c1) * u + c0)
+                + y3 * (((d3 * u + d2) * u + d1) * u + d0)
+            )
+            offset += next_i
         return total
 
 
-def _basis(knots: Floats) -> list[Basis]:
-    """For each cell the cubics of its four basis functions: Taylor's coefficients at its lower node."""
+def _basis_functions(knots: Floats) -> Floats:
+    """[cell, function, power]: each basis function's cubic in each cell, Taylor's at the cell's lower node."""
     count = len(knots) - _DEGREE - 1
     basis = BSpline(knots, np.eye(count), _DEGREE)
     nodes = knots[_DEGREE : -_DEGREE - 1]
-    c0, c1, c2, c3 = (np.asarray(basis(nodes, nu=order)) / math.factorial(order) for order in range(4))
-    cubics = np.stack([c3, c2, c1, c0], axis=-1).tolist()
-    return [tuple(map(tuple, cubics[cell][cell : cell + 4])) for cell in range(count - _DEGREE)]
+    return np.stack([np.asarray(basis(nodes, nu=order)) / math.factorial(order) for order in (3, 2, 1, 0)], axis=-1)
+
+
+def _of_cells(functions: Floats) -> list[Basis]:
+    """The four basis functions that differ from 0 in each cell."""
+    return [basis[cell : cell + 4].tolist() for cell, basis in enumerate(functions)]
 
 
 def cell_of(nodes: list[float], value: float) -> int:
@@ -66,7 +81,7 @@ def cell_of(nodes: list[float], value: float) -> int:
     return bisect_right(nodes, value, 1, len(nodes) - 1) - 1
 
 
-def _values(cubics: Basis, u: float) -> Cubic:
+def _values(cubics: Basis, u: float) -> tuple[float, float, float, float]:
     (a3, a2, a1, a0), (b3, b2, b1, b0), (c3, c2, c1, c0), (d3, d2, d1, d0) = cubics
     return (
         ((a3 * u + a2) * u + a1) * u + a0,
