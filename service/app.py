@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager
 from fastapi import APIRouter, FastAPI, Security
 from starlette.types import ASGIApp
 
-from service import d33, frf, health, log, metrics, openapi, sigma, tables, umbridge
+from service import d33, frf, health, metrics, openapi, record, sigma, tables, umbridge
 from service.dependencies import authorised
 from service.front import Front
 from service.gate import Gate
@@ -19,7 +19,7 @@ from underskin.surrogate import SigmaTable
 @asynccontextmanager
 async def _lifespan(_: FastAPI) -> AsyncIterator[None]:
     yield
-    log.flush()
+    record.flush()
 
 
 def create_api(settings: Settings, table: SigmaTable, gate: Gate) -> FastAPI:

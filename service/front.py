@@ -16,12 +16,12 @@ from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.gate import Gate
-from service.log import log_request
-from service.metrics import observe
 from service.problems import Refusal, unexpected
+from service.record import record
 
 logger = logging.getLogger("underskin")
 
+_NUMBERS = frozenset({int, float})
 _SANE_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 
 
@@ -31,7 +31,7 @@ HotRoute = Callable[[bytes], bytes | None]
 
 def are_numbers(values: Iterable[object]) -> bool:
     """Whether all are numbers as JSON knows them: what is not is left to the API."""
-    return {int, float}.issuperset(map(type, values))
+    return _NUMBERS.issuperset(map(type, values))
 
 
 class Front:
@@ -69,8 +69,7 @@ class Front:
         seconds = time.perf_counter() - start
         method, path = scope["method"], scope["path"]
         route = path if exchange.hot else getattr(scope.get("route"), "path", "none")
-        observe(method, route, exchange.status, seconds)
-        log_request(request_id, method, path, exchange.status, seconds, scope["key"])
+        record(request_id, method, route, path, exchange.status, seconds, scope["key"])
 
     def _request_id(self, sent: bytes | None) -> str:
         if sent is not None and _SANE_ID.fullmatch(sent):
@@ -84,7 +83,7 @@ class Front:
         method, path = scope["method"], scope["path"]
         scope["key"] = self._gate.check(method, path, headers)
         hot = self._hot.get((method, path))
-        if hot is None or b"csv" in headers.get(b"accept", b""):
+        if hot is None or not _plain(method, headers):
             await self._api(scope, self._limited(receive), exchange.send)
             return
         body = b"" if method == "GET" else await _whole_body(self._limited(receive))
@@ -143,6 +142,13 @@ class _Exchange:
         headers += (b"content-length", b"%d" % len(content)), (b"x-request-id", self._request_id.encode())
         await self._send({"type": "http.response.start", "status": status, "headers": headers})
         await self._send({"type": "http.response.body", "body": content})
+
+
+def _plain(method: str, headers: Mapping[bytes, bytes]) -> bool:
+    """Whether JSON is asked for and, where there is a body, sent."""
+    if b"csv" in headers.get(b"accept", b""):
+        return False
+    return method == "GET" or headers.get(b"content-type", b"").split(b";")[0].strip().lower() == b"application/json"
 
 
 async def _whole_body(receive: Receive) -> bytes:
