@@ -3,6 +3,7 @@
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
 from service.openapi import methods
 from service.problems import Refusal, from_validation, invalid_input, unexpected
@@ -31,6 +32,8 @@ def _as_refusal(request: Request, error: Exception) -> Refusal:
             return error
         case HTTPException(__cause__=Refusal() as refusal):  # FastAPI wraps what ends the reading of a body
             return refusal
+        case HTTPException(__cause__=ClientDisconnect()):
+            return Refusal(499, "The client left before its body was complete.", title="Client closed request")
         case InvalidInput():
             return invalid_input([error])
         case RequestValidationError():
