@@ -4,7 +4,7 @@ ENV PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1
 RUN python3 -m venv /opt/venv
 COPY requirements.lock /build/requirements.lock
 RUN /opt/venv/bin/pip install --quiet --require-hashes -r /build/requirements.lock
-COPY pyproject.toml LICENSE /app/
+COPY pyproject.toml README.md LICENSE /app/
 COPY underskin /app/underskin
 COPY service /app/service
 COPY tablegen /app/tablegen

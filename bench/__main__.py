@@ -1,16 +1,14 @@
-"""Run the benchmarks: python -m bench [PART ...]. A full run is written to docs/bench-results.json."""
+"""Run the benchmarks: python -m bench [PART ...]. What was measured is written to docs/validation.md."""
 
-import json
 import os
 import platform
 import sys
 import time
-from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 
 from bench import accuracy, batch, newton_step, orderings, single_requests, start, store
-from bench.figures import Figure
+from bench.page import keep, markdown, write
 
 PARTS = {
     "requests": single_requests.measure,
@@ -21,29 +19,18 @@ PARTS = {
     "accuracy": accuracy.measure,
     "store": store.measure,
 }
-RESULTS = Path(__file__).parent.parent / "docs" / "bench-results.json"
 _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem")
 
 
 def main(names: list[str]) -> None:
-    """Measure the parts named, or all; only a full run is written down."""
-    about = machine()
-    print(f"{about['processor']}, {about['cores']} cores, {about['idle_percent']} % idle before the start\n")
-    figures = [figure for name in names or PARTS for figure in PARTS[name]()]
-    print(markdown(figures))
-    if not names:
-        record = {"machine": about, "figures": [asdict(figure) | {"met": figure.met} for figure in figures]}
-        RESULTS.write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n")
-
-
-def markdown(figures: list[Figure]) -> str:
-    """The figures as a table."""
-    lines = ["| what | measured | target | met |", "|---|---|---|---|"]
-    for f in figures:
-        target = "" if f.target is None else f"{'≥' if f.better == 'higher' else '≤'} {f.target:,.10g}"
-        met = {None: "", True: "yes", False: "**no**"}[f.met]
-        lines.append(f"| {f.name} | {_rounded(f.value)} {f.unit} | {target} | {met} |")
-    return "\n".join(lines)
+    """Measure the parts named, or all, and write the page with what is new in it."""
+    for name in names or PARTS:
+        about = machine()
+        print(f"{name}: {about}", flush=True)
+        figures = PARTS[name]()
+        print(markdown(figures), flush=True)
+        keep(name, about, figures)
+    write()
 
 
 def machine() -> dict[str, str | int]:
@@ -75,11 +62,6 @@ def _processor_times() -> tuple[int, int]:
     """Idle and all ticks since boot."""
     times = [int(ticks) for ticks in Path("/proc/stat").read_text().split()[1:9]]
     return times[3] + times[4], sum(times)
-
-
-def _rounded(value: float) -> str:
-    """Three significant digits, thousands separated."""
-    return f"{value:,.0f}" if value >= 1000 else f"{value:.3g}"
 
 
 main(sys.argv[1:])

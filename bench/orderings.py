@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from scipy.sparse import bmat, coo_matrix, csc_matrix
+from scipy.sparse import coo_matrix, csc_matrix
 from scipy.sparse.linalg import splu
 from threadpoolctl import threadpool_limits
 
@@ -44,5 +44,9 @@ def _saddle_matrix(layer: Layer) -> csc_matrix:
     rows = np.broadcast_to(pressure[:, :, None], constraint.shape)
     columns = np.broadcast_to(d.numbers[:, None, :], constraint.shape)
     shape = (pressure.size, d.size)
-    c = coo_matrix((constraint.ravel(), (rows.ravel(), columns.ravel())), shape=shape).tocsc()[:, d.free]
-    return bmat([[d.assemble_matrix(stiffness), c.T], [c, None]], format="csc")
+    c = coo_matrix((constraint.ravel(), (rows.ravel(), columns.ravel())), shape=shape).tocsc()[:, d.free].tocoo()
+    k = d.assemble_matrix(stiffness).tocoo()
+    size = k.shape[0]
+    entries = np.concatenate([k.data, c.data, c.data])
+    places = np.concatenate([k.row, c.row + size, c.col]), np.concatenate([k.col, c.col, c.row + size])
+    return coo_matrix((entries, places), shape=(size + pressure.size,) * 2).tocsc()

@@ -103,20 +103,14 @@ def wants_csv(accept: str) -> bool:
         media_type, *parameters = (piece.strip() for piece in part.lower().split(";"))
         weight = next((value[2:] for value in parameters if value.startswith("q=")), "1")
         if media_type in weights:
-            weights[media_type] = float(weight) if weight.replace(".", "", 1).isdigit() else 0.0
+            weights[media_type] = float(weight) if weight.replace(".", "", 1).isdecimal() else 0.0
     csv_weight = weights.pop("text/csv")
     return csv_weight > 0 and csv_weight >= max(weights.values())
 
 
-def origin_headers(model: str, table_sha256: str | None) -> dict[str, str]:
-    """What a CSV answer has no place for."""
-    table = {} if table_sha256 is None else {"Underskin-Table-SHA256": table_sha256}
-    return {"Underskin-Model": model, **table}
-
-
 def respond(answer: Columns, accept: str, *, one: bool = False) -> Response:
-    """The answer in the form that the client asked for; model and table also travel as headers."""
-    headers = origin_headers(answer.model, answer.table_sha256)
-    if wants_csv(accept):
-        return Response(answer.csv(), media_type="text/csv", headers=headers)
-    return Response(answer.json_of_one() if one else answer.json(), media_type="application/json", headers=headers)
+    """The answer in the form that the client asked for; beside CSV, model and table travel as headers."""
+    if not wants_csv(accept):
+        return Response(answer.json_of_one() if one else answer.json(), media_type="application/json")
+    table = {} if answer.table_sha256 is None else {"Underskin-Table-SHA256": answer.table_sha256}
+    return Response(answer.csv(), media_type="text/csv", headers={"Underskin-Model": answer.model, **table})

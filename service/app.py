@@ -1,9 +1,12 @@
 """The application: routes by noun on FastAPI, behind the front."""
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
 from fastapi import APIRouter, FastAPI, Security
 from starlette.types import ASGIApp
 
-from service import campaigns, d33, exports, frf, health, metrics, openapi, sigma, skins, tables, umbridge
+from service import campaigns, d33, exports, frf, health, metrics, openapi, record, sigma, skins, tables, umbridge
 from service.dependencies import authorised
 from service.front import Front
 from service.gate import Gate
@@ -15,6 +18,15 @@ from underskin import __version__
 from underskin.surrogate import SigmaTable
 
 
+@asynccontextmanager
+async def _lifespan(api: FastAPI) -> AsyncIterator[None]:
+    api.state.uploads = UploadFolder(api.state.settings.data)
+    yield
+    api.state.uploads.close()
+    api.state.store.close()
+    record.flush()
+
+
 def create_api(settings: Settings, table: SigmaTable, gate: Gate, store: Database) -> FastAPI:
     """All routes, with the table they answer from and the store."""
     api = FastAPI(
@@ -24,14 +36,14 @@ def create_api(settings: Settings, table: SigmaTable, gate: Gate, store: Databas
         docs_url=None,
         redoc_url=None,
         openapi_url=None,
+        lifespan=_lifespan,
     )
     api.state.settings = settings
     api.state.table = table
     api.state.gate = gate
     api.state.store = store
-    api.state.uploads = UploadFolder(settings.data_folder)
     install_handlers(api)
-    v1 = APIRouter(prefix="/v1", dependencies=[Security(authorised, scopes=["read"])])
+    v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"])])
     for noun in (sigma, frf, d33, tables, campaigns, exports, skins):
         v1.include_router(noun.router)
     for router in (v1, umbridge.router, health.router, metrics.router, openapi.router):

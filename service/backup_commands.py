@@ -19,7 +19,7 @@ def backup(
     """Write all that the store keeps into one file, read back to be sure, while servers run."""
     settings = read_settings()
     try:
-        backups.make(database(settings.database_url, settings.data_folder), file)
+        backups.make(database(settings.database_url, settings.data), file)
     except (StoreError, OSError) as error:
         raise UnderskinError(str(error)) from error
     typer.echo(f"{file}: {file.stat().st_size / 1e6:.1f} MB, read back and whole")
@@ -31,9 +31,9 @@ def restore(
     """Put a backup in place of the store, while servers run; what was there is backed up first."""
     settings = read_settings()
     try:
-        store = database(settings.database_url, settings.data_folder)
+        store = database(settings.database_url, settings.data)
         stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
-        before = settings.data_folder / "backups" / f"before-restore-{stamp}{backups.suffix(store)}"
+        before = settings.data / "backups" / f"before-restore-{stamp}{backups.suffix(store)}"
         restoring.restore(store, file, before)
     except (StoreError, OSError) as error:
         raise UnderskinError(str(error)) from error

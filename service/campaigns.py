@@ -13,20 +13,45 @@ from service import campaign_models as models
 from service import inverting
 from service.accepting import Terms, accept
 from service.d33_models import D33
-from service.dependencies import Store, Table, authorised
+from service.dependencies import CampaignId, Store, Table, authorised
 from service.store import campaigns
 from service.store.times import stored
 from service.uploads import received
 from underskin import InvalidInput
 from underskin.recordings import hdf5_file, json_file
 
-router = APIRouter(tags=["campaigns"])
+router = APIRouter(prefix="/v1", tags=["campaigns"])
 
 WRITE = [Security(authorised, scopes=["write"])]
 # Reading a campaign takes memory many times its size: few at a time, the others wait.
 _heavy = asyncio.Semaphore(2)
 
 _FILE: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
+_EXAMPLE: dict[str, Any] = {
+    "schema": "campaign/1",
+    "name": "first day",
+    "skin": {
+        "id": "palm-3",
+        "thickness_mm": 2.5,
+        "youngs_modulus_mpa": 16.0,
+        "poisson_ratio": 0.5,
+        "sensor_radius_mm": 1.5,
+        "sensors": [{"id": "s01", "x_mm": 0.0, "y_mm": 0.0}],
+    },
+    "recordings": [
+        {
+            "id": "r1",
+            "sensor": "s01",
+            "indenter_radius_mm": 4.0,
+            "preload_n": 1.0,
+            "dynamic_force_n": 0.09,
+            "recorded_at": "2017-05-03T09:00:00Z",
+            "frequency_hz": [10.0, 20.0, 40.0],
+            "frf_re_pc_per_n": [7.1, 7.0, 7.0],
+            "frf_im_pc_per_n": [0.1, 0.0, 0.0],
+        }
+    ],
+}
 _BODY: dict[str, Any] = {
     "requestBody": {
         "required": True,
@@ -34,12 +59,20 @@ _BODY: dict[str, Any] = {
         "form with any number of files; its part `rig` is a rig description, for files that do not say what their "
         "channels are.",
         "content": {
-            "application/json": {"schema": {"type": "object", "description": "campaign/1"}},
-            "application/octet-stream": _FILE,
+            "application/json": {"schema": {"type": "object", "description": "campaign/1"}, "example": _EXAMPLE},
+            "application/octet-stream": {**_FILE, "example": orjson.dumps(_EXAMPLE).decode()},
             "multipart/form-data": {
                 "schema": {
                     "type": "object",
-                    "properties": {"file": {"type": "array", "items": _FILE["schema"]}, "rig": {"type": "string"}},
+                    "description": "Files, and what their channels are.",
+                    "properties": {
+                        "file": {
+                            "type": "array",
+                            "items": _FILE["schema"],
+                            "description": "Files of campaigns, or as instruments write them.",
+                        },
+                        "rig": {"type": "string", "description": "A rig description, `rig/1`, as YAML or JSON."},
+                    },
                 }
             },
         },
@@ -118,7 +151,7 @@ def listed(
 
 
 @router.get("/campaigns/{campaign_id}", operation_id="campaign", summary="One campaign")
-def one(campaign_id: str, store: Store) -> models.CampaignDetail:
+def one(campaign_id: CampaignId, store: Store) -> models.CampaignDetail:
     """With its recordings, without their arrays."""
     with store.reading() as connection:
         return _detail(connection, campaign_id)
@@ -139,7 +172,7 @@ def one(campaign_id: str, store: Store) -> models.CampaignDetail:
     },
 )
 def document(
-    campaign_id: str,
+    campaign_id: CampaignId,
     store: Store,
     file_format: Annotated[Literal["json", "hdf5"], Query(alias="format", description="JSON or HDF5.")] = "json",
 ) -> Response:
@@ -155,11 +188,13 @@ def document(
 
 @router.get("/campaigns/{campaign_id}/d33", operation_id="campaign_d33", summary="d33 of each sensor")
 def d33(
-    campaign_id: str,
+    campaign_id: CampaignId,
     store: Store,
     table: Table,
-    band_low_hz: Annotated[float | None, Query(gt=0, description="Average from here, not over the flat zone.")] = None,
-    band_high_hz: Annotated[float | None, Query(gt=0, description="Average up to here.")] = None,
+    band_low_hz: Annotated[
+        float | None, Query(gt=0, description="Average from here [Hz], not over the flat zone.")
+    ] = None,
+    band_high_hz: Annotated[float | None, Query(gt=0, description="Average up to here [Hz].")] = None,
 ) -> D33:
     """By sensor, indenter and preload, with uncertainty, and what it leaves out."""
     if (band_low_hz is None) != (band_high_hz is None):
@@ -173,7 +208,7 @@ def d33(
 @router.post(
     "/campaigns/{campaign_id}/withdraw", operation_id="withdraw_campaign", summary="Withdraw it", dependencies=WRITE
 )
-def withdraw(campaign_id: str, withdrawal: models.Withdrawal, store: Store) -> models.CampaignDetail:
+def withdraw(campaign_id: CampaignId, withdrawal: models.Withdrawal, store: Store) -> models.CampaignDetail:
     """Figures no longer use it; it can still be read."""
     with store.writing() as connection:
         campaigns.withdraw(connection, campaign_id, withdrawal.reason)
@@ -186,7 +221,7 @@ def withdraw(campaign_id: str, withdrawal: models.Withdrawal, store: Store) -> m
     summary="Exclude a recording",
     dependencies=WRITE,
 )
-def exclude(campaign_id: str, exclusion: models.Exclusion, store: Store, table: Table) -> models.CampaignDetail:
+def exclude(campaign_id: CampaignId, exclusion: models.Exclusion, store: Store, table: Table) -> models.CampaignDetail:
     """Figures no longer use it; it can still be read. A correction is the way back."""
     with store.writing() as connection:
         campaigns.exclude(connection, campaign_id, exclusion.recording, exclusion.reason)

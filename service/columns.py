@@ -70,24 +70,6 @@ def rows(columns: Mapping[str, Floats]) -> int:
     return 1 if first is None else len(columns[first])
 
 
-def non_negative(name: str, values: Floats) -> Floats:
-    """`values`, after refusing what is not finite or below 0 (InvalidInput with the first such row)."""
-    return _accepted(name, values, np.isfinite(values) & (values >= 0), "must be finite and at least 0")
-
-
-def finite(name: str, values: Floats) -> Floats:
-    """`values`, after refusing what is not finite (InvalidInput with the first such row)."""
-    return _accepted(name, values, np.isfinite(values), "must be finite")
-
-
-def _accepted(name: str, values: Floats, good: np.ndarray[Any, np.dtype[np.bool_]], allowed: str) -> Floats:
-    if not good.all():
-        first = int(np.argmin(good.ravel()))
-        row = int(np.unravel_index(first, values.shape)[0]) if values.ndim else None
-        raise InvalidInput(name, float(values.flat[first]), allowed, index=row)
-    return values
-
-
 def parse(kind: type[Request], body: bytes, content_type: str) -> Request:
     """The request in `body`; raises Refusal 400 (unreadable), 415 (another type) or 422 (a field is wrong)."""
     media_type = content_type.split(";", 1)[0].strip().lower()
@@ -121,6 +103,8 @@ def _from_csv(kind: type[ColumnsRequest], body: bytes) -> dict[str, Any]:
     header = [name.strip() for name in lines[0]]
     if len(set(header)) != len(header):
         raise Refusal(400, "The header names a field twice.")
+    if len(header) == 1 and any(separator in header[0] for separator in ";\t"):
+        raise Refusal(400, "The header has no comma; separate cells by commas and write numbers with a point.")
     for number, line in enumerate(lines[1:]):
         if len(line) != len(header):
             raise Refusal(400, f"Row {number} has {len(line)} cells; the header has {len(header)}.")

@@ -11,7 +11,7 @@ import uvicorn
 from pydantic import ValidationError
 
 from service.app import create_app
-from service.gate import Gate
+from service.gate import LOOPBACK_NAMES, Gate
 from service.keys import KeyStore, Scope
 from service.log import configure_logging
 from service.settings import Settings
@@ -28,22 +28,26 @@ def serve(
 ) -> None:
     """Serve σ, FRF and d33 over HTTP."""
     settings = read_settings()
-    keys = KeyStore(settings.data_folder)
-    loopback = _is_loopback(host)
+    keys = KeyStore(settings.data)
+    # Other names than loopback's mean a proxy in front, which lets other machines in.
+    private = _is_loopback(host) and settings.host_names <= LOOPBACK_NAMES
     try:
-        _require_writable(settings.data_folder)
-        if not loopback and not keys.entries():
-            _fail(f"refusing to listen on {host} without API keys: make one with `underskin key create NAME`")
+        _require_writable(settings.data)
+        known = keys.entries()  # a damaged file ends the start, not every request
+        if not private and not known:
+            where = f"as {settings.hosts}" if _is_loopback(host) else f"on {host}"
+            _fail(f"refusing to serve {where} without API keys: make one with `underskin key create NAME`")
         table = load_table(settings.tables / SIGMA_TABLE)
-        store = open_store(settings.database_url, settings.data_folder)
+        store = open_store(settings.database_url, settings.data)
         listener = _listen(host, port)
     except (TableError, StoreError, OSError, ValueError) as error:
         _fail(str(error))
     configure_logging()
+    typer.echo(f"underskin serves on http://{_host_name(host)}:{listener.getsockname()[1]} (Ctrl+C ends it)")
     gate = Gate(
         host_names=settings.host_names | {_host_name(host)},
         keys=keys,
-        keys_always=not loopback,
+        keys_always=not private,
         max_body_bytes=settings.max_body_bytes,
         max_upload_bytes=settings.max_upload_bytes,
     )
@@ -52,6 +56,7 @@ def serve(
         access_log=False,
         log_config=None,
         server_header=False,
+        proxy_headers=False,
         timeout_graceful_shutdown=10,
     )
     uvicorn.Server(config).run(sockets=[listener])
@@ -99,11 +104,12 @@ def read_settings() -> Settings:
         return Settings()
     except ValidationError as error:
         first = error.errors()[0]
-        _fail(f"UNDERSKIN_{str(first['loc'][0]).upper()} = {first['input']!r}: {first['msg'].lower()}")
+        reason = first["msg"].removeprefix("Value error, ")
+        _fail(f"UNDERSKIN_{str(first['loc'][0]).upper()} = {first['input']!r}: {reason[:1].lower()}{reason[1:]}")
 
 
 def _keys() -> KeyStore:
-    return KeyStore(read_settings().data_folder)
+    return KeyStore(read_settings().data)
 
 
 def _require_writable(folder: Path) -> None:

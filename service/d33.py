@@ -1,28 +1,28 @@
 """d33 of each sensor from its measured FRF."""
 
+from dataclasses import asdict
 from typing import Any, ClassVar
 
 import numpy as np
 from fastapi import APIRouter
-from pydantic import Field
+from pydantic import BaseModel, Field
 
 from service.answers import Columns
-from service.columns import NonNegative, Numbers, NumbersPerRow, Signed, finite, non_negative, rows
+from service.columns import NonNegative, Numbers, NumbersPerRow, Signed, rows
 from service.dependencies import columns_body, columns_route
 from service.frf import EXAMPLE as FRF_EXAMPLE
 from service.skin_columns import (
     FIELDS,
     PressedSkinAnswer,
     PressedSkinColumns,
-    lab_columns,
-    pressed,
     require_known_model,
 )
 from underskin import InvalidInput, response
+from underskin.answers import lab_columns, pressed
 from underskin.surrogate import SigmaTable
-from underskin.units import Floats, to_lab, to_si
+from underskin.units import Floats, findings, finite, non_negative, to_lab, to_si
 
-router = APIRouter(tags=["d33"])
+router = APIRouter(prefix="/v1", tags=["d33"])
 
 
 class D33Columns(PressedSkinColumns):
@@ -35,8 +35,8 @@ class D33Columns(PressedSkinColumns):
     )
     frf_uncertainty_pc_per_n: NonNegative | None = Field(
         default=None,
-        description="Standard uncertainty of the plateau [pC/N]. Left out: 0 for plateau values; for lines the "
-        "standard error of their mean, which does not see the gain error that lines of one recording share.",
+        description="Standard uncertainty of the plateau [pC/N]. Left out: unknown, so that d33's is null; for lines "
+        "the standard error of their mean, which does not see the gain error that lines of one recording share.",
     )
     frequency_hz: Numbers | None = Field(
         default=None, min_length=1, description="Frequencies of the lines, the same for all rows [Hz]."
@@ -54,6 +54,14 @@ class D33Columns(PressedSkinColumns):
     )
 
 
+class FindingModel(BaseModel):
+    """A measured value that looks wrong."""
+
+    field: str = Field(description="Name of the field.")
+    index: int | None = Field(description="First such row, from 0; null for a single value.")
+    statement: str = Field(description="What is unusual, and a guess at the reason.")
+
+
 class D33Answer(PressedSkinAnswer):
     """d33 in columns."""
 
@@ -64,7 +72,10 @@ class D33Answer(PressedSkinAnswer):
     )
     d33_pc_per_n: list[float | None] = Field(description="d33 = FRF / ((3/2) (rT/h)² σ) [pC/N].")
     d33_uncertainty_pc_per_n: list[float | None] = Field(
-        description="Standard uncertainty: the FRF's and the table's, in quadrature [pC/N]."
+        description="Standard uncertainty: the FRF's and the table's, in quadrature; null without the FRF's [pC/N]."
+    )
+    findings: list[FindingModel] = Field(
+        description="Measured values that look wrong, such as C/N taken for pC/N; they are used all the same."
     )
 
 
@@ -73,8 +84,9 @@ def answer(table: SigmaTable, request: D33Columns) -> Columns:
     require_known_model(request)
     measured = _plateau(request) if request.frf_pc_per_n is None else _given(request)
     columns = {name: request.column(name) for name in FIELDS} | measured
-    count = rows(columns)
-    reached = pressed(table, request, columns)
+    sent = {"frf_pc_per_n": "frf_re_pc_per_n"} if request.frf_pc_per_n is None else {}
+    count = rows({sent.get(name, name): values for name, values in columns.items()})
+    reached = pressed(table, columns, request.units_checked)
     d33, uncertainty = reached.d33(
         *(to_si(name, measured[name]) for name in ("frf_pc_per_n", "frf_uncertainty_pc_per_n"))
     )
@@ -83,6 +95,7 @@ def answer(table: SigmaTable, request: D33Columns) -> Columns:
         model=request.model,
         table_sha256=table.sha256,
         inside=reached.inside & np.isfinite(d33),
+        shared={"findings": [asdict(finding) for finding in findings("frf_pc_per_n", measured["frf_pc_per_n"])]},
         columns={
             **lab_columns(reached),
             **measured,
@@ -103,7 +116,7 @@ def _given(request: D33Columns) -> dict[str, Floats]:
 def _uncertainty(request: D33Columns) -> dict[str, Floats]:
     name = "frf_uncertainty_pc_per_n"
     if request.frf_uncertainty_pc_per_n is None:
-        return {name: np.zeros(())}
+        return {name: np.full((), np.nan)}
     return {name: non_negative(name, request.column(name))}
 
 

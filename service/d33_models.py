@@ -80,7 +80,9 @@ class D33(BaseModel):
     array: D33Value | None = Field(description="d33 of the array: mean of the sensors that are not flagged as unfit.")
     sensor_spread_percent: Scatter | None = Field(description="Standard deviation of d33 over the sensors.")
     gain_scatter_percent: Scatter | None = Field(description="Standard deviation of a recording's gain.")
-    position_scatter_mm: Scatter | None = Field(description="Standard deviation of the sphere's position, each axis.")
+    position_scatter_mm: Scatter | None = Field(
+        description="Standard deviation of the sphere's position, each axis [mm]."
+    )
     declared_percent: float | None = Field(
         description="How far d33 moves where the declared modulus is 2 % and the thickness 1 % off; not in intervals."
     )

@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
-from fastapi import Depends, Request, Response
+from fastapi import Depends, Path, Request, Response
 from fastapi.security import SecurityScopes
 
 from service.answers import Accept, Columns, respond
@@ -31,6 +31,9 @@ def _store(request: Request) -> Database:
 
 Store = Annotated[Database, Depends(_store)]
 
+CampaignId = Annotated[str, Path(description="Id of a campaign, as it was answered when it was sent.")]
+SkinId = Annotated[str, Path(description="Id of a skin.")]
+
 
 def authorised(scopes: SecurityScopes, request: Request) -> None:
     """Refuses a key of too narrow a scope; that there is a key, where one is needed, was checked before."""
@@ -52,6 +55,7 @@ def columns_route(
     """An endpoint that reads a request in columns, answers it and writes it as the client accepts it."""
 
     async def endpoint(request: Request, table: Table, accept: Accept = "application/json") -> Response:
+        """In columns: a list has an entry a row, a single number holds for all rows. Accept: text/csv gives CSV."""
         body = await request.body()
         content_type = request.headers.get("content-type", "")
 
@@ -70,13 +74,20 @@ def columns_route(
 def columns_body(kind: type[ColumnsRequest], examples: dict[str, Any]) -> dict[str, Any]:
     """OpenAPI's description of a body in columns."""
     schema = kind.model_json_schema()
-    csv_text = ",".join(examples) + "\r\n" + ",".join(str(value) for value in examples.values()) + "\r\n"
     return {
         "requestBody": {
             "required": True,
             "content": {
                 "application/json": {"schema": schema, "example": examples},
-                "text/csv": {"schema": {"type": "string"}, "example": csv_text},
+                "text/csv": {"schema": {"type": "string"}, "example": _as_csv(examples)},
             },
         }
     }
+
+
+def _as_csv(examples: dict[str, Any]) -> str:
+    """The same columns as CSV, single numbers repeated in every row."""
+    count = max((len(value) for value in examples.values() if isinstance(value, list)), default=1)
+    columns = [value if isinstance(value, list) else [value] * count for value in examples.values()]
+    lines = [examples, *zip(*columns, strict=True)]
+    return "".join(",".join(map(str, line)) + "\r\n" for line in lines)

@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field, ValidationError
 from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 
-from service.dependencies import Store, authorised
+from service.dependencies import SkinId, Store, authorised
 from service.problems import Refusal
 from service.store import importing, skins
 from service.store.engine import Database
@@ -21,7 +21,7 @@ from underskin import InvalidInput
 from underskin.errors import FileError
 from underskin.recordings.skin_export import ExportedCampaign, read_campaigns, read_overview
 
-router = APIRouter(tags=["skins"])
+router = APIRouter(prefix="/v1", tags=["skins"])
 
 _MEDIA_TYPE = "application/x-hdf5"
 _FILE: dict[str, Any] = {"content": {_MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}}}
@@ -43,7 +43,7 @@ class Imported(BaseModel):
     response_class=FileResponse,
     responses={200: _FILE},
 )
-def export_skin(skin_id: str, request: Request, store: Store) -> FileResponse:
+def export_skin(skin_id: SkinId, request: Request, store: Store) -> FileResponse:
     """One HDF5 file (`skin-export/1`) with its campaigns in every state, those of skins joined to it, and its rigs."""
     with full_disk_said(), store.reading() as connection:
         root = skins.require_root(connection, skin_id)
@@ -64,7 +64,9 @@ def export_skin(skin_id: str, request: Request, store: Store) -> FileResponse:
     operation_id="import_skin",
     summary="Bring in a skin that was exported",
     dependencies=[Security(authorised, scopes=["write"])],
-    openapi_extra={"requestBody": {"required": True, **_FILE}},
+    openapi_extra={
+        "requestBody": {"required": True, "content": {"application/octet-stream": _FILE["content"][_MEDIA_TYPE]}}
+    },
 )
 async def import_skin(request: Request, store: Store) -> Imported:
     """To the same state; what is here already must be the same, and is left. After a failure, send the file again."""

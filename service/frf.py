@@ -7,21 +7,20 @@ from fastapi import APIRouter
 from pydantic import Field
 
 from service.answers import Columns
-from service.columns import Numbers, Signed, non_negative, rows
+from service.columns import Numbers, Signed, rows
 from service.dependencies import columns_body, columns_route
 from service.skin_columns import (
     FIELDS,
     PressedSkinAnswer,
     PressedSkinColumns,
-    lab_columns,
-    pressed,
     require_known_model,
 )
 from underskin import InvalidInput
+from underskin.answers import lab_columns, pressed
 from underskin.surrogate import SigmaTable
-from underskin.units import Floats, checked, to_lab
+from underskin.units import Floats, checked, non_negative, to_lab
 
-router = APIRouter(tags=["frf"])
+router = APIRouter(prefix="/v1", tags=["frf"])
 
 # A spectrum a row multiplies the answer; this is some 20 MB of JSON.
 _LARGEST_SPECTRA = 1_000_000
@@ -58,7 +57,7 @@ def answer(table: SigmaTable, request: FrfColumns) -> Columns:
     require_known_model(request)
     columns = {name: request.column(name) for name in (*FIELDS, "d33_pc_per_n")}
     count = rows(columns)
-    reached = pressed(table, request, columns)
+    reached = pressed(table, columns, request.units_checked)
     d33 = checked("d33_pc_per_n", columns["d33_pc_per_n"], units_checked=request.units_checked)
     frf = to_lab("frf_pc_per_n", reached.frf(d33))
     spectra, frequency = _spectra(request, frf, count)

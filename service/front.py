@@ -11,32 +11,27 @@ import os
 import re
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 
 from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.gate import Gate
-from service.log import log_request
-from service.metrics import observe
-from service.problems import Refusal
+from service.problems import Refusal, unexpected
+from service.record import record
 
 logger = logging.getLogger("underskin")
 
+_NUMBERS = frozenset({int, float})
 _SANE_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 
 
-@dataclass(frozen=True)
-class HotRoute:
-    """Answers a query string (GET) or a body (POST) with JSON, or with None to leave it to the API."""
-
-    answer: Callable[[bytes], bytes | None]
-    headers: tuple[tuple[bytes, bytes], ...] = ()
+# Answers a query string (GET) or a body (POST) with JSON, or with None to leave it to the API.
+HotRoute = Callable[[bytes], bytes | None]
 
 
 def are_numbers(values: Iterable[object]) -> bool:
     """Whether all are numbers as JSON knows them: what is not is left to the API."""
-    return {int, float}.issuperset(map(type, values))
+    return _NUMBERS.issuperset(map(type, values))
 
 
 class Front:
@@ -70,12 +65,11 @@ class Front:
         except Exception:
             logger.exception("request failed", extra={"fields": {"request_id": request_id}})
             if not exchange.status:
-                await exchange.refuse(Refusal(500, "Something went wrong in the server."))
+                await exchange.refuse(unexpected())
         seconds = time.perf_counter() - start
         method, path = scope["method"], scope["path"]
         route = path if exchange.hot else getattr(scope.get("route"), "path", "none")
-        observe(method, route, exchange.status, seconds)
-        log_request(request_id, method, path, exchange.status, seconds, scope["key"])
+        record(request_id, method, route, path, exchange.status, seconds, scope["key"])
 
     def _request_id(self, sent: bytes | None) -> str:
         if sent is not None and _SANE_ID.fullmatch(sent):
@@ -88,19 +82,17 @@ class Front:
         """Pass the gate, then a hot route or the API."""
         method, path = scope["method"], scope["path"]
         scope["key"] = self._gate.check(method, path, headers)
-        receive = self._limited(receive, self._gate.takes_files(path, headers))
         hot = self._hot.get((method, path))
-        if hot is not None and b"csv" not in headers.get(b"accept", b""):
-            if method == "GET":
-                content = hot.answer(scope["query_string"])
-            else:
-                body = await _whole_body(receive)
-                content = hot.answer(body)
-                receive = _replay(body, receive)
-            if content is not None:
-                await exchange.answer(content, hot.headers)
-                return
-        await self._api(scope, receive, exchange.send)
+        if hot is None or not _plain(method, headers):
+            files = self._gate.takes_files(path, headers)
+            await self._api(scope, self._limited(receive, files), exchange.send)
+            return
+        body = b"" if method == "GET" else await _whole_body(self._limited(receive, files=False))
+        content = hot(body or scope["query_string"])
+        if content is None:
+            await self._api(scope, _replay(body, receive), exchange.send)
+        else:
+            await exchange.answer(content)
 
     def _limited(self, receive: Receive, files: bool) -> Receive:
         """`receive`, refusing the body once it exceeds the limit, whatever its Content-Length said."""
@@ -133,10 +125,10 @@ class _Exchange:
             message["headers"] = [*message.get("headers", ()), (b"x-request-id", self._request_id.encode())]
         await self._send(message)
 
-    async def answer(self, content: bytes, headers: tuple[tuple[bytes, bytes], ...]) -> None:
+    async def answer(self, content: bytes) -> None:
         """A hot route's JSON."""
         self.hot = True
-        await self._whole(200, content, [(b"content-type", b"application/json"), *headers])
+        await self._whole(200, content, [(b"content-type", b"application/json")])
 
     async def refuse(self, refusal: Refusal) -> None:
         """A problem."""
@@ -147,9 +139,17 @@ class _Exchange:
         )
 
     async def _whole(self, status: int, content: bytes, headers: list[tuple[bytes, bytes]]) -> None:
-        headers.append((b"content-length", b"%d" % len(content)))
-        await self.send({"type": "http.response.start", "status": status, "headers": headers})
+        self.status = status
+        headers += (b"content-length", b"%d" % len(content)), (b"x-request-id", self._request_id.encode())
+        await self._send({"type": "http.response.start", "status": status, "headers": headers})
         await self._send({"type": "http.response.body", "body": content})
+
+
+def _plain(method: str, headers: Mapping[bytes, bytes]) -> bool:
+    """Whether JSON is asked for and, where there is a body, sent."""
+    if b"csv" in headers.get(b"accept", b""):
+        return False
+    return method == "GET" or headers.get(b"content-type", b"").split(b";")[0].strip().lower() == b"application/json"
 
 
 async def _whole_body(receive: Receive) -> bytes:

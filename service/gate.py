@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from service.keys import Key, KeyStore
 from service.problems import Refusal
 
-_LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
+LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 OPEN = frozenset({"/health", "/ready"})
 _UPLOADS = frozenset({"/v1/campaigns", "/v1/skins/import"})
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -23,9 +23,9 @@ class Gate:
         max_body_bytes: int,
         max_upload_bytes: int,
     ) -> None:
-        """`keys_always`: bound to more than loopback, so that no request passes without a key, even when all
-        keys have been revoked; otherwise keys are needed once there are any."""
-        self._hosts = frozenset(name.encode() for name in host_names | _LOOPBACK_NAMES)
+        """`keys_always`: to be reached from other machines, so that no request passes without a key; otherwise
+        keys are needed once one has been made."""
+        self._hosts = frozenset(name.encode() for name in host_names | LOOPBACK_NAMES)
         self._keys = keys
         self._keys_always = keys_always
         self._max_body_bytes = max_body_bytes
@@ -45,7 +45,7 @@ class Gate:
 
     def keys_needed(self) -> bool:
         """Whether a request without a key is refused."""
-        return self._keys_always or bool(self._keys.entries())
+        return self._keys_always or self._keys.in_use()
 
     def takes_files(self, path: str, headers: Mapping[bytes, bytes]) -> bool:
         """Whether a body may be as large as uploads may: files do not go through memory, JSON does."""
@@ -62,7 +62,7 @@ class Gate:
                 limit, smaller = f"{self._max_upload_bytes / 1e6:g} MB (UNDERSKIN_MAX_UPLOAD_MB)", "fewer files"
             else:
                 limit, smaller = f"{self._max_body_bytes / 1e6:g} MB (UNDERSKIN_MAX_BODY_MB)", "fewer rows"
-            raise Refusal(413, f"The body exceeds {limit}; send {smaller} a request.")
+            raise Refusal(413, f"The body exceeds {limit}; send {smaller} a request.", title="Body too large")
 
     def _check_key(self, authorization: bytes) -> Key | None:
         if not self.keys_needed():
@@ -70,9 +70,10 @@ class Gate:
         scheme, _, token = authorization.partition(b" ")
         key = self._keys.find(token.strip()) if scheme.lower() == b"bearer" else None
         if key is None:
+            known = "This key is not known; it may have been revoked." if authorization else "A key is needed."
             raise Refusal(
                 401,
-                "A key is needed: send Authorization: Bearer KEY (`underskin key create` makes one).",
+                f"{known} Send Authorization: Bearer KEY (`underskin key create` makes one).",
                 headers={"WWW-Authenticate": "Bearer"},
             )
         return key

@@ -6,8 +6,10 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from sqlalchemy.exc import DataError, OperationalError
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
-from service.problems import Refusal, from_validation, invalid_input
+from service.openapi import methods
+from service.problems import Refusal, from_validation, invalid_input, unexpected
 from service.store.answers import OtherRequest
 from service.store.engine import StorageFull
 from service.store.errors import Conflict, Missing
@@ -37,18 +39,29 @@ def _as_refusal(request: Request, error: Exception) -> Refusal:
     match error:
         case Refusal():
             return error
+        case HTTPException(__cause__=Refusal() as refusal):  # FastAPI wraps what ends the reading of a body
+            return refusal
+        case HTTPException(__cause__=ClientDisconnect()):
+            return Refusal(499, "The client left before its body was complete.", title="Client closed request")
         case InvalidInput():
             return invalid_input([error])
         case RequestValidationError():
-            return from_validation(error.errors())
+            return _unreadable(error) or from_validation(error.errors())
         case HTTPException(status_code=404):
             return Refusal(404, f"There is nothing at {request.url.path}; /openapi.json lists all routes.")
         case HTTPException(status_code=405):
-            return Refusal(405, f"{request.url.path} does not take {request.method}.", headers=error.headers)
+            allowed = {"Allow": ", ".join(methods(request.app, request.scope["route"].path))}
+            return Refusal(405, f"{request.url.path} does not take {request.method}.", headers=allowed)
         case HTTPException():
             return Refusal(error.status_code, str(error.detail), headers=error.headers)
         case _:
             return _of_the_store(request, error)
+
+
+def _unreadable(error: RequestValidationError) -> Refusal | None:
+    """A body that is not JSON is no question of fields."""
+    found = [entry for entry in error.errors() if entry["type"] == "json_invalid"]
+    return Refusal(400, f"The body is not JSON: {found[0]['ctx']['error']}.") if found else None
 
 
 _STATUS = {Missing: 404, Conflict: 409, OtherRequest: 422}
@@ -65,4 +78,4 @@ def _of_the_store(request: Request, error: Exception) -> Refusal:
     if isinstance(error, OperationalError):
         logger.error("the store failed: %s", error, extra={"fields": {"request_id": request.scope["request_id"]}})
         return Refusal(503, "The store does not answer; try again in a while.", headers={"Retry-After": "5"})
-    return Refusal(500, "Something went wrong in the server; its log has the request's id.")
+    return unexpected()

@@ -36,7 +36,7 @@ async def health() -> Health:
 @router.get("/ready", operation_id="ready", summary="Can it do its work?")
 def ready(request: Request, table: Table, store: Store) -> Ready:
     """Table loaded, data folder writable and the store answering; 503 where not."""
-    folder = request.app.state.settings.data_folder
+    folder = request.app.state.settings.data
     if not os.access(folder, os.W_OK):
         raise Refusal(503, f"The data folder {folder} is not writable.")
     try:

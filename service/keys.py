@@ -6,6 +6,7 @@ import json
 import os
 import secrets
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -15,6 +16,9 @@ from pathlib import Path
 from typing import Literal
 
 from underskin import InvalidInput
+
+# Looking at the file takes longer than checking a key.
+_FRESH_S = 0.5
 
 Scope = Literal["read", "write"]
 
@@ -30,26 +34,38 @@ class Key:
 
 
 class KeyStore:
-    """The keys in `folder`/keys.json, read again when the file changes, so that revoking needs no restart."""
+    """The keys in `folder`/keys.json, read again within a second of a change, so that revoking needs no restart."""
 
     def __init__(self, folder: Path) -> None:
         """Nothing is read yet."""
         self.path = folder / "keys.json"
         self._stamp: tuple[int, int, int] | None = None
         self._keys: tuple[Key, ...] = ()
+        self._fresh_until = 0.0
+
+    def in_use(self) -> bool:
+        """Whether a key was ever made here: revoking the last one must not open the service to all."""
+        self.entries()
+        return self._stamp is not None
 
     def entries(self) -> tuple[Key, ...]:
         """All keys; raises ValueError when the file is damaged."""
+        now = time.monotonic()
+        if now >= self._fresh_until:
+            self._refresh()
+            self._fresh_until = now + _FRESH_S
+        return self._keys
+
+    def _refresh(self) -> None:
         try:
             status = self.path.stat()
         except FileNotFoundError:
             self._stamp, self._keys = None, ()
-            return ()
+            return
         stamp = (status.st_mtime_ns, status.st_ino, status.st_size)
         if stamp != self._stamp:
             self._keys = _read(self.path)
             self._stamp = stamp
-        return self._keys
 
     def find(self, token: bytes) -> Key | None:
         """The key that `token` is, compared in constant time."""
@@ -84,7 +100,8 @@ class KeyStore:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with self.path.with_suffix(".lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            keys = list(self.entries())
+            self._refresh()
+            keys = list(self._keys)
             yield keys
             _write(self.path, keys)
 

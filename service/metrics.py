@@ -1,28 +1,11 @@
-"""Counts and durations for Prometheus."""
-
-from functools import cache
+"""Counts and durations of requests, for Prometheus."""
 
 from fastapi import APIRouter, Response
-from prometheus_client import CONTENT_TYPE_LATEST, Histogram, generate_latest
+from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
+
+from service import record
 
 router = APIRouter(tags=["metrics"])
-
-_seconds = Histogram(
-    "underskin_request_seconds",
-    "Time to answer a request, by route as documented, method and status",
-    ["method", "route", "status"],
-    buckets=(0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0),
-)
-
-
-@cache  # finding the series by its labels takes longer than observing it
-def _series(method: str, route: str, status: int) -> Histogram:
-    return _seconds.labels(method, route, str(status))
-
-
-def observe(method: str, route: str, status: int, seconds: float) -> None:
-    """Count one request."""
-    _series(method, route, status).observe(seconds)
 
 
 @router.get(
@@ -34,4 +17,5 @@ def observe(method: str, route: str, status: int, seconds: float) -> None:
 )
 async def metrics() -> Response:
     """In Prometheus' text format."""
+    record.flush()
     return Response(generate_latest(), media_type=CONTENT_TYPE_LATEST)

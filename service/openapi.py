@@ -37,13 +37,22 @@ class UmbridgeProblem(BaseModel):
 @router.get("/openapi.json", operation_id="openapi", summary="This document")
 async def openapi(request: Request) -> dict[str, Any]:
     """OpenAPI 3.1; says that a key is needed where one is."""
-    document = dict(request.app.openapi() if request.app.openapi_schema else describe(request.app))
+    document = dict(_document(request.app))
     if request.app.state.gate.keys_needed():
         document["security"] = [{"key": []}]
     return document
 
 
-def describe(api: FastAPI) -> dict[str, Any]:
+def methods(api: FastAPI, path: str) -> list[str]:
+    """All that `path` takes, as it stands in the document; the router knows those of one of its routes only."""
+    return [method.upper() for method in _document(api)["paths"][path]]
+
+
+def _document(api: FastAPI) -> dict[str, Any]:
+    return api.openapi_schema or _describe(api)
+
+
+def _describe(api: FastAPI) -> dict[str, Any]:
     """The document without what depends on the keys; kept for the next time."""
     document = get_openapi(title=api.title, version=api.version, description=api.description, routes=api.routes)
     components = document["components"]

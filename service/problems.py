@@ -1,6 +1,7 @@
 """Errors as RFC 9457 problems, in one shape over all routes (UM-Bridge's protocol has its own)."""
 
 import math
+import reprlib
 from collections.abc import Iterable, Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
@@ -73,7 +74,7 @@ class Refusal(Exception):
                 "status": self.status,
                 "detail": self.detail,
                 "request_id": request_id,
-                "errors": [{**error, "value": _shown(error["value"])} for error in self.errors],
+                "errors": self.errors,
             }
         )
 
@@ -84,11 +85,17 @@ def _is_umbridge(path: str) -> bool:
 
 def invalid_input(errors: Iterable[InvalidInput]) -> Refusal:
     """The problem of values that cannot be used: 422."""
-    found = list(errors)
+    found = [InvalidInput(error.field, _brief(error.value), error.allowed, error.index) for error in errors]
     entries = [
-        {"field": error.field, "index": error.index, "value": error.value, "allowed": error.allowed} for error in found
+        {"field": error.field, "index": error.index, "value": _in_json(error.value), "allowed": error.allowed}
+        for error in found
     ]
     return Refusal(422, "; ".join(str(error) for error in found), title="Invalid input", errors=entries)
+
+
+def unexpected() -> Refusal:
+    """The problem of an error that nobody foresaw: 500."""
+    return Refusal(500, "Something went wrong in the server; its log has the request's id.")
 
 
 def from_validation(errors: ValidationError | Sequence[Any]) -> Refusal:
@@ -124,11 +131,15 @@ def _as_invalid_input(detail: Mapping[str, Any]) -> InvalidInput:
     )
 
 
-def _shown(value: Any) -> Any:
-    """The refused value as JSON can carry it, in few words."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else str(value)
-    if value is None or isinstance(value, bool) or (isinstance(value, int) and abs(value) < 2**53):
+def _brief(value: Any) -> Any:
+    """A refused value in few words: a whole batch may have been sent where a number belongs."""
+    if isinstance(value, int) and abs(value) >= 2**53:
+        return "a very large integer"
+    if value is None or isinstance(value, int | float):
         return value
-    text = str(value) if not isinstance(value, int) else "a very large integer"
+    text = value if isinstance(value, str) else reprlib.repr(value)
     return text if len(text) <= 80 else text[:77] + "..."
+
+
+def _in_json(value: Any) -> Any:
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value

@@ -68,6 +68,10 @@ def _read_json(upload: Upload, most_bytes: int) -> list[Arrived]:
     try:
         document = orjson.loads(upload.path.read_bytes().removeprefix(_BOM))
     except orjson.JSONDecodeError as error:
+        if upload.field is None:
+            raise Refusal(
+                400, f"The body is not JSON: line {error.lineno}, column {error.colno}: {error.msg}."
+            ) from None
         allowed = f"must be JSON; line {error.lineno}, column {error.colno}: {error.msg}"
         return [Arrived(upload.label, errors=[_error("file", upload.label, allowed)])]
     documents = document if isinstance(document, list) else [document]

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from pydantic import Field
+from pydantic import Field, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from underskin.surrogate import tables_folder
@@ -11,7 +11,7 @@ from underskin.surrogate import tables_folder
 class Settings(BaseSettings):
     """Read from variables named UNDERSKIN_ and the field in capitals."""
 
-    model_config = SettingsConfigDict(env_prefix="UNDERSKIN_")
+    model_config = SettingsConfigDict(env_prefix="UNDERSKIN_", env_ignore_empty=True, validate_default=True)
 
     data: Path = Field(
         default=Path("~/.local/share/underskin"),
@@ -23,11 +23,12 @@ class Settings(BaseSettings):
         description="Folder of the tables; by default those that ship with underskin.",
     )
     max_body_mb: float = Field(
-        default=64, gt=0, description="Largest request body in MB (10^6 bytes), counted as it streams in."
+        default=64, gt=0, le=1e6, description="Largest request body in MB (10^6 bytes), counted as it streams in."
     )
     max_upload_mb: float = Field(
         default=1024,
         gt=0,
+        le=1e6,
         description="Largest upload of files in MB (10^6 bytes), counted as it streams in; JSON has max_body_mb.",
     )
     database_url: str = Field(
@@ -41,10 +42,13 @@ class Settings(BaseSettings):
         "127.0.0.1, [::1] and the address it is bound to. A request with another Host is refused.",
     )
 
-    @property
-    def data_folder(self) -> Path:
-        """`data` with ~ resolved."""
-        return self.data.expanduser()
+    @field_validator("data")
+    @classmethod
+    def _home(cls, data: Path) -> Path:
+        try:
+            return data.expanduser()
+        except RuntimeError as error:
+            raise ValueError(f"{error} Name the folder in full.") from error
 
     @property
     def max_body_bytes(self) -> int:

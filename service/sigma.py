@@ -1,28 +1,23 @@
 """σ: one point (GET) or columns of points (POST)."""
 
 from typing import Annotated, Any, Literal
-from urllib.parse import parse_qsl
 
 import numpy as np
 from fastapi import APIRouter, Query, Response
 from orjson import dumps, loads
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.answers import Accept, AnswerInColumns, Columns, origin_headers, respond
-from service.columns import ColumnsRequest, NonNegative, Status, non_negative, rows
+from service.answers import Accept, AnswerInColumns, Columns, respond
+from service.columns import ColumnsRequest, NonNegative, Status, rows
 from service.dependencies import Table, columns_body, columns_route
 from service.front import HotRoute, are_numbers
 from underskin import half_space
-from underskin.surrogate import Sigma, SigmaTable
+from underskin.surrogate import SigmaTable
+from underskin.units import non_negative
 
-router = APIRouter(tags=["sigma"])
+router = APIRouter(prefix="/v1", tags=["sigma"])
 
 Model = Literal["layer", "half_space"]
-
-# The half space is integrated anew for each row, at a cost that grows with a/h and rT/h.
-HALF_SPACE_END = 10.0
-# Of the quadrature against one on twice as many panels, over that domain (tests/test_service_sigma.py).
-HALF_SPACE_ERROR = 1e-10
 
 _A = "Contact radius over skin thickness, a/h [-]."
 _RHO = "Sensor radius over skin thickness, rT/h [-]; 0 is a point sensor."
@@ -52,7 +47,8 @@ def answer(table: SigmaTable, request: SigmaColumns) -> Columns:
     columns = {name: non_negative(name, request.column(name)) for name in names}
     count = rows(columns)
     layer = request.model == "layer"
-    found = table.sigma(**columns) if layer else _half_space(**columns)
+    a, rho, load = np.broadcast_arrays(*columns.values())
+    found = table.sigma(a, rho, load) if layer else half_space.sigma_in_domain(a, rho)
     return Columns(
         rows=count,
         model=request.model,
@@ -60,14 +56,6 @@ def answer(table: SigmaTable, request: SigmaColumns) -> Columns:
         inside=found.inside,
         columns={"sigma": found.sigma, "rel_error": found.rel_error},
     )
-
-
-def _half_space(a_over_h: Any, rt_over_h: Any, load_parameter: Any) -> Sigma:
-    a, rho, _ = np.broadcast_arrays(a_over_h, rt_over_h, load_parameter)
-    inside = (a <= HALF_SPACE_END) & (rho <= HALF_SPACE_END)
-    sigma = np.full(a.shape, np.nan)
-    sigma[inside] = half_space.sigma(a[inside], rho[inside])
-    return Sigma(sigma, np.where(inside, HALF_SPACE_ERROR, np.nan), inside)
 
 
 class SigmaQuery(BaseModel):
@@ -96,7 +84,10 @@ def hot_route(table: SigmaTable) -> HotRoute:
 
     def one(query: bytes) -> bytes | None:
         try:
-            point = {name: loads(value) for name, value in parse_qsl(query.decode(), strict_parsing=True)}
+            point = {}
+            for part in query.split(b"&"):
+                name, _, value = part.partition(b"=")
+                point[name.decode()] = loads(value)
             found = table.at(**point) if are_numbers(point.values()) else None
         except (ValueError, TypeError):
             return None
@@ -106,8 +97,7 @@ def hot_route(table: SigmaTable) -> HotRoute:
         return dumps({**origin, "sigma": sigma, "rel_error": rel_error, "status": "ok"})
 
     origin = {"model": "layer", "table_sha256": table.sha256}
-    headers = origin_headers("layer", table.sha256)
-    return HotRoute(one, tuple((name.lower().encode(), value.encode()) for name, value in headers.items()))
+    return one
 
 
 @router.get(

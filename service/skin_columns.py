@@ -7,9 +7,7 @@ from pydantic import Field
 from service.answers import AnswerInColumns
 from service.columns import ColumnsRequest, NonNegative, Positive
 from service.problems import Refusal
-from underskin import Indenter, InvalidInput, Skin, Transmission, transmission
-from underskin.surrogate import SigmaTable
-from underskin.units import Floats, checked, to_lab
+from underskin import InvalidInput
 
 FIELDS = (
     "thickness_mm",
@@ -67,31 +65,3 @@ def require_known_model(request: PressedSkinColumns) -> None:
         raise Refusal(404, f"Skin {request.skin_id!r} has no adopted model; use model paper.")
     if request.skin_id is not None:
         raise InvalidInput("skin_id", request.skin_id, "is used only with model adopted")
-
-
-def pressed(table: SigmaTable, request: PressedSkinColumns, columns: dict[str, Floats]) -> Transmission:
-    """The transmission for the checked columns; raises InvalidInput."""
-    trusted = request.units_checked
-    skin = Skin.from_lab(
-        thickness_mm=columns["thickness_mm"],
-        youngs_modulus_mpa=columns["youngs_modulus_mpa"],
-        sensor_radius_mm=columns["sensor_radius_mm"],
-        poisson_ratio=columns["poisson_ratio"],
-        units_checked=trusted,
-    )
-    indenter = Indenter.from_lab(indenter_radius_mm=columns["indenter_radius_mm"], units_checked=trusted)
-    preload = checked("preload_n", columns["preload_n"], units_checked=trusted)
-    return transmission(table, skin, indenter, preload)
-
-
-def lab_columns(reached: Transmission) -> dict[str, Floats]:
-    """`PressedSkinAnswer`'s columns in lab units."""
-    return {
-        "contact_radius_mm": to_lab("contact_radius_mm", reached.contact_radius),
-        "a_over_h": reached.a_over_h,
-        "rt_over_h": reached.rt_over_h,
-        "load_parameter": reached.load_parameter,
-        "sigma": reached.sigma,
-        "rel_error": reached.rel_error,
-        "mean_stress_mpa": to_lab("mean_stress_mpa", reached.mean_stress),
-    }

@@ -8,13 +8,13 @@ from sqlalchemy import Connection
 
 from service import histories, inverting
 from service import skin_models as models
-from service.dependencies import Store, Table, authorised
+from service.dependencies import SkinId, Store, Table, authorised
 from service.problems import Refusal
 from service.store import skins
 from service.store.errors import Missing
 from underskin import InvalidInput
 
-router = APIRouter(tags=["skins"])
+router = APIRouter(prefix="/v1", tags=["skins"])
 
 WRITE = [Security(authorised, scopes=["write"])]
 
@@ -34,14 +34,14 @@ def listed(
 
 
 @router.get("/skins/{skin_id}", operation_id="skin", summary="One skin")
-def one(skin_id: str, store: Store) -> models.SkinDetail:
+def one(skin_id: SkinId, store: Store) -> models.SkinDetail:
     """With what was joined to it; of a joined skin, the one that it counts as."""
     with store.reading() as connection:
         return _detail(connection, skin_id)
 
 
 @router.post("/skins/{skin_id}/join", operation_id="join_skins", summary="Join another skin to it", dependencies=WRITE)
-def join(skin_id: str, join: models.Join, store: Store) -> models.SkinDetail:
+def join(skin_id: SkinId, join: models.Join, store: Store) -> models.SkinDetail:
     """Two ids turned out to mean one skin: from now on figures of this one use the campaigns of both."""
     if skin_id == join.skin_id:
         raise InvalidInput("skin_id", join.skin_id, "must be another skin")
@@ -59,7 +59,7 @@ def join(skin_id: str, join: models.Join, store: Store) -> models.SkinDetail:
 
 
 @router.get("/skins/{skin_id}/history", operation_id="skin_history", summary="d33 over time")
-def history(skin_id: str, store: Store, table: Table) -> models.History:
+def history(skin_id: SkinId, store: Store, table: Table) -> models.History:
     """d33 of each sensor in every current campaign, its trend and whether that is significant."""
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)

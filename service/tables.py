@@ -9,7 +9,7 @@ from pydantic import BaseModel, Field
 from service.dependencies import Table
 from underskin.table_format import SIGMA_SCHEMA
 
-router = APIRouter(tags=["tables"])
+router = APIRouter(prefix="/v1", tags=["tables"])
 
 
 class TableAxis(BaseModel):

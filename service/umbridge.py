@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 from fastapi import APIRouter
 from orjson import dumps, loads
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 
 from service.dependencies import Table
 from service.front import HotRoute, are_numbers
@@ -25,6 +25,7 @@ from underskin.units import LAB, Floats, checked, to_lab
 
 router = APIRouter(prefix="/umbridge", tags=["umbridge"])
 
+_Zero = Annotated[int, Field(strict=True, ge=0, le=0)]
 _Vector = list[Annotated[float, Field(strict=True, allow_inf_nan=False)]]
 
 
@@ -91,26 +92,32 @@ _MODELS = {
 }
 _EXAMPLE = [[0.3, 0.6, 0.01]]
 
+# Checked by `_model`, since the protocol has an error of its own for another name.
+_Name = Annotated[str, WithJsonSchema({"type": "string", "enum": list(_MODELS)})]
 
-class _Named(BaseModel):
+
+class ModelRequest(BaseModel):
+    """Which model is asked."""
+
     model_config = ConfigDict(extra="ignore")
 
-    name: str = Field(description="`sigma` or `frf`.", examples=["sigma"])
+    name: _Name = Field(description="Which model.", examples=["sigma"])
     config: dict[str, Any] = Field(default_factory=dict, description="Not used by these models.")
 
 
-class Evaluation(_Named):
+class Evaluation(ModelRequest):
     """Where to evaluate."""
 
     input: list[_Vector] = Field(
         description="One vector: a/h, rT/h, L for `sigma`; mm, MPa, mm, mm, N, pC/N for `frf`.",
         examples=[_EXAMPLE],
+        json_schema_extra={"minItems": 1, "maxItems": 1},
     )
 
 
 class _Derivative(Evaluation):
-    outWrt: int = Field(default=0, description="Which output: 0.")
-    inWrt: int = Field(default=0, description="Which input vector: 0.")
+    outWrt: _Zero = Field(default=0, description="Which output: there is one.")
+    inWrt: _Zero = Field(default=0, description="Which input vector: there is one.")
 
 
 class GradientRequest(_Derivative):
@@ -125,7 +132,7 @@ class JacobianRequest(_Derivative):
     vec: _Vector = Field(description="Direction in the space of inputs.", examples=[[1.0, 0.0, 0.0]])
 
 
-class HessianRequest(_Named):
+class HessianRequest(ModelRequest):
     """Not supported by these models."""
 
 
@@ -173,20 +180,20 @@ async def info() -> Info:
 
 
 @router.post("/ModelInfo", operation_id="umbridge_model_info", summary="What a model supports")
-async def model_info(request: _Named) -> ModelInfo:
+async def model_info(request: ModelRequest) -> ModelInfo:
     """Values and first derivatives."""
     _model(request)
     return ModelInfo(support={"Evaluate": True, "Gradient": True, "ApplyJacobian": True, "ApplyHessian": False})
 
 
 @router.post("/InputSizes", operation_id="umbridge_input_sizes", summary="Lengths of the inputs")
-async def input_sizes(request: _Named) -> InputSizes:
+async def input_sizes(request: ModelRequest) -> InputSizes:
     """One vector."""
     return InputSizes(inputSizes=[len(_model(request).inputs)])
 
 
 @router.post("/OutputSizes", operation_id="umbridge_output_sizes", summary="Lengths of the outputs")
-async def output_sizes(request: _Named) -> OutputSizes:
+async def output_sizes(request: ModelRequest) -> OutputSizes:
     """One number."""
     _model(request)
     return OutputSizes(outputSizes=[1])
@@ -229,16 +236,17 @@ def hot_route(table: SigmaTable) -> HotRoute:
         try:
             request = loads(body)
             (point,) = request["input"]
-            plain = request["name"] == "sigma" and len(point) == 3 and are_numbers(point)
+            plain = request["name"] == "sigma" and type(request.get("config", {})) is dict
+            plain = plain and len(point) == 3 and are_numbers(point)
             found = table.at(*point) if plain else None
         except (ValueError, TypeError, KeyError):
             return None
         return None if found is None else dumps({"output": [[found[0]]]})
 
-    return HotRoute(one)
+    return one
 
 
-def _model(request: _Named) -> _Model:
+def _model(request: ModelRequest) -> _Model:
     if request.name not in _MODELS:
         raise Refusal(400, f"There is no model {request.name!r}; there are {list(_MODELS)}.", title="Model not found")
     return _MODELS[request.name]
@@ -253,7 +261,6 @@ def _point(model: _Model, request: Evaluation) -> list[float]:
 
 def _slopes(table: SigmaTable, request: _Derivative) -> Floats:
     model = _model(request)
-    _require(request.outWrt == 0 and request.inWrt == 0, "outWrt and inWrt must be 0: one output, one input vector")
     return model.gradient(table, _point(model, request))
 
 

@@ -55,6 +55,11 @@ class UploadFolder:
             self._in_use = (self.path / ".lock").open("w")  # held as long as the process lives
             fcntl.flock(self._in_use, fcntl.LOCK_EX)
 
+    def close(self) -> None:
+        """Remove the folder."""
+        shutil.rmtree(self.path, ignore_errors=True)
+        self._in_use.close()
+
 
 def _nobody_uses(folder: Path) -> bool:
     try:
@@ -69,10 +74,12 @@ def _nobody_uses(folder: Path) -> bool:
 async def received(request: Request, parent: UploadFolder) -> AsyncIterator[list[Upload]]:
     """The files of a multipart form, or the whole body as one file; gone at the end of the block.
 
-    Raises Refusal (400) where a form cannot be read, StorageFull where the disk is full.
+    Raises Refusal where a form cannot be read (400) or is of the other kind (415), StorageFull where the disk is full.
     """
     with full_disk_said(), tempfile.TemporaryDirectory(dir=parent.path) as folder:
         content_type, options = parse_options_header(request.headers.get("content-type", ""))
+        if content_type == b"application/x-www-form-urlencoded":
+            raise Refusal(415, "Files come as they are (application/octet-stream) or as a form of multipart/form-data.")
         if content_type == b"multipart/form-data":
             yield await _parts(request, Path(folder), options.get(b"boundary", b""))
         else:

@@ -133,7 +133,7 @@ def test_bad_input_is_one_line_and_status_2(arguments: list[str], says: str) -> 
     [
         ("", "must have a header of field names and at least one row"),
         ("preload_n,frf_pc_per_n\n", "at least one row"),
-        ("preload_n;frf_pc_per_n\n1;7\n", "has the column 'preload_n;frf_pc_per_n'; allowed, once each: thickness_mm"),
+        ("preload_n;frf_pc_per_n\n1;7\n", "must separate cells by commas"),
         ("preload_n,preload_n\n1,7\n", "has the column 'preload_n'; allowed, once each"),
         ("preload_n,frf_pc_per_n\n1,7\n1\n", "has 1 cells in row 1, but 2 in the header"),
         ("preload_n,frf_pc_per_n\n1,7\n3,-\n", "frf_pc_per_n[1] = '-': must be a number"),
@@ -172,6 +172,24 @@ def test_commands_of_other_packages_get_their_arguments(tmp_path: Path) -> None:
     assert "bench-1" in run("key", "list", UNDERSKIN_DATA=str(tmp_path)).stdout
     assert "--port" in run("serve", "--help").stdout
     assert "Invalid value for '--port'" in refused("serve", "--port", "seven")
+
+
+def test_terminal_without_greek_letters() -> None:
+    answer = run("sigma", "--a-over-h", "0.3", "--rt-over-h", "0.6", PYTHONIOENCODING="ascii")
+    assert (answer.returncode, answer.stderr) == (0, "")
+    assert "0.93651" in answer.stdout
+
+
+def test_reader_that_goes_away() -> None:
+    """As `underskin … | head` does."""
+    many = ",".join(["1"] * 20_000)
+    command = [str(COMMAND), *FRF, "--preload-n", many, "--csv"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.readline()
+        process.stdout.close()
+        assert process.stderr.read() == b""
 
 
 def test_python_m() -> None:

@@ -1,14 +1,18 @@
 """The client against a running service: the same numbers as the library, and errors that say what to do."""
 
 import http.server
+import os
+import subprocess
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import underskin
+from tests.conftest import UNDERSKIN, running
 from underskin import Client, Indenter, ServiceError, Skin, Unreachable, half_space
 from underskin.units import to_lab, to_si
 
@@ -132,6 +136,19 @@ def test_slip_of_units_can_be_meant(client: Client) -> None:
         **{**PRESSED, "indenter_radius_mm": 0.007}, preload_n=1e-6, d33_pc_per_n=14.0, units_checked=True
     )
     assert answer.status == "ok"
+
+
+def test_key_is_sent_and_a_wrong_one_is_refused(tmp_path: Path) -> None:
+    create = [str(UNDERSKIN), "key", "create", "lab"]
+    made = subprocess.run(
+        create, env={**os.environ, "UNDERSKIN_DATA": str(tmp_path / "data")}, capture_output=True, text=True, check=True
+    )
+    with running(tmp_path, {}, "--host", "0.0.0.0") as keyed:
+        with Client(keyed.url, api_key=made.stdout.strip()) as client:
+            assert client.sigma(0.3, 0.6).status == "ok"
+        with Client(keyed.url, api_key="wrong") as client, pytest.raises(ServiceError) as refusal:
+            client.sigma(0.3, 0.6)
+        assert refusal.value.status == 401
 
 
 def test_nobody_there() -> None:

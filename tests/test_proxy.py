@@ -101,11 +101,14 @@ def proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[httpx.Clie
     serve = [str(Path(sys.executable).with_name("underskin")), "serve", "--port", str(service)]
     nginx = [str(NGINX), "-e", "stderr", "-p", str(folder), "-c", str(folder / "nginx.conf")]
     trust = ssl.create_default_context(cafile=folder / "fullchain.pem")
+    make_key = [str(Path(sys.executable).with_name("underskin")), "key", "create", "proxy"]
+    key = subprocess.run(make_key, env=os.environ | settings, check=True, capture_output=True, text=True).stdout.strip()
+    headers = {"Host": NAME, "Authorization": f"Bearer {key}"}
     with subprocess.Popen(serve, env=os.environ | settings) as server, subprocess.Popen(nginx) as front:
         try:
             wait_until_open(service, server)
             wait_until_open(tls, front)
-            with httpx.Client(verify=trust, base_url=f"https://127.0.0.1:{tls}", headers={"Host": NAME}) as client:
+            with httpx.Client(verify=trust, base_url=f"https://127.0.0.1:{tls}", headers=headers) as client:
                 yield client, plain
         finally:
             front.terminate()

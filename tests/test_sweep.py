@@ -17,6 +17,7 @@ from tablegen.sweep import run_pieces
 from underskin import SolverError
 
 SOAK = "UNDERSKIN_SOAK" in os.environ
+PIECES = "sigma.h5.parts/*/*.npz"
 SMALL = Nodes(
     a=np.linspace(0, 3.0, 7), rho=np.linspace(0, 3, 7), cbrt_load=np.linspace(0, 0.1, 7), r=np.linspace(0, 8, 9)
 )
@@ -51,18 +52,19 @@ def test_killed_at_any_moment_it_resumes_to_the_same_table(uninterrupted: Path, 
     script.write_text(SCRIPT)
     path = tmp_path / "sigma.h5"
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent.parent)}
-    delays = np.random.default_rng(1).uniform(1.5, 6.0, 20 if SOAK else 2)
-    for delay in delays:
+    generator = np.random.default_rng(1)
+    for _ in range(8 if SOAK else 2):
+        seen = len(list(tmp_path.glob(PIECES)))
         sweep = subprocess.Popen(
             [sys.executable, script, path], env=environment, start_new_session=True, stdout=subprocess.DEVNULL
         )
-        time.sleep(delay)
+        while sweep.poll() is None and len(list(tmp_path.glob(PIECES))) == seen:
+            time.sleep(0.05)
+        time.sleep(generator.uniform(0, 0.5))
+        assert sweep.poll() is None, "the sweep ended before it could be killed"
         os.killpg(sweep.pid, signal.SIGKILL)
         sweep.wait()
-        if path.exists():
-            break
-    pieces = list(tmp_path.glob("sigma.h5.parts/*/*.npz"))
-    assert pieces or path.exists(), "killed before the first piece: nothing was resumed"
+    pieces = list(tmp_path.glob(PIECES))
     if pieces:
         pieces[0].write_bytes(pieces[0].read_bytes()[:100])
     subprocess.run([sys.executable, script, path], env=environment, check=True, stdout=subprocess.DEVNULL)

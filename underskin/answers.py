@@ -1,23 +1,19 @@
 """What the commands answer: columns in lab units in and out; a single number holds for all rows."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from underskin import half_space
-from underskin.errors import InvalidInput
 from underskin.prediction import Transmission, transmission
 from underskin.skin import Indenter, Skin
 from underskin.surrogate import SigmaTable
-from underskin.units import Floats, checked, to_lab, to_si
+from underskin.units import Finding, Floats, checked, findings, finite, non_negative, to_lab, to_si
 
 Model = Literal["layer", "half_space"]
-
-# The half space is integrated anew for each row, at a cost that grows with a/h and rT/h.
-HALF_SPACE_END = 10.0
 
 
 @dataclass(frozen=True)
@@ -27,39 +23,40 @@ class Answer:
     columns: Mapping[str, Floats]
     inside: NDArray[np.bool_]
     domain: str
+    findings: Sequence[Finding] = ()
 
 
 def sigma(table: SigmaTable, given: Mapping[str, Floats], model: Model) -> Answer:
     """σ from `a_over_h`, `rt_over_h` and `load_parameter`; raises InvalidInput."""
-    a, rho, load = (
-        _accepted(name, given[name], negative=False) for name in ("a_over_h", "rt_over_h", "load_parameter")
-    )
+    a, rho, load = (non_negative(name, given[name]) for name in ("a_over_h", "rt_over_h", "load_parameter"))
     if model == "layer":
-        found = table.sigma(a, rho, load)
-        return Answer({"sigma": found.sigma, "rel_error": found.rel_error}, found.inside, _table_domain(table))
-    inside = (a <= HALF_SPACE_END) & (rho <= HALF_SPACE_END)
-    value = half_space.sigma(np.where(inside, a, 0.0), np.where(inside, rho, 0.0))
-    return Answer({"sigma": np.where(inside, value, np.nan)}, inside, f"a/h and rT/h 0 to {HALF_SPACE_END:g}")
+        found, domain = table.sigma(a, rho, load), _table_domain(table)
+    else:
+        found, domain = half_space.sigma_in_domain(a, rho), f"a/h and rT/h 0 to {half_space.DOMAIN_END:g}"
+    return Answer({"sigma": found.sigma, "rel_error": found.rel_error}, found.inside, domain)
 
 
 def frf(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Answer:
     """What the sensor should answer to the preload, and what leads to it; raises InvalidInput."""
-    reached = _pressed(table, given, units_checked)
+    reached = pressed(table, given, units_checked)
     d33 = checked("d33_pc_per_n", given["d33_pc_per_n"], units_checked=units_checked)
     return _skin_answer(table, reached, {"frf_pc_per_n": reached.frf(d33)})
 
 
 def d33(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Answer:
     """d33 and its standard uncertainty from a measured FRF, and what leads to them; raises InvalidInput."""
-    reached = _pressed(table, given, units_checked)
-    _accepted("frf_pc_per_n", given["frf_pc_per_n"], negative=True)
-    _accepted("frf_uncertainty_pc_per_n", given["frf_uncertainty_pc_per_n"], negative=False)
+    reached = pressed(table, given, units_checked)
+    finite("frf_pc_per_n", given["frf_pc_per_n"])
+    if not np.isnan(given["frf_uncertainty_pc_per_n"]).all():  # unknown: then d33's is NaN
+        non_negative("frf_uncertainty_pc_per_n", given["frf_uncertainty_pc_per_n"])
     measured = (to_si(name, given[name]) for name in ("frf_pc_per_n", "frf_uncertainty_pc_per_n"))
     value, uncertainty = reached.d33(*measured)
-    return _skin_answer(table, reached, {"d33_pc_per_n": value, "d33_uncertainty_pc_per_n": uncertainty})
+    answer = _skin_answer(table, reached, {"d33_pc_per_n": value, "d33_uncertainty_pc_per_n": uncertainty})
+    return replace(answer, findings=findings("frf_pc_per_n", given["frf_pc_per_n"]))
 
 
-def _pressed(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Transmission:
+def pressed(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Transmission:
+    """What reaches the sensor of a skin described in lab units; raises InvalidInput."""
     skin = Skin.from_lab(
         thickness_mm=given["thickness_mm"],
         youngs_modulus_mpa=given["youngs_modulus_mpa"],
@@ -71,8 +68,9 @@ def _pressed(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool
     return transmission(table, skin, indenter, checked("preload_n", given["preload_n"], units_checked=units_checked))
 
 
-def _skin_answer(table: SigmaTable, reached: Transmission, results: Mapping[str, Floats]) -> Answer:
-    columns = {
+def lab_columns(reached: Transmission) -> dict[str, Floats]:
+    """A transmission as columns in lab units."""
+    return {
         "contact_radius_mm": to_lab("contact_radius_mm", reached.contact_radius),
         "a_over_h": reached.a_over_h,
         "rt_over_h": reached.rt_over_h,
@@ -81,20 +79,13 @@ def _skin_answer(table: SigmaTable, reached: Transmission, results: Mapping[str,
         "rel_error": reached.rel_error,
         "mean_stress_mpa": to_lab("mean_stress_mpa", reached.mean_stress),
     }
+
+
+def _skin_answer(table: SigmaTable, reached: Transmission, results: Mapping[str, Floats]) -> Answer:
     in_lab_units = {name: to_lab(name, values) for name, values in results.items()}
-    return Answer(columns | in_lab_units, reached.inside, f"{_table_domain(table)}, Poisson's ratio 0.5")
+    return Answer(lab_columns(reached) | in_lab_units, reached.inside, f"{_table_domain(table)}, Poisson's ratio 0.5")
 
 
 def _table_domain(table: SigmaTable) -> str:
     symbols = {"a_over_h": "a/h", "rt_over_h": "rT/h", "load_parameter": "L"}
     return ", ".join(f"{symbols[name]} {low:g} to {high:g}" for name, (low, high) in table.domain.items())
-
-
-def _accepted(name: str, values: Floats, *, negative: bool) -> Floats:
-    """`values`, after refusing what is not finite and, unless it may be, what is below 0."""
-    good = np.isfinite(values) & (negative | (values >= 0))
-    if not good.all():
-        first = int(np.argmin(good))
-        allowed = "must be finite" if negative else "must be finite and at least 0"
-        raise InvalidInput(name, float(values.flat[first]), allowed, index=first if values.ndim else None)
-    return values

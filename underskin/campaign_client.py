@@ -158,7 +158,7 @@ class Skins:
 
     def load(self, file: str | Path) -> Document:
         """Bring in what `export` wrote elsewhere."""
-        headers = {"Content-Type": "application/x-hdf5"}
+        headers = {"Content-Type": "application/octet-stream"}
         with Path(file).open("rb") as source:
             return self._session.json("POST", "/v1/skins/import", headers=headers, content=source)
 

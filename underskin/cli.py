@@ -6,10 +6,12 @@ The other packages (the server, the table generator) hand in theirs through the 
 
 import ast
 import importlib.util
+import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from importlib.metadata import EntryPoint, entry_points
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -28,6 +30,7 @@ _ELSEWHERE = "runs from a checkout or the image"
 
 app = typer.Typer(
     add_completion=False,
+    no_args_is_help=True,
     rich_markup_mode="markdown",  # or [mm] is taken for a style
     help="Stress, FRF and d33 of piezoelectric electronic skin.",
 )
@@ -126,7 +129,7 @@ def d33(
     preload_n: PreloadN = None,
     frf_pc_per_n: Annotated[_Given, _column("Measured FRF on the plateau, real part [pC/N].")] = None,
     frf_uncertainty_pc_per_n: Annotated[
-        _Given, _column("Standard uncertainty of the measured FRF [pC/N], 0 if left out.")
+        _Given, _column("Standard uncertainty of the measured FRF [pC/N]; without it d33 has none.")
     ] = None,
     poisson_ratio: PoissonRatio = None,
     units_checked: UnitsChecked = False,
@@ -146,7 +149,7 @@ def d33(
         "frf_pc_per_n": frf_pc_per_n,
         "frf_uncertainty_pc_per_n": frf_uncertainty_pc_per_n,
     }
-    defaults = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": 0.0}
+    defaults = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": math.nan}
     _answer(given, defaults, input_file, csv, lambda table, columns: answers.d33(table, columns, units_checked))
 
 
@@ -166,6 +169,8 @@ def _answer(
     table = load_table()
     answer = compute(table, gathered)
     everything = {**gathered, **answer.columns}
+    for finding in answer.findings:
+        typer.echo(f"underskin: look at {finding.field}: {finding.statement}", err=True)
     if as_csv:
         columns.write_csv(everything, answer.inside, count)
     else:
@@ -231,6 +236,9 @@ def _run(command: typer.Typer, arguments: Sequence[str], name: str) -> int:
 
 def main() -> None:
     """Run the command line; an error is one line on stderr and exit status 2."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal may know no σ
     _add_commands_of_other_packages()
     try:
         sys.exit(_run(app, sys.argv[1:], "underskin"))

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from underskin.campaign_client import Campaigns, Skins
 from underskin.http_session import Session
-from underskin.units import Floats
+from underskin.units import Finding, Floats
 
 
 @dataclass(frozen=True)
@@ -72,6 +72,7 @@ class D33Answer(PressedSkinAnswer):
     frf_uncertainty_pc_per_n: Floats
     d33_pc_per_n: Floats
     d33_uncertainty_pc_per_n: Floats
+    findings: tuple[Finding, ...] = ()
     frf_im_pc_per_n: Floats | None = None
 
 
@@ -258,6 +259,8 @@ def _shared(name: str, value: Any) -> Any:
 def _field(name: str, document: Mapping[str, Any], single: bool) -> Any:
     """A field of the answer: an array, without its rows' axis where single numbers were given."""
     value = document.get(name)
+    if name == "findings":
+        return tuple(Finding(**finding) for finding in value or ())
     if not isinstance(value, list):
         return value
     array = np.array(value) if name == "status" else np.array(value, dtype=float)  # None becomes NaN

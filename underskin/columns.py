@@ -3,8 +3,6 @@
 import csv
 import sys
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,17 +71,17 @@ def _from_option(name: str, values: Sequence[str]) -> Floats:
 
 def _from_csv(path: str, allowed: Sequence[str]) -> dict[str, Floats]:
     try:
-        if path == STANDARD_INPUT:
-            lines = _lines(sys.stdin)
-        else:
-            with Path(path).open(encoding="utf-8-sig", newline="") as file:
-                lines = _lines(file)
+        source = sys.stdin.fileno() if path == STANDARD_INPUT else path
+        with open(source, encoding="utf-8-sig", newline="", closefd=path != STANDARD_INPUT) as file:
+            lines = [line for line in csv.reader(file, strict=True) if line]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise InvalidInput("input", path, f"must be a readable CSV file ({reason})") from error
     if len(lines) < 2:
         raise InvalidInput("input", path, "must have a header of field names and at least one row")
     header = [name.strip() for name in lines[0]]
+    if len(header) == 1 and any(separator in header[0] for separator in ";\t"):
+        raise InvalidInput("input", path, "must separate cells by commas and write numbers with a point")
     for name in header:
         if name not in allowed or header.count(name) > 1:
             raise InvalidInput("input", path, f"has the column {name!r}; allowed, once each: {', '.join(allowed)}")
@@ -141,10 +139,6 @@ def _rows_table(columns: Mapping[str, Floats], inside: NDArray[np.bool_]) -> Tab
 def status(inside: bool) -> str:
     """The word for a row."""
     return "ok" if inside else "out_of_domain"
-
-
-def _lines(file: TextIO) -> list[list[str]]:
-    return [line for line in csv.reader(file, strict=True) if line]
 
 
 def _numbers(name: str, cells: Sequence[str]) -> Floats:

@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from underskin.hankel import hertz_transform, normal_stress, tangential_stress
+from underskin.surrogate import Sigma
 from underskin.units import Floats
+
+# The integral is done anew for each row, at a cost that grows with a/h and rT/h.
+DOMAIN_END = 10.0
+# Of the quadrature against one on twice as many panels, over that domain (tests/test_service_sigma.py).
+REL_ERROR = 1e-10
 
 
 def stress(
@@ -47,6 +53,15 @@ def delta(a: ArrayLike) -> Floats:
 def sigma(a: ArrayLike, rho: ArrayLike, offset: ArrayLike = 0.0) -> Floats:
     """σ(a/h, ρ): Hertz pressure on an extended sensor, `offset` r̂/h beside it (equation 14)."""
     return normal_stress(_normal, hertz_transform, a, rho, offset)
+
+
+def sigma_in_domain(a: ArrayLike, rho: ArrayLike) -> Sigma:
+    """σ with its error, NaN where a/h or ρ exceeds `DOMAIN_END`; arrays broadcast."""
+    a_all, rho_all = np.broadcast_arrays(np.asarray(a, dtype=float), np.asarray(rho, dtype=float))
+    inside = (a_all <= DOMAIN_END) & (rho_all <= DOMAIN_END)
+    value = np.full(a_all.shape, np.nan)
+    value[inside] = sigma(a_all[inside], rho_all[inside])
+    return Sigma(value, np.where(inside, REL_ERROR, np.nan), inside)
 
 
 def _normal(k: Floats) -> Floats:

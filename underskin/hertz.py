@@ -31,9 +31,7 @@ def pressure(r: ArrayLike, preload: ArrayLike, contact_radius: ArrayLike) -> Flo
 
 def load_parameter(preload: ArrayLike, indenter_radius: ArrayLike, youngs_modulus: ArrayLike) -> Floats:
     """L = F / (R² E) [-], equation 16."""
-    return np.asarray(preload, dtype=float) / (
-        np.square(indenter_radius) * np.asarray(youngs_modulus, dtype=float)
-    )
+    return np.asarray(preload, dtype=float) / (np.square(indenter_radius) * np.asarray(youngs_modulus, dtype=float))
 
 
 def contact_radius_over_indenter_radius(load_parameter: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Floats:

@@ -75,7 +75,7 @@ def frf_gradient(
     """
     reached = transmission(table, skin, indenter, preload)
     rho = reached.rt_over_h
-    scale = response.frf(d33, 1.0, rho)
+    scale = np.where(reached.inside, response.frf(d33, 1.0, rho), np.nan)
     slopes = table.gradient(reached.a_over_h, rho, reached.load_parameter)
     # ∂FRF/∂ of the logarithm of each dimensionless number; d33's is FRF itself.
     in_a, in_load = scale * slopes[0] * reached.a_over_h, scale * slopes[2] * reached.load_parameter

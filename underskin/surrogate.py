@@ -6,7 +6,6 @@ proportional to the strain (PHYSICS, section 2). Rows outside the domain are NaN
 
 import math
 import os
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import NdBSpline, make_interp_spline
 
 from underskin.errors import TableError
+from underskin.point_spline import PointSpline, cell_of
 from underskin.table_format import SIGMA_SCHEMA, read_table
 from underskin.units import Floats
 
@@ -43,8 +43,9 @@ class SigmaTable:
         data = file.data
         try:
             self.axes = tuple(data[f"sigma/{name}"] for name in ("a_over_h", "rt_over_h", "cbrt_load_parameter"))
-            self._nodes = [axis.tolist() for axis in self.axes]
             self._sigma = _spline(self.axes, data["sigma/sigma"])
+            self._point_sigma = PointSpline(self._sigma)
+            self._point_axes = [axis.tolist() for axis in self.axes]
             self._cell_error = _largest_at_corners(
                 data["sigma/discretisation_error"] + data["sigma/interpolation_error"]
             )
@@ -78,12 +79,12 @@ class SigmaTable:
     def at(self, a_over_h: float, rt_over_h: float, load_parameter: float = 0.0) -> tuple[float, float] | None:
         """σ and the bound on its relative error at one point, without the cost of arrays; None outside the domain."""
         point = (a_over_h, rt_over_h, math.cbrt(load_parameter))
-        cell = []
-        for value, axis in zip(point, self._nodes, strict=True):
-            if not axis[0] <= value <= axis[-1]:
-                return None
-            cell.append(bisect_right(axis, value, 1, len(axis) - 1) - 1)
-        return float(self._sigma(point)), float(self._cell_error[tuple(cell)])
+        cell = self._point_sigma.cell(*point)
+        if cell is None:
+            return None
+        # The spline's cells are not the table's: next to its ends one spans two of them (not-a-knot).
+        a, rho, x = map(cell_of, self._point_axes, point)
+        return self._point_sigma.value(cell, *point), float(self._cell_error[a, rho, x])
 
     def gradient(
         self, a_over_h: ArrayLike, rt_over_h: ArrayLike, load_parameter: ArrayLike = 0.0

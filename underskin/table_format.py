@@ -139,9 +139,7 @@ def _verified(path: Path, file: h5py.File, schema: str) -> TableFile:
             _verify_values(path, group_name, name, data, list(dataset.attrs.get("axes", ())))
     digest = data_hash(data)
     if digest != attributes.get("data_sha256"):
-        raise TableError(
-            f"table {path} was altered after it was written: its SHA-256 does not match. {_REMEDY}"
-        )
+        raise TableError(f"table {path} was altered after it was written: its SHA-256 does not match. {_REMEDY}")
     return TableFile(data, attributes, digest)
 
 
@@ -153,6 +151,4 @@ def _verify_values(path: Path, group: str, name: str, data: Mapping[str, Floats]
         raise TableError(f"table {path}: axis {group}/{name} does not ascend. {_REMEDY}")
     expected = tuple(data[f"{group}/{axis}"].size for axis in axes)
     if axes and values.shape != expected:
-        raise TableError(
-            f"table {path}: {group}/{name} has shape {values.shape}, its axes {expected}. {_REMEDY}"
-        )
+        raise TableError(f"table {path}: {group}/{name} has shape {values.shape}, its axes {expected}. {_REMEDY}")

@@ -43,7 +43,7 @@ LAB: dict[str, LabField] = {
         LabField("charge_pc", "pC", 1e-12, signed=True),
         LabField("preload_n", "N", 1.0, (1e-3, 1e3)),
         LabField("d33_pc_per_n", "pC/N", 1e-12, (1e-2, 1e4), signed=True),
-        LabField("frf_pc_per_n", "pC/N", 1e-12, signed=True),
+        LabField("frf_pc_per_n", "pC/N", 1e-12, (1e-4, 1e5), signed=True),
         LabField("frf_uncertainty_pc_per_n", "pC/N", 1e-12),
         LabField("frequency_hz", "Hz", 1.0),
         LabField("contact_radius_mm", "mm", 1e-3),
@@ -99,6 +99,53 @@ def checked(name: str, value: ArrayLike, *, units_checked: bool = False) -> Floa
     return values * field.to_si
 
 
+def non_negative(name: str, values: Floats) -> Floats:
+    """`values`, after refusing what is not finite or below 0 (InvalidInput with the first such row)."""
+    return _accepted(name, values, np.isfinite(values) & (values >= 0), "must be finite and at least 0")
+
+
+def finite(name: str, values: Floats) -> Floats:
+    """`values`, after refusing what is not finite (InvalidInput with the first such row)."""
+    return _accepted(name, values, np.isfinite(values), "must be finite")
+
+
+def _accepted(name: str, values: Floats, good: NDArray[np.bool_], allowed: str) -> Floats:
+    if not good.all():
+        first = int(np.argmin(good.ravel()))
+        row = int(np.unravel_index(first, values.shape)[0]) if values.ndim else None
+        raise InvalidInput(name, float(values.flat[first]), allowed, index=row)
+    return values
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A measured value that looks wrong but is used all the same: the row, and what to look at."""
+
+    field: str
+    index: int | None
+    statement: str
+
+
+def findings(name: str, value: ArrayLike) -> list[Finding]:
+    """The first entry of a measured field whose magnitude looks like a slip of units or a dead sensor, if any.
+
+    Measured values are never refused for their magnitude, unlike declared ones (see `checked`).
+    """
+    field = LAB[name]
+    values = np.asarray(value, dtype=float)
+    assert field.likely is not None, f"{name} has no likely range"
+    size = np.abs(values)
+    unlikely = (size < field.likely[0]) | (size > field.likely[1])
+    if not unlikely.any():
+        return []
+    first = int(np.argmax(unlikely))
+    number = float(values.flat[first])
+    guess = "a dead sensor?" if number == 0 else _guess(field, abs(number))
+    more = int(unlikely.sum()) - 1
+    others = f" ({more} more rows like it)" if more else ""
+    return [Finding(name, first if values.ndim else None, f"{number:g} {field.unit} is unusual: {guess}{others}")]
+
+
 def _refuse(name: str, values: Floats, bad: NDArray[np.bool_], allowed: str) -> None:
     if bad.any():
         first = int(np.argmax(bad))
@@ -110,15 +157,20 @@ def _slip(field: LabField, size: float) -> str:
     assert field.likely is not None
     low, high = field.likely
     text = f"must be {low:g} to {high:g} {field.unit} in magnitude (or set units_checked to true)"
+    return f"{text}; {_guess(field, size)}"
+
+
+def _guess(field: LabField, size: float) -> str:
+    """The slip that would explain a magnitude outside the likely range."""
+    assert field.likely is not None
+    low, high = field.likely
     for factor, unit in _NEIGHBOURS[field.unit].items():
         if _usual(size * factor, low, high):
-            return f"{text}; {size:g} {unit} is {size * factor:g} {field.unit}: was it given in {unit}?"
+            return f"{size:g} {unit} is {size * factor:g} {field.unit}: was it given in {unit}?"
     for power in (3, 6, 9, 12, -3, -6, -9, -12):
         if _usual(size * 10.0**power, low, high):
-            return (
-                f"{text}; off by a factor of 10^{-power}? {size * 10.0**power:g} {field.unit} would be usual"
-            )
-    return text
+            return f"off by a factor of 10^{-power}? {size * 10.0**power:g} {field.unit} would be usual"
+    return "no unit that we know explains it"
 
 
 def _usual(size: float, low: float, high: float) -> bool:

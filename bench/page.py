@@ -1,0 +1,79 @@
+"""docs/validation.md, written from what `make bench` or one of its parts measured last (docs/bench-results.json)."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from bench.figures import Figure
+
+_DOCS = Path(__file__).parent.parent / "docs"
+PAGE, RESULTS = _DOCS / "validation.md", _DOCS / "bench-results.json"
+
+_INTRODUCTION = """# Accuracy and speed, measured
+
+Written by `make bench`, or by the command named at each section, which says where it was measured. Ratios were taken
+in turns within one run, medians over the rounds; single times depend on the machine, and other work on it disturbs even
+ratios: `idle_percent` is how idle it was before the start. A target is what the project holds itself to; **no** marks
+one that was not met.
+"""
+
+_SECTIONS = {
+    "accuracy": "Accuracy of the shipped table",
+    "batch": "Batches over HTTP",
+    "requests": "Single requests",
+    "start": "Start and memory",
+    "newton": "Finite elements against FElupe",
+    "orderings": "What was tried for the solver",
+}
+
+_EXPLANATIONS = {
+    "accuracy": """Errors are relative. The fresh solves share nothing with the table but the code of the elements; an
+independent finite-element code is compared in `tests/test_felupe.py`.""",
+    "batch": "One request of 100,000 rows, the server on one core.",
+    "requests": """8 connections, the server on one core and the load on the other, against the `umbridge` package's own
+server and Tesseract Core's runtime, each serving the same spline.""",
+    "start": "From starting the process to the first answer of `/ready`; resident memory after load.",
+    "newton": "One Newton step at equal unknowns, on one core.",
+    "orderings": "Factors of one step's matrix, on one core.",
+}
+
+
+def keep(part: str, machine: Mapping[str, object], figures: Sequence[Figure]) -> None:
+    """Put one part's figures in the place of its last ones."""
+    results = _results()
+    results[part] = {"machine": dict(machine), "figures": [asdict(figure) for figure in figures]}
+    RESULTS.write_text(json.dumps(results, indent=1, ensure_ascii=False, sort_keys=True) + "\n")
+
+
+def write() -> None:
+    """Write the page from all that was kept."""
+    text = _INTRODUCTION
+    results = _results()
+    for part, title in _SECTIONS.items():
+        if part in results:
+            figures = [Figure(**figure) for figure in results[part]["figures"]]
+            machine = ", ".join(f"{name} {value}" for name, value in results[part]["machine"].items())
+            text += f"\n## {title}\n\n`python -m bench {part}`. {_EXPLANATIONS[part]}\n\n"
+            text += f"{markdown(figures)}\n\nMeasured on: {machine}.\n"
+    PAGE.write_text(text)
+
+
+def _results() -> dict[str, Any]:
+    return json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+
+
+def markdown(figures: Sequence[Figure]) -> str:
+    """The figures as a table."""
+    lines = ["| what | measured | target | met |", "|---|---|---|---|"]
+    for f in figures:
+        target = "" if f.target is None else f"{'≥' if f.better == 'higher' else '≤'} {f.target:,.10g}"
+        met = {None: "", True: "yes", False: "**no**"}[f.met]
+        lines.append(f"| {f.name} | {_rounded(f.value)} {f.unit} | {target} | {met} |")
+    return "\n".join(lines)
+
+
+def _rounded(value: float) -> str:
+    """Three significant digits, thousands separated."""
+    return f"{value:,.0f}" if value >= 1000 else f"{value:.3g}"

@@ -1,0 +1,238 @@
+"""What is refused, and how it is said: RFC 9457 problems in one shape over all routes."""
+
+import asyncio
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from service.app import create_api
+from service.front import Front
+from service.gate import Gate
+from service.keys import KeyStore
+from service.problems import Problem
+from service.settings import Settings
+from service.store import open_store
+from underskin import load_table
+
+SIGMA: dict[str, Any] = {"a_over_h": [0.3, 0.6], "rt_over_h": 0.6}
+FRF: dict[str, Any] = {
+    "thickness_mm": 2.5,
+    "youngs_modulus_mpa": 16.0,
+    "sensor_radius_mm": 1.5,
+    "indenter_radius_mm": 4.0,
+    "preload_n": [1.0, 3.0],
+    "d33_pc_per_n": 14.0,
+}
+D33: dict[str, Any] = {**{name: FRF[name] for name in FRF if name != "d33_pc_per_n"}, "frf_pc_per_n": [6.8, 11.0]}
+LINES: dict[str, Any] = {
+    **{name: D33[name] for name in D33 if name != "frf_pc_per_n"},
+    "frequency_hz": [10, 20],
+    "band_hz": [1, 100],
+    "frf_re_pc_per_n": [[7, 7.1], [8, 8.1]],
+}
+
+
+def problem_of(answer: httpx.Response, status: int) -> dict[str, Any]:
+    """The problem document, after checking the shape that all have."""
+    assert answer.status_code == status, answer.text
+    if answer.request.url.path.startswith("/umbridge/"):
+        error = answer.json()
+        assert answer.headers["content-type"] == "application/json"
+        assert set(error) == {"error"}
+        assert set(error["error"]) == {"type", "message"}
+        assert error["error"]["type"].isalpha()
+        return dict(error["error"])
+    document: dict[str, Any] = answer.json()
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert set(document) == set(Problem.model_fields)
+    Problem.model_validate(document)
+    assert document["status"] == status
+    assert document["type"].startswith("urn:underskin:problem:")
+    assert document["request_id"] == answer.headers["x-request-id"]
+    assert document["title"]
+    assert document["detail"]
+    return document
+
+
+def all_routes(http: httpx.Client) -> list[tuple[str, str]]:
+    """Method and path of every route there is."""
+    paths = http.get("/openapi.json").json()["paths"]
+    routes = [(method.upper(), path) for path, methods in paths.items() for method in methods]
+    assert len(routes) >= 15
+    return routes
+
+
+def test_every_route_refuses_in_the_same_shape(http: httpx.Client) -> None:
+    for method, path in all_routes(http):
+        problem_of(http.request(method, path, headers={"Host": "evil.example"}), 421)
+        allowed = {other for other, same in all_routes(http) if same == path}
+        refused = http.request("DELETE", path)
+        problem_of(refused, 405)
+        assert set(refused.headers["allow"].split(", ")) == allowed
+        problem_of(http.request(method, path + "/nothing/here"), 404)
+        if method == "POST":
+            invalid = 400 if path.startswith("/umbridge/") else 422
+            problem_of(http.post(path, json={}), invalid)
+            problem_of(http.post(path, json=[1, 2]), invalid)
+            problem_of(http.post(path, headers={"Origin": "http://evil.example"}, json={}), 403)
+            unreadable = http.post(path, content=b"{", headers={"Content-Type": "application/json"})
+            problem_of(unreadable, 422 if path == "/v1/skins/import" else 400)  # which takes HDF5 alone
+            if not path.startswith("/umbridge/"):
+                form = http.post(path, content=b"a=1", headers={"Content-Type": "application/x-www-form-urlencoded"})
+                problem_of(form, 422 if "{" in path else 415)
+
+
+@pytest.mark.parametrize(
+    ("path", "good", "wrong", "field", "index"),
+    [
+        ("/v1/sigma", SIGMA, {"a_over_h": [0.3, -0.1]}, "a_over_h", 1),
+        ("/v1/sigma", SIGMA, {"a_over_h": [0.3, math.nan]}, "a_over_h", 1),
+        ("/v1/sigma", SIGMA, {"a_over_h": [math.inf, 0.3]}, "a_over_h", 0),
+        ("/v1/sigma", SIGMA, {"a_over_h": [0.3, None]}, "a_over_h", 1),
+        ("/v1/sigma", SIGMA, {"a_over_h": [0.3, "0.6"]}, "a_over_h", 1),
+        ("/v1/sigma", SIGMA, {"a_over_h": [True, 0.6]}, "a_over_h", 0),
+        ("/v1/sigma", SIGMA, {"a_over_h": "0.3"}, "a_over_h", None),
+        ("/v1/sigma", SIGMA, {"a_over_h": [[0.3], 0.6]}, "a_over_h", 0),
+        ("/v1/sigma", SIGMA, {"a_over_h": []}, "a_over_h", None),
+        ("/v1/sigma", SIGMA, {"rt_over_h": [0.6, 0.6, 0.6]}, "rt_over_h", None),
+        ("/v1/sigma", SIGMA, {"rt_over_h": [0.6]}, "rt_over_h", None),
+        ("/v1/sigma", SIGMA, {"load_parameter": -1e-9}, "load_parameter", None),
+        ("/v1/sigma", SIGMA, {"load_paramter": 0.1}, "load_paramter", None),
+        ("/v1/sigma", SIGMA, {"model": "sphere"}, "model", None),
+        ("/v1/sigma", SIGMA, {"a_over_h": 10**400}, "a_over_h", None),
+        ("/v1/frf", FRF, {"preload_n": [1.0, 0.0]}, "preload_n", 1),
+        ("/v1/frf", FRF, {"preload_n": [1.0, -3.0]}, "preload_n", 1),
+        ("/v1/frf", FRF, {"thickness_mm": 0.0}, "thickness_mm", None),
+        ("/v1/frf", FRF, {"youngs_modulus_mpa": math.nan}, "youngs_modulus_mpa", None),
+        ("/v1/frf", FRF, {"indenter_radius_mm": [4.0, math.inf]}, "indenter_radius_mm", 1),
+        ("/v1/frf", FRF, {"d33_pc_per_n": 0.0}, "d33_pc_per_n", None),
+        ("/v1/frf", FRF, {"poisson_ratio": 0.51}, "poisson_ratio", None),
+        ("/v1/frf", FRF, {"frequency_hz": [10.0, -1.0]}, "frequency_hz", 1),
+        ("/v1/frf", FRF, {"frequency_hz": []}, "frequency_hz", None),
+        ("/v1/frf", FRF, {"frequency_hz": [1.0] * 500_001}, "frequency_hz", None),
+        ("/v1/frf", FRF, {"skin_id": "palm"}, "skin_id", None),
+        ("/v1/frf", FRF, {"model": "adopted"}, "skin_id", None),
+        ("/v1/d33", D33, {"frf_pc_per_n": [1.0, math.nan]}, "frf_pc_per_n", 1),
+        ("/v1/d33", D33, {"frf_pc_per_n": [1.0, 2.0, 3.0]}, "frf_pc_per_n", None),
+        ("/v1/d33", D33, {"frf_uncertainty_pc_per_n": -0.1}, "frf_uncertainty_pc_per_n", None),
+        ("/v1/d33", D33, {"band_hz": [1, 2]}, "band_hz", None),
+        ("/v1/d33", LINES, {"band_hz": None}, "band_hz", None),
+        ("/v1/d33", LINES, {"band_hz": [30, 100]}, "band_hz", None),
+        ("/v1/d33", LINES, {"band_hz": [15, 100]}, "frf_uncertainty_pc_per_n", None),
+        ("/v1/d33", LINES, {"frf_re_pc_per_n": [[7, 7.1], [8]]}, "frf_re_pc_per_n", 1),
+        ("/v1/d33", LINES, {"frf_re_pc_per_n": [[7, 7.1], [8, math.inf]]}, "frf_re_pc_per_n", 1),
+        ("/v1/d33", LINES, {"frf_re_pc_per_n": [[7, 7.1]]}, "frf_re_pc_per_n", None),
+        ("/v1/d33", LINES, {"frf_im_pc_per_n": [[7, 7.1], [8, None]]}, "frf_im_pc_per_n", 1),
+    ],
+)
+def test_wrong_value_is_named_with_its_row(
+    http: httpx.Client, path: str, good: dict[str, Any], wrong: dict[str, Any], field: str, index: int | None
+) -> None:
+    assert http.post(path, json=good).status_code == 200
+    body = json.dumps({**good, **wrong})  # httpx would refuse NaN; MATLAB and Python's own clients send it
+    document = problem_of(http.post(path, content=body, headers={"Content-Type": "application/json"}), 422)
+    (error,) = document["errors"]
+    assert (error["field"], error["index"]) == (field, index)
+    assert error["allowed"]
+    assert field in document["detail"]
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "guess"),
+    [("thickness_mm", 0.0025, "m"), ("thickness_mm", 2500.0, "µm"), ("youngs_modulus_mpa", 16e6, "Pa")],
+)
+def test_slip_of_units_is_guessed_and_can_be_meant(http: httpx.Client, field: str, value: float, guess: str) -> None:
+    fields = {**FRF, field: value}
+    (error,) = problem_of(http.post("/v1/frf", json=fields), 422)["errors"]
+    assert error["field"] == field
+    assert f"given in {guess}?" in error["allowed"]
+    assert http.post("/v1/frf", json={**fields, "units_checked": True}).status_code == 200
+
+
+def test_unequal_columns_are_both_named(http: httpx.Client) -> None:
+    answer = http.post("/v1/sigma", json={"a_over_h": [0.3, 0.6], "rt_over_h": [0.1, 0.2, 0.3]})
+    detail = problem_of(answer, 422)["detail"]
+    assert "a_over_h" in detail
+    assert "rt_over_h" in detail
+
+
+def test_a_skin_without_an_adopted_model_is_not_found(http: httpx.Client) -> None:
+    for path, good in (("/v1/frf", FRF), ("/v1/d33", D33)):
+        answer = http.post(path, json={**good, "model": "adopted", "skin_id": "palm-3"})
+        assert "'palm-3' has no adopted model" in problem_of(answer, 404)["detail"]
+
+
+@pytest.mark.parametrize("query", ["a_over_h=-1&rt_over_h=1", "a_over_h=nan&rt_over_h=1", "a_over_h=1&rt_over_h=inf"])
+def test_wrong_value_in_a_query(http: httpx.Client, query: str) -> None:
+    (error,) = problem_of(http.get(f"/v1/sigma?{query}"), 422)["errors"]
+    assert error["field"] in query
+
+
+@pytest.mark.parametrize(
+    "query", ["", "a_over_h=1", "a_over_h=1&rt_over_h=", "a_over_h=1&rt_over_h=x", "a_over_h=1&rt_over_h=1&load=0.1"]
+)
+def test_query_that_is_not_understood(http: httpx.Client, query: str) -> None:
+    assert problem_of(http.get(f"/v1/sigma?{query}"), 422)["errors"]
+
+
+@pytest.mark.parametrize(
+    ("body", "status", "says"),
+    [
+        (b"", 400, "header"),
+        (b"a_over_h,rt_over_h\n", 400, "at least one row"),
+        (b"a_over_h,rt_over_h\n0.3\n", 400, "Row 0"),
+        (b"a_over_h,a_over_h\n0.3,0.3\n", 400, "twice"),
+        (b"\xff\xfe", 400, "UTF-8"),
+        (b'a_over_h,rt_over_h\n"0.3,0.6\n', 400, "CSV"),
+        (b"a_over_h,rt_over_h\n0.3,0.6\n0.3,x\n", 422, "rt_over_h[1]"),
+        (b"a_over_h,rt_over_h\n0.3,NaN\n", 422, "rt_over_h[0]"),
+        (b"a_over_h,rt_over_h,model\n0.3,0.6,layer\n0.3,0.6,half_space\n", 422, "model[1]"),
+    ],
+)
+def test_csv_that_is_not_understood(http: httpx.Client, body: bytes, status: int, says: str) -> None:
+    answer = http.post("/v1/sigma", content=body, headers={"Content-Type": "text/csv"})
+    assert says in problem_of(answer, status)["detail"]
+
+
+def test_what_csv_cannot_tell_is_said(http: httpx.Client) -> None:
+    fields = {**FRF, "preload_n": 1.0, "frequency_hz": 10.0}
+    body = ",".join(fields) + "\n" + ",".join(map(str, fields.values()))
+    answer = http.post("/v1/frf", content=body, headers={"Content-Type": "text/csv"})
+    (error,) = problem_of(answer, 422)["errors"]
+    assert error["field"] == "frequency_hz"
+    assert "application/json" in error["allowed"]
+
+
+def test_values_too_large_for_a_double_are_outside_not_a_failure(http: httpx.Client) -> None:
+    answer = http.post("/v1/frf", json={**FRF, "preload_n": [1.0, 1e308], "units_checked": True})
+    assert answer.status_code == 200
+    assert answer.json()["status"] == ["ok", "out_of_domain"]
+
+
+def test_what_nobody_expected_is_a_problem_with_the_traceback_in_the_log(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    gate = Gate(
+        host_names=frozenset(), keys=KeyStore(tmp_path), keys_always=False, max_body_bytes=1000, max_upload_bytes=1000
+    )
+    store = open_store("", tmp_path)
+    api = create_api(Settings(data=tmp_path), load_table(), gate, store)
+
+    @api.get("/fails")
+    async def fails() -> None:
+        raise ZeroDivisionError("a bug")
+
+    async def ask() -> httpx.Response:
+        transport = httpx.ASGITransport(Front(api, gate, {}))
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
+            return await client.get("/fails")
+
+    document = problem_of(asyncio.run(ask()), 500)
+    store.close()
+    assert "a bug" not in document["detail"]
+    (record,) = [record for record in caplog.records if record.exc_info]
+    assert getattr(record, "fields", {}) == {"request_id": document["request_id"]}
