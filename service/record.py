@@ -54,6 +54,7 @@ def _line(
         "time": datetime.fromtimestamp(ended, UTC),
         "level": "info",
         "logger": "underskin.request",
+        "message": f"{method} {path[:200]} {status}",
         "request_id": request_id,
         "method": method,
         "path": path[:200],
