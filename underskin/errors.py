@@ -2,6 +2,7 @@
 
 UnderskinError
 ├── InvalidInput      a value that cannot be used: names the field, the value and what is allowed
+├── FileError         a file that cannot be read: names the file and the place in it
 ├── TableError        a table that is missing, damaged, altered or of another schema
 ├── SolverError       a finite-element solve that did not converge: names the point
 ├── ServiceError      an answer of the server that is not a success (raised by the client)
@@ -29,6 +30,20 @@ class InvalidInput(UnderskinError, ValueError):
         self.index = index
         place = field if index is None else f"{field}[{index}]"
         super().__init__(f"{place} = {value!r}: {allowed}")
+
+
+class FileError(UnderskinError):
+    """A file that cannot be read.
+
+    Attributes: `file` (the name the user knows), `place` (line, field or byte; empty where the whole file is meant),
+    `reason`.
+    """
+
+    def __init__(self, file: str, place: str, reason: str) -> None:
+        self.file = file
+        self.place = place
+        self.reason = reason
+        super().__init__(": ".join(part for part in (file, place, reason) if part))
 
 
 class TableError(UnderskinError):

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from underskin.errors import InvalidInput
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,10 @@ LAB: dict[str, LabField] = {
         LabField("youngs_modulus_mpa", "MPa", 1e6, (1e-3, 1e4)),
         LabField("sensor_radius_mm", "mm", 1e-3, (0.01, 100.0)),
         LabField("indenter_radius_mm", "mm", 1e-3, (0.05, 1000.0)),
+        LabField("width_mm", "mm", 1e-3, (0.1, 10000.0)),
+        LabField("length_mm", "mm", 1e-3, (0.1, 10000.0)),
+        LabField("sample_height_mm", "mm", 1e-3, (0.1, 1000.0)),
+        LabField("sample_diameter_mm", "mm", 1e-3, (0.1, 1000.0)),
         LabField("preload_n", "N", 1.0, (1e-3, 1e3)),
         LabField("d33_pc_per_n", "pC/N", 1e-12, (1e-2, 1e4), signed=True),
         LabField("frf_pc_per_n", "pC/N", 1e-12, (1e-4, 1e5), signed=True),
@@ -41,6 +46,15 @@ LAB: dict[str, LabField] = {
         LabField("contact_radius_mm", "mm", 1e-3),
         LabField("mean_stress_mpa", "MPa", 1e6),
         LabField("d33_uncertainty_pc_per_n", "pC/N", 1e-12),
+        LabField("dynamic_force_n", "N", 1.0),
+        LabField("force_n", "N", 1.0, signed=True),
+        LabField("charge_pc", "pC", 1e-12, signed=True),
+        LabField("displacement_mm", "mm", 1e-3, signed=True),
+        LabField("time_s", "s", 1.0),
+        LabField("dwell_s", "s", 1.0),
+        LabField("sample_rate_hz", "Hz", 1.0),
+        LabField("frf_re_pc_per_n", "pC/N", 1e-12, signed=True),
+        LabField("frf_im_pc_per_n", "pC/N", 1e-12, signed=True),
     )
 }
 

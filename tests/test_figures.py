@@ -1,0 +1,50 @@
+"""Figures: every sensor and recording is in them, in lab units, told apart by more than colour."""
+
+import numpy as np
+import pytest
+
+from underskin.errors import InvalidInput
+from underskin.figures import array_map, frf_versus_preload, response_per_sensor
+
+SENSORS = ("s1", "s2", "s3")
+D33 = np.array([14.0, 15.0, 3.0])
+REASONS = ("", "", "weak: 21 % of the array's d33")
+
+
+def test_the_map_shows_each_sensor_in_its_place_and_marks_those_that_stand_out() -> None:
+    figure = array_map(SENSORS, [0.0, 8.0, 16.0], [0.0, 0.0, 8.0], D33, 0.1 * D33, REASONS)
+    plain, odd = figure.data
+    assert list(zip(plain.x, plain.y, strict=True)) == [(0.0, 0.0), (8.0, 0.0)]
+    assert odd.marker.symbol != plain.marker.symbol
+    assert odd.text[0] == f"s3: {REASONS[2]}"
+    assert list(plain.marker.color) == [14.0, 15.0]
+    assert (plain.marker.cmin, plain.marker.cmax) == (odd.marker.cmin, odd.marker.cmax) == (3.0, 15.0)
+    assert "pC/N" in plain.hovertemplate
+    assert "mm" in plain.hovertemplate
+
+
+def test_frf_against_preload_has_points_and_a_line_for_each_indenter() -> None:
+    radius, preload = np.array([4.0, 4.0, 10.0, 10.0, 4.0]), np.array([1.0, 0.5, 0.5, 1.0, 1.0])
+    frf = np.array([6.0, 6.2, 7.0, 6.9, 6.1])
+    figure = frf_versus_preload(("a", "b", "c", "d", "e"), radius, preload, frf, 0.1 * frf, frf + 0.05)
+    points = {trace.name: trace for trace in figure.data}
+    assert set(points) == {"4 mm, measured", "4 mm, model", "10 mm, measured", "10 mm, model"}
+    assert sorted(points["4 mm, measured"].y) == [6.0, 6.1, 6.2]
+    assert list(points["4 mm, model"].x) == [0.5, 1.0]
+    assert points["4 mm, measured"].marker.symbol != points["10 mm, measured"].marker.symbol
+    assert points["4 mm, measured"].marker.color != points["10 mm, measured"].marker.color
+
+
+def test_the_response_of_each_sensor_has_its_interval_and_the_arrays() -> None:
+    figure = response_per_sensor(SENSORS, D33, D33 - 1, D33 + 2, (13.5, 14.5), REASONS)
+    assert [name for trace in figure.data for name in trace.x] == list(SENSORS)
+    np.testing.assert_allclose(figure.data[0].error_y.array, 2)
+    np.testing.assert_allclose(figure.data[0].error_y.arrayminus, 1)
+    band = figure.layout.shapes[0]
+    assert (band.y0, band.y1) == (13.5, 14.5)
+    assert figure.to_json()
+
+
+def test_a_column_of_another_length_is_refused_by_name() -> None:
+    with pytest.raises(InvalidInput, match="high_pc_per_n"):
+        response_per_sensor(SENSORS, D33, D33, D33[:2], (1.0, 2.0), REASONS)

@@ -1,0 +1,155 @@
+"""The flat zone of campaigns with known resonances, roll-offs and mains, and averages over it."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from underskin.errors import InvalidInput
+from underskin.recordings.campaign import FrfRecording, parse
+from underskin.recordings.flat_zone import Condition, FlatZone, band_average, flat_zone, stacked
+from underskin.recordings.frf_estimation import Frf, lines_of
+from underskin.units import Complexes, Floats
+
+LOG_GRID = np.geomspace(1, 1000, 60)
+LINEAR_GRID = np.arange(1.0, 401.0)
+NEEDS_CAMPAIGNS = pytest.mark.skipif(
+    "UNDERSKIN_CAMPAIGNS" not in os.environ, reason="UNDERSKIN_CAMPAIGNS does not name the folder of campaigns"
+)
+PRELOADS = (0.5, 1.0, 2.0, 3.0)
+INDENTERS = (4.0, 10.0)
+
+
+def resonance(frequency: Floats, radius: float, preload: float, mass_g: float = 1.0) -> Complexes:
+    """A tip on a contact spring that stiffens with radius and preload; lowest at 4 mm and 0.5 N."""
+    natural = 400 * np.cbrt(radius / 4 * preload / 0.5) ** 0.5 / np.sqrt(mass_g)
+    x = frequency / natural
+    return 1 / (1 - x**2 + 0.05j * x)
+
+
+def recorded(
+    frequency: Floats, shape: str, seed: int = 0, line: float = 0.01, copies: int = 3
+) -> tuple[list[Frf], list[Condition]]:
+    random = np.random.default_rng(seed)
+    frfs, conditions = [], []
+    for radius in INDENTERS:
+        for preload in PRELOADS:
+            for _ in range(copies):
+                clean = np.ones_like(frequency, dtype=complex)
+                if "resonance" in shape:
+                    clean = clean * resonance(frequency, radius, preload)
+                if "high-pass" in shape:
+                    clean = clean * (1j * frequency / 2) / (1 + 1j * frequency / 2)
+                if "relaxation" in shape:
+                    clean = clean * (1j * frequency / 30) ** -0.03
+                noise = (
+                    line
+                    * np.abs(clean)
+                    * (random.normal(size=len(frequency)) + 1j * random.normal(size=len(frequency)))
+                )
+                clean = clean + noise
+                if "mains" in shape:
+                    for harmonic in (50, 100, 150):
+                        near = np.abs(frequency - harmonic) < 1.5
+                        clean = clean + near * 0.4 * np.exp(2j * np.pi * random.random())
+                frfs.append(Frf(frequency, 7e-12 * np.exp(0.03 * random.normal()) * clean.astype(np.complex128)))
+                conditions.append((radius, preload))
+    return frfs, conditions
+
+
+def zone_of(shape: str, frequency: Floats = LOG_GRID, **options: float) -> FlatZone:
+    frfs, conditions = recorded(frequency, shape, **options)  # type: ignore[arg-type]
+    return flat_zone(stacked(frfs), conditions)
+
+
+def test_a_flat_campaign_is_flat_throughout() -> None:
+    zone = zone_of("")
+    assert (zone.low_hz, zone.high_hz) == (LOG_GRID[0], LOG_GRID[-1])
+    assert "whole recorded range" in zone.reason
+
+
+def test_the_lowest_of_the_resonances_ends_the_zone_and_is_named() -> None:
+    zone = zone_of("resonance")
+    assert 40 < zone.high_hz < 110  # 1/(1 − (f/400)²) has risen by 1 % to 8 %
+    assert zone.low_hz == LOG_GRID[0]
+    assert "4 mm sphere at 0.5 N" in zone.reason
+    assert "moving with the contact" in zone.reason
+
+
+def test_a_high_pass_begins_it_and_a_relaxation_does_not_end_it() -> None:
+    zone = zone_of("high-pass")
+    assert 4 < zone.low_hz < 20  # corner at 2 Hz: Re = 0.8 at 4 Hz, 0.99 at 20 Hz
+    assert "high-pass" in zone.reason
+    relaxing = zone_of("relaxation", LINEAR_GRID[:130])
+    assert (relaxing.low_hz, relaxing.high_hz) == (1, 130)
+    assert "fall alike, by 6." in relaxing.reason
+
+
+def test_mains_lines_are_left_out_and_do_not_end_it() -> None:
+    frfs, conditions = recorded(LINEAR_GRID[:200], "mains")
+    zone = flat_zone(stacked(frfs), conditions)
+    assert (zone.low_hz, zone.high_hz) == (1, 200)
+    assert {50.0, 100.0, 150.0} <= set(zone.left_out_hz) <= {x + d for x in (50, 100, 150) for d in (-1.0, 0.0, 1.0)}
+    assert "mains" in zone.reason
+    mean, uncertainty, _ = band_average(stacked(frfs), zone)
+    quiet, _ = recorded(LINEAR_GRID[:200], "")
+    level, _, _ = band_average(stacked(quiet), FlatZone(1, 200, ""))
+    assert np.median(uncertainty / mean) < 1.5e-3
+    assert np.median(mean) == pytest.approx(np.median(level), rel=0.03)
+
+
+def test_dead_sensors_and_single_recordings_do_not_spoil_it() -> None:
+    frfs, conditions = recorded(LOG_GRID, "resonance", copies=1)
+    random = np.random.default_rng(5)
+    for _ in range(4):
+        frfs.append(Frf(LOG_GRID, (1e-14 * random.normal(size=60)).astype(np.complex128)))
+        conditions.append((4.0, 1.0))
+    zone = flat_zone(stacked(frfs), conditions)
+    assert 40 < zone.high_hz < 130
+    assert zone.low_hz < 2
+
+
+def test_the_users_band_overrides() -> None:
+    frfs, conditions = recorded(LOG_GRID, "resonance")
+    zone = flat_zone(stacked(frfs), conditions, (5.0, 300.0))
+    assert (zone.low_hz, zone.high_hz, zone.chosen_by_user) == (5.0, 300.0, True)
+    with pytest.raises(InvalidInput, match="band_hz"):
+        flat_zone(stacked(frfs), conditions, (2000.0, 3000.0))
+
+
+@pytest.mark.parametrize("with_coherence", [True, False])
+def test_the_uncertainty_of_an_average_is_its_scatter_and_coherence_lowers_it(with_coherence: bool) -> None:
+    random = np.random.default_rng(6)
+    noise = np.where(np.arange(100) < 50, 0.002, 0.03)
+    gamma2 = 1 / (1 + 2 * 16 * noise**2) if with_coherence else None
+    frfs = [
+        Frf(np.arange(1.0, 101.0), np.asarray(1 + noise * random.normal(size=100), dtype=np.complex128), gamma2)
+        for _ in range(800)
+    ]
+    mean, uncertainty, _ = band_average(stacked(frfs), FlatZone(1, 100, ""))
+    assert np.std(mean) == pytest.approx(np.sqrt(np.mean(uncertainty**2)), rel=0.1)
+    assert np.std(mean) < (0.8e-3 if with_coherence else 2.5e-3)
+
+
+@NEEDS_CAMPAIGNS
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [
+        ("c2pdsjnae", (1, 1), (130, 130)),  # nothing missing
+        ("c79wg2fgy", (1, 1), (1000, 1000)),  # nothing missing
+        ("c3x0t9wv3", (1, 1), (120, 300)),  # contact resonances near 900 Hz
+        ("ca40ad867", (3, 15), (130, 130)),  # amplifier's high-pass
+        ("c4chxhg3d", (1, 1), (130, 130)),  # sensor relaxation
+    ],
+)
+def test_concealed_campaigns(name: str, low: tuple[float, float], high: tuple[float, float]) -> None:
+    document = json.loads((Path(os.environ["UNDERSKIN_CAMPAIGNS"]) / "open" / f"{name}.json").read_text())
+    recordings = [item for item in parse(document).recordings if isinstance(item, FrfRecording)]
+    zone = flat_zone(
+        stacked([lines_of(item) for item in recordings]),
+        [(item.indenter_radius_mm, item.preload_n) for item in recordings],
+    )
+    assert low[0] <= zone.low_hz <= low[1]
+    assert high[0] <= zone.high_hz <= high[1]

@@ -1,0 +1,265 @@
+"""FRF estimation: right on systems whose FRF is known, at least as accurate as pyFRF, honest about its uncertainty."""
+
+import os
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter, lfilter_zi
+
+from underskin.errors import InvalidInput
+from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.frf_estimation import Frf, broadband, estimate, lines_of, stepped_sine
+from underskin.recordings.signal_check import defects
+from underskin.units import Complexes, Floats
+
+RATE = 2000.0
+POLE = 0.9  # of the known system: charge[k] = POLE · charge[k − 1] + (1 − POLE) · GAIN · force[k], which lags
+GAIN = 5e-12
+
+
+def known_frf(frequency: Floats) -> Complexes:
+    return (1 - POLE) * GAIN / (1 - POLE * np.exp(-2j * np.pi * frequency / RATE))
+
+
+def answer_to(force: Floats) -> Floats:
+    taps, poles = [(1 - POLE) * GAIN], [1, -POLE]
+    return lfilter(taps, poles, force, zi=lfilter_zi(taps, poles) * force[0])[0]
+
+
+def shaken(seed: int, samples: int = 60_000, preload: float = 2.0) -> tuple[Floats, Floats]:
+    random = np.random.default_rng(seed)
+    force = preload + 0.05 * random.standard_normal(samples)
+    return force, answer_to(force)
+
+
+def dwelling(frequencies: list[float], cycles: int = 40, preload: float = 2.0) -> Floats:
+    tones = [0.09 * np.sin(2 * np.pi * f * np.arange(round(max(cycles / f, 0.5) * RATE)) / RATE) for f in frequencies]
+    return preload + np.concatenate(tones)
+
+
+def rms_error(frf: Frf) -> float:
+    true = known_frf(frf.frequency)
+    return float(np.sqrt(np.mean(np.abs(frf.values / true - 1) ** 2)))
+
+
+def test_broadband_recovers_a_known_system_and_a_lagging_charge_has_a_negative_phase() -> None:
+    frf = broadband(*shaken(1), RATE, block_samples=2000)
+    assert rms_error(frf) < 2e-3
+    below = frf.frequency < 500
+    assert np.all(np.angle(frf.values[below]) < 0)
+
+
+def test_stepped_sine_recovers_a_known_system_and_its_phase() -> None:
+    tones = [1.0, 3.3, 10.0, 31.7, 100.0, 317.0, 700.0]
+    force = dwelling(tones)
+    frf = stepped_sine(force, answer_to(force), RATE)
+    np.testing.assert_allclose(frf.frequency, tones, rtol=1e-4)
+    np.testing.assert_allclose(frf.values, known_frf(np.array(tones)), rtol=2e-3)
+    assert np.all(np.angle(frf.values) < 0)
+
+
+def test_a_pure_delay_turns_the_phase_by_minus_omega_t() -> None:
+    force = dwelling([20.0, 50.0])
+    charge = 3e-12 * np.interp(np.arange(len(force)) - 5, np.arange(len(force)), force)
+    frf = stepped_sine(force, charge, RATE)
+    np.testing.assert_allclose(np.angle(frf.values), -2 * np.pi * frf.frequency * 5 / RATE, rtol=1e-3)
+
+
+def test_preload_and_drift_of_the_charge_change_nothing() -> None:
+    drift = 4e-12 * np.linspace(0, 1, 60_000)
+    force, charge = shaken(2)
+    clean, drifting = (broadband(force, charge + extra, RATE, block_samples=2000) for extra in (0.0, 7e-12 + drift))
+    np.testing.assert_allclose(drifting.values, clean.values, rtol=1e-6)
+    tones = dwelling([2.0, 40.0])
+    charge = answer_to(tones)
+    drift = 4e-12 * np.linspace(0, 1, len(tones))
+    clean, drifting = (stepped_sine(tones, charge + extra, RATE) for extra in (0.0, 7e-12 + drift))
+    np.testing.assert_allclose(drifting.values, clean.values, rtol=1e-4)
+
+
+def test_the_kind_of_excitation_is_recognised() -> None:
+    force = dwelling([5.0, 20.0, 60.0])
+    assert len(estimate(force, answer_to(force), RATE).frequency) == 3
+    assert len(estimate(*shaken(3, 8000), RATE).frequency) > 100
+
+
+@pytest.mark.parametrize("overlap", [0.0, 0.5])
+@pytest.mark.parametrize("block", ["broadband", "stepped"])
+def test_the_stated_uncertainty_and_the_variance_of_coherence_are_those_seen(overlap: float, block: str) -> None:
+    random = np.random.default_rng(4)
+    errors, coherences, stated, variances = [], [], [], []
+    for _ in range(150):
+        if block == "broadband":
+            force = random.standard_normal(8192)
+            charge = force + random.standard_normal(8192)
+            frf = broadband(force, charge, RATE, block_samples=512, overlap=overlap)
+        else:
+            force = np.sin(2 * np.pi * 50 * np.arange(4000) / RATE)
+            charge = force + 1.5 * random.standard_normal(4000)
+            frf = stepped_sine(force, charge, RATE)
+        assert frf.coherence is not None
+        assert frf.relative_uncertainty is not None
+        assert frf.coherence_variance is not None
+        errors.append(np.log(np.abs(frf.values)))
+        coherences.append(frf.coherence)
+        stated.append(np.mean(frf.relative_uncertainty**2))
+        variances.append(np.mean(frf.coherence_variance))
+    assert np.mean(stated) == pytest.approx(np.mean(np.var(errors, axis=0)), rel=0.25)
+    if block == "broadband":  # a fixed tone has less scatter in γ² than the random signals that the formula is for
+        assert np.mean(variances) == pytest.approx(np.mean(np.var(coherences, axis=0)), rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("noise_in_force", "noise_in_charge", "best"), [(0.0, 0.3, "H1"), (0.3, 0.0, "H2"), (0.3, 0.3, "Hv")]
+)
+def test_each_estimator_is_unbiased_for_the_noise_it_is_meant_for(
+    noise_in_force: float, noise_in_charge: float, best: str
+) -> None:
+    random = np.random.default_rng(5)
+    force = random.standard_normal(400_000)
+    seen_force = force + noise_in_force * random.standard_normal(len(force))
+    seen_charge = 1e-12 * (force + noise_in_charge * random.standard_normal(len(force)))
+    bias = {
+        name: abs(
+            np.mean(broadband(seen_force, seen_charge, RATE, block_samples=500, estimator=name).values) / 1e-12 - 1
+        )
+        for name in ("H1", "H2", "Hv")
+    }
+    assert bias[best] < 2e-3
+    assert all(value > 0.03 for name, value in bias.items() if name != best and best == "Hv")
+
+
+@pytest.mark.parametrize("estimator", ["H1", "H2", "Hv"])
+@pytest.mark.parametrize("drift", [0.0, 0.5])
+def test_at_least_as_accurate_as_pyfrf(estimator: str, drift: float) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from pyFRF import FRF
+    random = np.random.default_rng(60)
+    force, charge = shaken(6)
+    force, charge = (x + 0.04 * np.std(x) * random.standard_normal(len(x)) for x in (force, charge))
+    charge = charge + GAIN * drift * np.arange(len(force)) / RATE
+    ours = broadband(force, charge, RATE, block_samples=2000, estimator=estimator)  # type: ignore[arg-type]
+    peer = FRF(
+        int(RATE),
+        force,
+        charge * 1e12,
+        exc_type="f",
+        resp_type="d",
+        window="hann",
+        fft_len=2000,
+        nperseg=2000,
+        noverlap=1000,
+    )
+    theirs = Frf(ours.frequency, peer.get_FRF(frf_estimator=estimator)[0, 0, 1:1000] * 1e-12)
+    assert len(peer.get_f_axis()) == 1001
+    assert rms_error(ours) <= 1.005 * rms_error(theirs)  # what chance alone may do
+    if drift:
+        assert rms_error(ours) < 0.6 * rms_error(theirs)
+
+
+def test_overload_is_seen_where_it_is_and_nowhere_else() -> None:
+    _, charge = shaken(7)
+    ceiling = np.quantile(charge, 0.98)
+    found = defects("charge_pc", np.minimum(charge, ceiling))
+    assert {defect.kind for defect in found} == {"overload"}
+    assert all(charge[defect.first_sample : defect.first_sample + defect.samples].min() >= ceiling for defect in found)
+    assert "overload" in found[0].statement
+    assert defects("charge_pc", charge) == []
+
+
+def test_broadband_leaves_damaged_blocks_out() -> None:
+    force, charge = shaken(10)
+    damaged = charge.copy()
+    damaged[30_000:30_100] = damaged[30_000]
+    frf = broadband(force, damaged, RATE, block_samples=2000)
+    whole = broadband(force, charge, RATE, block_samples=2000)
+    assert [defect.kind for defect in frf.found] == ["held_samples"]
+    assert rms_error(frf) < 1.2 * rms_error(whole)
+    assert frf.averages is not None
+    assert whole.averages is not None
+    assert frf.averages[0] < whole.averages[0]
+
+
+def test_a_coarse_but_whole_sine_is_not_called_overloaded_or_held() -> None:
+    for amplitude in (7.3, 20.0, 50.5):
+        sine = np.round(amplitude * np.sin(2 * np.pi * np.arange(20_000) * 3.1 / RATE))
+        assert defects("force_n", sine) == []
+
+
+@pytest.mark.parametrize("kind", ["overload", "held_samples", "jump"])
+def test_damage_is_named_and_left_out(kind: str) -> None:
+    random = np.random.default_rng(8)
+    force = dwelling([10.0], cycles=100)
+    charge = answer_to(force) + 1e-16 * random.standard_normal(len(force))
+    if kind == "overload":
+        charge[6000:6400] *= 1.5
+        charge = np.minimum(charge, 1.04 * np.quantile(charge, 0.9))
+    elif kind == "held_samples":
+        charge[7005:7045] = charge[7005]
+    else:
+        charge = np.concatenate([charge[:7010], charge[7030:], charge[-20:]])
+    frf = stepped_sine(force, charge, RATE)
+    assert kind in {defect.kind for defect in frf.found}
+    if kind != "jump":  # after lost samples of one channel, the phase is off for good
+        np.testing.assert_allclose(frf.values, known_frf(frf.frequency), rtol=5e-3)
+
+
+def test_a_spike_is_a_defect_and_a_blow_is_not() -> None:
+    random = np.random.default_rng(11)
+    force = 0.001 * random.standard_normal(8192)
+    spiked = force.copy()
+    spiked[3000] = 5.0
+    assert [defect.kind for defect in broadband(spiked, 1e-12 * force, RATE).found] == ["jump"]
+    force[3000:3005] += np.hanning(7)[1:-1]
+    frf = broadband(force, answer_to(force), RATE, block_samples=8192, window="boxcar")
+    assert frf.found == ()
+    struck = frf.frequency < 300  # the blow's own spectrum ends at 670 Hz
+    assert rms_error(Frf(frf.frequency[struck], frf.values[struck])) < 0.03
+
+
+@pytest.mark.skipif("UNDERSKIN_RECORDINGS" not in os.environ, reason="UNDERSKIN_RECORDINGS does not name the folder")
+@pytest.mark.parametrize(
+    ("channel", "peaks", "median"),
+    [(1, {21.1: None}, 0.024), (2, {19.7: 27.2, 40.0: 3.3, 160.7: 6.8, 461.3: 4.7}, 0.43)],
+)
+def test_a_hammer_blow_on_a_structure(channel: int, peaks: dict[float, float | None], median: float) -> None:
+    """Resonances of a measured response as the folder's description gives them, in the file's units."""
+    path = Path(os.environ["UNDERSKIN_RECORDINGS"]) / "impact-hammer-lvm" / "long_single_header_multi_ch.lvm"
+    lines = path.read_text(encoding="latin-1").split("X_Value", 1)[1].splitlines()[1:]
+    values = np.array([line.split("\t")[1:4] for line in lines if line], dtype=float)
+    frf = broadband(values[:, 0], values[:, channel], 1 / 0.000977, block_samples=8192, overlap=0, window="boxcar")
+    size = np.abs(frf.values)
+    for peak, height in peaks.items():
+        near = np.flatnonzero(np.abs(frf.frequency - peak) < 1)
+        top = near[np.argmax(size[near])]
+        assert frf.frequency[top] == pytest.approx(peak, abs=0.15)
+        if height is not None:
+            assert size[top] == pytest.approx(height, rel=0.02)
+    low = (frf.frequency > 5) & (frf.frequency < 50)
+    assert np.median(size[low]) == pytest.approx(median, rel=0.02)
+
+
+def test_a_recording_with_time_series_gives_lines_in_si() -> None:
+    force, charge = shaken(9)
+    recording = FrfRecording(
+        id="r", sensor="s", indenter_radius_mm=4.0, preload_n=2.0, dynamic_force_n=0.09,
+        sample_rate_hz=RATE, force_n=force, charge_pc=charge * 1e12,
+    )  # fmt: skip
+    assert abs(lines_of(recording).values[0]) == pytest.approx(GAIN, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("force", "charge", "field"),
+    [
+        (np.ones(20), np.ones(19), "charge_pc"),
+        (np.ones(4), np.ones(4), "force_n"),
+        (np.array([*np.ones(20), np.nan]), np.ones(21), "force_n"),
+    ],
+)
+def test_unusable_series_are_refused_by_name(force: Floats, charge: Floats, field: str) -> None:
+    with pytest.raises(InvalidInput) as refusal:
+        estimate(force, charge, RATE)
+    assert refusal.value.field == field

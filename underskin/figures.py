@@ -1,0 +1,174 @@
+"""Figures of an array: its map, FRF against preload per indenter (Seminara 2018, figure 15), and the response of each
+sensor (figure 16). Built from columns in lab units; colours of Okabe and Ito, and Cividis, that colour-blind people
+tell apart; what a colour says, a marker or the text under the pointer says too.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import ArrayLike
+
+from underskin.errors import InvalidInput
+from underskin.units import Floats
+
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+_MARKERS = ("circle", "square", "diamond", "triangle-up", "cross", "x", "star")
+_HOVER_INTERVAL = "%{text}<br>d33 %{y:.3g} pC/N<br>%{customdata[0]:.3g} to %{customdata[1]:.3g} (95 %)<extra></extra>"
+_HOVER_D33 = "%{text}<br>d33 %{customdata[0]:.3g} ± %{customdata[1]:.2g} pC/N"
+
+
+def array_map(
+    sensors: Sequence[str],
+    x_mm: ArrayLike,
+    y_mm: ArrayLike,
+    d33_pc_per_n: ArrayLike,
+    d33_uncertainty_pc_per_n: ArrayLike,
+    reasons: Sequence[str],
+) -> go.Figure:
+    """Where each sensor lies and what its d33 is; `reasons` says why a sensor stands out, empty where it does not.
+
+    Raises InvalidInput where a column's length differs from that of `sensors`.
+    """
+    x, y, d33, uncertainty = _columns(
+        sensors, x_mm=x_mm, y_mm=y_mm, d33_pc_per_n=d33_pc_per_n, d33_uncertainty_pc_per_n=d33_uncertainty_pc_per_n
+    )
+    plain = np.array([not reason for reason in reasons])
+    figure = go.Figure()
+    known = d33[np.isfinite(d33)]
+    limits = {"cmin": float(known.min()), "cmax": float(known.max())} if len(known) else {}
+    for name, chosen, symbol in (("sensor", plain, "circle"), ("stands out", ~plain, "x")):
+        if not chosen.any():
+            continue
+        figure.add_scatter(
+            x=x[chosen],
+            y=y[chosen],
+            mode="markers",
+            name=name,
+            text=[_with_reason(sensors[row], reasons[row]) for row in np.flatnonzero(chosen).tolist()],
+            customdata=np.column_stack([d33, uncertainty])[chosen],
+            hovertemplate=f"{_HOVER_D33}<br>x %{{x:.4g}} mm, y %{{y:.4g}} mm<extra></extra>",
+            marker={
+                "symbol": symbol,
+                "size": 18,
+                "color": d33[chosen],
+                "colorscale": "Cividis",
+                "colorbar": {"title": {"text": "d33 [pC/N]"}},
+                "line": {"width": 1, "color": "#000000"},
+                **limits,
+            },
+        )
+    figure.update_layout(title="d33 over the array", legend={"orientation": "h"})
+    figure.update_xaxes(title="x [mm]")
+    figure.update_yaxes(title="y [mm]", scaleanchor="x", scaleratio=1)
+    return figure
+
+
+def frf_versus_preload(
+    recordings: Sequence[str],
+    indenter_radius_mm: ArrayLike,
+    preload_n: ArrayLike,
+    frf_pc_per_n: ArrayLike,
+    frf_uncertainty_pc_per_n: ArrayLike,
+    model_frf_pc_per_n: ArrayLike,
+) -> go.Figure:
+    """The measured FRF of each recording and the model's line, per indenter.
+
+    Raises InvalidInput where a column's length differs from that of `recordings`.
+    """
+    radius, preload, frf, uncertainty, model = _columns(
+        recordings,
+        indenter_radius_mm=indenter_radius_mm,
+        preload_n=preload_n,
+        frf_pc_per_n=frf_pc_per_n,
+        frf_uncertainty_pc_per_n=frf_uncertainty_pc_per_n,
+        model_frf_pc_per_n=model_frf_pc_per_n,
+    )
+    figure = go.Figure()
+    for number, size in enumerate(np.unique(radius)):
+        chosen = radius == size
+        colour, marker = _COLOURS[number % len(_COLOURS)], _MARKERS[number % len(_MARKERS)]
+        figure.add_scatter(
+            x=preload[chosen],
+            y=frf[chosen],
+            error_y={"type": "data", "array": uncertainty[chosen], "thickness": 1},
+            mode="markers",
+            name=f"{size:g} mm, measured",
+            text=[recordings[row] for row in np.flatnonzero(chosen).tolist()],
+            hovertemplate=f"%{{text}}<br>sphere {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.3g}} pC/N<extra></extra>",
+            marker={"color": colour, "symbol": marker, "size": 8},
+        )
+        at, first = np.unique(preload[chosen], return_index=True)
+        figure.add_scatter(
+            x=at,
+            y=model[chosen][first],
+            mode="lines",
+            name=f"{size:g} mm, model",
+            hovertemplate=f"model, sphere {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.3g}} pC/N<extra></extra>",
+            line={"color": colour, "dash": ("solid", "dash", "dot")[number % 3]},
+        )
+    figure.update_layout(title="FRF against preload")
+    figure.update_xaxes(title="preload [N]", rangemode="tozero")
+    figure.update_yaxes(title="FRF in the flat zone [pC/N]", rangemode="tozero")
+    return figure
+
+
+def response_per_sensor(
+    sensors: Sequence[str],
+    d33_pc_per_n: ArrayLike,
+    low_pc_per_n: ArrayLike,
+    high_pc_per_n: ArrayLike,
+    array_pc_per_n: tuple[float, float],
+    reasons: Sequence[str],
+) -> go.Figure:
+    """d33 of each sensor with its 95 % interval, and that of the array (low, high) as a band.
+
+    Raises InvalidInput where a column's length differs from that of `sensors`.
+    """
+    d33, low, high = _columns(
+        sensors, d33_pc_per_n=d33_pc_per_n, low_pc_per_n=low_pc_per_n, high_pc_per_n=high_pc_per_n
+    )
+    figure = go.Figure()
+    figure.add_hrect(
+        y0=array_pc_per_n[0], y1=array_pc_per_n[1], fillcolor=_COLOURS[5], opacity=0.35, line_width=0,
+        annotation_text="array, 95 %",
+    )  # fmt: skip
+    plain = np.array([not reason for reason in reasons])
+    for name, chosen, style in (("sensor", plain, 0), ("stands out", ~plain, 1)):
+        if not chosen.any():
+            continue
+        figure.add_scatter(
+            x=[sensors[row] for row in np.flatnonzero(chosen).tolist()],
+            y=d33[chosen],
+            error_y={
+                "type": "data",
+                "symmetric": False,
+                "array": (high - d33)[chosen],
+                "arrayminus": (d33 - low)[chosen],
+                "thickness": 1,
+            },
+            mode="markers",
+            name=name,
+            text=[_with_reason(sensors[row], reasons[row]) for row in np.flatnonzero(chosen).tolist()],
+            customdata=np.column_stack([low, high])[chosen],
+            hovertemplate=_HOVER_INTERVAL,
+            marker={"color": _COLOURS[style], "symbol": _MARKERS[(0, 5)[style]], "size": 9},
+        )
+    figure.update_layout(title="Response of each sensor")
+    figure.update_xaxes(title="sensor", categoryorder="array", categoryarray=list(sensors))
+    figure.update_yaxes(title="d33 [pC/N]")
+    return figure
+
+
+def _columns(rows: Sequence[str], **columns: ArrayLike) -> list[Floats]:
+    arrays = []
+    for name, column in columns.items():
+        array = np.asarray(column, dtype=float)
+        if array.shape != (len(rows),):
+            raise InvalidInput(name, f"shape {array.shape}", f"must have {len(rows)} entries")
+        arrays.append(array)
+    return arrays
+
+
+def _with_reason(name: str, reason: str) -> str:
+    return f"{name}: {reason}" if reason else name

@@ -1,0 +1,192 @@
+"""The mixed model of an array's d33: sensor effect, recording scatter, position scatter and line noise.
+
+Recording i of sensor s gives z_i = FRF_i / ((3/2) ρ² σ_i), in which
+    z_i = μ (1 + b_s) m_i(p) e^(ε_i) + n_i,    b_s ~ N(0, t²), ε_i ~ N(0, g²), n_i ~ N(0, u_i²)
+with μ the array's d33, t its relative spread over sensors, g the gain scatter of a recording, p the scatter of the
+sphere's position (m_i the mean and v_i the variance of what it does to σ_i), u_i the known line noise. The covariance
+is built along the model, never along the data. Given (t, g, p), μ is normal by generalised least squares (flat prior,
+so the likelihood of (t, g, p) is the restricted one); (t, g, p) are marginalised on a grid under the priors below.
+The interval is that of the mixture: at few sensors or recordings it has the wide tails of Student's t.
+
+Priors: g log-normal, PHYSICS' 1–5 %; t zero, or half-Cauchy (Gelman 2006); p zero in most rigs, or 0.05–0.3 mm.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+from scipy.stats import t as student
+
+from underskin.units import Floats
+
+GAINS = np.geomspace(2e-3, 0.8, 36)
+SPREADS = np.concatenate([[0.0], np.geomspace(2e-3, 1.5, 36)])
+POSITIONS = np.array([0.0, 0.05e-3, 0.1e-3, 0.15e-3, 0.2e-3, 0.25e-3, 0.3e-3])  # [m]
+_GAIN_MEDIAN, _GAIN_FACTOR = 0.022, 2.0
+_NO_SPREAD, _SPREAD_SCALE = 0.6, 0.05
+_NO_POSITION_SCATTER = 0.7
+_LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with its standard uncertainty and 95 % interval; arrays where there are several."""
+
+    value: Floats
+    uncertainty: Floats
+    low: Floats
+    high: Floats
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Recordings: `z` and `line` (u) in one unit, `pilot` a first value of each one's d33, along which the gain's
+    variance is built, and m_i and v_i at each of POSITIONS (positions, rows)."""
+
+    z: Floats
+    line: Floats
+    pilot: Floats
+    position_mean: Floats
+    position_variance: Floats
+
+    def part(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> "Rows":
+        """Some of the rows."""
+        return Rows(
+            self.z[chosen],
+            self.line[chosen],
+            self.pilot[chosen],
+            self.position_mean[:, chosen],
+            self.position_variance[:, chosen],
+        )
+
+    def moments(self) -> tuple[Floats, Floats]:
+        """E z over its sensor's d33, and 1/variance about it, each (positions, gains, rows)."""
+        mean, variance = self.position_mean[:, None, :], np.maximum(self.position_variance, 0)[:, None, :]
+        gain = GAINS[:, None] ** 2
+        scatter = mean**2 * np.expm1(gain) * np.exp(gain) + variance
+        return mean * np.exp(gain / 2), 1 / (np.square(self.pilot) * scatter + self.line**2)
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """What is known of gain and position scatter: `weights` (positions, gains) that sum to 1."""
+
+    weights: Floats
+
+    def d33(self, rows: Rows, group: NDArray[np.intp], count: int) -> Estimate:
+        """The d33 of each of `count` groups of recordings, from those alone."""
+        design, weight = rows.moments()
+        information = _sum_by_group(weight * design**2, group, count)
+        moment = _sum_by_group(weight * design * rows.z, group, count)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values, variances = moment / information, 1 / information
+            posterior = self.weights[..., None]
+            value = (posterior * values).sum(axis=(0, 1))
+            between = (posterior * (values - value) ** 2).sum(axis=(0, 1))
+            variance = (posterior * variances).sum(axis=(0, 1))
+            unsure = (posterior * (variances - variance) ** 2).sum(axis=(0, 1))
+            # A variance known only roughly: the Student t whose own variance has the same mean and spread.
+            freedom = 4 + 2 * variance**2 / np.maximum(unsure, 1e-12 * variance**2)
+            scale = np.sqrt(variance * (freedom - 2) / freedom + between)
+        reach = student.ppf((1 + _LEVEL) / 2, freedom) * scale
+        return Estimate(value, np.sqrt(variance + between), value - reach, value + reach)
+
+
+@dataclass(frozen=True)
+class MixedModel:
+    """`mean` is the array's d33; `spread` (relative), `gain` (relative) and `position` [m] the scatters."""
+
+    mean: Estimate
+    spread: Estimate
+    gain: Estimate
+    position: Estimate
+    scatter: Scatter
+
+
+def fit(rows: Rows, sensor: NDArray[np.intp]) -> MixedModel:
+    """The model of recordings of sensors numbered from 0.
+
+    With one sensor there is no spread to speak of, and the mean is that sensor's own d33.
+    """
+    count = int(sensor.max()) + 1
+    spreads = SPREADS if count > 1 else SPREADS[:1]
+    design, weight = rows.moments()
+    information = _sum_by_group(weight * design**2, sensor, count)[:, :, None, :]
+    moment = _sum_by_group(weight * design * rows.z, sensor, count)[:, :, None, :]
+    between = (spreads[:, None] * float(np.median(np.abs(rows.pilot)))) ** 2
+    inflation = 1 + between * information
+    total, first = (information / inflation).sum(-1), (moment / inflation).sum(-1)
+    means = first / total
+    residual = (weight * rows.z**2).sum(-1)[..., None] - (between * moment**2 / inflation).sum(-1)
+    log_density = 0.5 * (
+        np.log(weight).sum(-1)[..., None] - np.log(inflation).sum(-1) - residual + means * first - np.log(total)
+    )
+    posterior = np.exp(log_density - log_density.max()) * _prior(spreads)
+    posterior /= posterior.sum()
+    return MixedModel(
+        _mixture(posterior, means, np.sqrt(1 / total)),
+        _scale_estimate(posterior.sum(axis=(0, 1)), spreads),
+        _scale_estimate(posterior.sum(axis=(0, 2)), GAINS),
+        _scale_estimate(posterior.sum(axis=(1, 2)), POSITIONS),
+        Scatter(posterior.sum(axis=2)),
+    )
+
+
+def prior_scatter() -> Scatter:
+    """What is known of the scatters before any recording."""
+    weights = _prior(SPREADS[:1])[..., 0]
+    return Scatter(weights / weights.sum())
+
+
+def _prior(spreads: Floats) -> Floats:
+    """Prior weight of each node, the cells of the grid included (positions, gains, spreads)."""
+    gain = np.exp(-0.5 * (np.log(GAINS / _GAIN_MEDIAN) / np.log(_GAIN_FACTOR)) ** 2)
+    spread = np.ones(1)
+    if len(spreads) > 1:
+        spread = np.gradient(spreads) / (1 + (spreads / _SPREAD_SCALE) ** 2)
+        spread *= (1 - _NO_SPREAD) / spread[1:].sum()
+        spread[0] = _NO_SPREAD
+    position = np.full(len(POSITIONS), (1 - _NO_POSITION_SCATTER) / (len(POSITIONS) - 1))
+    position[0] = _NO_POSITION_SCATTER
+    return position[:, None, None] * gain[:, None] * spread
+
+
+def _mixture(weights: Floats, means: Floats, deviations: Floats) -> Estimate:
+    """Mean and central interval of a mixture of normals; its uncertainty is that of a normal with this interval."""
+    kept = weights > 1e-7 * weights.max()
+    weight, mean, deviation = weights[kept] / weights[kept].sum(), means[kept], deviations[kept]
+    low, high = (_quantile(weight, mean, deviation, q) for q in ((1 - _LEVEL) / 2, (1 + _LEVEL) / 2))
+    uncertainty = (high - low) / (2 * ndtri((1 + _LEVEL) / 2))
+    return Estimate(np.array(weight @ mean), np.array(uncertainty), np.array(low), np.array(high))
+
+
+def _quantile(weight: Floats, mean: Floats, deviation: Floats, probability: float) -> float:
+    low, high = float((mean - 40 * deviation).min()), float((mean + 40 * deviation).max())
+    for _ in range(60):
+        middle = (low + high) / 2
+        if weight @ ndtr((middle - mean) / deviation) < probability:
+            low = middle
+        else:
+            high = middle
+    return (low + high) / 2
+
+
+def _scale_estimate(weights: Floats, nodes: Floats) -> Estimate:
+    """Mean, deviation and central interval of a scatter over its nodes."""
+    value = float(weights @ nodes)
+    low, high = np.interp([(1 - _LEVEL) / 2, (1 + _LEVEL) / 2], np.cumsum(weights) - weights / 2, nodes)
+    return Estimate(np.array(value), np.sqrt(weights @ (nodes - value) ** 2), np.asarray(low), np.asarray(high))
+
+
+def _sum_by_group(values: Floats, group: NDArray[np.intp], count: int) -> Floats:
+    """Sums over the last axis by group: (…, rows) → (…, count)."""
+    return values @ np.eye(count)[group] if count <= 64 else _sorted_sums(values, group, count)
+
+
+def _sorted_sums(values: Floats, group: NDArray[np.intp], count: int) -> Floats:
+    order = np.argsort(group, kind="stable")
+    present, first = np.unique(group[order], return_index=True)
+    sums = np.zeros((*values.shape[:-1], count))
+    sums[..., present] = np.add.reduceat(values[..., order], first, axis=-1)
+    return sums

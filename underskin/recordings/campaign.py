@@ -1,0 +1,298 @@
+"""The campaign (`campaign/1`): a skin, and what was recorded on it, in the lab's units.
+
+Fields are named as in the document and keep its units; a field that a document leaves out is None. Reading a document
+keeps the good recordings and says of each of the others what is wrong; writing one gives the canonical document.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Any
+
+import numpy as np
+
+from underskin.errors import InvalidInput
+from underskin.recordings import fields as field
+from underskin.recordings.fields import shown
+
+SCHEMA = "campaign/1"
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A sensor of the array and its centre: x along the skin's length, y along its width."""
+
+    id: field.Name
+    x_mm: field.Number
+    y_mm: field.Number
+
+
+def _sensors(name: str, value: Any, units_checked: bool) -> tuple[Sensor, ...]:
+    if not isinstance(value, list | tuple):
+        raise InvalidInput(name, shown(value), "must be a list of sensors")
+    sensors = [field.build(Sensor, f"{name}[{index}]", entry, units_checked) for index, entry in enumerate(value)]
+    seen: set[str] = set()
+    for index, sensor in enumerate(sensors):
+        if sensor.id in seen:
+            raise InvalidInput(f"{name}[{index}].id", sensor.id, "must differ from every other sensor's")
+        seen.add(sensor.id)
+    return tuple(sensors)
+
+
+Sensors = Annotated[tuple[Sensor, ...], _sensors]
+
+
+@dataclass(frozen=True)
+class SkinDescription:
+    """The skin as the lab declares it.
+
+    `thickness_mm`, `youngs_modulus_mpa`, `sensor_radius_mm` and `sensors` may be unknown (None, empty) where no
+    `frf` recording needs them; `d33_pc_per_n` may always be.
+    """
+
+    poisson_ratio: field.PoissonRatio
+    id: field.Name | None = None
+    thickness_mm: field.Declared | None = None
+    youngs_modulus_mpa: field.Declared | None = None
+    sensor_radius_mm: field.Declared | None = None
+    d33_pc_per_n: field.Declared | None = None
+    width_mm: field.Declared | None = None
+    length_mm: field.Declared | None = None
+    sensors: Sensors = ()
+
+
+@dataclass(frozen=True, eq=False)
+class FrfRecording:
+    """Charge over force while the skin is pressed by `preload_n` and shaken by `dynamic_force_n` (peak amplitude).
+
+    Either the FRF (`frequency_hz`, real and imaginary part, e^(+iωt); γ² in `coherence`) or the time series
+    (`sample_rate_hz`, `force_n`, `charge_pc`) that it is estimated from.
+    """
+
+    id: field.Name
+    sensor: field.Name
+    indenter_radius_mm: field.Declared
+    preload_n: field.Declared
+    dynamic_force_n: field.Positive
+    kind: field.Name = "frf"
+    recorded_at: field.TimeOfDay | None = None
+    load_cycles: field.Count | None = None
+    dwell_s: field.NotNegative | None = None
+    position_mm: field.Position | None = None
+    frequency_hz: field.Frequencies | None = None
+    frf_re_pc_per_n: field.Series | None = None
+    frf_im_pc_per_n: field.Series | None = None
+    coherence: field.Coherence | None = None
+    sample_rate_hz: field.Positive | None = None
+    force_n: field.Series | None = None
+    charge_pc: field.Series | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class IndentationRecording:
+    """A sphere pressed in and drawn back, loading and unloading in order; compression positive."""
+
+    id: field.Name
+    indenter_radius_mm: field.Declared
+    displacement_mm: field.Series
+    force_n: field.Series
+    kind: field.Name = "indentation"
+    sensor: field.Name | None = None
+    time_s: field.Times | None = None
+    recorded_at: field.TimeOfDay | None = None
+    load_cycles: field.Count | None = None
+    dwell_s: field.NotNegative | None = None
+    position_mm: field.Position | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class CompressionRecording:
+    """A cylinder between platens; compression positive, tension negative."""
+
+    id: field.Name
+    sample_height_mm: field.Declared
+    sample_diameter_mm: field.Declared
+    displacement_mm: field.Series
+    force_n: field.Series
+    kind: field.Name = "compression"
+    time_s: field.Times | None = None
+    recorded_at: field.TimeOfDay | None = None
+    load_cycles: field.Count | None = None
+    dwell_s: field.NotNegative | None = None
+
+
+Recording = FrfRecording | IndentationRecording | CompressionRecording
+KINDS: dict[str, type[Recording]] = {
+    "frf": FrfRecording,
+    "indentation": IndentationRecording,
+    "compression": CompressionRecording,
+}
+COLUMNS = (
+    "frequency_hz",
+    "frf_re_pc_per_n",
+    "frf_im_pc_per_n",
+    "coherence",
+    "force_n",
+    "charge_pc",
+    "displacement_mm",
+    "time_s",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """Recordings of one skin; `units_checked` accepts magnitudes that look like a slip of units."""
+
+    name: str
+    skin: SkinDescription
+    recordings: tuple[Recording, ...]
+    units_checked: bool = False
+
+
+@dataclass(frozen=True)
+class RecordingProblem:
+    """Why a recording was refused: its id (or its place, `recordings[3]`), the field, its value, what is allowed."""
+
+    recording: str
+    field: str
+    value: Any
+    allowed: str
+
+
+def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
+    """The campaign of a document, with its good recordings, and what is wrong with the others.
+
+    Raises InvalidInput where the campaign itself or its skin cannot be used.
+    """
+    document = field.mapping("campaign", document)
+    for name in document:
+        if name not in ("schema", "name", "skin", "recordings", "units_checked"):
+            raise InvalidInput(shown(name), shown(document[name]), "unknown field of a campaign")
+    if document.get("schema") != SCHEMA:
+        raise InvalidInput("schema", shown(document.get("schema")), f"must be {SCHEMA}")
+    units_checked = field.flag("units_checked", document.get("units_checked", False), False)
+    name = field.name("name", document.get("name"), units_checked)
+    skin = field.build(SkinDescription, "skin", document.get("skin"), units_checked)
+    entries = document.get("recordings")
+    if not isinstance(entries, list) or not entries:
+        raise InvalidInput("recordings", shown(entries), "must be a list of at least one recording")
+    good: dict[str, Recording] = {}
+    problems: list[RecordingProblem] = []
+    for index, entry in enumerate(entries):
+        recording, refused = _recording(entry, skin, units_checked)
+        if recording is not None and recording.id in good:
+            refused = [InvalidInput("id", recording.id, "must differ from every other recording's")]
+        if recording is not None and not refused:
+            good[recording.id] = recording
+        label = recording.id if recording is not None else _label(entry, index)
+        problems += [RecordingProblem(label, _place(error), error.value, error.allowed) for error in refused]
+    if not good and all(problem.field.startswith("skin.") for problem in problems):
+        raise InvalidInput(problems[0].field, problems[0].value, problems[0].allowed)
+    return Campaign(name, skin, tuple(good.values()), units_checked), problems
+
+
+def parse(document: Any) -> Campaign:
+    """The campaign of a document; raises InvalidInput at the first thing wrong, in a recording too."""
+    campaign, problems = from_dict(document)
+    if problems:
+        first = problems[0]
+        raise InvalidInput(f"recordings[{first.recording}].{first.field}", first.value, first.allowed)
+    return campaign
+
+
+def to_dict(campaign: Campaign) -> dict[str, Any]:
+    """The canonical document of a campaign: plain JSON values, without the fields that are not known.
+
+    `youngs_modulus_mpa` and `d33_pc_per_n` are written as null when unknown; `kind` is left out when it is `frf`.
+    """
+    unknown = {"youngs_modulus_mpa": campaign.skin.youngs_modulus_mpa, "d33_pc_per_n": campaign.skin.d33_pc_per_n}
+    skin = {**_plain(replace(campaign.skin, sensors=())), **unknown}
+    if campaign.skin.sensors:
+        skin["sensors"] = [_plain(sensor) for sensor in campaign.skin.sensors]
+    document = {
+        "schema": SCHEMA,
+        "name": campaign.name,
+        "skin": skin,
+        "recordings": [_plain(recording) for recording in campaign.recordings],
+    }
+    return {**document, "units_checked": True} if campaign.units_checked else document
+
+
+def _plain(model: Any) -> dict[str, Any]:
+    document: dict[str, Any] = {}
+    for name in (entry.name for entry in fields(model)):
+        value = getattr(model, name)
+        if isinstance(value, np.ndarray):
+            document[name] = value.tolist()
+        elif value not in (None, ()) and (name, value) != ("kind", "frf"):
+            document[name] = list(value) if isinstance(value, tuple) else value
+    return document
+
+
+def _recording(entry: Any, skin: SkinDescription, units_checked: bool) -> tuple[Recording | None, list[InvalidInput]]:
+    try:
+        document = field.mapping("recording", entry)
+    except InvalidInput as refusal:
+        return None, [refusal]
+    kind = document.get("kind") or "frf"
+    if not isinstance(kind, str) or kind not in KINDS:
+        return None, [InvalidInput("kind", shown(kind), f"must be one of {', '.join(KINDS)}")]
+    values, refused = field.check_fields(KINDS[kind], document, units_checked=units_checked)
+    if refused:
+        return None, refused
+    recording = KINDS[kind](**{**values, "kind": kind})
+    return recording, [*_unmet_needs(recording, skin), *_unequal_lengths(recording)]
+
+
+def _unmet_needs(recording: Recording, skin: SkinDescription) -> list[InvalidInput]:
+    """What the recording's kind needs of the skin, and of its own fields together."""
+    refused = []
+    sensor = None if isinstance(recording, CompressionRecording) else recording.sensor
+    if sensor is not None and sensor not in (known.id for known in skin.sensors):
+        refused.append(InvalidInput("sensor", sensor, "must be the id of one of the skin's sensors"))
+    if isinstance(recording, FrfRecording):
+        refused += [
+            InvalidInput(f"skin.{name}", None, "required by a recording of kind frf")
+            for name in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm")
+            if getattr(skin, name) is None
+        ]
+        refused += _not_one_of_two_forms(recording)
+    return refused
+
+
+_LINES = ("frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n")
+_TIME_SERIES = ("sample_rate_hz", "force_n", "charge_pc")
+
+
+def _not_one_of_two_forms(recording: FrfRecording) -> list[InvalidInput]:
+    """An FRF or the time series it is estimated from: one of the two, whole."""
+    series = [name for name in _TIME_SERIES if getattr(recording, name) is not None]
+    lines = [name for name in (*_LINES, "coherence") if getattr(recording, name) is not None]
+    if series and lines:
+        return [InvalidInput(series[0], "given", "must be absent where the FRF itself is given")]
+    needed = _TIME_SERIES if series else _LINES
+    return [InvalidInput(name, None, "required") for name in needed if getattr(recording, name) is None]
+
+
+def _unequal_lengths(recording: Recording) -> list[InvalidInput]:
+    columns = {
+        entry.name: len(column)
+        for entry in fields(recording)
+        if isinstance(column := getattr(recording, entry.name), np.ndarray)
+    }
+    if len(set(columns.values())) < 2:
+        return []
+    first, length = next(iter(columns.items()))
+    return [
+        InvalidInput(name, f"{size} entries", f"must have {length} entries, as many as {first}")
+        for name, size in columns.items()
+        if size != length
+    ]
+
+
+def _label(entry: Any, index: int) -> str:
+    named = entry.get("id") if isinstance(entry, Mapping) else None
+    return shown(named) if isinstance(named, str) and named else f"recordings[{index}]"
+
+
+def _place(error: InvalidInput) -> str:
+    return error.field if error.index is None else f"{error.field}[{error.index}]"

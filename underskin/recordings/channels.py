@@ -1,0 +1,65 @@
+"""What an instrument's file holds before a rig description says what its channels are."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.units import Floats
+
+Values = Floats | NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One column: its name as written, its unit as labelled (empty where the file says none), its values."""
+
+    name: str
+    unit: str
+    values: Values
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Channels acquired together; `sample_rate_hz` where they are evenly sampled in time."""
+
+    name: str
+    channels: tuple[Channel, ...]
+    sample_rate_hz: float | None = None
+
+    def channel(self, name: str) -> Channel | None:
+        """The channel of that name, or None."""
+        return next((channel for channel in self.channels if channel.name == name), None)
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """A file: its blocks, what it says about itself (`properties`), and what the user should know (`warnings`)."""
+
+    blocks: tuple[Block, ...]
+    properties: Mapping[str, str | float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    def described(self) -> str:
+        """The channels and their units, for an error message."""
+        names = [f"{channel.name} [{channel.unit or '?'}]" for block in self.blocks for channel in block.channels]
+        different = list(dict.fromkeys(names))
+        return ", ".join(different[:20]) + (", …" if len(different) > 20 else "") if different else "no channels"
+
+
+def with_distinct_names(channels: list[Channel]) -> tuple[Channel, ...]:
+    """The same channels; a name that comes again is numbered, `force (2)`."""
+    seen: dict[str, int] = {}
+    distinct = []
+    for channel in channels:
+        seen[channel.name] = count = seen.get(channel.name, 0) + 1
+        name = channel.name if count == 1 else f"{channel.name} ({count})"
+        distinct.append(Channel(name, channel.unit, channel.values))
+    return tuple(distinct)
+
+
+def as_values(stored: NDArray[Any]) -> Values:
+    """Numbers of any kind as the model keeps them."""
+    return stored.astype(np.complex128) if stored.dtype.kind == "c" else stored.astype(np.float64)

@@ -1,0 +1,29 @@
+"""Campaigns as JSON (`campaign/1`), the format all others are turned into."""
+
+from typing import Any, BinaryIO
+
+import orjson
+
+from underskin.errors import FileError
+from underskin.recordings.campaign import Campaign, to_dict
+
+_BOM = b"\xef\xbb\xbf"
+
+
+def read(stream: BinaryIO, file: str) -> Any:
+    """The JSON document of an open file; raises FileError that names line and column."""
+    stream.seek(0)
+    return document(stream.read(), file)
+
+
+def document(data: bytes, file: str) -> Any:
+    """The JSON document in `data`; raises FileError that names line and column. NaN and Infinity are not JSON."""
+    try:
+        return orjson.loads(data.removeprefix(_BOM))
+    except orjson.JSONDecodeError as error:
+        raise FileError(file, f"line {error.lineno}, column {error.colno}", f"not JSON: {error.msg}") from None
+
+
+def write(campaign: Campaign) -> bytes:
+    """The campaign as JSON; numbers keep every digit."""
+    return orjson.dumps(to_dict(campaign))

@@ -1,0 +1,70 @@
+"""From a lab's file, of whatever format, to a campaign."""
+
+import io
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from underskin.errors import FileError
+from underskin.recordings import formats, rig_mapping
+from underskin.recordings.campaign import Campaign, RecordingProblem, from_dict
+from underskin.recordings.channels import Contents
+from underskin.recordings.rig_description import RigDescription
+from underskin.recordings.sandbox import parse_apart
+
+_LARGEST_TEXT = 8_000_000  # larger tables are parsed under the limits of binary files
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A file's campaign with its good recordings, what is wrong with the others, and what the user should know."""
+
+    campaign: Campaign
+    problems: list[RecordingProblem]
+    warnings: list[str]
+
+
+def read_file(source: Path | str | bytes, name: str, rig: RigDescription | None = None) -> Reading:
+    """The campaign in a file, of which `source` is the place on this machine or the bytes, and `name` what to call it.
+
+    The format is told by the content. Files that hold channels, not campaigns, need a rig description. Raises FileError
+    that names the file and the place, InvalidInput where the campaign itself or its skin cannot be used.
+    """
+    contents = read_contents(source, name)
+    if not isinstance(contents, Contents):
+        return Reading(*from_dict(contents), [])
+    if rig is None:
+        reason = f"a rig description must say what its channels are; it has {contents.described()}"
+        raise FileError(name, "", reason)
+    document, warnings = rig_mapping.apply(rig, contents, name)
+    return Reading(*from_dict(document), warnings)
+
+
+def read_contents(source: Path | str | bytes, name: str) -> Contents | dict[str, Any]:
+    """A file's channels, or its campaign document, before a rig description is applied; raises FileError."""
+    with _opened(source, name) as stream:
+        kind = formats.detect(stream, name)
+        size = stream.seek(0, io.SEEK_END)
+        if kind in formats.BINARY or (kind != "JSON" and size > _LARGEST_TEXT):
+            return parse_apart(kind, stream, name)
+        return formats.parse(kind, stream, name)
+
+
+@contextmanager
+def _opened(source: Path | str | bytes, name: str) -> Iterator[BinaryIO]:
+    """An open file; bytes go into one without a name."""
+    if isinstance(source, bytes):
+        with tempfile.TemporaryFile() as stream:
+            stream.write(source)
+            stream.flush()
+            yield stream
+        return
+    try:
+        opened = Path(source).open("rb")  # noqa: SIM115 (closed below)
+    except OSError as error:
+        raise FileError(name, "", f"cannot be opened: {error.strerror}") from None
+    with opened:
+        yield opened

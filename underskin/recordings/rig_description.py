@@ -1,0 +1,175 @@
+"""The rig description (`rig/1`): what a lab's instrument files do not say, written once by the user as YAML or JSON.
+
+    schema: rig/1
+    kind: indentation
+    skin: {thickness_mm: 8.0, poisson_ratio: 0.5}
+    recording: {indenter_radius_mm: 2.5, id: {property: Well}}
+    channels:
+      displacement_mm: {channel: Z_Position(mm), sign: -1}
+      force_n: {channel: Corrected_Force(N), sign: -1}
+
+`skin` and `recording` hold campaign fields that are the same for all files; `{property: ...}` takes one from what the
+file, or the block, says about itself. `channels` says for each campaign field which channel holds it.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Annotated, Any
+
+import yaml
+
+from underskin.errors import FileError, InvalidInput
+from underskin.recordings import fields as field
+from underskin.recordings import json_file, text
+from underskin.recordings.campaign import COLUMNS, KINDS, SkinDescription
+from underskin.recordings.fields import mapping, shown
+
+SCHEMA = "rig/1"
+_LARGEST_BYTES = 1_000_000
+BLOCK_NAME = "block"  # a property that every part of a file has: a TDMS group, a MATLAB structure
+COMPLEX_FRF = "frf_pc_per_n"  # a channel of complex numbers, both parts of the FRF
+
+
+def _sign(name: str, value: Any, units_checked: bool) -> int:
+    if field.number(name, value, units_checked) not in (1, -1):
+        raise InvalidInput(name, shown(value), "must be 1 or -1")
+    return int(value)
+
+
+@dataclass(frozen=True)
+class ChannelMapping:
+    """Where a field's values are.
+
+    `channel` is the name in the file. `unit` is its true unit; where the file's own label says another one, `labelled`
+    repeats that label, to say that it is known to be wrong. `sign` -1 turns the values round. `sensitivity`, in
+    `sensitivity_unit` (mV/N), divides a signal into the field's quantity. `stiffness_n_per_mm` (displacements only):
+    force over it is the instrument's own give and is subtracted.
+    """
+
+    channel: field.Name
+    unit: field.Name | None = None
+    labelled: field.Name | None = None
+    sign: Annotated[int, _sign] | None = None
+    sensitivity: field.Positive | None = None
+    sensitivity_unit: field.Name | None = None
+    stiffness_n_per_mm: field.Positive | None = None
+
+
+@dataclass(frozen=True)
+class Property:
+    """A field's value that the file itself states under the name `property`."""
+
+    property: field.Name
+
+
+@dataclass(frozen=True)
+class RigDescription:
+    """A rig: the kind of its recordings, fields common to them, and which channel is what. `document` is as given."""
+
+    kind: str
+    skin: Mapping[str, Any]
+    recording: Mapping[str, Any | Property]
+    channels: Mapping[str, ChannelMapping]
+    units_checked: bool
+    document: Mapping[str, Any]
+
+
+def parse(data: bytes, file: str) -> RigDescription:
+    """The rig description in a YAML or JSON file.
+
+    Raises FileError where the text is neither, InvalidInput where a field cannot be used.
+    """
+    if len(data) > _LARGEST_BYTES:
+        raise FileError(file, "", f"a rig description may have up to {_LARGEST_BYTES} bytes")
+    if data.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] == b"{":
+        return from_dict(json_file.document(data, file))
+    try:
+        return from_dict(yaml.load(text.decode(data, file), Loader=_PlainLoader))  # noqa: S506 (a SafeLoader)
+    except yaml.MarkedYAMLError as error:
+        place = f"line {error.problem_mark.line + 1}" if error.problem_mark else ""
+        raise FileError(file, place, f"not YAML: {error.problem}") from None
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        if isinstance(error, InvalidInput):
+            raise
+        raise FileError(file, "", f"not YAML: {error}") from None
+
+
+def from_dict(document: Any) -> RigDescription:
+    """The rig description of a document; raises InvalidInput that names the field."""
+    document = mapping("rig", document)
+    for name in document:
+        if name not in ("schema", "name", "kind", "skin", "recording", "channels", "units_checked"):
+            raise InvalidInput(shown(name), shown(document[name]), "unknown field of a rig description")
+    if document.get("schema") != SCHEMA:
+        raise InvalidInput("schema", shown(document.get("schema")), f"must be {SCHEMA}")
+    kind = document.get("kind", "frf")
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise InvalidInput("kind", shown(kind), f"must be one of {', '.join(KINDS)}")
+    field.name("name", document.get("name", SCHEMA), False)
+    known = {entry.name for entry in fields(KINDS[kind])} - {"kind"}
+    recording = mapping("recording", document.get("recording", {}))
+    return RigDescription(
+        kind=kind,
+        skin=_known("skin", mapping("skin", document.get("skin")), {entry.name for entry in fields(SkinDescription)}),
+        recording={
+            name: field.build(Property, f"recording.{name}", value, False) if isinstance(value, Mapping) else value
+            for name, value in _known("recording", recording, known).items()
+        },
+        channels=_channels(kind, document.get("channels")),
+        units_checked=field.flag("units_checked", document.get("units_checked", False), False),
+        document=document,
+    )
+
+
+def channel_fields(kind: str) -> set[str]:
+    """The fields of a kind that channels may hold; `time_s` of an frf stands for its sample rate."""
+    columns = {entry.name for entry in fields(KINDS[kind])} & set(COLUMNS)
+    return columns | {COMPLEX_FRF, "time_s"} if kind == "frf" else columns
+
+
+def _channels(kind: str, document: Any) -> dict[str, ChannelMapping]:
+    given = _known("channels", mapping("channels", document), channel_fields(kind))
+    channels = {name: field.build(ChannelMapping, f"channels.{name}", value, False) for name, value in given.items()}
+    for name, entry in channels.items():
+        if (entry.sensitivity is None) != (entry.sensitivity_unit is None):
+            raise InvalidInput(
+                f"channels.{name}.sensitivity", entry.sensitivity, "needs a sensitivity_unit, and it one"
+            )
+        if entry.labelled is not None and entry.unit is None:
+            raise InvalidInput(f"channels.{name}.unit", None, "required where labelled says that the label is wrong")
+        if entry.stiffness_n_per_mm is not None and (name != "displacement_mm" or "force_n" not in channels):
+            raise InvalidInput(
+                f"channels.{name}.stiffness_n_per_mm", entry.stiffness_n_per_mm, "is for displacement_mm"
+            )
+    if not channels:
+        raise InvalidInput("channels", "none", "must name at least one channel")
+    return channels
+
+
+def _known(prefix: str, document: Mapping[str, Any], known: set[str]) -> Mapping[str, Any]:
+    for name in document:
+        if name not in known:
+            raise InvalidInput(f"{prefix}.{shown(name)}", shown(document[name]), f"must be one of {sorted(known)}")
+    return document
+
+
+class _PlainLoader(yaml.SafeLoader):
+    """Safe YAML without references and without dates; 1e-3 is a number, as in JSON."""
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """Refuses references: a few lines of them can stand for any amount of data."""
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise yaml.composer.ComposerError(None, None, "references (*name) are not allowed", mark)
+        return super().compose_node(parent, index)
+
+
+_FLOAT = "tag:yaml.org,2002:float"
+_PlainLoader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in resolvers if tag not in ("tag:yaml.org,2002:timestamp", _FLOAT)]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+_PlainLoader.add_implicit_resolver(
+    _FLOAT, re.compile(r"^[-+]?(\d+[.]\d*|[.]\d+|\d+(?=[eE]))([eE][-+]?\d+)?$"), list("-+.0123456789")
+)

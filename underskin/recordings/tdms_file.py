@@ -1,0 +1,93 @@
+"""LabVIEW TDMS, read by npTDMS: each group is a block of channels.
+
+A TDMS file is a row of segments, each with its length in front. An acquisition that was interrupted leaves the last
+one without length, or shorter than it says: what comes before is read, with a warning.
+"""
+
+import io
+import struct
+from collections.abc import Mapping
+from typing import Any, BinaryIO
+
+import numpy as np
+from nptdms import TdmsChannel, TdmsFile, TdmsGroup
+
+from underskin.errors import FileError
+from underskin.recordings.channels import Block, Channel, Contents, as_values, with_distinct_names
+
+MAGIC = b"TDSm"
+_LEAD_IN = 28
+_BIG_ENDIAN = 1 << 6  # in the table of contents of a segment
+
+
+def read(stream: BinaryIO, file: str) -> Contents:
+    """The channels of a TDMS file; raises FileError that names the byte or channel."""
+    whole, warnings = _whole_segments(stream, file)
+    stream.seek(0)
+    try:
+        tdms = TdmsFile.read(io.BytesIO(stream.read(whole)), raw_timestamps=True)
+        blocks = tuple(_block(group, file) for group in tdms.groups())
+    except (MemoryError, FileError):
+        raise
+    except Exception as error:  # npTDMS lets any exception of a damaged file through
+        raise FileError(file, f"segments up to byte {whole}", f"no TDMS: {type(error).__name__}: {error}") from None
+    properties = _properties("", tdms.properties)
+    for group in tdms.groups():
+        properties |= _properties(f"{group.name}.", group.properties)
+    return Contents(tuple(block for block in blocks if block.channels), properties, tuple(warnings))
+
+
+def _whole_segments(stream: BinaryIO, file: str) -> tuple[int, list[str]]:
+    """The bytes up to the end of the last whole segment, and a warning if there are more."""
+    size = stream.seek(0, io.SEEK_END)
+    position = 0
+    while position < size:
+        stream.seek(position)
+        lead_in = stream.read(_LEAD_IN)
+        if not lead_in.startswith(MAGIC[: len(lead_in)]):
+            raise FileError(file, f"byte {position}", "no TDMS: a segment must begin here")
+        if len(lead_in) < _LEAD_IN:
+            break
+        order = ">" if lead_in[4] & _BIG_ENDIAN else "<"
+        following = position + _LEAD_IN + struct.unpack(f"{order}Q", lead_in[12:20])[0]
+        if following > size:  # an interrupted segment has the length 2^64 - 1
+            break
+        position = following
+    if position == 0:
+        raise FileError(file, "byte 0", "the acquisition was interrupted before its first segment was whole")
+    if position == size:
+        return size, []
+    return position, [
+        f"the acquisition was interrupted: the last {size - position} bytes, no whole segment, are left out"
+    ]
+
+
+def _block(group: TdmsGroup, file: str) -> Block:
+    channels = [channel for channel in group.channels() if _is_numeric(channel)]
+    steps = {channel.properties.get("wf_increment") for channel in channels} - {None, 0}
+    step = steps.pop() if len(steps) == 1 else None
+    rate = 1 / step if isinstance(step, float) and step > 0 else None
+    return Block(group.name, with_distinct_names([_channel(channel, file) for channel in channels]), rate)
+
+
+def _is_numeric(channel: TdmsChannel) -> bool:
+    return channel.dtype.kind in "iufc" and len(channel) > 0
+
+
+def _channel(channel: TdmsChannel, file: str) -> Channel:
+    try:
+        values = np.asarray(channel[:])
+        return Channel(channel.name, str(channel.properties.get("unit_string", "")), as_values(values))
+    except MemoryError:
+        raise
+    except Exception as error:
+        reason = f"cannot be read: {type(error).__name__}: {error}"
+        raise FileError(file, f"channel {channel.path}", reason) from None
+
+
+def _properties(prefix: str, properties: Mapping[str, Any]) -> dict[str, str | float]:
+    numbers = {f"{prefix}{name}": value for name, value in properties.items()}
+    return {
+        name: float(value) if isinstance(value, int | float | np.number) else str(value)
+        for name, value in numbers.items()
+    }

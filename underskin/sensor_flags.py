@@ -1,0 +1,139 @@
+"""Sensors that stand out of their array, each with the reason: dead, inverted, weak, strong, noisy or bent."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+from scipy.stats import t as student
+
+from underskin.units import Floats
+
+_DEAD = 0.05  # of the array's d33
+_OUTLYING = 5.0  # robust deviations
+_WEAK, _STRONG = 0.6, 1 / 0.6  # of the array's d33, and outlying
+_LEAST_SPREAD = 0.03  # of the array's d33, below which sensors are not told apart
+_NOISY = 3.0  # times the array's
+_LEAST_BEND = 0.05  # of d33
+_FALSE_ALARMS = 1e-3  # per array
+
+
+@dataclass(frozen=True)
+class Flag:
+    """A sensor that stands out: `code` is dead, inverted, weak, strong, noisy or bent; `reason` has the numbers."""
+
+    sensor: str
+    code: str
+    reason: str
+
+
+class Measured(Protocol):
+    """The columns of recordings that are looked at."""
+
+    @property
+    def d33(self) -> Floats: ...  # noqa: D102
+    @property
+    def line_scatter(self) -> Floats: ...  # noqa: D102
+    @property
+    def indenter_radius(self) -> Floats: ...  # noqa: D102
+    @property
+    def preload(self) -> Floats: ...  # noqa: D102
+
+
+def unfit(
+    sensor: NDArray[np.intp], d33: Floats, noise: Floats, count: int
+) -> tuple[dict[int, tuple[str, str]], Floats]:
+    """Sensors that do not belong to the array's population, (code, reason) by number, and each sensor's pilot d33.
+
+    The pilot is the array's median for those that do belong, the sensor's own magnitude for the others.
+    """
+    typical = float(np.median(np.abs(d33)))
+    weight = 1 / (noise**2 + (_LEAST_SPREAD * typical) ** 2)
+    total = np.bincount(sensor, weight, count)
+    with np.errstate(invalid="ignore"):
+        value = np.bincount(sensor, weight * d33, count) / total
+        line = np.sqrt(np.bincount(sensor, (weight * noise) ** 2, count)) / total
+    size = np.abs(value)
+    array = float(np.nanmedian(size[size > 3 * line])) if (size > 3 * line).any() else float(np.nanmedian(size))
+    alive = size > np.maximum(_DEAD * array, 3 * line)
+    sign = 1.0 if np.sum(np.sign(value[alive])) >= 0 else -1.0
+    spread = max(1.4826 * float(np.median(np.abs(size[alive] - array))) if alive.any() else 0.0, _LEAST_SPREAD * array)
+    found: dict[int, tuple[str, str]] = {}
+    for number in np.flatnonzero(np.isfinite(value)).tolist():
+        percent = f"{100 * value[number] * sign / array:.0f} % of the array's d33"
+        outlying = alive.sum() > 3 and abs(size[number] - array) > _OUTLYING * spread
+        if not alive[number]:
+            found[number] = ("dead", f"dead: no charge beyond noise ({percent})")
+        elif value[number] * sign < 0:
+            found[number] = ("inverted", f"inverted polarity: {percent}")
+        elif outlying and size[number] < _WEAK * array:
+            found[number] = ("weak", f"weak: {percent}")
+        elif outlying and size[number] > _STRONG * array:
+            found[number] = ("strong", f"strong: {percent}")
+    pilot = np.full(count, array)
+    pilot[list(found)] = size[list(found)]
+    return found, pilot
+
+
+def standing_out(
+    ids: tuple[str, ...],
+    sensor: NDArray[np.intp],
+    rows: Measured,
+    good: NDArray[np.intp],
+    pilot: Floats,
+    expected: Floats,
+) -> list[Flag]:
+    """Sensors whose lines or recordings scatter, or whose d33 bends with preload, beyond their array's.
+
+    `good` are the rows looked at; `sensor` and `expected`, the relative scatter that the mixed model gives each
+    recording, are theirs.
+    """
+    numbers, member = np.unique(sensor, return_inverse=True)
+    level = rows.d33[good] / pilot[sensor]
+    lines = rows.line_scatter[good] * np.abs(level)
+    line_of = np.array([np.median(lines[member == index]) for index in range(len(numbers))])
+    usual = float(np.median(line_of))
+    rest = _beyond_common(level, member, rows.indenter_radius[good], rows.preload[good])
+    alarm = _FALSE_ALARMS / len(numbers)
+    flags = []
+    for index, name in enumerate(ids[number] for number in numbers):
+        own = member == index
+        bend, chance, scatter, freedom = _bend(rest[own], rows.preload[good][own], expected[own])
+        if chance < alarm and abs(bend) > _LEAST_BEND:
+            flags.append(Flag(name, "bent", f"bent: its d33 curves by {100 * bend:+.0f} % over the preloads"))
+        if len(numbers) > 2 and line_of[index] > _NOISY * usual:
+            times = f"{line_of[index] / usual:.1f} times"
+            flags.append(Flag(name, "noisy", f"noisy: its lines scatter {times} as much as those of the others"))
+        elif scatter > _NOISY and chi2.sf(freedom * scatter**2, freedom) < alarm:
+            flags.append(Flag(name, "noisy", f"noisy: its recordings scatter {scatter:.1f} times as much as expected"))
+    return flags
+
+
+def _beyond_common(level: Floats, member: NDArray[np.intp], radius: Floats, preload: Floats) -> Floats:
+    """Each recording over its sensor's median, less what its condition does to all sensors (three or more)."""
+    median = np.array([np.median(level[member == index]) for index in range(member.max() + 1)])
+    own = level / median[member]
+    rest = own - 1
+    conditions = np.unique(np.column_stack([radius, preload]), axis=0, return_inverse=True)[1].reshape(-1)
+    for number in range(conditions.max() + 1):
+        alike = conditions == number
+        if len(np.unique(member[alike])) > 2:
+            rest[alike] = own[alike] - np.median(own[alike])
+    return rest
+
+
+def _bend(rest: Floats, preload: Floats, expected: Floats) -> tuple[float, float, float, int]:
+    """Curvature over the range of preloads, the chance of one as large, the scatter about the curve over the one
+    expected, and its degrees of freedom."""
+    if len(rest) < 6 or len(np.unique(preload)) < 3:
+        freedom = max(1, len(rest) - 1)
+        return 0.0, 1.0, float(np.sqrt(np.sum((rest / expected) ** 2) / freedom)), freedom
+    x = (2 * preload - preload.min() - preload.max()) / (preload.max() - preload.min())
+    basis = np.column_stack([np.ones_like(x), x, (3 * x**2 - 1) / 2]) / expected[:, None]
+    coefficients = np.linalg.lstsq(basis, rest / expected, rcond=None)[0]
+    freedom = len(rest) - 3
+    scatter = float(np.sqrt(np.sum((rest / expected - basis @ coefficients) ** 2) / freedom))
+    deviation = max(scatter, 1.0) * float(np.sqrt(np.linalg.pinv(basis.T @ basis)[2, 2]))
+    chance = 2 * student.sf(abs(coefficients[2]) / deviation, freedom)
+    return 1.5 * float(coefficients[2]), float(chance), scatter, freedom
