@@ -12,6 +12,7 @@ import h5py
 import httpx
 import pytest
 
+from service.settings import Settings
 from tests.conftest import UNDERSKIN, running
 from tests.test_service_errors import SIGMA, problem_of
 from tests.test_service_limits import HEAD, connect, read_answer
@@ -37,7 +38,7 @@ def test_a_port_in_use_is_named(tmp_path: Path) -> None:
     assert f"cannot listen on 127.0.0.1 port {port}: Address already in use" in line
 
 
-@pytest.mark.parametrize("place", ["a file", "a file/data", "/proc/underskin"])
+@pytest.mark.parametrize("place", ["a file/data", "/proc/underskin"])
 def test_a_data_folder_that_cannot_be_written_is_named(tmp_path: Path, place: str) -> None:
     (tmp_path / "a file").touch()  # in the way whoever runs this, and /proc takes no folder even from root
     data = tmp_path / place
@@ -63,7 +64,6 @@ def test_keys_that_cannot_be_read_end_the_start(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("variable", "value", "says"),
     [
-        ("UNDERSKIN_MAX_BODY_MB", "0", "greater than 0"),
         ("UNDERSKIN_MAX_BODY_MB", "inf", "less than or equal to 1000000"),
         ("UNDERSKIN_MAX_BODY_MB", "64 MB", "a valid number"),
         ("UNDERSKIN_DATA", "~nobody-of-this-name/data", "home directory"),
@@ -75,10 +75,13 @@ def test_a_wrong_setting_is_named(tmp_path: Path, variable: str, value: str, say
     assert says in line
 
 
-def test_an_empty_setting_is_the_default(tmp_path: Path) -> None:
-    empty = {f"UNDERSKIN_{name}": "" for name in ("TABLES", "MAX_BODY_MB", "HOSTS")}
-    with running(tmp_path, empty) as started:
-        assert httpx.post(f"{started.url}/v1/sigma", json=SIGMA).status_code == 200
+def test_an_empty_setting_is_the_default(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in Settings.model_fields:
+        monkeypatch.delenv(f"UNDERSKIN_{name.upper()}", raising=False)
+    default = Settings()
+    for name in Settings.model_fields:
+        monkeypatch.setenv(f"UNDERSKIN_{name.upper()}", "")
+    assert Settings() == default
 
 
 # Tables
