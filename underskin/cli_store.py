@@ -13,7 +13,9 @@ if TYPE_CHECKING:
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 Url = Annotated[str, typer.Option(envvar="UNDERSKIN_URL", help="Where the service is.")]
-Key = Annotated[str | None, typer.Option(envvar="UNDERSKIN_API_KEY", help="API key of scope write, where keys are needed.")]
+Key = Annotated[
+    str | None, typer.Option(envvar="UNDERSKIN_API_KEY", help="API key of scope write, where keys are needed.")
+]
 _LOCAL = "http://127.0.0.1:8000"
 _LONGEST_WAIT_S = 600.0
 
