@@ -1,6 +1,7 @@
 """A real server process for the tests that talk HTTP."""
 
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -15,6 +16,9 @@ import pytest
 
 UNDERSKIN = Path(sys.executable).with_name("underskin")
 _START_LIMIT = 30.0  # s
+
+# A shell that runs the tests in the background has them ignore it, and the servers would inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @dataclass(frozen=True)
