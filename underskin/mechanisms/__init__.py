@@ -1,0 +1,21 @@
+"""What the base model may have left out: one file a mechanism, and the models that they make up.
+
+model = compose(["moving_contact_edge", "contact_resonance"], campaign, table)
+prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
+"""
+
+from underskin.mechanisms.catalogue import CATALOGUE
+from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Uniform, Unsupported
+from underskin.mechanisms.model import Model, Prediction, compose
+
+__all__ = [
+    "CATALOGUE",
+    "Mechanism",
+    "Model",
+    "Normal",
+    "Parameter",
+    "Prediction",
+    "Uniform",
+    "Unsupported",
+    "compose",
+]

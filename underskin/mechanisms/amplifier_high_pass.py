@@ -1,0 +1,41 @@
+"""The charge amplifier forgets a constant charge.
+
+Law: FRF · iωτ/(1 + iωτ), τ = 1/(2π corner).
+
+Assumptions: one pole, the same for all recordings and sensors.
+
+Source: a charge amplifier's feedback capacitor with its resistor in parallel (Gautschi, Piezoelectric Sensorics, 2002,
+chapter 11).
+"""
+
+from underskin.mechanisms.contact_state import Contacts
+from underskin.mechanisms.differentiated import Differentiated
+from underskin.mechanisms.frf_design import FrfDesign
+from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.recordings.campaign import Campaign
+
+
+class AmplifierHighPass(Mechanism):
+    """See the module."""
+
+    name = "amplifier_high_pass"
+    axes = ("frequency_hz", "phase")
+
+    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+        """The corner frequency."""
+        return (
+            Parameter(
+                name="corner",
+                unit="Hz",
+                low=1e-3,
+                high=100.0,
+                prior=Normal(-0.7, 1.5),
+                scale="log",
+                limit=0.0,
+                reason="charge amplifiers have corners of 0.01 to some Hz; 0.5 Hz within a factor of 4.5",
+            ),
+        )
+
+    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
+        """1/(1 − i corner/f)."""
+        return 1.0 / (1.0 - values["corner"] * (1j / design.line_frequency))

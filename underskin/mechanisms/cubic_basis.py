@@ -1,0 +1,38 @@
+"""The four cubic B-splines that differ from 0 at a point: values and slopes, for many points at once."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_interp_spline
+
+from underskin.units import Floats
+
+_DEGREE = 3
+
+
+class CubicBasis:
+    """The cubic splines through values at `nodes` (not-a-knot ends)."""
+
+    def __init__(self, nodes: Floats) -> None:
+        """Write each basis function of each cell as a cubic in the distance from the cell's lower knot."""
+        self.nodes = nodes
+        knots = np.asarray(make_interp_spline(nodes, nodes, k=_DEGREE).t)
+        count = len(knots) - _DEGREE - 1
+        self._knots = knots[_DEGREE:-_DEGREE]
+        basis = BSpline(knots, np.eye(count), _DEGREE)
+        powers = [np.asarray(basis(self._knots[:-1], nu=order)) / math.factorial(order) for order in range(4)]
+        cells = np.arange(len(self._knots) - 1)[:, None]
+        # (power, cell, function): the four functions of each cell, lowest power first
+        self._cubics = np.stack([power[cells, cells + np.arange(4)] for power in powers])
+
+    def coefficients(self, values: Floats, axis: int) -> Floats:
+        """The spline's coefficients, along one axis of the values."""
+        return np.moveaxis(np.asarray(make_interp_spline(self.nodes, values, k=_DEGREE, axis=axis).c), 0, axis)
+
+    def weights(self, at: Floats) -> tuple[NDArray[np.intp], Floats, Floats]:
+        """For each point: the first of its four functions, their values (points, 4) and their slopes (points, 4)."""
+        cell = np.searchsorted(self._knots[1:-1], at, side="right")
+        u = (at - self._knots[cell])[:, None]
+        c0, c1, c2, c3 = self._cubics[:, cell]
+        return cell, ((c3 * u + c2) * u + c1) * u + c0, (3 * c3 * u + 2 * c2) * u + c1

@@ -1,0 +1,116 @@
+"""Numbers that carry their derivatives with respect to a model's parameters (forward mode).
+
+Only what the mechanisms need: arithmetic, a few functions, picking rows, and `chain` for everything else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]  # float64 or complex128
+Operand = "Differentiated | Array | float | complex"
+
+
+class Differentiated:
+    """`value` (rows,) and `slopes` (parameters, rows); one row stands for all, as NumPy broadcasts."""
+
+    __slots__ = ("slopes", "value")
+    __array_ufunc__ = None  # so that array * Differentiated comes here
+
+    def __init__(self, value: Array, slopes: Array) -> None:
+        self.value = value
+        self.slopes = slopes
+
+    def __add__(self, other: Differentiated | Array | complex) -> Differentiated:
+        if isinstance(other, Differentiated):
+            return Differentiated(self.value + other.value, self.slopes + other.slopes)
+        value = self.value + other
+        return Differentiated(value, np.broadcast_to(self.slopes, (len(self.slopes), *value.shape)))
+
+    __radd__ = __add__
+
+    def __neg__(self) -> Differentiated:
+        return Differentiated(-self.value, -self.slopes)
+
+    def __sub__(self, other: Differentiated | Array | complex) -> Differentiated:
+        return self + (-other)
+
+    def __rsub__(self, other: Array | complex) -> Differentiated:
+        return (-self) + other
+
+    def __mul__(self, other: Differentiated | Array | complex) -> Differentiated:
+        if isinstance(other, Differentiated):
+            return Differentiated(self.value * other.value, self.slopes * other.value + self.value * other.slopes)
+        return Differentiated(self.value * other, self.slopes * other)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Differentiated | Array | complex) -> Differentiated:
+        if isinstance(other, Differentiated):
+            quotient = self.value / other.value
+            return Differentiated(quotient, (self.slopes - quotient * other.slopes) / other.value)
+        return self * (1 / other)
+
+    def __rtruediv__(self, other: Array | complex) -> Differentiated:
+        inverse = 1 / self.value
+        return Differentiated(other * inverse, -other * inverse**2 * self.slopes)
+
+    def __pow__(self, exponent: float) -> Differentiated:
+        power = self.value ** (exponent - 1)
+        return Differentiated(power * self.value, exponent * power * self.slopes)
+
+    def __getitem__(self, rows: Any) -> Differentiated:
+        """The rows picked by an index array or slice; a single row that stands for all stays one."""
+        if len(self.value) == 1:
+            return self
+        return Differentiated(self.value[rows], self.slopes[:, rows])
+
+
+def exp(x: Differentiated) -> Differentiated:
+    """e^x."""
+    value = np.exp(x.value)
+    return Differentiated(value, value * x.slopes)
+
+
+def log(x: Differentiated) -> Differentiated:
+    """The natural logarithm."""
+    return Differentiated(np.log(x.value), x.slopes / x.value)
+
+
+def cbrt(x: Differentiated) -> Differentiated:
+    """The real cube root, of positive values."""
+    value = np.cbrt(x.value)
+    return Differentiated(value, x.slopes * (value / (3 * x.value)))
+
+
+def chain(value: Array, *terms: tuple[Array, Differentiated]) -> Differentiated:
+    """A function's `value` from its partial derivatives: slopes = Σ ∂f/∂x · x.slopes over the pairs (∂f/∂x, x)."""
+    slopes = sum(partial * x.slopes for partial, x in terms)
+    return Differentiated(value, np.asarray(slopes))
+
+
+def constant(value: Array | float, parameters: int) -> Differentiated:
+    """A number that no parameter changes."""
+    rows = np.atleast_1d(np.asarray(value))
+    return Differentiated(rows, np.zeros((parameters, 1)))
+
+
+def variables(values: Sequence[float], slopes: Sequence[float]) -> list[Differentiated]:
+    """One single-row variable a parameter, each with its derivative with respect to its own fit coordinate."""
+    return [
+        Differentiated(np.array([value]), row[:, None])
+        for value, row in zip(values, np.diag(np.asarray(slopes, dtype=float)), strict=True)
+    ]
+
+
+def sum_rows(x: Differentiated, owner: NDArray[np.intp], rows: int) -> Differentiated:
+    """Row r of the answer is the sum of x's rows whose `owner` is r."""
+    value = np.bincount(owner, x.value, rows)
+    slopes = np.stack(
+        [np.bincount(owner, slope, rows) for slope in np.broadcast_to(x.slopes, (len(x.slopes), len(owner)))]
+    )
+    return Differentiated(value, slopes)
