@@ -1,0 +1,42 @@
+"""What finite strain adds to the stress on the base: reads the coefficients that `finite_strain_solve` keeps.
+
+Δ(k; a/h, x) = c1 x + c2 x² + c3 x³ + c4 x⁴ with x = L^(1/3), L = F/(R² E): a cubic spline over a/h, 0 at a/h = 0.
+"""
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from rig.errors import RigError
+from rig.layer import RIM, WAVENUMBERS, Floats
+
+LARGEST_LOAD = 0.1  # L
+WIDEST = 3.2  # a/h
+_DATA = Path(__file__).with_name("finite_strain.npz")
+
+
+@lru_cache(maxsize=1)
+def _curve() -> CubicSpline:
+    with np.load(_DATA) as data:
+        assert data["rim"] == RIM
+        radii, coefficients = data["a_over_h"], data["coefficients"].astype(np.float64)
+    return CubicSpline(np.append(0.0, radii), np.concatenate([0 * coefficients[:1], coefficients]))
+
+
+def added_spectrum(a_over_h: Floats, load: Floats) -> Floats:
+    """Δ at the rig's wavenumbers, to be added to p̂ M: (rows, WAVENUMBERS).
+
+    Raises RigError where a contact or a load is beyond what was solved.
+    """
+    if np.any(a_over_h > WIDEST):
+        raise RigError("contact radius", f"{np.max(a_over_h):.3g} h", f"must be at most {WIDEST} h: lower preload_n")
+    if np.any(load > LARGEST_LOAD):
+        allowed = f"must be at most {LARGEST_LOAD}: lower preload_n, or a larger indenter_radius_mm"
+        raise RigError("load parameter F/(R²E)", float(np.max(load)), allowed)
+    powers = np.cbrt(load)[:, None] ** np.arange(1, 5)
+    known = np.einsum("rp,rpk->rk", powers, _curve()(a_over_h))
+    added = np.zeros((len(known), len(WAVENUMBERS)))
+    added[:, : known.shape[1]] = known
+    return added
