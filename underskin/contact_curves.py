@@ -67,7 +67,8 @@ class CurveGrid:
     def __init__(self, wave_numbers: Floats) -> None:
         self.interval = ChebyshevInterval(REACH, _NODES)
         self.equation = ContactEquation(self.interval.nodes)
-        self.transforms = mode_transforms(wave_numbers, self.interval.nodes, self.equation.modes).transpose(0, 2, 1)
+        s = np.multiply.outer(self.interval.nodes, wave_numbers)
+        self.transforms = mode_transforms(s, self.equation.modes).transpose(0, 2, 1)
         self.table_basis = self.interval.basis(_TABLE)
 
     def curves(self, layer: Layer) -> "ContactCurves":
@@ -154,7 +155,8 @@ class _Start:
     def __call__(self, root: Floats, root_adhesion: Floats) -> Floats:
         """From the root of the value that a sphere without adhesion would have, and U."""
         unstable = np.interp(root_adhesion ** (2 / 3), self._critical, self._alpha)
-        return np.maximum(np.interp(root, self._root, self._alpha), 1.02 * unstable)
+        start: Floats = np.maximum(np.interp(root, self._root, self._alpha), 1.02 * unstable)
+        return start
 
 
 def _law(law: _Law, alpha: Floats, root_adhesion: Floats, at: Floats) -> Floats:

@@ -21,8 +21,8 @@ from scipy.special import spherical_jn
 from underskin.layer import Layer
 from underskin.units import Floats
 
-_END = 20.0  # where 1 − K has fallen below 1e-14
-_FIRST_PANELS = (0.0, 0.01, 0.04, 0.15, 0.5)  # a nearly frictionless base bends K close to k = 0
+_END = 18.0  # where 1 − K has fallen below 1e-13
+_FIRST_PANELS = (0.0, 0.02, 0.15, 0.7)  # a nearly frictionless base bends K close to k = 0
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class ContactEquation:
         self.alpha = alpha
         self.modes = 8 + int(np.ceil(2.5 * largest))
         self._k, self._weight = _nodes(largest)
-        self._transforms = mode_transforms(self._k, alpha, self.modes)
+        self._transforms = mode_transforms(np.multiply.outer(alpha, self._k), self.modes)
         order = np.arange(self.modes)
         self._edge = np.sqrt(4 * order + 1) * (-1.0) ** order  # eₙ(1)
 
@@ -79,12 +79,10 @@ class ContactEquation:
         right = np.zeros((self.modes, 2))
         right[0] = 1, 1 / 3
         right[1, 1] = -2 / (3 * np.sqrt(5))
-        solution = np.linalg.solve(
-            np.pi / 2 * np.eye(self.modes) - matrix, np.broadcast_to(right, (len(matrix), *right.shape))
-        )
-        changes = np.concatenate([slope @ solution for slope in slopes], axis=-1)
-        by_both = np.linalg.solve(np.pi / 2 * np.eye(self.modes) - matrix, changes)
-        stacked = np.stack([solution, by_both[..., :2], by_both[..., 2:]])
+        inverse = np.linalg.inv(np.pi / 2 * np.eye(self.modes) - matrix)
+        solution = inverse @ right
+        changes = [inverse @ (slope @ solution) for slope in slopes]
+        stacked = np.stack([solution, *changes])
         return stacked[..., 0], stacked[..., 1]
 
     def _galerkin(self, kernel: Floats) -> Floats:
@@ -93,17 +91,16 @@ class ContactEquation:
         return self.alpha[:, None, None] * (weighted.transpose(0, 2, 1) @ self._transforms)
 
 
-def mode_transforms(k: Floats, alpha: Floats, modes: int) -> Floats:
-    """√(4n + 1) j₂ₙ(kα), the modes' cosine transforms over α: (alpha, k, modes)."""
+def mode_transforms(s: Floats, modes: int) -> Floats:
+    """√(4n + 1) j₂ₙ(s), the modes' cosine transforms over α at s = kα, of any shape: (*s.shape, modes)."""
     order = np.arange(modes)
-    argument = np.multiply.outer(alpha, k)
-    return np.sqrt(4 * order + 1) * np.asarray(spherical_jn(2 * order, argument[..., None]))
+    return np.sqrt(4 * order + 1) * np.asarray(spherical_jn(2 * order, s[..., None]))
 
 
 def _nodes(largest: float) -> tuple[Floats, Floats]:
     """Gauss–Legendre nodes and weights on [0, 20], fine enough for products of modes up to the largest radius."""
     x, w = np.polynomial.legendre.leggauss(16)
-    panels = 6 + int(np.ceil(_END * 2 * largest / 12.0))
+    panels = max(6, int(np.ceil(_END * 2 * largest / 16.0)))
     edges = np.concatenate([_FIRST_PANELS[:-1], np.linspace(_FIRST_PANELS[-1], _END, panels + 1)])
     half = np.diff(edges)[:, None] / 2
     k = edges[:-1, None] + half * (1 + x)
