@@ -16,9 +16,10 @@ class Contacts:
     modulus: Differentiated  # E [Pa] in force in each contact
     thickness: Differentiated  # h [m], of one row
     poisson_ratio: Differentiated  # ν, of one row
-    glue: Differentiated | None = None  # κ, of one row; None where the glue line is rigid
+    slip: Differentiated | None = None  # of the glue line, 1/(1 + κ), of one row; None where it is rigid
     work_of_adhesion: Differentiated | None = None  # w [J/m²], of one row; None without adhesion
     layered: bool = False  # contact by the layer of finite thickness, not by the half space
+    stiffness: Differentiated | None = None  # dF/dδ [N/m] at the radius in force, where a mechanism asks
 
     @property
     def reduced_modulus(self) -> Differentiated:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist, pdist
 
 from underskin.errors import InvalidInput
-from underskin.mechanisms.offset_sigma import PROFILE_END
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf_estimation import lines_of
 from underskin.units import Floats, to_si
@@ -138,7 +137,6 @@ def _contact_key(entry: FrfRecording, contact_axes: Collection[str]) -> tuple[fl
     return entry.preload_n, float(to_si("indenter_radius_mm", entry.indenter_radius_mm)), dynamic_force, dwell
 
 
-def reach(design: FrfDesign, thickness: float, further: float) -> float:
-    """The largest e/h that the points need, plus `further` [m]; at most where the profile ends."""
-    largest = float(np.hypot(design.point_x, design.point_y).max()) + further
-    return min(PROFILE_END, largest / thickness)
+def largest_offset(design: FrfDesign, further: float) -> float:
+    """The largest distance of a point's contact from its sensor's centre, plus `further` [m]."""
+    return float(np.hypot(design.point_x, design.point_y).max()) + further

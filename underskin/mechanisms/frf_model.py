@@ -13,13 +13,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.contact_curves import ContactCurves
 from underskin.errors import InvalidInput
+from underskin.layer import Layer
 from underskin.mechanisms.composition import Composition, Prediction
 from underskin.mechanisms.contact_state import Contacts
 from underskin.mechanisms.differentiated import Array, Differentiated, chain, constant, sum_rows
-from underskin.mechanisms.frf_design import FrfDesign, Indices, reach
+from underskin.mechanisms.frf_design import FrfDesign, Indices, largest_offset
 from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
 from underskin.mechanisms.offset_sigma import PROFILE_END, offset_sigma
+from underskin.mechanisms.pressed import press, stiffness
+from underskin.mechanisms.sigma_curves import layer_of, sigma_curves
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate import SigmaTable
 from underskin.units import Floats, to_si
@@ -57,6 +61,7 @@ NUISANCES = (
         reason="a declared thickness is good to 1 %; a larger error is the mechanism thickness_error",
     ),
 )
+_NUISANCE_STRETCH = 1.06  # the thickness' bounds
 _POSITION = 2  # two more variables: the contact's x and y
 
 
@@ -80,9 +85,13 @@ class FrfModel:
         self._sensor_radius = _required("sensor_radius_mm", skin.sensor_radius_mm)
         self._poisson_ratio = skin.poisson_ratio
         further = max((mechanism.largest_offset for mechanism in mechanisms), default=0.0)
-        # The layer may be thinner than declared, and e/h larger.
-        stretched = 1.7 * reach(design, self._thickness, further)
-        self._sigma = offset_sigma(table, self._sensor_radius / self._thickness, min(PROFILE_END, stretched))
+        stretch = _NUISANCE_STRETCH * max((mechanism.largest_stretch for mechanism in mechanisms), default=1.0)
+        reached = min(PROFILE_END, stretch * largest_offset(design, further) / self._thickness)
+        self._sigma = offset_sigma(table, self._sensor_radius / self._thickness, stretch, reached)
+        self._needs_stiffness = any(mechanism.needs_stiffness for mechanism in mechanisms)
+        self._last_layer: tuple[Layer, ContactCurves] | None = None
+        shapes = [(mechanism, mechanism.pickup_shape(campaign, design)) for mechanism in mechanisms]
+        self._pickup_shapes = [(mechanism, shape) for mechanism, shape in shapes if shape is not None]
         self._force, self._increments = _force_nodes(self._mechanisms, design)
         self.valid = self._declared_inside(table)[design.point][design.recording]
 
@@ -132,21 +141,28 @@ class FrfModel:
         """σ of each point at each force node, and which points are inside the table at all of them."""
         design = self.design
         rho = self._sensor_radius / contacts.thickness
-        a_over_h, cbrt_load = contacts.hertz_radius / contacts.thickness, contacts.cbrt_load
-        curves = self._sigma.table_curves(a_over_h.value, cbrt_load.value, float(rho.value[0]))
+        layer = self._layer_curves(contacts) if contacts.layered or self._needs_stiffness else None
+        pressed = press(contacts, layer if contacts.layered else None)
+        if layer is not None and self._needs_stiffness:
+            contacts.stiffness = stiffness(contacts, pressed, layer)
+        curves = sigma_curves(self._sigma, contacts, pressed, rho, layer if contacts.layered else None)
         offset = self._offset(own, position) / contacts.thickness
         sigma = []
         inside = np.ones(len(design.point_contact), dtype=bool)
         for node in range(len(self._force)):
             contact = design.point_contact + node * len(design.force)
-            (value, by_a, by_load, by_rho), by_offset = self._sigma.at(curves.coefficients, contact, offset.value)
-            sigma.append(
-                chain(
-                    value, (by_a, a_over_h[contact]), (by_load, cbrt_load[contact]), (by_rho, rho), (by_offset, offset)
-                )
-            )
+            (value, *partial), by_offset = self._sigma.at(curves.coefficients, contact, offset.value)
+            at_points = (variable[contact] for variable in curves.variables)
+            sigma.append(chain(value, (by_offset, offset), *zip(partial, at_points, strict=True)))
             inside &= curves.inside[contact]
         return sigma, inside
+
+    def _layer_curves(self, contacts: Contacts) -> ContactCurves:
+        """The contact curves of the layer at hand; those of the last layer are kept."""
+        layer = layer_of(contacts)
+        if self._last_layer is None or self._last_layer[0] != layer:
+            self._last_layer = layer, self._sigma.contact_grid.curves(layer)
+        return self._last_layer[1]
 
     def _offset(self, own: dict[str, Values], position: Sequence[Differentiated]) -> Differentiated:
         """The distance of each point's contact from its sensor's centre [m]."""
@@ -198,10 +214,8 @@ class FrfModel:
         return product
 
     def _pickup(self, own: dict[str, Values]) -> Differentiated | None:
-        for mechanism in self._mechanisms:
-            pickup = mechanism.pickup(self.design, own[mechanism.name])
-            if pickup is not None:
-                return pickup
+        for mechanism, shape in self._pickup_shapes:
+            return shape * mechanism.pickup_charge(own[mechanism.name])
         return None
 
     def _declared_inside(self, table: SigmaTable) -> NDArray[np.bool_]:

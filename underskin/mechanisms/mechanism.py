@@ -123,10 +123,13 @@ class Mechanism:
     name: ClassVar[str]
     kinds: ClassVar[tuple[Kind, ...]] = ("frf",)
     axes: ClassVar[tuple[str, ...]]
-    # What a model must prepare for it: further fields that tell contacts apart, neighbours, room for an offset [m].
+    # What a model must prepare for it: further fields that tell contacts apart, the contacts' stiffness, neighbours,
+    # room for an offset [m] and for a layer that much thicker or thinner.
     contact_axes: ClassVar[tuple[str, ...]] = ()
+    needs_stiffness: ClassVar[bool] = False
     needs_neighbours: ClassVar[bool] = False
     largest_offset: ClassVar[float] = 0.0
+    largest_stretch: ClassVar[float] = 1.0
 
     @property
     def law(self) -> str:
@@ -194,9 +197,13 @@ class Mechanism:
         """The complex factor on each distinct line (contact and frequency)."""
         return None
 
-    def pickup(self, design: FrfDesign, values: Values) -> Differentiated | None:
-        """The standard deviation of a pick-up on each row [C/N]."""
+    def pickup_shape(self, campaign: Campaign, design: FrfDesign) -> Floats | None:
+        """The pick-up on each row [1/N] for a charge of 1."""
         return None
+
+    def pickup_charge(self, values: Values) -> Differentiated:
+        """The standard deviation of that charge [C]."""
+        raise NotImplementedError
 
     def spread(self, values: Values) -> Differentiated | None:
         """The standard deviation of the logarithms of the sensors' gains."""

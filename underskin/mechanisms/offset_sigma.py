@@ -11,14 +11,14 @@ r/h = 8, the stress is 0 (below 1e-6 of its peak).
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.special import j0
 
-from underskin.hankel import disc_average
+from underskin.contact_curves import CurveGrid
 from underskin.mechanisms.cubic_basis import CubicBasis
 from underskin.surrogate import SigmaTable
 from underskin.units import Floats
@@ -27,7 +27,7 @@ PROFILE_END = 8.0
 _SPACING = 0.0625  # of the profile and of the offsets; the profile turns over lengths of 0.3 h and more
 _MIRRORED = 4  # offsets below 0, so that the curve is even
 _RADIAL, _ANGULAR = 10, 20  # quadrature over the disc
-_RHO_RANGE, _RHO_NODES = 1.7, 13  # around the declared rT/h, both ways
+_RHO_RATIO = 1.1  # of neighbouring rT/h in the table
 _WAVENUMBER_END, _NODES_PER_TURN = 24.0, 4  # M decays as e^(−k)
 
 
@@ -43,12 +43,16 @@ class Curves:
 
 
 class OffsetSigma:
-    """σ(a/h, L^(1/3), rT/h, e/h) around one rT/h, for offsets up to `reach` (in h)."""
+    """σ(a/h, L^(1/3), rT/h, e/h) around one rT/h, for offsets up to `reach` (in h).
 
-    def __init__(self, table: SigmaTable, rt_over_h: float, reach: float) -> None:
-        """Tabulate; takes about a tenth of a second."""
+    Attributes: `wavenumber` (k,) in units of 1/h, at which transforms for `linear_curves` are wanted.
+    """
+
+    def __init__(self, table: SigmaTable, rt_over_h: float, stretch: float, reach: float) -> None:
+        """Tabulate for rT/h up to `stretch` times larger or smaller; takes hundredths to tenths of a second."""
         offsets = _SPACING * np.arange(-_MIRRORED, int(np.ceil(reach / _SPACING)) + _MIRRORED + 1)
-        rho = rt_over_h * np.geomspace(1 / _RHO_RANGE, _RHO_RANGE, _RHO_NODES)
+        rho_nodes = max(5, 1 + int(np.ceil(2 * np.log(stretch) / np.log(_RHO_RATIO))))
+        rho = rt_over_h * np.geomspace(1 / stretch, stretch, rho_nodes)
         radii = np.arange(0.0, min(PROFILE_END, offsets[-1] + rho[-1]) + _SPACING / 2, _SPACING)
         radii = np.append(radii, radii[-1] + _SPACING * np.arange(1, 4)) if len(radii) < 4 else radii
         a, x = table.axes[0], table.axes[2]
@@ -64,16 +68,15 @@ class OffsetSigma:
         bessel = j0(np.multiply.outer(self.wavenumber, offsets)) * (self._weight * self.wavenumber / 3)[:, None]
         self._bessel = self.bases[3].coefficients(bessel, 1)
 
+    @cached_property
+    def contact_grid(self) -> CurveGrid:
+        """The grid of contacts with a layer whose pressures' transforms are at this object's wavenumbers."""
+        return CurveGrid(self.wavenumber)
+
     def table_curves(self, a_over_h: Floats, cbrt_load: Floats, rt_over_h: float) -> Curves:
         """σ and ∂/∂(a/h), ∂/∂L^(1/3), ∂/∂(rT/h) of the table, one row a contact."""
-        low, high = ([basis.nodes[end] for basis in self.bases[:2]] for end in (0, -1))
-        a, x = np.clip(a_over_h, low[0], high[0]), np.clip(cbrt_load, low[1], high[1])
-        coefficients = self._contract(a, x, rt_over_h)
-        beyond = np.stack([a_over_h - a, cbrt_load - x])
-        inside = np.asarray(~beyond.any(axis=0))
-        if not inside.all():
-            coefficients[0] += beyond[0, :, None] * coefficients[1] + beyond[1, :, None] * coefficients[2]
-        return Curves(coefficients, inside)
+        a, x = (basis.nodes[-1] for basis in self.bases[:2])
+        return Curves(self._contract(a_over_h, cbrt_load, rt_over_h), (a_over_h <= a) & (cbrt_load <= x))
 
     def finite_strain_curves(self, a_over_h: Floats, cbrt_load: Floats, rt_over_h: float) -> Curves:
         """What finite strain adds to the linear layer: the table less its own value at L = 0, same quantities."""
@@ -82,10 +85,9 @@ class OffsetSigma:
         linear[2] = 0.0
         return Curves(total.coefficients - linear, total.inside)
 
-    def linear_curves(self, pressure: Floats, transmission: Floats, rt_over_h: float) -> Floats:
-        """Σ over the wavenumbers: (quantities, contacts, offsets) of the transforms p̂·M (quantities, contacts, k)."""
-        disc = disc_average(self.wavenumber * rt_over_h)
-        return np.asarray((pressure * (transmission * disc)) @ self._bessel)
+    def linear_curves(self, transforms: Floats) -> Floats:
+        """The Hankel integral of the transforms p̂ · M · 2 J1(kρ)/(kρ): (quantities, contacts, k) to (…, offsets)."""
+        return np.asarray(transforms @ self._bessel)
 
     def _contract(self, a: Floats, x: Floats, rt_over_h: float) -> Floats:
         rows = len(a)
@@ -117,9 +119,9 @@ class OffsetSigma:
 
 
 @lru_cache(maxsize=8)
-def offset_sigma(table: SigmaTable, rt_over_h: float, reach: float) -> OffsetSigma:
+def offset_sigma(table: SigmaTable, rt_over_h: float, stretch: float, reach: float) -> OffsetSigma:
     """The same, kept for the next model of the same skin."""
-    return OffsetSigma(table, rt_over_h, reach)
+    return OffsetSigma(table, rt_over_h, stretch, reach)
 
 
 def _disc_averages(radii: Floats, offsets: Floats, rt_over_h: float) -> Floats:
@@ -134,13 +136,12 @@ def _disc_averages(radii: Floats, offsets: Floats, rt_over_h: float) -> Floats:
     reached = distance <= radii[-1]
     design = BSpline.design_matrix(np.where(reached, distance, 0.0), knots, 3)
     weights = np.where(reached, np.tile(weight, len(offsets)), 0.0)
-    summed = design.multiply(weights[:, None]).tocsr()
-    owner = np.arange(len(distance)) // len(weight)
-    total = np.zeros((len(offsets), len(radii)))
-    np.add.at(total, (owner[summed.tocoo().row], summed.tocoo().col), summed.tocoo().data)
-    # From spline coefficients to values at the radii.
+    # Sums over each disc of the four functions at each of its points.
+    disc = np.repeat(np.arange(len(offsets)) * len(radii), len(weight))
+    place = np.repeat(disc, 4) + design.indices
+    total = np.asarray(np.bincount(place, np.repeat(weights, 4) * design.data, len(offsets) * len(radii)), dtype=float)
     to_coefficients = np.asarray(make_interp_spline(radii, np.eye(len(radii)), k=3).c)
-    return total @ to_coefficients
+    return total.reshape(len(offsets), -1) @ to_coefficients
 
 
 def _wavenumbers(highest: float) -> tuple[Floats, Floats]:

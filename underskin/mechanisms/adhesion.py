@@ -1,0 +1,41 @@
+"""The skin sticks to the sphere.
+
+Law: Johnson, Kendall and Roberts: on the half space a³ = (3R/4E') [F + 3πwR + √(6πwRF + (3πwR)²)], pressure = Hertz'
+less a flat punch's; on the layer φ(a) = −√(2awE'/π) in PHYSICS, section 5.
+
+Assumptions: short-ranged adhesion (soft, large contacts: Tabor's number far above 1), equilibrium on the loading branch
+under a given force. FRF = Q(F)/F with the static pressure.
+
+Source: Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301.
+"""
+
+from underskin.mechanisms.contact_state import Contacts
+from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.recordings.campaign import Campaign
+
+
+class Adhesion(Mechanism):
+    """See the module."""
+
+    name = "adhesion"
+    kinds = ("frf", "indentation")
+    axes = ("preload_n", "indenter_radius_mm", "position_mm")
+
+    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+        """The work of adhesion."""
+        return (
+            Parameter(
+                name="work_of_adhesion",
+                unit="J/m²",
+                low=1e-3,
+                high=20.0,
+                prior=Normal(-1.6, 1.3),
+                scale="log",
+                limit=0.0,
+                reason="0.04 J/m² is thermodynamic for silicone; rate effects and soft gels raise it to some J/m²",
+            ),
+        )
+
+    def on_material(self, contacts: Contacts, values: Values) -> None:
+        """Make it stick."""
+        contacts.work_of_adhesion = values["work_of_adhesion"]

@@ -1,0 +1,24 @@
+"""The sphere presses a layer of finite thickness, not a half space.
+
+Law: contact radius and pressure from the integral equation of a rigid sphere on the layer (PHYSICS, section 5), with
+the layer's own ν and glue line; with adhesion where that mechanism is present too.
+
+Assumptions: linear, frictionless contact; what finite strain adds is the table's at this a and L.
+
+Source: Lebedev & Ufliand, J. Appl. Math. Mech. 22 (1958) 442; Dimitriadis et al., Biophys. J. 82 (2002) 2798.
+"""
+
+from underskin.mechanisms.contact_state import Contacts
+from underskin.mechanisms.mechanism import Mechanism, Values
+
+
+class LayeredContact(Mechanism):
+    """See the module."""
+
+    name = "layered_contact"
+    kinds = ("frf", "indentation")
+    axes = ("preload_n", "indenter_radius_mm", "position_mm")
+
+    def on_material(self, contacts: Contacts, values: Values) -> None:
+        """Press the layer."""
+        contacts.layered = True

@@ -1,0 +1,81 @@
+"""The mains' field puts charge on the leads.
+
+Law: a charge q at the mains' frequency and q/n at its n-th harmonic, each a line of width 1.5 Hz (the analysis
+window's), whatever the dynamic force: an FRF error of q/Fd, complex, its phase independent in each recording. It enters
+the covariance as pickup · pickupᵀ within a recording.
+
+Assumptions: q is the standard deviation of each component over recordings; 50 or 60 Hz, whichever stands out in the
+campaign's lines; harmonics up to the fifth.
+
+Source: PHYSICS, section 8.
+"""
+
+import numpy as np
+
+from underskin.mechanisms.differentiated import Differentiated
+from underskin.mechanisms.frf_design import FrfDesign, frf_recordings
+from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Values
+from underskin.recordings.campaign import Campaign
+from underskin.recordings.frf_estimation import Frf, lines_of
+from underskin.units import Floats
+
+_MAINS_HZ = (50.0, 60.0)
+_HARMONICS = np.arange(1, 6)
+_WIDTH_HZ = 1.5
+_REACH_HZ = 3.0
+_NEAR, _FAR = 0.3, 0.05
+
+
+class MainsPickup(Mechanism):
+    """See the module."""
+
+    name = "mains_pickup"
+    axes = ("frequency_hz", "dynamic_force_n")
+
+    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+        """The charge."""
+        return (
+            Parameter(
+                name="pickup_charge",
+                unit="pC",
+                low=1e-4,
+                high=1e3,
+                prior=Normal(-3.0, 1.5),
+                scale="log",
+                limit=0.0,
+                reason="unshielded leads of some pF to mains at 230 V collect hundredths to tenths of a pC",
+            ),
+        )
+
+    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+        """Lines near the mains are needed."""
+        for entry in frf_recordings(campaign):
+            frequency = lines_of(entry).frequency
+            if any(np.abs(frequency - mains).min() < _REACH_HZ for mains in _MAINS_HZ):
+                return None
+        return "no line lies within 3 Hz of 50 or 60 Hz (frequency_hz)"
+
+    def pickup_shape(self, campaign: Campaign, design: FrfDesign) -> Floats:
+        """The lines' shape over Fd [1/N]."""
+        lines = [lines_of(entry) for entry in frf_recordings(campaign)]
+        mains = max(_MAINS_HZ, key=lambda mains: sum(_departure(entry, mains) for entry in lines))
+        return _shape(design.row_frequency, mains) / design.row_dynamic_force
+
+    def pickup_charge(self, values: Values) -> Differentiated:
+        """q [C]."""
+        return 1e-12 * values["pickup_charge"]
+
+
+def _departure(lines: Frf, mains: float) -> float:
+    """How far the lines near the mains lie from a straight line between those beside them, relative, squared."""
+    shape = _shape(lines.frequency, mains)
+    near, far = shape > _NEAR, shape < _FAR
+    if not near.any() or far.sum() < 2:
+        return 0.0
+    expected = np.interp(lines.frequency[near], lines.frequency[far], lines.values[far])
+    return float((np.abs(lines.values[near] - expected) ** 2).sum() / np.median(np.abs(lines.values)) ** 2)
+
+
+def _shape(frequency: Floats, mains: float) -> Floats:
+    distance = (frequency[:, None] - mains * _HARMONICS) / _WIDTH_HZ
+    return np.asarray((np.exp(-0.5 * distance**2) / _HARMONICS).sum(axis=1))

@@ -1,0 +1,50 @@
+"""The indenter's axis is not where the stage says.
+
+Law: true position = commanded + a constant offset, for all recordings.
+
+Assumptions: stage and array are shifted against each other, not turned or stretched. Where every press is commanded at
+a sensor's centre the direction cannot be told, and the offset's length alone is a parameter.
+
+Source: PHYSICS, sections 3 and 8: the offset enters as J0(k e/h).
+"""
+
+import numpy as np
+
+from underskin.mechanisms.differentiated import Differentiated
+from underskin.mechanisms.frf_design import offsets
+from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.recordings.campaign import Campaign
+
+_LARGEST_MM = 2.0
+
+
+class Misalignment(Mechanism):
+    """See the module."""
+
+    name = "misalignment"
+    axes = ("position_mm", "sensor", "preload_n", "indenter_radius_mm")
+    largest_offset = 1e-3 * _LARGEST_MM * np.sqrt(2)
+
+    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+        """The offset's two components, or its length where its direction cannot be told."""
+        centred = not offsets(campaign).any()
+        names, low = (("offset",), 0.0) if centred else (("offset_x", "offset_y"), -_LARGEST_MM)
+        return tuple(
+            Parameter(
+                name=name,
+                unit="mm",
+                low=low,
+                high=_LARGEST_MM,
+                prior=Normal(0.0, 0.7),
+                scale="linear",
+                limit=0.0,
+                reason="a tip centred by eye is off by some tenths of a millimetre to a millimetre",
+            )
+            for name in names
+        )
+
+    def offset(self, values: Values) -> tuple[Differentiated, Differentiated]:
+        """The offset [m]."""
+        if "offset" in values:
+            return 1e-3 * values["offset"], 0.0 * values["offset"]
+        return 1e-3 * values["offset_x"], 1e-3 * values["offset_y"]

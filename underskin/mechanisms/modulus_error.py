@@ -1,0 +1,38 @@
+"""The declared Young's modulus is wrong: a parameter, not physics.
+
+Law: E = declared E · factor; it acts through a³ ∝ 1/E and L ∝ 1/E, and on an indentation's or compression's force.
+
+Assumptions: one factor for the whole skin, in all recordings.
+
+Source: PHYSICS, section 8; under force control σ of a linear layer depends on E through the contact radius alone.
+"""
+
+from underskin.mechanisms.contact_state import Contacts
+from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.recordings.campaign import Campaign
+
+
+class ModulusError(Mechanism):
+    """See the module."""
+
+    name = "modulus_error"
+    axes = ("preload_n", "indenter_radius_mm", "position_mm")
+
+    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+        """True over declared modulus."""
+        return (
+            Parameter(
+                name="modulus_factor",
+                unit="-",
+                low=0.25,
+                high=4.0,
+                prior=Normal(0.0, 0.35),
+                scale="log",
+                limit=1.0,
+                reason="E from a durometer, a data sheet or another cure is off by tens of percent",
+            ),
+        )
+
+    def on_declared(self, contacts: Contacts, values: Values) -> None:
+        """Scale the modulus."""
+        contacts.modulus = contacts.modulus * values["modulus_factor"]

@@ -1,0 +1,47 @@
+"""Each sensor has its own d33.
+
+Law: d33 of sensor j = d33 · e^(g_j), g_j normal with the standard deviation `spread`.
+
+Assumptions: the gains are the sensors' own, constant over the campaign; they are marginalised by whoever fits, as a
+random effect along the model's response that a sensor's recordings share. Without this mechanism the spread is 1 %.
+
+Source: PHYSICS, section 8.
+"""
+
+from underskin.mechanisms.composition import SENSOR_SPREAD
+from underskin.mechanisms.differentiated import Differentiated
+from underskin.mechanisms.frf_design import frf_recordings
+from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Values
+from underskin.recordings.campaign import Campaign
+
+
+class SensorSpread(Mechanism):
+    """See the module."""
+
+    name = "sensor_spread"
+    axes = ("sensor",)
+
+    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+        """The spread."""
+        return (
+            Parameter(
+                name="spread",
+                unit="-",
+                low=0.02,
+                high=0.8,
+                prior=Normal(-2.1, 0.6),
+                scale="log",
+                limit=SENSOR_SPREAD,
+                reason="poled films and printed electrodes vary by some to 30 percent; 12 % within a factor of 1.8",
+            ),
+        )
+
+    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+        """Two sensors are needed."""
+        if len({entry.sensor for entry in frf_recordings(campaign)}) < 2:
+            return "all recordings are of one sensor"
+        return None
+
+    def spread(self, values: Values) -> Differentiated:
+        """The spread."""
+        return values["spread"]

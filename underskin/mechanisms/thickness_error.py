@@ -1,0 +1,39 @@
+"""The declared thickness is wrong: a parameter, not physics.
+
+Law: h = declared h · factor; it acts through a/h, rT/h and e/h: everything.
+
+Assumptions: one factor for the whole skin, in all recordings.
+
+Source: PHYSICS, sections 1 and 8.
+"""
+
+from underskin.mechanisms.contact_state import Contacts
+from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.recordings.campaign import Campaign
+
+
+class ThicknessError(Mechanism):
+    """See the module."""
+
+    name = "thickness_error"
+    axes = ("preload_n", "indenter_radius_mm", "position_mm")
+    largest_stretch = 1.55
+
+    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+        """True over declared thickness."""
+        return (
+            Parameter(
+                name="thickness_factor",
+                unit="-",
+                low=0.65,
+                high=1.55,
+                prior=Normal(0.0, 0.12),
+                scale="log",
+                limit=1.0,
+                reason="a cast layer differs from its mould by shrinkage, meniscus and tilt: some to 20 percent",
+            ),
+        )
+
+    def on_declared(self, contacts: Contacts, values: Values) -> None:
+        """Scale the thickness."""
+        contacts.thickness = contacts.thickness * values["thickness_factor"]
