@@ -104,7 +104,7 @@ class SphereOnLayer:
         )
 
     def pull_off(self) -> SphereContact:
-        """The smallest force at which the sphere sticks; InvalidInput without adhesion."""
+        """The smallest force at which it sticks; InvalidInput without adhesion, or where a/h would exceed 10."""
         if self.work_of_adhesion == 0:
             raise InvalidInput("work_of_adhesion", 0.0, "must be greater than 0 for a pull-off")
         guess = min(self._half_space_radius(-np.inf), LARGEST * self.thickness / 4)
@@ -114,7 +114,11 @@ class SphereOnLayer:
             method="bounded",
             options={"xatol": 1e-9},
         )
-        return self.at_radius(float(least.x) * guess)
+        radius = float(least.x) * guess
+        if radius > 0.999 * LARGEST * self.thickness:
+            allowed = f"must let the sphere come off below a radius of {LARGEST:g} thicknesses"
+            raise InvalidInput("work_of_adhesion", self.work_of_adhesion, allowed)
+        return self.at_radius(radius)
 
     @property
     def _force_unit(self) -> float:

@@ -27,7 +27,7 @@ REACH = 4.0  # largest a/h
 _NODES = 28
 _TABLE: Floats = REACH / 128 * np.arange(1.0, 129.0)  # of a/h, for first guesses
 _SMALLEST = 1e-12
-_TOLERANCE = 1e-12
+_TOLERANCE = 1e-7  # of the last step; the error that is left is about its square
 _ITERATIONS = 60
 
 # Sums of terms: factor, exponent of α, the curve among A, G, B, V, S, and whether U multiplies it.
@@ -108,6 +108,10 @@ class ContactCurves:
         equivalent = np.sqrt(np.maximum(depth, 0.0)) + np.cbrt(2 * np.pi * root_adhesion**2)
         start = self._depth_start(equivalent, root_adhesion)
         return self._contacts(depth, root_adhesion, start, _DEPTH)
+
+    def stiffness_at(self, alpha: Floats) -> Floats:
+        """S at given a/h (rows,), 0 to REACH: its value and derivatives by α, ν and slip (4, rows)."""
+        return self._evaluated(self.interval.basis(alpha))[:, _STIFFNESS[0][2]]
 
     def _contacts(self, target: Floats, root_adhesion: Floats, start: Floats, given: _Law) -> ContactRows:
         alpha = self._newton(target, root_adhesion, start, given)
