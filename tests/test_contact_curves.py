@@ -119,3 +119,15 @@ def test_no_contact_is_nan() -> None:
     load, adhesion = _dimensionless(setup, setup.pull_off().force * np.array([1.001, 0.999]))
     rows = curves.at_load(load, adhesion)
     assert np.isnan(rows.stiffness.value).tolist() == [True, False]
+
+
+def test_stiffness_at_a_given_radius() -> None:
+    alpha, step = np.array([0.0, 0.3, 2.0, 3.9]), 1e-5
+    found = GRID.curves(Layer(0.4, 0.3)).stiffness_at(alpha)
+    assert found[0, 0] == pytest.approx(1.0, abs=1e-8)
+    exact = ContactEquation(alpha[1:]).solve(Layer(0.4, 0.3)).stiffness
+    assert found[[0, 2, 3], 1:] == pytest.approx(exact, rel=1e-6)
+    neighbours = (
+        ContactEquation(np.concatenate([alpha[1:] - step, alpha[1:] + step])).solve(Layer(0.4, 0.3)).stiffness[0]
+    )
+    assert found[1, 1:] == pytest.approx((neighbours[3:] - neighbours[:3]) / (2 * step), rel=1e-6)
