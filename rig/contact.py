@@ -39,40 +39,46 @@ _BASIS: Floats = np.array([np.polynomial.legendre.Legendre.basis(2 * j)(_T) for 
 class SphereContact:
     """Curves over a/h for one Poisson ratio and glue line; see `sphere_contact`.
 
-    `_solutions` gives, for right sides 1 and s², φ at the quadrature nodes and at 1: (2, nodes + 1).
+    For right sides 1 and s², `_solutions` gives φ at the quadrature nodes, (2, nodes), and `_summary` ∫ φ dt and φ(1),
+    (2, 2). The adhesion w may be an array over contacts, as may every other argument.
     """
 
     poisson_ratio: float
     _solutions: CubicSpline
+    _summary: CubicSpline
 
-    def force(self, a: Floats, radius: float | Floats, modulus: float | Floats, adhesion: float = 0.0) -> Floats:
+    def force(
+        self, a: Floats, radius: float | Floats, modulus: float | Floats, adhesion: float | Floats = 0.0
+    ) -> Floats:
         """F of a contact of radius a, all in units of h, E and h (F in E h², adhesion w in E h)."""
         plane = modulus / (1 - self.poisson_ratio**2)
-        punch, bowl = self._integrals(a)
+        punch, bowl = np.moveaxis(self._summary(a)[..., 0], -1, 0)
         depth = self.depth(a, radius, modulus, adhesion)
         return np.pi * plane * a * (depth * punch - a**2 / (2 * radius) * bowl)
 
-    def depth(self, a: Floats, radius: float | Floats, modulus: float | Floats, adhesion: float = 0.0) -> Floats:
+    def depth(
+        self, a: Floats, radius: float | Floats, modulus: float | Floats, adhesion: float | Floats = 0.0
+    ) -> Floats:
         """Indentation δ of a contact of radius a, in units of h."""
         plane = modulus / (1 - self.poisson_ratio**2)
-        edge = self._solutions(a)[..., -1]
+        edge = self._summary(a)[..., 1]
         pull = 2 / plane * np.sqrt(2 * a * adhesion * plane / np.pi)
         return (a**2 / (2 * radius) * edge[..., 1] - pull) / edge[..., 0]
 
     def stiffness(self, a: Floats, modulus: float | Floats) -> Floats:
         """dF/dδ at a held edge, in E h."""
-        return np.pi * modulus / (1 - self.poisson_ratio**2) * a * self._integrals(a)[0]
+        return np.pi * modulus / (1 - self.poisson_ratio**2) * a * self._summary(a)[..., 0, 0]
 
-    def shape(self, a: Floats, radius: Floats, modulus: Floats, adhesion: float, k: Floats) -> Floats:
+    def shape(self, a: Floats, radius: Floats, modulus: Floats, adhesion: float | Floats, k: Floats) -> Floats:
         """Transform of the pressure over its force, (rows, k)."""
-        phi = self._solutions(a)[..., :-1]
+        phi = self._solutions(a)
         depth = self.depth(a, radius, modulus, adhesion)
         profile = depth[:, None] * phi[:, 0] - (a**2 / (2 * radius))[:, None] * phi[:, 1]
         weighted = profile * _T_WEIGHT
         waves = np.cos(a[:, None, None] * k[:, None] * _T)
         return np.einsum("rt,rkt->rk", weighted, waves) / weighted.sum(axis=1, keepdims=True)
 
-    def radius_of(self, force: Floats, radius: Floats, modulus: Floats, adhesion: float = 0.0) -> Floats:
+    def radius_of(self, force: Floats, radius: Floats, modulus: Floats, adhesion: float | Floats = 0.0) -> Floats:
         """The contact radius under a force, on the stable branch, by bisection in log a; NaN where none is.
 
         All in units of h, E, h. Raises RigError where the contact is wider than the curves reach.
@@ -89,18 +95,14 @@ class SphereContact:
             low, high = np.where(under, middle, low), np.where(under, high, middle)
         return np.where(held, np.exp((low + high) / 2), np.nan)
 
-    def _least(self, radius: Floats, modulus: Floats, adhesion: float) -> Floats:
+    def _least(self, radius: Floats, modulus: Floats, adhesion: float | Floats) -> Floats:
         """The radius at pull-off under force control, where F is least: the rising branch begins there."""
-        if adhesion == 0:
-            return np.full(np.shape(radius * modulus), 1e-6)
+        rows = np.broadcast_arrays(radius, modulus, adhesion)
+        if not np.any(adhesion):
+            return np.full(rows[0].shape, 1e-6)
         grid = np.geomspace(1e-4, WIDEST, 400)
-        rows = np.broadcast_arrays(radius, modulus)
-        force = self.force(grid, rows[0][..., None], rows[1][..., None], adhesion)
-        return grid[np.argmin(force, axis=-1)]
-
-    def _integrals(self, a: Floats) -> tuple[Floats, Floats]:
-        whole = self._solutions(a)[..., :-1] @ _T_WEIGHT
-        return whole[..., 0], whole[..., 1]
+        force = self.force(grid, *(row[..., None] for row in rows))
+        return np.asarray(grid[np.argmin(force, axis=-1)])
 
 
 @lru_cache(maxsize=64)
@@ -109,7 +111,8 @@ def sphere_contact(layer: Layer) -> SphereContact:
     k, weight = _nodes(160, 40.0)
     missing = weight * (1 - layer.compliance(k))
     solutions = np.array([_solution(alpha, k, missing) for alpha in _RADII])
-    return SphereContact(layer.poisson_ratio, CubicSpline(_RADII, solutions))
+    summary = np.stack([solutions[..., :-1] @ _T_WEIGHT, solutions[..., -1]], axis=-1)
+    return SphereContact(layer.poisson_ratio, CubicSpline(_RADII, solutions[..., :-1]), CubicSpline(_RADII, summary))
 
 
 def _solution(alpha: float, k: Floats, missing: Floats) -> NDArray[np.float64]:

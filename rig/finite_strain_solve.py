@@ -149,7 +149,7 @@ class Layer:
         coupling = -np.einsum("ep,epc,epcn,pm->enm", w, cofactor, b, self.modes, optimize=True)
         matrix[:, :18, 18:] = coupling
         matrix[:, 18:, :18] = coupling.transpose(0, 2, 1)
-        total = np.bincount(self.unknowns.ravel(), forces.ravel(), self.size)
+        total = np.bincount(self.unknowns.ravel(), forces.ravel(), self.size).astype(np.float64)
         rows = np.repeat(self.unknowns, 21, axis=1).ravel()
         columns = np.tile(self.unknowns, (1, 21)).ravel()
         return total, coo_matrix((matrix.ravel(), (rows, columns)), shape=(self.size, self.size))

@@ -1,0 +1,228 @@
+"""Random experiments of kind frf like a lab's that hide no, one, two or uncatalogued effects; fixed by seed and number.
+
+Skins, arrays, preloads, noise and the effects' strengths are drawn from ranges that labs have, strengths evenly in
+their logarithm, from subtle to strong. An experiment whose contact leaves the rig's reach is drawn again.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+
+from rig.effects import EFFECTS, FRF, UNCATALOGUED
+from rig.errors import RigError
+from rig.experiment import SCHEMA, parse
+from rig.recorded import RecordedLines, record_lines
+
+What = Literal["none", "single", "pair", "unknown"]
+SHARES: dict[What, float] = {"none": 0.2, "single": 0.4, "pair": 0.2, "unknown": 0.2}
+CATALOGUED = tuple(name for name, effect in EFFECTS.items() if FRF in effect.kinds)
+UNKNOWN = tuple(name for name, effect in UNCATALOGUED.items() if FRF in effect.kinds)
+_TWINS = ({"moving_contact_edge", "amplitude_nonlinearity"}, {"modulus_error", "strain_stiffening"})
+_INDENTERS = np.array([2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])
+_ARRAYS = ((1, 1), (1, 1), (2, 2), (3, 3), (4, 2), (4, 4), (8, 4), (8, 8))
+_WIDEST, _HARDEST = 1.8, 0.06  # a/h and L of the base model
+_MOST = 110
+
+# What an effect needs of the design to act at all.
+_NEEDS_CYCLES = {"ageing", "cracked_electrode"}
+_NEEDS_DWELL = {"contact_creep"}
+_NEEDS_TIME = {"temperature_drift"}
+_NEEDS_SENSORS = {"sensor_spread", "crosstalk", "bending_substrate"}
+_NEEDS_POSITIONS = {"misalignment", "crosstalk", "interface_slip", "compressible_layer", "stage_wobble"}
+_NEEDS_HIGH_LINES = {"contact_resonance", "timing_delay", "rattle", "cable_motion"}
+_NEEDS_AMPLITUDES = {"amplitude_nonlinearity", "mains_pickup"}
+_NEEDS_SOFT = {"layered_contact", "adhesion", "contact_creep", "modulus_error", "strain_stiffening"}
+
+
+def draw(seed: int, number: int, what: What | None = None) -> dict[str, Any]:
+    """The description of random experiment `number` of a seed; `what` it hides is drawn too where not given."""
+    random = np.random.default_rng([seed, number, 17])
+    drawn: What = random.choice(list(SHARES), p=list(SHARES.values())) if what is None else what
+    for _ in range(200):
+        names = _names(random, drawn)
+        description = _description(random, f"drawn {seed}/{number}", set(names))
+        description["effects"] = {name: _strength(random, name, description) for name in names}
+        try:
+            record_lines(parse(description))
+        except RigError:
+            continue
+        return description
+    raise RuntimeError(f"no feasible experiment {seed}/{number}")
+
+
+def record(description: Mapping[str, Any]) -> RecordedLines:
+    """Carry out a description."""
+    return record_lines(parse(description))
+
+
+def _names(random: np.random.Generator, what: What) -> list[str]:
+    if what == "none":
+        return []
+    if what == "unknown":
+        return [str(random.choice(UNKNOWN))]
+    while True:
+        names = [str(name) for name in random.choice(CATALOGUED, 1 if what == "single" else 2, replace=False)]
+        if set(names) not in _TWINS:
+            return names
+
+
+def _log(random: np.random.Generator, low: float, high: float) -> float:
+    """Even in the logarithm, to three digits."""
+    return float(f"{math.exp(random.uniform(math.log(low), math.log(high))):.3g}")
+
+
+def _description(random: np.random.Generator, name: str, effects: set[str]) -> dict[str, Any]:
+    skin, spacing = _skin(random, effects)
+    high = bool(effects & _NEEDS_HIGH_LINES) or random.random() < 0.4
+    return {
+        "schema": SCHEMA,
+        "name": name,
+        "seed": int(random.integers(2**31)),
+        "skin": skin,
+        "design": _design(random, skin, spacing, effects),
+        "lines": {"low_hz": 1.0, "high_hz": 1000.0 if high else 130.0, "count": int(random.integers(25, 76))},
+        "noise": {
+            "gain": _log(random, 0.01, 0.05),
+            "position_mm": _log(random, 0.05, 0.3) if random.random() < 0.35 else 0.0,
+            "line": _log(random, 0.003, 0.03),
+            "low": float(random.uniform(0, 1.5)),
+            "high": float(random.uniform(0, 1.5)),
+            "floor_pc_per_n": _log(random, 0.01, 0.1),
+            "averages": float(random.choice([8, 16, 32])),
+            "coherence": bool(random.random() < 0.7),
+        },
+    }
+
+
+def _skin(random: np.random.Generator, effects: set[str]) -> tuple[dict[str, Any], float]:
+    """A skin, in a third of cases the prototype's, and its pitch."""
+    soft = bool(effects & _NEEDS_SOFT)
+    prototype = random.random() < (0.1 if soft else 0.35)
+    skin: dict[str, Any] = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16.0, "sensor_radius_mm": 1.5}
+    if not prototype:
+        skin["thickness_mm"] = _log(random, 1.0, 4.0)
+        skin["youngs_modulus_mpa"] = _log(random, 0.4, 3.0 if soft else 16.0)
+        skin["sensor_radius_mm"] = _log(random, max(0.5, 0.25 * skin["thickness_mm"]), 1.3 * skin["thickness_mm"])
+    arrays = [array for array in _ARRAYS if math.prod(array) >= 4] if effects & _NEEDS_SENSORS else list(_ARRAYS)
+    columns, rows = arrays[random.integers(len(arrays))]
+    pitch = 8.0 if prototype else float(f"{max(3.0, 2.2 * skin['sensor_radius_mm']) * random.uniform(1, 1.8):.2g}")
+    skin |= {"d33_pc_per_n": _log(random, 8, 30), "array": {"columns": columns, "rows": rows, "pitch_mm": pitch}}
+    if "bending_substrate" in effects or random.random() < 0.5:
+        skin |= {"length_mm": round(pitch * (columns + 1.5), 1), "width_mm": round(pitch * (rows + 1.5), 1)}
+    return skin, pitch
+
+
+def _design(random: np.random.Generator, skin: Mapping[str, Any], pitch: float, effects: set[str]) -> dict[str, Any]:
+    """Indenters, preloads up to what the skin bears, and what else the lab writes down."""
+    sensors = skin["array"]["columns"] * skin["array"]["rows"]
+    indenters = sorted(random.choice(_INDENTERS, random.integers(1, 4), replace=False).tolist())
+    lowest = float(random.choice([0.2, 0.3, 0.5]))
+    highest = min(_bearable(skin, indenters), float(random.uniform(1.5, 4.0)))
+    count = int(random.integers(3, 11))
+    preloads = sorted({float(f"{force:.2g}") for force in np.geomspace(min(lowest, 0.4 * highest), highest, count)})
+    dynamic = sorted({_log(random, 0.02, 0.2) for _ in range(2 if effects & _NEEDS_AMPLITUDES else 1)})
+    design: dict[str, Any] = {
+        "indenters_mm": indenters,
+        "preloads_n": preloads,
+        "dynamic_forces_n": [min(force, 0.5 * preloads[0]) for force in dynamic],
+        "shuffled": bool(random.random() < 0.6),
+        "most_recordings": int(random.integers(24, _MOST + 1)),
+        "repeats": 1 if sensors > 1 else int(random.integers(1, 4)),
+    }
+    if effects & _NEEDS_POSITIONS or random.random() < 0.25:
+        reach = min(0.5 * pitch if sensors > 1 else math.inf, 1.2 * skin["thickness_mm"])
+        angles = random.uniform(0, 2 * math.pi, 5)
+        ring = [[round(reach * s * math.cos(t), 2), round(reach * s * math.sin(t), 2)] for s, t in zip(
+            (0.3, 0.5, 0.7, 0.85, 1.0), angles, strict=True)]  # fmt: skip
+        design["offsets_mm"] = [[0.0, 0.0], *ring[: int(random.integers(3, 6))]]
+    total = sensors * len(indenters) * len(preloads) * design["repeats"] * len(design.get("offsets_mm", [0]))
+    design["most_recordings"] = min(total, design["most_recordings"])
+    if effects & _NEEDS_DWELL or random.random() < 0.3:
+        design["dwells_s"] = [1.0, 5.0, 20.0, 60.0, 300.0][: int(random.integers(3, 6))]
+    if effects & _NEEDS_CYCLES or random.random() < 0.4:
+        design["cycles_per_recording"] = _log(random, 10, 1000)
+    if effects & _NEEDS_TIME or random.random() < 0.6:
+        design |= {"start": "2021-03-01T09:00:00Z", "minutes_per_recording": float(random.choice([3, 5, 10, 30]))}
+    return design
+
+
+def _bearable(skin: Mapping[str, Any], indenters: list[float]) -> float:
+    """The force at which the base model's contact gets too wide or too hard."""
+    modulus, h = skin["youngs_modulus_mpa"], skin["thickness_mm"]
+    wide = (_WIDEST * h) ** 3 * modulus / (0.5625 * max(indenters))
+    return float(min(wide, _HARDEST * min(indenters) ** 2 * modulus))
+
+
+def _strength(random: np.random.Generator, name: str, description: Mapping[str, Any]) -> dict[str, Any]:
+    """An effect's parameters, subtle to strong."""
+    skin, design, lines = (description[part] for part in ("skin", "design", "lines"))
+    sign = float(random.choice([-1, 1]))
+    cycles = design.get("cycles_per_recording", 1.0) * design["most_recordings"]
+    stress = 1.5 * design["preloads_n"][-1] / (math.pi * skin["thickness_mm"] ** 2)  # MPa, about, at the highest
+    angle = random.uniform(0, 2 * math.pi)
+    reach = skin["thickness_mm"] * _log(random, 0.08, 0.5)
+    inside_hz = _log(random, 8, 0.5 * lines["high_hz"])
+    laws: dict[str, Any] = {
+        "moving_contact_edge": lambda: {"mobile_fraction": round(random.uniform(0.3, 1), 3)},
+        "layered_contact": dict,
+        "misalignment": lambda: {"x_mm": round(reach * math.cos(angle), 3), "y_mm": round(reach * math.sin(angle), 3)},
+        "adhesion": lambda: {"work_j_per_m2": _log(random, 0.05, 2)},
+        "strain_stiffening": lambda: {"coefficient": _log(random, 1, 8), "law": _either(random, "linear", "limited")},
+        "compressible_layer": lambda: {"poisson_ratio": round(random.uniform(0.3, 0.49), 3)},
+        "interface_slip": lambda: {"glue_stiffness": _log(random, 0.05, 20)},
+        "preload_dependent_d33": lambda: {
+            "beta_per_mpa": sign * _log(random, 0.05, 0.6) / stress,
+            "saturation_mpa": stress * _log(random, 0.3, 3),
+            "law": _either(random, "linear", "saturating"),
+        },
+        "sensor_spread": lambda: {"sd": _log(random, 0.02, 0.25)},
+        "ageing": lambda: {
+            "rate": _log(random, 0.05, 0.35),
+            "cycles": cycles * _log(random, 0.02, 0.5),
+            "law": _either(random, "log", "exponential"),
+        },
+        "contact_resonance": lambda: {"tip_mass_g": _log(random, 0.1, 30), "damping": _log(random, 0.01, 0.15)},
+        "amplifier_high_pass": lambda: {"corner_hz": _log(random, 0.05, 3)},
+        "sensor_relaxation": lambda: (
+            {"law": "ladder", "exponent": _log(random, 0.003, 0.06)}
+            if random.random() < 0.5
+            else {"law": "step", "step": _log(random, 0.02, 0.5), "corner_hz": _log(random, 3, 100)}
+        ),
+        "contact_creep": lambda: {"fraction": round(random.uniform(0.1, 0.7), 3), "time_s": _log(random, 3, 150)},
+        "mains_pickup": lambda: {
+            "charge_pc": _log(random, 0.02, 0.6) * 0.2 * skin["d33_pc_per_n"] * design["dynamic_forces_n"][0],
+            "mains_hz": float(random.choice([50, 60])),
+        },
+        "amplitude_nonlinearity": lambda: {"mobility": round(random.uniform(0.3, 1), 3)},
+        "crosstalk": lambda: {"fraction": _log(random, 0.02, 0.3)},
+        "timing_delay": lambda: {"delay_us": _log(random, 2, 300)},
+        "modulus_error": lambda: {"factor": _log(random, 1.08, 1.6) ** sign},
+        "thickness_error": lambda: {"factor": _log(random, 1.03, 1.25) ** sign},
+        "bending_substrate": lambda: {"amplitude": sign * _log(random, 0.05, 0.4)},
+        "preload_leak": lambda: {"corner_hz": _log(random, 0.1, 3), "power": round(random.uniform(0.5, 2), 2)},
+        "temperature_drift": lambda: {
+            "amplitude": _log(random, 0.03, 0.25),
+            "period_h": design.get("minutes_per_recording", 5) / 60 * design["most_recordings"] * _log(random, 0.3, 1),
+        },
+        "stage_wobble": lambda: {"amplitude_mm": 2 * reach, "period_recordings": round(random.uniform(4, 20), 2)},
+        "hysteretic_d33": lambda: {"amplitude": sign * _log(random, 0.03, 0.25)},
+        "rattle": lambda: {
+            "hz": inside_hz,
+            "amplitude": sign * _log(random, 0.02, 0.3),
+            "damping": _log(random, 0.03, 0.2),
+        },
+        "notch": lambda: {"hz": inside_hz, "left": round(random.uniform(0, 0.9), 3), "width_hz": 0.25 * inside_hz},
+        "cable_motion": lambda: {"hz": inside_hz, "amplitude": sign * _log(random, 0.02, 0.4)},
+        "cracked_electrode": lambda: {
+            "amplitude": _log(random, 0.04, 0.3),
+            "at_cycle": float(round(cycles * random.uniform(0.2, 0.8))),
+        },
+    }
+    values: dict[str, Any] = laws[name]()
+    return values
+
+
+def _either(random: np.random.Generator, first: str, second: str) -> str:
+    return first if random.random() < 0.5 else second

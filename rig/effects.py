@@ -1,0 +1,189 @@
+"""What may be switched on: every effect's law as the rig has it, its parameters and the kinds it acts on.
+
+The first part has the names of the project's catalogue (PHYSICS, section 8), the second is physics that is not in it.
+The laws are the rig's own: physical, not always in the catalogue's parametrisation. Units stand in the names.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rig import checks
+from rig.errors import RigError
+
+FRF, INDENTATION, COMPRESSION = "frf", "indentation", "compression"
+_PRESSED = (FRF, INDENTATION)
+
+Values = dict[str, float | str]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """`parameters`: name to lowest and highest value; `laws`: names of its laws, the first by default."""
+
+    law: str
+    kinds: tuple[str, ...]
+    parameters: Mapping[str, tuple[float, float]]
+    laws: tuple[str, ...] = ()
+    optional: tuple[str, ...] = ()  # parameters that only some laws need
+
+
+EFFECTS: dict[str, Effect] = {
+    "moving_contact_edge": Effect(
+        "a fraction m of the edge follows the load: (1−m) σ + m d(Fσ)/dF", (FRF,), {"mobile_fraction": (0, 1)}
+    ),
+    "layered_contact": Effect("the sphere feels the base: contact radius and pressure of the layer", _PRESSED, {}),
+    "misalignment": Effect("every position is off by one vector", (FRF,), {"x_mm": (-5, 5), "y_mm": (-5, 5)}),
+    "adhesion": Effect("JKR, on the layer where layered_contact is on", _PRESSED, {"work_j_per_m2": (0, 5)}),
+    "strain_stiffening": Effect(
+        "with the contact strain e = 0.2 a/R (a cylinder: e = |u|/H): linear E (1 + c e), limited E/(1 − c e)",
+        (FRF, INDENTATION, COMPRESSION),
+        {"coefficient": (0, 20)},
+        ("linear", "limited"),
+    ),
+    "compressible_layer": Effect("ν of the layer", _PRESSED, {"poisson_ratio": (0.2, 0.5)}),
+    "interface_slip": Effect("the glue line yields: shear stress κ (G/h) u_r", (FRF,), {"glue_stiffness": (0, 1e6)}),
+    "preload_dependent_d33": Effect(
+        "with the sensor's mean stress T: linear 1 + β T, saturating 1 + β T/(1 + T/Ts)",
+        (FRF,),
+        {"beta_per_mpa": (-20, 20), "saturation_mpa": (1e-4, 100)},
+        ("linear", "saturating"),
+        optional=("saturation_mpa",),
+    ),
+    "sensor_spread": Effect("each sensor its own gain, log-normal", (FRF,), {"sd": (0, 1)}),
+    "ageing": Effect(
+        "after N load cycles: log 1 − r log10(1 + N/n0), exponential 1 − r (1 − e^(−N/n0))",
+        (FRF,),
+        {"rate": (0, 1), "cycles": (1, 1e9)},
+        ("log", "exponential"),
+    ),
+    "contact_resonance": Effect(
+        "a tip mass on the contact spring of the layer, 1/(1 − (ω/ω0)² + 2iζω/ω0)",
+        (FRF,),
+        {"tip_mass_g": (0, 500), "damping": (1e-3, 2)},
+    ),
+    "amplifier_high_pass": Effect("iωτ/(1 + iωτ)", (FRF,), {"corner_hz": (0, 100)}),
+    "sensor_relaxation": Effect(
+        "a ladder of Debye terms, nearly (iω/ω30)^(−n) from 0.1 Hz to 10 kHz, or one step 1 + s/(1 + iω/ω_s)",
+        (FRF,),
+        {"exponent": (0, 0.4), "step": (0, 5), "corner_hz": (1e-3, 1e4)},
+        ("ladder", "step"),
+        optional=("exponent", "step", "corner_hz"),
+    ),
+    "contact_creep": Effect(
+        "standard linear solid: relaxes to E (1 − g) with τ; under constant load a³ grows with its creep compliance",
+        (FRF, INDENTATION, COMPRESSION),
+        {"fraction": (0, 0.95), "time_s": (1e-3, 1e6)},
+    ),
+    "mains_pickup": Effect(
+        "a charge at the mains frequency and a third of it at its third harmonic",
+        (FRF,),
+        {"charge_pc": (0, 1000), "mains_hz": (50, 60)},
+    ),
+    "amplitude_nonlinearity": Effect(
+        "a fraction m of the edge follows the whole cycle: first harmonic of Fσ over Fd", (FRF,), {"mobility": (0, 1)}
+    ),
+    "crosstalk": Effect("a fraction of the charge of each sensor within 1.2 pitch adds", (FRF,), {"fraction": (0, 1)}),
+    "timing_delay": Effect("the charge comes late", (FRF,), {"delay_us": (-1e4, 1e4)}),
+    "instrument_compliance": Effect("the stage gives by F/k", (INDENTATION,), {"stiffness_n_per_mm": (1e-3, 1e6)}),
+    "platen_friction": Effect(
+        "friction f holds the cylinder's ends: stiffer by 1 + 2 f S², S = diameter/(4 height)",
+        (COMPRESSION,),
+        {"friction": (0, 1)},
+    ),
+    "modulus_error": Effect("true E = factor · declared", (FRF, INDENTATION), {"factor": (0.2, 5)}),
+    "thickness_error": Effect("true h = factor · declared", (FRF,), {"factor": (0.5, 2)}),
+}
+
+UNCATALOGUED: dict[str, Effect] = {
+    "bending_substrate": Effect(
+        "the plate bends between its supports: gain 1 + A (1 − X²)(1 − Y²), X, Y the position over the half plate",
+        (FRF,),
+        {"amplitude": (-1, 2)},
+    ),
+    "preload_leak": Effect(
+        "the crack under load leaks charge: high-pass whose corner grows as (F/1 N)^p",
+        (FRF,),
+        {"corner_hz": (0, 100), "power": (0, 4)},
+    ),
+    "temperature_drift": Effect(
+        "gain 1 + A sin(2π t/period) with the time of day", (FRF,), {"amplitude": (0, 1), "period_h": (0.1, 100)}
+    ),
+    "stage_wobble": Effect(
+        "the true position runs round a circle from one recording to the next",
+        (FRF,),
+        {"amplitude_mm": (0, 5), "period_recordings": (2, 1000)},
+    ),
+    "hysteretic_d33": Effect(
+        "gain 1 − A where the preload before was higher", (FRF,), {"amplitude": (-1, 1)}
+    ),
+    "rattle": Effect(
+        "a loose part at a fixed frequency: 1 + A/(1 − (ω/ω1)² + 2iζω/ω1) − A",
+        (FRF,),
+        {"hz": (1, 1e4), "amplitude": (-2, 2), "damping": (1e-3, 1)},
+    ),
+    "notch": Effect(
+        "a trap: (s² + d b s + ω1²)/(s² + b s + ω1²)", (FRF,), {"hz": (1, 1e4), "left": (0, 5), "width_hz": (0.1, 1e4)}
+    ),
+    "cable_motion": Effect(
+        "the cable shakes above its own resonance: 1 + A s²/(s² + 1.4 ω1 s + ω1²)",
+        (FRF,),
+        {"hz": (1, 1e4), "amplitude": (-2, 2)},
+    ),
+    "cracked_electrode": Effect(
+        "from one load cycle on the gain drops by A", (FRF,), {"amplitude": (-1, 1), "at_cycle": (0, 1e9)}
+    ),
+    "force_ripple": Effect(
+        "the spindle's pitch shows in the force: A F sin(2π u/pitch)",
+        (INDENTATION, COMPRESSION),
+        {"amplitude": (0, 1), "pitch_mm": (1e-4, 10)},
+    ),
+    "force_drift": Effect(
+        "the force cell warms: a force that grows with the root of time",
+        (INDENTATION, COMPRESSION),
+        {"n_per_root_s": (-1, 1)},
+    ),
+    "tilted_platen": Effect(
+        "the end touches little by little over a wedge", (COMPRESSION,), {"wedge_mm": (0, 5)}
+    ),
+}  # fmt: skip
+
+KNOWN = {**EFFECTS, **UNCATALOGUED}
+
+
+def checked(kind: str, document: Any) -> dict[str, Values]:
+    """The effects of a description, every parameter given and within its range; raises RigError."""
+    given = checks.mapping("effects", document, tuple(KNOWN))
+    result: dict[str, Values] = {}
+    for name, parameters in given.items():
+        effect, field = KNOWN[name], f"effects.{name}"
+        if kind not in effect.kinds:
+            raise RigError(field, kind, f"acts on recordings of kind {', '.join(effect.kinds)}")
+        known = (*effect.parameters, *(("law",) if effect.laws else ()))
+        entry = checks.mapping(field, {} if parameters is None else parameters, known)
+        values: Values = {}
+        if effect.laws:
+            values["law"] = checks.one_of(f"{field}.law", entry.get("law", effect.laws[0]), effect.laws)
+        for parameter, (low, high) in effect.parameters.items():
+            if parameter in entry:
+                values[parameter] = checks.number(f"{field}.{parameter}", entry[parameter], low, high)
+            elif parameter not in effect.optional:
+                raise RigError(f"{field}.{parameter}", None, f"required, {low:g} to {high:g}")
+        for parameter in _needed_by_law(name, values):
+            if parameter not in values:
+                raise RigError(f"{field}.{parameter}", None, f"required by the law {values['law']}")
+        result[name] = values
+    return result
+
+
+def _needed_by_law(name: str, values: Values) -> tuple[str, ...]:
+    return {
+        ("preload_dependent_d33", "saturating"): ("saturation_mpa",),
+        ("sensor_relaxation", "ladder"): ("exponent",),
+        ("sensor_relaxation", "step"): ("step", "corner_hz"),
+    }.get((name, str(values.get("law"))), ())
+
+
+def of(effects: Mapping[str, Values], name: str, parameter: str) -> float:
+    """A parameter's value; 0 where the effect is off."""
+    return float(effects[name][parameter]) if name in effects else 0.0

@@ -1,0 +1,150 @@
+"""An experiment carried out: FRF lines with the rig's noise, and what is true of them.
+
+Each recording has a gain of its own, e^N(0, gain²), an error of position, and on each part of a line noise of variance
+rel² |G|² + floor². γ² = 1/(1 + 2 n v), v the variance over |G|².
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rig import effects
+from rig.bench import Bench
+from rig.effects import Values
+from rig.experiment import Experiment, Noise
+from rig.layer import Floats
+from rig.linear_filters import Complexes
+from rig.plan import recordings
+
+_MAINS_WIDTH_HZ = 1.5
+_HARMONICS = ((1, 1.0), (3, 1 / 3))
+
+
+@dataclass(frozen=True)
+class RecordedLines:
+    """`bench` is what truly was; `exact` its lines, `measured` those with everything (rows, lines) [pC/N]."""
+
+    bench: Bench
+    frequency_hz: Floats
+    exact: Complexes
+    measured: Complexes
+    line_variance: Floats  # of each part [pC²/N²]
+    pickup: Complexes  # mains' share of `measured`
+    coherence: Floats | None
+
+
+def make_bench(experiment: Experiment) -> Bench:
+    """The experiment's bench with its scatter of position and of sensors drawn."""
+    plan = recordings(experiment)
+    random = np.random.default_rng([experiment.seed, 1])
+    missed = experiment.noise.position_mm * random.normal(size=(len(plan.preload_n), 2))
+    spread = effects.of(experiment.effects, "sensor_spread", "sd")
+    gains = np.exp(spread * random.normal(size=len(experiment.skin.sensors)))
+    return Bench(experiment, plan, missed, gains)
+
+
+def recording_gains(experiment: Experiment, rows: int) -> Floats:
+    """The gain error of each recording."""
+    return np.exp(experiment.noise.gain * np.random.default_rng([experiment.seed, 2]).normal(size=rows))
+
+
+def record_lines(experiment: Experiment) -> RecordedLines:
+    """Carry out an experiment that records FRF lines."""
+    assert experiment.lines is not None
+    bench = make_bench(experiment)
+    grid = np.geomspace(experiment.lines.low_hz, experiment.lines.high_hz, experiment.lines.count)
+    frequency = np.unique(np.round(grid, 4))
+    exact = bench.lines(frequency)
+    random = np.random.default_rng([experiment.seed, 3])
+    actual = exact * recording_gains(experiment, len(exact))[:, None]
+    variance = line_noise(experiment.noise, frequency) ** 2 * np.abs(actual) ** 2 + experiment.noise.floor_pc_per_n**2
+    noise = random.normal(size=(2, *exact.shape)) * np.sqrt(variance)
+    pickup = mains_pickup(experiment.effects, bench.plan.dynamic_n, frequency, random)
+    size = np.maximum(np.abs(actual) ** 2, 1e-300)
+    coherence = 1 / (1 + 2 * experiment.noise.averages * variance / size) if experiment.noise.coherence else None
+    return RecordedLines(
+        bench, frequency, exact, actual + noise[0] + 1j * noise[1] + pickup, variance, pickup, coherence
+    )
+
+
+def line_noise(noise: Noise, frequency_hz: Floats) -> Floats:
+    """rel of each line."""
+    low, high = frequency_hz[0], frequency_hz[-1]
+    return noise.line * (1 + noise.low * low / frequency_hz + noise.high * (frequency_hz / high) ** 2)
+
+
+def mains_pickup(
+    on: dict[str, Values], dynamic_n: Floats, frequency_hz: Floats, random: np.random.Generator
+) -> Complexes:
+    """The error that mains leave on the lines near them, its phase anew in each recording (rows, lines) [pC/N]."""
+    if "mains_pickup" not in on:
+        return np.zeros((len(dynamic_n), len(frequency_hz)), dtype=complex)
+    charge, mains = (effects.of(on, "mains_pickup", name) for name in ("charge_pc", "mains_hz"))
+    shape = sum(
+        share / (1 + ((frequency_hz - harmonic * mains) / _MAINS_WIDTH_HZ) ** 2) for harmonic, share in _HARMONICS
+    )
+    phase = np.exp(2j * np.pi * random.random(len(dynamic_n)))
+    return np.multiply.outer(charge / dynamic_n * phase, shape)
+
+
+def campaign(recorded: RecordedLines) -> dict[str, Any]:
+    """The campaign (`campaign/1`) of recorded lines: what the lab knows, and no more."""
+    entries = recording_headers(recorded.bench)
+    for row, entry in enumerate(entries):
+        entry["frequency_hz"] = recorded.frequency_hz.tolist()
+        entry["frf_re_pc_per_n"] = _rounded(recorded.measured[row].real)
+        entry["frf_im_pc_per_n"] = _rounded(recorded.measured[row].imag)
+        if recorded.coherence is not None:
+            entry["coherence"] = np.round(recorded.coherence[row], 8).tolist()
+    return campaign_document(recorded.bench.experiment, entries)
+
+
+def _rounded(values: Floats) -> list[float]:
+    return [float(f"{value:.7g}") for value in values]
+
+
+def campaign_document(experiment: Experiment, entries: list[dict[str, Any]]) -> dict[str, Any]:
+    """A campaign of the experiment's skin and these recordings."""
+    return {"schema": "campaign/1", "name": experiment.name, "skin": skin_document(experiment), "recordings": entries}
+
+
+def skin_document(experiment: Experiment) -> dict[str, Any]:
+    """The skin as the lab declares it; d33 is not known to it."""
+    skin = experiment.skin
+    known = {name: getattr(skin, name) for name in ("id", "width_mm", "length_mm") if getattr(skin, name) is not None}
+    return {
+        **known,
+        "thickness_mm": skin.thickness_mm,
+        "youngs_modulus_mpa": skin.youngs_modulus_mpa,
+        "poisson_ratio": 0.5,
+        "sensor_radius_mm": skin.sensor_radius_mm,
+        "d33_pc_per_n": None,
+        "sensors": [{"id": name, "x_mm": x, "y_mm": y} for name, x, y in skin.sensors],
+    }
+
+
+def recording_headers(bench: Bench) -> list[dict[str, Any]]:
+    """What the lab writes down of each recording, in order."""
+    plan, skin, times = bench.plan, bench.experiment.skin, bench.plan.recorded_at
+    moved = bool(np.any(plan.offset_mm != 0))
+    entries = []
+    for row, number in enumerate(plan.sensor):
+        name, x, y = skin.sensors[number]
+        entry: dict[str, Any] = {
+            "id": f"r{row + 1:03d}",
+            "sensor": name,
+            "indenter_radius_mm": float(plan.indenter_mm[row]),
+            "preload_n": float(plan.preload_n[row]),
+            "dynamic_force_n": float(plan.dynamic_n[row]),
+        }
+        if times is not None:
+            entry["recorded_at"] = times[row]
+        if plan.cycles is not None:
+            entry["load_cycles"] = int(plan.cycles[row])
+        if plan.dwell_s is not None:
+            entry["dwell_s"] = float(plan.dwell_s[row])
+        if moved:
+            entry["position_mm"] = [float(x + plan.offset_mm[row, 0]), float(y + plan.offset_mm[row, 1])]
+        entries.append(entry)
+    return entries

@@ -1,0 +1,45 @@
+"""What the rig knows and the campaign does not tell: kept in a file of its own."""
+
+from typing import Any
+
+from rig.effects import UNCATALOGUED
+from rig.experiment import Experiment
+from rig.identifiable import visibility
+from rig.recorded import RecordedLines
+
+SCHEMA = "truth/1"
+
+
+def truth_of(experiment: Experiment) -> dict[str, Any]:
+    """What holds for any kind: effects by their catalogue names (`unknown` where not in it), and every parameter."""
+    names = ["unknown" if name in UNCATALOGUED else name for name in experiment.effects]
+    skin, on = experiment.skin, experiment.effects
+    factors = {name: float(on[f"{name}_error"]["factor"]) if f"{name}_error" in on else 1.0
+               for name in ("modulus", "thickness")}  # fmt: skip
+    return {
+        "schema": SCHEMA,
+        "name": experiment.name,
+        "seed": experiment.seed,
+        "kind": experiment.kind,
+        "effects": names,
+        "parameters": dict(on),
+        "d33_pc_per_n": skin.d33_pc_per_n,
+        "youngs_modulus_mpa": skin.youngs_modulus_mpa * factors["modulus"],
+        "thickness_mm": skin.thickness_mm * factors["thickness"],
+        "experiment": dict(experiment.document),
+    }
+
+
+def truth_of_lines(recorded: RecordedLines) -> dict[str, Any]:
+    """The same with what FRF lines add: sensors' gains, and whether each effect and all of them show."""
+    seen = visibility(recorded)
+    on = tuple(recorded.bench.on)
+    each = {name: visibility(recorded, tuple(other for other in on if other != name)).chi2_gain for name in on}
+    return {
+        **truth_of(recorded.bench.experiment),
+        "sensor_gains": [round(float(gain), 6) for gain in recorded.bench.sensor_gains],
+        "identifiable": seen.identifiable if on else True,
+        "chi2_gain_of_truth": round(seen.chi2_gain, 2),
+        "chi2_gain_of_each": {name: round(gain, 2) for name, gain in each.items()},
+        "base_rms_misfit_percent": round(seen.base_misfit_percent, 3),
+    }
