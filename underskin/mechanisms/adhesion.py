@@ -4,13 +4,15 @@ Law: Johnson, Kendall and Roberts: on the half space a³ = (3R/4E') [F + 3πwR +
 less a flat punch's; on the layer φ(a) = −√(2awE'/π) in PHYSICS, section 5.
 
 Assumptions: short-ranged adhesion (soft, large contacts: Tabor's number far above 1), equilibrium on the loading branch
-under a given force. FRF = Q(F)/F with the static pressure.
+under a given force. FRF = Q(F)/F with the static pressure. An indentation sticks from the first touch to
+the pull-off.
 
 Source: Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301.
 """
 
 from underskin.mechanisms.contact_state import Contacts
-from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.curve_state import Curve
+from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Values
 from underskin.recordings.campaign import Campaign
 
 
@@ -19,9 +21,9 @@ class Adhesion(Mechanism):
 
     name = "adhesion"
     kinds = ("frf", "indentation")
-    axes = ("preload_n", "indenter_radius_mm", "position_mm")
+    axes = ("preload_n", "indenter_radius_mm", "position_mm", "force_n")
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The work of adhesion."""
         return (
             Parameter(
@@ -39,3 +41,7 @@ class Adhesion(Mechanism):
     def on_material(self, contacts: Contacts, values: Values) -> None:
         """Make it stick."""
         contacts.work_of_adhesion = values["work_of_adhesion"]
+
+    def on_curve(self, curve: Curve, values: Values) -> None:
+        """Make it stick."""
+        curve.work_of_adhesion = values["work_of_adhesion"]

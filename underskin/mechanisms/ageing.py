@@ -24,7 +24,7 @@ class Ageing(Mechanism):
     name = "ageing"
     axes = ("load_cycles",)
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """Loss a decade, the cycles at which it sets in, and the shape."""
         return (
             Parameter(

@@ -11,7 +11,7 @@ chapter 11).
 from underskin.mechanisms.contact_state import Contacts
 from underskin.mechanisms.differentiated import Differentiated
 from underskin.mechanisms.frf_design import FrfDesign
-from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Values
 from underskin.recordings.campaign import Campaign
 
 
@@ -21,7 +21,7 @@ class AmplifierHighPass(Mechanism):
     name = "amplifier_high_pass"
     axes = ("frequency_hz", "phase")
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The corner frequency."""
         return (
             Parameter(

@@ -27,7 +27,7 @@ class AmplitudeNonlinearity(Mechanism):
     axes = ("dynamic_force_n", "preload_n", "indenter_radius_mm")
     contact_axes = ("dynamic_force_n",)
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The edge's mobility."""
         return (
             Parameter(

@@ -8,6 +8,7 @@ from underskin.mechanisms.compressible_layer import CompressibleLayer
 from underskin.mechanisms.contact_creep import ContactCreep
 from underskin.mechanisms.contact_resonance import ContactResonance
 from underskin.mechanisms.crosstalk import Crosstalk
+from underskin.mechanisms.instrument_compliance import InstrumentCompliance
 from underskin.mechanisms.interface_slip import InterfaceSlip
 from underskin.mechanisms.layered_contact import LayeredContact
 from underskin.mechanisms.mains_pickup import MainsPickup
@@ -15,6 +16,7 @@ from underskin.mechanisms.mechanism import Mechanism
 from underskin.mechanisms.misalignment import Misalignment
 from underskin.mechanisms.modulus_error import ModulusError
 from underskin.mechanisms.moving_contact_edge import MovingContactEdge
+from underskin.mechanisms.platen_friction import PlatenFriction
 from underskin.mechanisms.preload_dependent_d33 import PreloadDependentD33
 from underskin.mechanisms.sensor_relaxation import SensorRelaxation
 from underskin.mechanisms.sensor_spread import SensorSpread
@@ -45,5 +47,7 @@ CATALOGUE: dict[str, Mechanism] = {
         AmplifierHighPass(),
         TimingDelay(),
         MainsPickup(),
+        InstrumentCompliance(),
+        PlatenFriction(),
     )
 }

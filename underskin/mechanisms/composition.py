@@ -32,10 +32,12 @@ class Prediction:
 class Composition:
     """The mechanisms of a model, in order, and how one vector of fit coordinates is theirs and the nuisances'."""
 
-    def __init__(self, mechanisms: Sequence[Mechanism], campaign: Campaign, nuisances: Sequence[Parameter]) -> None:
+    def __init__(
+        self, mechanisms: Sequence[Mechanism], campaign: Campaign, kind: Kind, nuisances: Sequence[Parameter]
+    ) -> None:
         """Take the parameters of each mechanism, then the nuisances."""
         self.mechanisms = tuple(mechanisms)
-        own = [mechanism.parameters(campaign) for mechanism in mechanisms]
+        own = [mechanism.parameters(campaign, kind) for mechanism in mechanisms]
         self.parameters = (*(parameter for group in own for parameter in group), *nuisances)
         starts = np.cumsum([0, *(len(group) for group in own)])
         self._places = {

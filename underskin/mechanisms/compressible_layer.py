@@ -9,6 +9,7 @@ Source: PHYSICS, sections 2 and 3; Sneddon, Fourier Transforms (1951), chapter 1
 """
 
 from underskin.mechanisms.contact_state import Contacts
+from underskin.mechanisms.curve_state import Curve
 from underskin.mechanisms.mechanism import Kind, Mechanism, Parameter, Uniform, Values
 from underskin.recordings.campaign import Campaign
 from underskin.skin import INCOMPRESSIBLE
@@ -21,7 +22,7 @@ class CompressibleLayer(Mechanism):
     kinds = ("frf", "indentation")
     axes = ("position_mm", "preload_n", "indenter_radius_mm")
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The Poisson ratio."""
         return (
             Parameter(
@@ -45,3 +46,7 @@ class CompressibleLayer(Mechanism):
     def on_material(self, contacts: Contacts, values: Values) -> None:
         """Set ν."""
         contacts.poisson_ratio = values["poisson_ratio"]
+
+    def on_curve(self, curve: Curve, values: Values) -> None:
+        """Set ν."""
+        curve.poisson_ratio = values["poisson_ratio"]

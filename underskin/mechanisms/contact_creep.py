@@ -5,11 +5,14 @@ Law: E(t) = E (1 − g (1 − e^(−t/τ))), with t the time held; a³ ∝ 1/E(t
 Assumptions: quasi-elastic: each instant as an elastic layer of modulus E(t), one Prony pair, the declared E is the
 instantaneous one. (Exact creep under a constant force uses J(t), whose time is τ/(1 − g).) A held oscillation is felt
 through the contact radius alone, since transmission through a linear layer under force control has no modulus in it.
+Curves: F(t) = u − g ∫ (1 − e^(−(t−s)/τ)) du(s) of the elastic force u(t), exact for a linear material while the contact
+grows; where it shrinks Ting's theory would take the same history up to the moment of equal contact.
 
-Source: Lee & Radok, J. Appl. Mech. 27 (1960) 438; PHYSICS, sections 7 and 8.
+Source: Lee & Radok, J. Appl. Mech. 27 (1960) 438; Ting, J. Appl. Mech. 33 (1966) 845; PHYSICS, sections 7 and 8.
 """
 
 from underskin.mechanisms.contact_state import Contacts
+from underskin.mechanisms.curve_state import Curve
 from underskin.mechanisms.differentiated import exp
 from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Uniform, Values
 from underskin.recordings.campaign import Campaign
@@ -23,7 +26,7 @@ class ContactCreep(Mechanism):
     axes = ("dwell_s", "preload_n", "indenter_radius_mm", "time_s")
     contact_axes = ("dwell_s",)
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """One Prony pair."""
         return (
             Parameter(
@@ -63,3 +66,7 @@ class ContactCreep(Mechanism):
         """Relax the modulus."""
         times = -contacts.dwell * (1.0 / values["relaxation_time"])
         contacts.modulus = contacts.modulus * (1.0 - values["relaxed_fraction"] * (1.0 - exp(times)))
+
+    def on_curve(self, curve: Curve, values: Values) -> None:
+        """Relax the force."""
+        curve.relaxation = values["relaxed_fraction"], values["relaxation_time"]

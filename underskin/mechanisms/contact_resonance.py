@@ -14,7 +14,7 @@ import numpy as np
 from underskin.mechanisms.contact_state import Contacts
 from underskin.mechanisms.differentiated import Differentiated
 from underskin.mechanisms.frf_design import FrfDesign
-from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Values
 from underskin.recordings.campaign import Campaign
 
 
@@ -25,7 +25,7 @@ class ContactResonance(Mechanism):
     axes = ("frequency_hz", "phase", "preload_n", "indenter_radius_mm")
     needs_stiffness = True
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """Tip mass and damping ratio."""
         return (
             Parameter(

@@ -27,7 +27,7 @@ class Crosstalk(Mechanism):
     axes = ("position_mm", "sensor")
     needs_neighbours = True
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The fraction."""
         return (
             Parameter(

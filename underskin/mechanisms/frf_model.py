@@ -70,7 +70,7 @@ class FrfModel:
 
     def __init__(self, mechanisms: Sequence[Mechanism], campaign: Campaign, table: SigmaTable) -> None:
         """Work out everything that no parameter changes."""
-        self._composition = Composition(mechanisms, campaign, NUISANCES)
+        self._composition = Composition(mechanisms, campaign, "frf", NUISANCES)
         self.names = tuple(mechanism.name for mechanism in mechanisms)
         self.parameters = self._composition.parameters
         self._mechanisms = self._composition.mechanisms

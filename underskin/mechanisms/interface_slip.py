@@ -9,7 +9,7 @@ Source: PHYSICS, sections 3 and 8; Goodman, Taylor & Brekke, J. Soil Mech. Found
 """
 
 from underskin.mechanisms.contact_state import Contacts
-from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Values
 from underskin.recordings.campaign import Campaign
 
 
@@ -19,7 +19,7 @@ class InterfaceSlip(Mechanism):
     name = "interface_slip"
     axes = ("position_mm", "preload_n", "indenter_radius_mm")
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The glue line's stiffness in units of the layer's own."""
         return (
             Parameter(

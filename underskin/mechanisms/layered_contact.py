@@ -9,7 +9,9 @@ Source: Lebedev & Ufliand, J. Appl. Math. Mech. 22 (1958) 442; Dimitriadis et al
 """
 
 from underskin.mechanisms.contact_state import Contacts
-from underskin.mechanisms.mechanism import Mechanism, Values
+from underskin.mechanisms.curve_state import Curve
+from underskin.mechanisms.mechanism import Kind, Mechanism, Values
+from underskin.recordings.campaign import Campaign
 
 
 class LayeredContact(Mechanism):
@@ -19,6 +21,14 @@ class LayeredContact(Mechanism):
     kinds = ("frf", "indentation")
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
 
+    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+        """A thickness is needed."""
+        return "skin.thickness_mm is not given" if campaign.skin.thickness_mm is None else None
+
     def on_material(self, contacts: Contacts, values: Values) -> None:
         """Press the layer."""
         contacts.layered = True
+
+    def on_curve(self, curve: Curve, values: Values) -> None:
+        """Press the layer."""
+        curve.layered = True

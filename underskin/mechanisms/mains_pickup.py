@@ -32,7 +32,7 @@ class MainsPickup(Mechanism):
     name = "mains_pickup"
     axes = ("frequency_hz", "dynamic_force_n")
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The charge."""
         return (
             Parameter(

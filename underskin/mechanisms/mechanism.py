@@ -22,6 +22,7 @@ from underskin.units import Floats
 
 if TYPE_CHECKING:
     from underskin.mechanisms.contact_state import Contacts
+    from underskin.mechanisms.curve_state import Curve
     from underskin.mechanisms.frf_design import FrfDesign
 
 Kind = Literal["frf", "indentation", "compression"]
@@ -153,15 +154,15 @@ class Mechanism:
             raise InvalidInput("docstring", type(self).__module__, f"must have a paragraph '{title}: …'")
         return " ".join(found.group(1).split())
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
-        """Its parameters; bounds may depend on the campaign."""
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """Its parameters for recordings of one kind; bounds may depend on the campaign."""
         return ()
 
     def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
         """What the campaign lacks to support it, in words; None where nothing is lacking."""
         return None
 
-    # Stages of the FRF model (and the first three of the indentation model), in the order in which they act.
+    # Stages of the FRF model, in the order in which they act.
 
     def on_declared(self, contacts: Contacts, values: Values) -> None:
         """Change the declared modulus and thickness."""
@@ -204,6 +205,9 @@ class Mechanism:
     def pickup_charge(self, values: Values) -> Differentiated:
         """The standard deviation of that charge [C]."""
         raise NotImplementedError
+
+    def on_curve(self, curve: Curve, values: Values) -> None:
+        """Change what governs an indentation or compression."""
 
     def spread(self, values: Values) -> Differentiated | None:
         """The standard deviation of the logarithms of the sensors' gains."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from underskin.mechanisms.differentiated import Differentiated
 from underskin.mechanisms.frf_design import offsets
-from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Values
 from underskin.recordings.campaign import Campaign
 
 _LARGEST_MM = 2.0
@@ -25,7 +25,7 @@ class Misalignment(Mechanism):
     axes = ("position_mm", "sensor", "preload_n", "indenter_radius_mm")
     largest_offset = 1e-3 * _LARGEST_MM * np.sqrt(2)
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The offset's two components, or its length where its direction cannot be told."""
         centred = not offsets(campaign).any()
         names, low = (("offset",), 0.0) if centred else (("offset_x", "offset_y"), -_LARGEST_MM)

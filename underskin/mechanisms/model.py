@@ -8,10 +8,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.errors import InvalidInput
 from underskin.mechanisms.catalogue import CATALOGUE
 from underskin.mechanisms.composition import Prediction, check_supported, chosen, kind_of
+from underskin.mechanisms.compression_model import CompressionModel
 from underskin.mechanisms.frf_model import FrfModel
+from underskin.mechanisms.indentation_model import IndentationModel
 from underskin.mechanisms.mechanism import Kind, Parameter
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate import SigmaTable
@@ -53,4 +54,6 @@ def compose(names: Sequence[str], campaign: Campaign, table: SigmaTable, kind: K
     check_supported(mechanisms, campaign, kind)
     if kind == "frf":
         return FrfModel(mechanisms, campaign, table)
-    raise InvalidInput("kind", kind, "not built yet")
+    if kind == "indentation":
+        return IndentationModel(mechanisms, campaign)
+    return CompressionModel(mechanisms, campaign)

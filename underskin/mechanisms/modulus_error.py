@@ -8,7 +8,8 @@ Source: PHYSICS, section 8; under force control σ of a linear layer depends on 
 """
 
 from underskin.mechanisms.contact_state import Contacts
-from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.curve_state import Curve
+from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Values
 from underskin.recordings.campaign import Campaign
 
 
@@ -16,9 +17,10 @@ class ModulusError(Mechanism):
     """See the module."""
 
     name = "modulus_error"
+    kinds = ("frf", "indentation", "compression")
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """True over declared modulus."""
         return (
             Parameter(
@@ -33,6 +35,16 @@ class ModulusError(Mechanism):
             ),
         )
 
+    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+        """A declared modulus is needed."""
+        if campaign.skin.youngs_modulus_mpa is None:
+            return "skin.youngs_modulus_mpa is not declared, and so free already"
+        return None
+
     def on_declared(self, contacts: Contacts, values: Values) -> None:
         """Scale the modulus."""
         contacts.modulus = contacts.modulus * values["modulus_factor"]
+
+    def on_curve(self, curve: Curve, values: Values) -> None:
+        """Scale the modulus."""
+        curve.modulus = curve.modulus * values["modulus_factor"]

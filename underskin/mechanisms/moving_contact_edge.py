@@ -12,7 +12,7 @@ punch's).
 import numpy as np
 
 from underskin.mechanisms.differentiated import Array, Differentiated
-from underskin.mechanisms.mechanism import Mechanism, Parameter, Uniform, Values
+from underskin.mechanisms.mechanism import Kind, Mechanism, Parameter, Uniform, Values
 from underskin.recordings.campaign import Campaign
 from underskin.units import Floats
 
@@ -25,7 +25,7 @@ class MovingContactEdge(Mechanism):
     name = "moving_contact_edge"
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The mobile fraction."""
         return (
             Parameter(

@@ -11,7 +11,7 @@ Source: PHYSICS, section 8; Seminara 2018, section 3.2 (22 pC/N at 3 N against 1
 import numpy as np
 
 from underskin.mechanisms.differentiated import Differentiated, chain
-from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Values
 from underskin.recordings.campaign import Campaign
 
 
@@ -21,7 +21,7 @@ class PreloadDependentD33(Mechanism):
     name = "preload_dependent_d33"
     axes = ("preload_n", "indenter_radius_mm", "position_mm", "sensor")
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The coefficient and the stress at which it saturates."""
         return (
             Parameter(

@@ -13,7 +13,7 @@ import numpy as np
 from underskin.mechanisms.contact_state import Contacts
 from underskin.mechanisms.differentiated import Differentiated, exp
 from underskin.mechanisms.frf_design import FrfDesign
-from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Values
 from underskin.recordings.campaign import Campaign
 
 _REFERENCE = 30.0  # Hz
@@ -25,7 +25,7 @@ class SensorRelaxation(Mechanism):
     name = "sensor_relaxation"
     axes = ("frequency_hz", "phase")
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The power law's exponent, the step and its frequency."""
         return (
             Parameter(

@@ -21,7 +21,7 @@ class SensorSpread(Mechanism):
     name = "sensor_spread"
     axes = ("sensor",)
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The spread."""
         return (
             Parameter(

@@ -8,7 +8,7 @@ Source: PHYSICS, sections 1 and 8.
 """
 
 from underskin.mechanisms.contact_state import Contacts
-from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Values
 from underskin.recordings.campaign import Campaign
 
 
@@ -19,7 +19,7 @@ class ThicknessError(Mechanism):
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     largest_stretch = 1.55
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """True over declared thickness."""
         return (
             Parameter(

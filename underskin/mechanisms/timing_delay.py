@@ -12,7 +12,7 @@ import numpy as np
 from underskin.mechanisms.contact_state import Contacts
 from underskin.mechanisms.differentiated import Differentiated, exp
 from underskin.mechanisms.frf_design import FrfDesign
-from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Values
 from underskin.recordings.campaign import Campaign
 
 
@@ -22,7 +22,7 @@ class TimingDelay(Mechanism):
     name = "timing_delay"
     axes = ("phase", "frequency_hz")
 
-    def parameters(self, campaign: Campaign) -> tuple[Parameter, ...]:
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The delay."""
         return (
             Parameter(

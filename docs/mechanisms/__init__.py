@@ -1,0 +1,1 @@
+"""The page of mechanisms, made from the catalogue: `make mechanisms`."""

@@ -1,0 +1,113 @@
+"""Three hyperelastic laws fitted to measured silicones: what the priors of strain_stiffening are built on.
+
+Incompressible uniaxial nominal stress over E/3, with stretch λ (1 − strain in compression), I = λ² + 2/λ − 3:
+Yeoh  (λ − λ⁻²)(1 + 2 c2 I + 3 c3 I²);  Gent  (λ − λ⁻²)/(1 − I/J);  Ogden, one term,  (2/α)(λ^(α−1) − λ^(−α/2−1)).
+"""
+
+import csv
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from underskin.units import Floats
+
+Law = Callable[[Floats, Floats], Floats]  # stretch, shape parameters -> nominal stress over E/3
+_POINTS = 300
+
+
+@dataclass(frozen=True)
+class Fit:
+    """E [kPa], the shape parameters and the residual in percent of the largest stress."""
+
+    modulus_kpa: float
+    shape: Floats
+    residual_percent: float
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A loading curve: engineering strain (compression negative) and nominal stress [kPa]."""
+
+    name: str
+    strain: Floats
+    stress_kpa: Floats
+
+    def up_to(self, strain: float) -> "Sample":
+        """The part below a strain."""
+        kept = np.abs(self.strain) <= strain
+        return Sample(self.name, self.strain[kept], self.stress_kpa[kept])
+
+
+def yeoh(stretch: Floats, shape: Floats) -> Floats:
+    """Three terms."""
+    invariant = stretch**2 + 2 / stretch - 3
+    return (stretch - stretch**-2) * (1 + 2 * shape[0] * invariant + 3 * shape[1] * invariant**2)
+
+
+def gent(stretch: Floats, shape: Floats) -> Floats:
+    """Limited extensibility; shape is 1/J."""
+    invariant = stretch**2 + 2 / stretch - 3
+    return (stretch - stretch**-2) / (1 - shape[0] * invariant)
+
+
+def ogden(stretch: Floats, shape: Floats) -> Floats:
+    """One term."""
+    (alpha,) = shape
+    return 2 / alpha * (stretch ** (alpha - 1) - stretch ** (-alpha / 2 - 1))
+
+
+LAWS: dict[str, tuple[Law, tuple[float, ...]]] = {
+    "Yeoh": (yeoh, (0.0, 0.0)),
+    "Gent": (gent, (0.01,)),
+    "Ogden": (ogden, (2.5,)),
+}
+
+
+def fit(sample: Sample, law: Law, start: tuple[float, ...]) -> Fit:
+    """Least squares in stress over E and the law's shape."""
+    stretch = 1 + sample.strain
+    largest = np.abs(sample.stress_kpa).max()
+    modulus = np.polyfit(sample.strain, sample.stress_kpa, 1)[0]
+
+    def residual(parameters: Floats) -> Floats:
+        with np.errstate(all="ignore"):
+            model = parameters[0] * modulus / 3 * law(stretch, parameters[1:])
+        return np.nan_to_num((model - sample.stress_kpa) / largest, nan=10.0, posinf=10.0, neginf=-10.0)
+
+    found = least_squares(residual, [1.0, *start], x_scale=[1.0, *(0.1 for _ in start)], max_nfev=2000)
+    return Fit(float(found.x[0] * modulus), found.x[1:], float(100 * np.sqrt(np.mean(found.fun**2))))
+
+
+def compression_samples(folder: Path) -> list[Sample]:
+    """The first repeat of each Ecoflex cylinder."""
+    files = sorted(folder.glob("silicone-compression/*/*1.csv"))
+    return [_sample(path.stem, _numbers(path, ",", 7), 3, 4, 1.0) for path in files]
+
+
+def tension_samples(folder: Path) -> list[Sample]:
+    """All dumbbells."""
+    files = sorted(folder.glob("silicone-tension/*.csv"))
+    return [_sample(path.stem, _numbers(path, ";", 5), 3, 4, 1e3) for path in files]
+
+
+def _sample(name: str, rows: Floats, strain: int, stress: int, to_kpa: float) -> Sample:
+    kept = rows[:: max(1, len(rows) // _POINTS)]
+    return Sample(name, kept[:, strain], kept[:, stress] * to_kpa)
+
+
+def _numbers(path: Path, delimiter: str, columns: int) -> Floats:
+    """The rows that are all numbers, up to the largest strain."""
+    rows = []
+    with path.open(newline="", encoding="utf-8", errors="replace") as file:
+        for row in csv.reader(file, delimiter=delimiter):
+            try:
+                numbers = [float(entry) for entry in row[:columns]]
+            except ValueError:
+                continue
+            if len(numbers) == columns:
+                rows.append(numbers)
+    values = np.array(rows)
+    return values[: int(np.abs(values[:, 3]).argmax()) + 1]

@@ -1,0 +1,160 @@
+"""The force of a campaign's indentation curves, sample by sample, under a set of mechanisms.
+
+Base model: Hertz on a half space, F = (4/3) E/(1 − ν²) √R (d − d0)^(3/2), with the contact point d0 and, where none is
+declared, E free. Stages: declared value → material → depth (the stage's give) → elastic force → relaxation.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.contact_curves import ContactCurves, CurveGrid
+from underskin.errors import InvalidInput
+from underskin.layer import Layer
+from underskin.mechanisms import curve_parameters, indentation_law
+from underskin.mechanisms.composition import Composition, Prediction
+from underskin.mechanisms.curve_state import Curve
+from underskin.mechanisms.differentiated import Differentiated, constant
+from underskin.mechanisms.mechanism import Mechanism, Parameter, Values
+from underskin.mechanisms.relaxation import relaxed
+from underskin.recordings import elastomer
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.units import Floats, to_si
+
+_NEWTON_STEPS = 30
+_TOLERANCE = 1e-12
+
+
+class IndentationModel:
+    """See the module; `predict` gives all samples of all recordings, one recording after another."""
+
+    sensor: NDArray[np.intp] | None = None
+
+    def __init__(self, mechanisms: Sequence[Mechanism], campaign: Campaign) -> None:
+        """Work out everything that no parameter changes; InvalidInput names a recording that does not load."""
+        recordings = [entry for entry in campaign.recordings if isinstance(entry, IndentationRecording)]
+        self._skin = campaign.skin
+        self._composition = Composition(mechanisms, campaign, "indentation", _nuisances(recordings, campaign))
+        self.names = tuple(mechanism.name for mechanism in mechanisms)
+        self.parameters = self._composition.parameters
+        self._mechanisms = self._composition.mechanisms
+        self._ids = [entry.id for entry in recordings]
+        lengths = [len(entry.force_n) for entry in recordings]
+        self.recording = np.repeat(np.arange(len(recordings)), lengths)
+        self.valid = np.ones(len(self.recording), dtype=bool)
+        self._first = np.diff(self.recording, prepend=-1) > 0
+        radii = to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in recordings])
+        self._radius = radii[self.recording]
+        self._displacement = to_si("displacement_mm", np.concatenate([entry.displacement_mm for entry in recordings]))
+        self._time = times_of(recordings)
+        self._grid = CurveGrid(np.ones(1))
+        self._last_layer: tuple[Layer, ContactCurves] | None = None
+
+    def predict(self, fit: Floats) -> Prediction:
+        """All samples at one point of the fit coordinates (parameters,)."""
+        own, nuisances, (at_depth,) = self._composition.values(np.asarray(fit, dtype=float), 1)
+        curve = self._curve(own, nuisances)
+        layer = self._layer_curves(curve) if curve.layered else None
+        answer, inside = self._elastic(curve, layer, self._pressed(nuisances), at_depth)
+        if curve.relaxation is not None:
+            answer = relaxed(answer, self._time, self._first, *curve.relaxation)
+            if curve.work_of_adhesion is None:
+                answer = _pushing(answer)
+        offsets = [nuisances[f"force_offset {name}"] for name in self._ids]
+        value = answer.value + np.concatenate([offset.value for offset in offsets])[self.recording]
+        slopes = answer.slopes + np.concatenate([offset.slopes for offset in offsets], axis=1)[:, self.recording]
+        return Prediction(value, slopes[: len(self.parameters)], None, None, None, inside)
+
+    def sensor_spread_of(self, fit: Floats) -> tuple[float, Floats]:
+        """No sensor takes part: the usual spread."""
+        return self._composition.sensor_spread(np.asarray(fit, dtype=float))
+
+    def _curve(self, own: dict[str, Values], nuisances: Values) -> Curve:
+        thickness = self._skin.thickness_mm
+        count = len(self.parameters) + 1
+        curve = Curve(
+            modulus=declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"],
+            poisson_ratio=constant(self._skin.poisson_ratio, count),
+            thickness=None if thickness is None else constant(float(to_si("thickness_mm", thickness)), count),
+        )
+        for mechanism in self._mechanisms:
+            mechanism.on_curve(curve, own[mechanism.name])
+        return curve
+
+    def _pressed(self, nuisances: Values) -> Differentiated:
+        """Displacement since the contact point [m], (rows,)."""
+        points = [nuisances[f"contact_point {name}"] for name in self._ids]
+        begins = Differentiated(
+            1e-3 * np.concatenate([point.value for point in points])[self.recording],
+            1e-3 * np.concatenate([point.slopes for point in points], axis=1)[:, self.recording],
+        )
+        return self._displacement - begins
+
+    def _elastic(
+        self, curve: Curve, layer: ContactCurves | None, pressed: Differentiated, at_depth: Differentiated
+    ) -> tuple[Differentiated, NDArray[np.bool_]]:
+        """F with δ + F/k = displacement; `at_depth` is the variable that stands for δ."""
+        touched = _met(pressed.value, self._first)
+        give = 0.0 if curve.stage_stiffness is None else 1 / float(curve.stage_stiffness.value[0])
+        depth = pressed.value
+        for _ in range(_NEWTON_STEPS):
+            answer, inside = indentation_law.force(curve, self._radius, at_depth + depth, touched, layer)
+            rate = answer.slopes[-1]
+            step = (depth + give * answer.value - pressed.value) / (1 + give * rate)
+            if not (np.abs(step) > _TOLERANCE * np.abs(pressed.value).max()).any():
+                break
+            depth = depth - step
+        moved = pressed.slopes - give * answer.slopes
+        if curve.stage_stiffness is not None:
+            moved = moved + give**2 * answer.value * curve.stage_stiffness.slopes
+        by_depth = (moved + give * rate * at_depth.slopes) / (1 + give * rate)
+        slopes = answer.slopes - rate * at_depth.slopes + rate * by_depth
+        return Differentiated(answer.value, slopes), inside
+
+    def _layer_curves(self, curve: Curve) -> ContactCurves:
+        layer = Layer(float(curve.poisson_ratio.value[0]))
+        if self._last_layer is None or self._last_layer[0] != layer:
+            self._last_layer = layer, self._grid.curves(layer)
+        return self._last_layer[1]
+
+
+def declared_modulus(youngs_modulus_mpa: float | None) -> float:
+    """What the parameter youngs_modulus multiplies [Pa]: the declared modulus, or 1 MPa."""
+    return float(to_si("youngs_modulus_mpa", 1.0 if youngs_modulus_mpa is None else youngs_modulus_mpa))
+
+
+def times_of(recordings: Sequence[IndentationRecording | CompressionRecording]) -> Floats:
+    """time_s of all samples; the sample's number where a recording has none, and no mechanism asks."""
+    return np.concatenate(
+        [np.arange(float(len(entry.force_n))) if entry.time_s is None else entry.time_s for entry in recordings]
+    )
+
+
+def _pushing(force: Differentiated) -> Differentiated:
+    """Without adhesion the surfaces part where a relaxed force would pull."""
+    pushes = force.value > 0
+    return Differentiated(np.where(pushes, force.value, 0.0), np.where(pushes, force.slopes, 0.0))
+
+
+def _met(pressed: Floats, first: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which samples come at or after the first that reaches the surface, in each recording."""
+    reached = (pressed >= 0).astype(int)
+    total = np.cumsum(reached)
+    before = np.maximum.accumulate(np.where(first, total - reached, 0))
+    met: NDArray[np.bool_] = total > before
+    return met
+
+
+def _nuisances(recordings: Sequence[IndentationRecording], campaign: Campaign) -> list[Parameter]:
+    estimates, per_recording = [], []
+    for entry in recordings:
+        try:
+            hertz = elastomer.of_indentation(entry, campaign.skin.poisson_ratio)
+        except InvalidInput as refusal:
+            raise InvalidInput(f"recordings[{entry.id}].{refusal.field}", refusal.value, refusal.allowed) from refusal
+        estimates.append(hertz.modulus)
+        span = float(np.ptp(to_si("displacement_mm", entry.displacement_mm)))
+        per_recording.append(curve_parameters.contact_point(entry.id, hertz.contact_point, 0.1 * span, 0.8 * span))
+        per_recording.append(curve_parameters.force_offset(entry.id, float(np.abs(entry.force_n).max())))
+    return [curve_parameters.modulus_parameter(campaign.skin, estimates), *per_recording]

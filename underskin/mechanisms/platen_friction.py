@@ -1,0 +1,40 @@
+"""A compressed cylinder sticks to its platens and looks stiffer.
+
+Law: nominal stress · (1 + 2 f S²), S = D/4H of the sample as it is now (D ∝ λ^(−1/2), H ∝ λ), f from 0 (slips) to 1
+(sticks fully).
+
+Assumptions: incompressible; Gent and Lindley's factor for bonded cylinders, carried along with the shape; f constant.
+
+Source: Gent & Lindley, Proc. Inst. Mech. Eng. 173 (1959) 111.
+"""
+
+from underskin.mechanisms.curve_state import Curve
+from underskin.mechanisms.mechanism import Kind, Mechanism, Parameter, Uniform, Values
+from underskin.recordings.campaign import Campaign
+
+
+class PlatenFriction(Mechanism):
+    """See the module."""
+
+    name = "platen_friction"
+    kinds = ("compression",)
+    axes = ("sample_height_mm", "sample_diameter_mm")
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """How far the platens hold the sample."""
+        return (
+            Parameter(
+                name="friction",
+                unit="-",
+                low=0.0,
+                high=1.0,
+                prior=Uniform(),
+                scale="linear",
+                limit=0.0,
+                reason="from well oiled to bonded: nothing is known beforehand",
+            ),
+        )
+
+    def on_curve(self, curve: Curve, values: Values) -> None:
+        """Let the platens hold."""
+        curve.platen_friction = values["friction"]
