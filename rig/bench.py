@@ -104,12 +104,11 @@ class Bench:
             moving = (up * self.sigma(up) - down * self.sigma(down)) / (up - down)
             result = result + effects.of(self.on, "moving_contact_edge", "mobile_fraction") * (moving - held)
         if "amplitude_nonlinearity" in self.on:
-            result = result + effects.of(self.on, "amplitude_nonlinearity", "mobility") * (
-                self._first_harmonic() - held
-            )
+            result = result + effects.of(self.on, "amplitude_nonlinearity", "mobility") * (self.first_harmonic - held)
         return result
 
-    def _first_harmonic(self) -> Floats:
+    @cached_property
+    def first_harmonic(self) -> Floats:
         """First harmonic of Fσ over one cycle of force, over Fd; the sphere lifts off where the force is pulled."""
         relative = np.empty_like(self.pressed.force)
         relative[self.contact] = self.plan.dynamic_n / self.plan.preload_n

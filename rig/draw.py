@@ -6,7 +6,7 @@ their logarithm, from subtle to strong. An experiment whose contact leaves the r
 
 import math
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from rig.errors import RigError
 from rig.experiment import SCHEMA, parse
 from rig.recorded import RecordedLines, record_lines
 
-What = Literal["none", "single", "pair", "unknown"]
-SHARES: dict[What, float] = {"none": 0.2, "single": 0.4, "pair": 0.2, "unknown": 0.2}
+SHARES = {"none": 0.2, "single": 0.4, "pair": 0.2, "unknown": 0.2}
 CATALOGUED = tuple(name for name, effect in EFFECTS.items() if FRF in effect.kinds)
 UNKNOWN = tuple(name for name, effect in UNCATALOGUED.items() if FRF in effect.kinds)
 _TWINS = ({"moving_contact_edge", "amplitude_nonlinearity"}, {"modulus_error", "strain_stiffening"})
@@ -36,12 +35,12 @@ _NEEDS_AMPLITUDES = {"amplitude_nonlinearity", "mains_pickup"}
 _NEEDS_SOFT = {"layered_contact", "adhesion", "contact_creep", "modulus_error", "strain_stiffening"}
 
 
-def draw(seed: int, number: int, what: What | None = None) -> dict[str, Any]:
+def drawn(seed: int, number: int, what: str | None = None) -> dict[str, Any]:
     """The description of random experiment `number` of a seed; `what` it hides is drawn too where not given."""
     random = np.random.default_rng([seed, number, 17])
-    drawn: What = random.choice(list(SHARES), p=list(SHARES.values())) if what is None else what
+    hidden = str(random.choice(list(SHARES), p=list(SHARES.values()))) if what is None else what
     for _ in range(200):
-        names = _names(random, drawn)
+        names = _names(random, hidden)
         description = _description(random, f"drawn {seed}/{number}", set(names))
         description["effects"] = {name: _strength(random, name, description) for name in names}
         try:
@@ -57,7 +56,7 @@ def record(description: Mapping[str, Any]) -> RecordedLines:
     return record_lines(parse(description))
 
 
-def _names(random: np.random.Generator, what: What) -> list[str]:
+def _names(random: np.random.Generator, what: str) -> list[str]:
     if what == "none":
         return []
     if what == "unknown":

@@ -1,7 +1,6 @@
 """What lies between the force cell and the recorded charge: filters rational in s = iω, e^(+iωt).
 
-One definition serves both routes: `response` for FRF lines, `apply` for time series (exact for a signal that is
-straight between its samples: first-order hold).
+One definition serves both routes: `response` for FRF lines, `apply` for time series (first-order hold).
 """
 
 import math
@@ -34,13 +33,22 @@ def response(chain: Sequence[Filter], frequency_hz: Floats) -> Complexes:
 
 
 def apply(chain: Sequence[Filter], signal: Floats, step_s: float) -> Floats:
-    """The signal, sampled every `step_s`, after the filters; at rest before."""
+    """The signal, sampled every `step_s`, after the filters; at rest before.
+
+    Straight lines between the samples weaken a smooth signal by (ωΔt)²/12, which what comes through with inertia is
+    given back beforehand: errors are of order (ωΔt)⁴.
+    """
     for terms in chain:
+        sharpened = signal.copy()
+        sharpened[1:-1] -= np.diff(signal, n=2) / 12
         passed = np.zeros_like(signal)
         for top, bottom in terms:
-            system = np.array(top[::-1]), np.array(bottom[::-1])
-            numerator, denominator, _ = cont2discrete(system, step_s, method="foh")
-            passed += lfilter(np.ravel(numerator), denominator, signal)
+            direct = top[-1] / bottom[-1] if len(top) == len(bottom) else 0.0
+            inert = polynomial.polysub(top, np.multiply(direct, bottom))[: len(bottom) - 1]
+            passed += direct * signal
+            if inert.any():
+                discrete = cont2discrete((inert[::-1], np.array(bottom[::-1])), step_s, method="foh")
+                passed += lfilter(np.ravel(discrete[0]), discrete[1], sharpened)
         signal = passed
     return signal
 

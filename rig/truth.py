@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from rig.bench import Bench
 from rig.effects import UNCATALOGUED
 from rig.experiment import Experiment
 from rig.identifiable import visibility
@@ -30,14 +31,22 @@ def truth_of(experiment: Experiment) -> dict[str, Any]:
     }
 
 
+def truth_of_bench(bench: Bench) -> dict[str, Any]:
+    """The same with the sensors' true gains."""
+    gains = [round(float(gain), 6) for gain in bench.sensor_gains]
+    return {**truth_of(bench.experiment), "sensor_gains": gains}
+
+
 def truth_of_lines(recorded: RecordedLines) -> dict[str, Any]:
-    """The same with what FRF lines add: sensors' gains, and whether each effect and all of them show."""
+    """The same with whether each effect, and all of them together, show in the lines at all.
+
+    Where nothing is missing there is nothing to show, and `identifiable` is true.
+    """
     seen = visibility(recorded)
     on = tuple(recorded.bench.on)
     each = {name: visibility(recorded, tuple(other for other in on if other != name)).chi2_gain for name in on}
     return {
-        **truth_of(recorded.bench.experiment),
-        "sensor_gains": [round(float(gain), 6) for gain in recorded.bench.sensor_gains],
+        **truth_of_bench(recorded.bench),
         "identifiable": seen.identifiable if on else True,
         "chi2_gain_of_truth": round(seen.chi2_gain, 2),
         "chi2_gain_of_each": {name: round(gain, 2) for name, gain in each.items()},

@@ -1,0 +1,65 @@
+"""`underskin rig`: experiments on the virtual rig."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+import yaml
+
+rig = typer.Typer(no_args_is_help=True, help="Try an experiment on a virtual rig before building it.")
+
+OutputDir = Annotated[Path, typer.Option(help="Folder to write; made where it does not exist.")]
+
+
+@rig.command()
+def run(
+    experiment: Annotated[Path, typer.Argument(help="The experiment's description (experiment/1), YAML or JSON.")],
+    output_dir: OutputDir,
+    tdms: Annotated[bool, typer.Option("--tdms", help="Also write raw recordings and their rig description.")] = False,
+) -> None:
+    """Carry out an experiment: campaign.json, truth.json, and raw recordings where asked for."""
+    from rig.experiment import parse
+    from rig.output import carry_out
+
+    try:
+        files = carry_out(parse(_document(experiment)), output_dir, tdms=tdms)
+    except (ValueError, OSError, yaml.YAMLError) as error:
+        typer.echo(f"underskin rig: {experiment}: {' '.join(str(error).split())}", err=True)
+        raise typer.Exit(2) from error
+    for file in files:
+        typer.echo(str(file))
+
+
+@rig.command()
+def draw(
+    output_dir: OutputDir,
+    count: Annotated[int, typer.Option(min=1, help="How many campaigns.")] = 10,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same campaigns.")] = 0,
+    what: Annotated[
+        str | None, typer.Option(help="none, single, pair or unknown: what each hides; default: a mixture.")
+    ] = None,
+) -> None:
+    """Random campaigns with hidden effects, to test a diagnosis on: campaigns/NNNN.json and truth.json."""
+    from rig.draw import SHARES, drawn
+    from rig.draw import record as carry_out
+    from rig.recorded import campaign
+    from rig.truth import truth_of_lines
+
+    if what is not None and what not in SHARES:
+        raise typer.BadParameter(f"{what!r}: must be one of {', '.join(SHARES)}", param_hint="--what")
+    folder = output_dir / "campaigns"
+    folder.mkdir(parents=True, exist_ok=True)
+    truths = {}
+    for number in range(count):
+        recorded = carry_out(drawn(seed, number, what))
+        name = f"{number:04d}"
+        (folder / f"{name}.json").write_text(json.dumps(campaign(recorded)) + "\n", encoding="utf-8")
+        truths[name] = truth_of_lines(recorded)
+    (output_dir / "truth.json").write_text(json.dumps(truths, ensure_ascii=False) + "\n", encoding="utf-8")
+    typer.echo(f"{count} campaigns in {folder}, what they hide in {output_dir / 'truth.json'}")
+
+
+def _document(path: Path) -> Any:
+    text = path.read_text(encoding="utf-8")
+    return json.loads(text) if text.lstrip().startswith("{") else yaml.safe_load(text)

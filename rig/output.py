@@ -1,0 +1,117 @@
+"""An experiment's folder: campaign.json, truth.json and, where asked for, the raw recordings with their description.
+
+`recordings.tdms` has a group a recording: load cell and charge amplifier in volts, as LabVIEW writes them; `rig.yaml`
+(`rig/1`) says what the channels are. The amplifier turns the charge round, as charge amplifiers do.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
+
+from rig.bench import Bench
+from rig.effects import FRF
+from rig.elastomer import campaign_of_curves, record_curves
+from rig.errors import RigError
+from rig.experiment import Experiment
+from rig.recorded import campaign, campaign_document, record_lines, recording_headers, skin_document
+from rig.time_domain import TimeSeries, record_series
+from rig.truth import truth_of, truth_of_bench, truth_of_lines
+
+_VOLTS_PER_NEWTON = 0.5
+_MILLIVOLTS_PER_PICOCOULOMB = 10.0
+_PROPERTIES = {
+    "indenter_radius_mm": "indenter radius [mm]",
+    "preload_n": "preload [N]",
+    "dynamic_force_n": "dynamic force [N]",
+    "dwell_s": "dwell [s]",
+    "load_cycles": "load cycles",
+    "recorded_at": "recorded at",
+    "sensor": "sensor",
+}
+
+
+def carry_out(experiment: Experiment, folder: Path, *, tdms: bool = False) -> list[Path]:
+    """Record the experiment and write its folder; returns the files.
+
+    Raises RigError where an effect or the raw files need what the experiment does not have.
+    """
+    if tdms and experiment.drive is None:
+        raise RigError("drive", None, "required for raw recordings: lines and curves have no time series")
+    if tdms and any(offset != (0.0, 0.0) for offset in experiment.design.offsets_mm):
+        raise RigError("design.offsets_mm", experiment.design.offsets_mm, "must be [[0, 0]] in TDMS, which keeps none")
+    series: list[TimeSeries] = []
+    if experiment.kind != FRF:
+        document, truth = campaign_of_curves(experiment, record_curves(experiment)), truth_of(experiment)
+    elif experiment.lines is not None:
+        lines = record_lines(experiment)
+        document, truth = campaign(lines), truth_of_lines(lines)
+    else:
+        bench, series = record_series(experiment)
+        document, truth = campaign_of_series(bench, series), truth_of_bench(bench)
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [_write_json(folder / "campaign.json", document), _write_json(folder / "truth.json", truth)]
+    if tdms:
+        files += [_write_tdms(folder / "recordings.tdms", bench, series), _write_rig(folder / "rig.yaml", bench)]
+    return files
+
+
+def campaign_of_series(bench: Bench, series: list[TimeSeries]) -> dict[str, Any]:
+    """The campaign (`campaign/1`) of time series."""
+    drive = bench.experiment.drive
+    assert drive is not None
+    entries = recording_headers(bench)
+    for entry, recorded in zip(entries, series, strict=True):
+        entry["sample_rate_hz"] = drive.sample_rate_hz
+        entry["force_n"], entry["charge_pc"] = recorded.force_n.tolist(), recorded.charge_pc.tolist()
+    return campaign_document(bench.experiment, entries)
+
+
+def _write_json(path: Path, document: dict[str, Any]) -> Path:
+    path.write_text(json.dumps(document, ensure_ascii=False, separators=(",", ":")) + "\n", encoding="utf-8")
+    return path
+
+
+def _write_tdms(path: Path, bench: Bench, series: list[TimeSeries]) -> Path:
+    drive = bench.experiment.drive
+    assert drive is not None
+    timing = {"wf_increment": 1 / drive.sample_rate_hz, "wf_start_offset": 0.0, "unit_string": "V"}
+    with TdmsWriter(str(path)) as writer:
+        writer.write_segment([RootObject({"name": bench.experiment.name})])
+        for entry, recorded in zip(recording_headers(bench), series, strict=True):
+            stated = {_PROPERTIES[name]: value for name, value in entry.items() if name in _PROPERTIES}
+            volts = {
+                "Load cell": recorded.force_n * _VOLTS_PER_NEWTON,
+                "Charge amplifier": -recorded.charge_pc * _MILLIVOLTS_PER_PICOCOULOMB * 1e-3,
+            }
+            channels = [
+                ChannelObject(entry["id"], name, values.astype(np.float64), timing) for name, values in volts.items()
+            ]
+            writer.write_segment([GroupObject(entry["id"], stated), *channels])
+    return path
+
+
+def _write_rig(path: Path, bench: Bench) -> Path:
+    known = [name for name in recording_headers(bench)[0] if name in _PROPERTIES]
+    description = {
+        "schema": "rig/1",
+        "name": f"virtual rig: {bench.experiment.name}"[:200],
+        "kind": FRF,
+        "skin": {name: value for name, value in skin_document(bench.experiment).items() if value is not None},
+        "recording": {"id": {"property": "block"}, **{name: {"property": _PROPERTIES[name]} for name in known}},
+        "channels": {
+            "force_n": {
+                "channel": "Load cell", "unit": "V",
+                "sensitivity": _VOLTS_PER_NEWTON, "sensitivity_unit": "V/N", "sign": 1,
+            },
+            "charge_pc": {
+                "channel": "Charge amplifier", "unit": "V",
+                "sensitivity": _MILLIVOLTS_PER_PICOCOULOMB, "sensitivity_unit": "mV/pC", "sign": -1,
+            },
+        },
+    }  # fmt: skip
+    path.write_text(yaml.safe_dump(description, sort_keys=False, allow_unicode=True), encoding="utf-8")
+    return path

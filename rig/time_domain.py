@@ -1,0 +1,134 @@
+"""Recordings as time series: shaker, tip, contact, sensor, amplifier, converter (mm, N, pC, s).
+
+The shaker's force about the preload is made on a grid `_FINER` times finer than the converter's; tip and electronics
+are integrated there (`linear_filters.apply`), the charge of a moving edge follows the curve Fσ(F) at every instant.
+Noise is white plus 1/f; the converter rounds to its steps and stops at its range.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import chirp
+
+from rig import effects, linear_filters
+from rig.bench import Bench
+from rig.experiment import Drive, Experiment
+from rig.layer import Floats
+from rig.recorded import make_bench, recording_gains
+
+_FINER = 8
+_RUN_IN_S = 2.0  # before the recording, for filters to settle
+_SWEEPS = 16
+_CYCLES_A_STEP = 10
+_CURVE = np.linspace(-1.0, 1.0, 9)  # nodes of the curve of charge over force, in units of its reach
+
+
+@dataclass(frozen=True)
+class TimeSeries:
+    """One recording: `force_n` and `charge_pc`, sampled together."""
+
+    force_n: Floats
+    charge_pc: Floats
+
+
+def record_series(experiment: Experiment) -> tuple[Bench, list[TimeSeries]]:
+    """Carry out an experiment that records time series."""
+    bench = make_bench(experiment)
+    gains = recording_gains(experiment, len(bench.contact))
+    return bench, [_recording(bench, row, float(gain)) for row, gain in enumerate(gains)]
+
+
+def _recording(bench: Bench, row: int, gain: float) -> TimeSeries:
+    drive = bench.experiment.drive
+    assert drive is not None
+    random = np.random.default_rng([bench.experiment.seed, 4, row])
+    rate = drive.sample_rate_hz * _FINER
+    preload, dynamic = float(bench.plan.preload_n[row]), float(bench.plan.dynamic_n[row])
+    applied = dynamic * shaker(drive, rate, random)
+    tip = linear_filters.apply(linear_filters.resonance(bench.on, float(bench.stiffness[row])), applied, 1 / rate)
+    charge = gain * _charge(bench, row, tip)
+    charge = linear_filters.apply(linear_filters.electrical(bench.on, preload), charge, 1 / rate)
+    time = np.arange(len(charge)) / rate
+    charge += _mains(bench, time, random)
+    kept = slice(round(_RUN_IN_S * rate), None, _FINER)
+    late = 1e-6 * effects.of(bench.on, "timing_delay", "delay_us")
+    if late:
+        charge = CubicSpline(time, charge)(np.clip(time - late, 0, time[-1]))
+    noise = coloured_noise(len(time[kept]), drive, random)
+    return TimeSeries(
+        converted(preload + applied[kept] + drive.force_noise_n * random.normal(size=len(noise)),
+                  drive.force_range_n, drive.converter_bits),
+        converted(charge[kept] + noise, drive.charge_range_pc, drive.converter_bits),
+    )  # fmt: skip
+
+
+def shaker(drive: Drive, rate: float, random: np.random.Generator) -> Floats:
+    """The shaker's force over its peak amplitude, run-in first; random excitation has the rms of such a sine."""
+    if drive.kind == "stepped_sine":
+        return _stepped_sine(drive, rate)
+    samples = round((_RUN_IN_S + drive.duration_s) * rate)
+    time = np.arange(samples) / rate
+    if drive.kind == "sweep":
+        period = drive.duration_s / _SWEEPS
+        return chirp(time % period, drive.low_hz, period, drive.high_hz)
+    frequency = np.fft.rfftfreq(samples, 1 / rate)
+    spectrum = random.normal(size=(2, len(frequency)))
+    inside = (frequency >= drive.low_hz) & (frequency <= drive.high_hz)
+    signal = np.fft.irfft(np.where(inside, spectrum[0] + 1j * spectrum[1], 0), samples)
+    return signal / (np.sqrt(2) * signal.std())
+
+
+def _stepped_sine(drive: Drive, rate: float) -> Floats:
+    """Tones that rise; each has ten cycles and its share of the duration; the phase runs on between them."""
+    tones = np.geomspace(drive.low_hz, drive.high_hz, drive.steps)
+    lengths = np.round((_CYCLES_A_STEP / tones + drive.duration_s / drive.steps) * rate).astype(int)
+    lengths[0] += round(_RUN_IN_S * rate)
+    return np.sin(np.cumsum(2 * np.pi * np.repeat(tones, lengths) / rate))
+
+
+def _charge(bench: Bench, row: int, force: Floats) -> Floats:
+    """Charge under the force about the preload, before the electronics: straight, or along the moving edge's curve."""
+    straight = bench.level[row] * force
+    mobility = effects.of(bench.on, "amplitude_nonlinearity", "mobility")
+    if not mobility:
+        return straight
+    preload = bench.plan.preload_n[row]
+    reach = min(float(np.abs(force).max()) / preload, 0.999)
+    held = bench.sigma()[row]
+    factor = np.maximum(1 + reach * _CURVE, 1e-6)
+    curve = [(f * bench.sigma(f)[row] - held) * preload for f in factor]
+    moved = CubicSpline(reach * preload * _CURVE, curve)(np.maximum(force, -reach * preload))
+    linear = bench.level[row] / bench.effective_sigma[row]
+    still = bench.effective_sigma[row] - mobility * (bench.first_harmonic[row] - held)
+    return linear * (still * force + mobility * (moved - held * force))
+
+
+def _mains(bench: Bench, time: Floats, random: np.random.Generator) -> Floats:
+    """Mains and a third of it at the third harmonic, the phase of the recording's own."""
+    charge, mains = (effects.of(bench.on, "mains_pickup", name) for name in ("charge_pc", "mains_hz"))
+    phase = 2 * np.pi * mains * time + 2 * np.pi * random.random()
+    return charge * (np.sin(phase) + np.sin(3 * phase) / 3)
+
+
+def coloured_noise(samples: int, drive: Drive, random: np.random.Generator) -> Floats:
+    """White noise of the drive's rms, and 1/f noise as strong at the corner."""
+    frequency = np.fft.rfftfreq(samples, 1 / drive.sample_rate_hz)
+    frequency[0] = frequency[1]
+    spectrum = np.fft.rfft(random.normal(size=samples)) * np.sqrt(1 + drive.flicker_corner_hz / frequency)
+    return drive.charge_noise_pc * np.fft.irfft(spectrum, samples)
+
+
+def converted(signal: Floats, end: float, bits: int) -> Floats:
+    """The signal in steps of 2 end / 2^bits, held at the ends of the range."""
+    step = 2 * end / 2**bits
+    return np.clip(np.round(signal / step) * step, -end, end - step)
+
+
+def frf_noise(drive: Drive, dynamic_n: float, frequency_hz: Floats) -> Iterator[float]:
+    """Noise of the charge over signal of the force, as spectral densities [pC²/N²], at each line of a random drive."""
+    force = 0.5 * dynamic_n**2 / (drive.high_hz - drive.low_hz)
+    charge = 2 * drive.charge_noise_pc**2 / drive.sample_rate_hz
+    for frequency in frequency_hz:
+        yield charge * (1 + drive.flicker_corner_hz / frequency) / force
