@@ -8,6 +8,7 @@ COPY pyproject.toml README.md LICENSE /app/
 COPY underskin /app/underskin
 COPY service /app/service
 COPY tablegen /app/tablegen
+COPY rig /app/rig
 COPY tables /app/tables
 RUN /opt/venv/bin/pip install --quiet --no-deps --no-build-isolation -e /app
 # The root is read-only later, so byte code is written now; the packages' own test suites and pip are not needed any more.
