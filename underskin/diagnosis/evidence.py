@@ -1,0 +1,128 @@
+"""The evidence of one hypothesis: Laplace's method, with care for parameters at their bounds.
+
+log Z = −cost* + (n/2) log 2π − ½ log|H| + log P(box). The cost is that of the quadratic's own minimum (which may lie
+outside the bounds), H the information on the mean parameters and the Hessian in the covariance's, P(box) the
+probability that a normal with this mean and H⁻¹ gives to the bounds: one bound after another, each with the moments
+left by the ones before (exact for one bound; Mendell and Elston 1974).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import log_ndtr
+
+from underskin.diagnosis.fit import Evaluated, Fitter
+from underskin.units import Floats
+
+_NEAR = 4.0  # standard deviations from a bound within which it counts
+_POLISHING, _POLISHED = 4, 0.05  # steps at most, and the gain in log posterior below which it stops
+_LEAST_COVARIANCE_CURVATURE = 0.3  # of logarithms of noise levels: their priors are not wider
+_FLAT = 1e-3  # least standard deviations of the quadratic within a parameter's bounds: keeps H invertible
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """log Z up to what all hypotheses share, the most probable point, and the parameters' covariance there."""
+
+    log_evidence: float
+    fitter: Fitter
+    at: Evaluated
+    covariance: Floats  # (mean parameters, mean parameters), of the quadratic, bounds not counted
+
+
+def laplace(fitter: Fitter, at: Evaluated) -> Evidence:
+    """The evidence around a most probable point, which is first brought to where the whole gradient vanishes."""
+    places = fitter.places
+    low, high = fitter.low[places], fitter.high[places]
+    for _ in range(_POLISHING):
+        information, _ = fitter.posterior_equations(at)
+        information = information + np.diag((_FLAT / (high - low)) ** 2)
+        gradient = _gradient(fitter, at, information)
+        polished = _polish(fitter, at, information, gradient)
+        if polished is None:
+            break
+        at = polished
+    covariance: Floats = np.linalg.inv(information).astype(np.float64)
+    fit = at.point.fit[places]
+    # Towards a bound the gradient stays; elsewhere what polishing left of it is not to be trusted far.
+    gain = 0.5 * gradient @ covariance @ gradient
+    shift = -covariance @ gradient
+    mean_part = -at.cost + gain + 0.5 * len(fit) * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(information)[1]
+    mean_part += log_box((fit + shift).astype(np.float64), covariance, low, high)
+    slope, hessian = fitter.covariance_equations(at)
+    eigenvalues = np.maximum(np.linalg.eigvalsh(hessian), _LEAST_COVARIANCE_CURVATURE)
+    level_part = 0.5 * len(slope) * np.log(2 * np.pi) - 0.5 * float(np.log(eigenvalues).sum())
+    return Evidence(float(mean_part + level_part), fitter, at, covariance)
+
+
+def _polish(fitter: Fitter, at: Evaluated, information: Floats, gradient: Floats) -> Evaluated | None:
+    """A Newton step with the whole gradient, within the bounds; None where it gains nothing."""
+    places = fitter.places
+    fit, low, high = at.point.fit[places], fitter.low[places], fitter.high[places]
+    held = ((fit <= low) & (gradient > 0)) | ((fit >= high) & (gradient < 0))
+    free = ~held
+    if not free.any():
+        return None
+    step = np.zeros(len(fit))
+    step[free] = -np.linalg.solve(information[np.ix_(free, free)], gradient[free])
+    if -0.5 * gradient @ step < _POLISHED:
+        return None
+    for _ in range(5):
+        moved = at.point.fit.copy()
+        moved[places] = np.clip(fit + step, low, high)
+        tried = fitter.settle(fitter.evaluate(replace(at.point, fit=moved)), 1)
+        if tried.cost < at.cost - 0.2 * _POLISHED:
+            return tried
+        step = step / 3
+    return None
+
+
+def _gradient(fitter: Fitter, at: Evaluated, information: Floats) -> Floats:
+    places = fitter.places
+    steps = 0.1 / np.sqrt(np.diag(information))
+    gradient = np.empty(len(places))
+    for index, place in enumerate(places):
+        room = fitter.high[place] - fitter.low[place]
+        step = min(float(steps[index]), 0.02 * room)
+        ends, costs = [], []
+        for sign in (1, -1):
+            fit = at.point.fit.copy()
+            fit[place] = np.clip(fit[place] + sign * step, fitter.low[place], fitter.high[place])
+            ends.append(fit[place])
+            costs.append(fitter.evaluate(replace(at.point, fit=fit)).cost)
+        gradient[index] = (costs[0] - costs[1]) / (ends[0] - ends[1])
+        if ends[0] - ends[1] < 1.5 * step:  # one-sided, at a bound: back to the bound itself
+            gradient[index] += (0.5 if ends[0] == at.point.fit[place] else -0.5) * information[index, index] * step
+    return gradient
+
+
+def log_box(mean: Floats, covariance: Floats, low: Floats, high: Floats) -> float:
+    """The logarithm of the probability of low < x < high for x ~ N(mean, covariance)."""
+    mean, covariance = mean.copy(), covariance.copy()
+    deviation = np.sqrt(np.diag(covariance))
+    near = np.minimum(mean - low, high - mean) < _NEAR * deviation
+    total = 0.0
+    for place in np.flatnonzero(near):
+        sd = float(np.sqrt(covariance[place, place]))
+        a, b = (low[place] - mean[place]) / sd, (high[place] - mean[place]) / sd
+        if a > 0:  # the far tail is computed on the side where it is small
+            a, b, sign = -b, -a, -1.0
+        else:
+            sign = 1.0
+        log_mass = _log_between(a, b)
+        total += log_mass
+        # Mean and variance of the truncated normal, and what they do to the others
+        density_a, density_b = (np.exp(-0.5 * x * x - 0.5 * np.log(2 * np.pi) - log_mass) for x in (a, b))
+        first = density_a - density_b
+        tail = (a * density_a if np.isfinite(a) else 0.0) - (b * density_b if np.isfinite(b) else 0.0)
+        variance = float(np.clip(1 + tail - first**2, 1e-6, 1.0))
+        gain = covariance[:, place] / sd
+        mean = mean + gain * sign * first
+        covariance = covariance - np.outer(gain, gain) * (1 - variance)
+    return total
+
+
+def _log_between(a: float, b: float) -> float:
+    """log(Φ(b) − Φ(a)), a < b and a ≤ 0."""
+    upper, lower = log_ndtr(b), log_ndtr(a)
+    return float(upper + np.log1p(-np.exp(min(lower - upper, -1e-15))))

@@ -1,0 +1,171 @@
+"""One set of mechanisms as an explanation of the recordings: fitted from several starts, and its evidence.
+
+Every set is fitted without positioning scatter and, where that could show, with it; its evidence is the mean of the
+two under their prior.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from underskin.diagnosis.curvature import curvature
+from underskin.diagnosis.evidence import Evidence, laplace
+from underskin.diagnosis.fit import Evaluated, Fitter, Hypothesis, Point
+from underskin.diagnosis.lines import Lines
+from underskin.diagnosis.scatter import NO_POSITION, POSITION
+from underskin.mechanisms.catalogue import CATALOGUE
+from underskin.mechanisms.model import Model, compose
+from underskin.surrogate import SigmaTable
+
+_QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7, 0.9), 3: (0.2, 0.5, 0.8)}
+_KEPT_STARTS = 3
+_DECIDED = 0.999  # probability beyond which a parent's positioning scatter, or none, is its offspring's
+_LEAST_GAIN = 1.0  # in log posterior density
+_LEAST_SCATTER = 3e-3  # relative effect of positioning scatter on a recording below which it is not looked for
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """`best` is the more probable of the fits with and without positioning scatter."""
+
+    names: tuple[str, ...]
+    log_evidence: float
+    best: Evidence
+    placed: float  # probability that there is positioning scatter, given this set
+
+    @property
+    def model(self) -> Model:
+        """The composed model."""
+        return self.best.fitter.hypothesis.model
+
+    @property
+    def point(self) -> Point:
+        """The most probable parameters."""
+        return self.best.at.point
+
+    def own(self, name: str) -> list[float]:
+        """The fit coordinates of one of its mechanisms."""
+        return list(self.point.fit[own_places(self.names, self.best.fitter.hypothesis.lines)[name]])
+
+
+def own_places(names: Sequence[str], lines: Lines) -> dict[str, slice]:
+    """Where in a composed model's parameters each mechanism's are."""
+    places, first = {}, 0
+    for name, mechanism in CATALOGUE.items():
+        if name in names:
+            count = len(mechanism.parameters(lines.campaign))
+            places[name] = slice(first, first + count)
+            first += count
+    return places
+
+
+class Workbench:
+    """The lines of one campaign, whole and collapsed, and what fitting any set to them needs."""
+
+    def __init__(self, lines: Lines, table: SigmaTable) -> None:
+        """Collapse, and work out how σ bends."""
+        self.lines = lines
+        self.collapsed = lines.collapsed()
+        self.table = table
+        self.curvature = curvature(self.collapsed, table)
+
+    def hypothesis(self, names: Sequence[str], placed: bool, *, whole: bool = False) -> Hypothesis:
+        """The set's model on the lines that it needs; raises Unsupported."""
+        lines = self.lines if whole or any(needs_lines(name) for name in names) else self.collapsed
+        return Hypothesis(compose(names, lines.campaign, self.table, "frf"), lines, self.curvature, placed)
+
+    def explain(self, names: Sequence[str], parent: Explanation | None = None) -> Explanation | None:
+        """The set's explanation; from a parent's, which has one mechanism less, where one is given.
+
+        None where the log posterior density gains less than `_LEAST_GAIN` over the parent: the added mechanism does
+        not show. Raises Unsupported.
+        """
+        plain = self.hypothesis(names, False)
+        fitters = [Fitter(plain), Fitter(replace(plain, placed=True))]
+        weights = np.log([NO_POSITION, 1 - NO_POSITION])
+        found: list[Evidence | None] = [None, None]
+        starts: list[Evaluated] = []
+        if parent is None or parent.placed < _DECIDED:
+            starts = [fitters[0].improve(at.point) for at in self._starts(fitters[0], names, parent)]
+            best = min(starts, key=lambda entry: entry.cost)
+            if not self._gains(best, parent, 0):
+                return None
+            found[0] = laplace(fitters[0], best)
+            if parent is None and not self._position_matters(best):
+                weights[0] = 0.0
+        if (parent is None and weights[0] < 0) or (parent is not None and parent.placed > 1 - _DECIDED):
+            beside = starts or self._starts(fitters[1], names, parent)
+            moved = [at.point if fitters[1].holds(at.point) else _with_position(at.point) for at in beside]
+            best = min((fitters[1].improve(point) for point in moved), key=lambda entry: entry.cost)
+            if not self._gains(best, parent, 1):
+                return None
+            found[1] = laplace(fitters[1], best)
+        each = np.array([-np.inf if entry is None else entry.log_evidence for entry in found]) + weights
+        total = float(np.logaddexp.reduce(each))
+        chosen = found[int(np.argmax(each))]
+        assert chosen is not None
+        ordered = tuple(name for name in CATALOGUE if name in names)
+        return Explanation(ordered, total, chosen, float(np.exp(each[1] - total)))
+
+    @staticmethod
+    def _gains(at: Evaluated, parent: Explanation | None, placed: int) -> bool:
+        if parent is None or int(parent.placed > 0.5) != placed:
+            return True
+        return at.cost < parent.best.at.cost - _LEAST_GAIN
+
+    def _position_matters(self, at: Evaluated) -> bool:
+        slopes = at.prediction.position_slopes
+        assert slopes is not None
+        p = POSITION[1]
+        size = np.abs(at.prediction.value) ** 2 + 1e-300
+        first = (np.abs(slopes) ** 2).sum(axis=0) / size
+        second = self.curvature.square[at_recording(self, at)]
+        effect = p**2 * first + 0.5 * p**4 * second
+        return bool(effect.max() > _LEAST_SCATTER**2)
+
+    def _starts(self, fitter: Fitter, names: Sequence[str], parent: Explanation | None) -> list[Evaluated]:
+        """The best of the local minima of a grid over the new mechanisms' prior quantiles."""
+        lines = fitter.hypothesis.lines
+        places = own_places(names, lines)
+        own = np.zeros(max((place.stop for place in places.values()), default=0))
+        free: list[int] = []
+        axes: list[list[float]] = []
+        new = [name for name in places if parent is None or name not in parent.names]
+        parameters = {name: CATALOGUE[name].parameters(lines.campaign) for name in new}
+        quantiles = _QUANTILES.get(sum(map(len, parameters.values())), (0.5,))
+        for name, place in places.items():
+            if name in new:
+                free += range(place.start, place.stop)
+                axes += [[entry.quantile(q) for q in quantiles] for entry in parameters[name]]
+            elif parent is not None:
+                own[place] = parent.own(name)
+        tried: dict[tuple[int, ...], Evaluated] = {}
+        for index in itertools.product(*(range(len(axis)) for axis in axes)):
+            own[free] = [axis[at] for axis, at in zip(axes, index, strict=True)]
+            tried[index] = fitter.settle(fitter.evaluate(fitter.start(own, parent.point if parent else None)), 2)
+        lowest = [index for index in tried if _is_lowest(index, tried)]
+        return sorted((tried[index] for index in lowest), key=lambda entry: entry.cost)[:_KEPT_STARTS]
+
+
+def _is_lowest(index: tuple[int, ...], tried: dict[tuple[int, ...], Evaluated]) -> bool:
+    """Whether no neighbour on the grid is lower."""
+    around = (tuple(np.add(index, step)) for step in itertools.product((-1, 0, 1), repeat=len(index)))
+    return all(tried[index].cost <= tried[other].cost for other in around if other in tried)
+
+
+def at_recording(bench: Workbench, at: Evaluated) -> np.ndarray:
+    """The recording of each row of an evaluated prediction."""
+    return bench.lines.recording if len(at.prediction.value) == len(bench.lines.value) else bench.collapsed.recording
+
+
+def needs_lines(name: str) -> bool:
+    """Whether a mechanism acts on lines apart, so that a recording's lines cannot be replaced by their mean."""
+    return bool({"frequency_hz", "phase"} & set(CATALOGUE[name].axes))
+
+
+def _with_position(point: Point) -> Point:
+    gain, level, *own = point.covariance
+    start = float(np.log(np.sqrt(POSITION[0] * POSITION[1])))
+    return replace(point, covariance=np.array([gain, level, start, *own]))

@@ -1,0 +1,298 @@
+"""The most probable parameters of one hypothesis, by Gauss–Newton steps with a trust region.
+
+Mean parameters move by the model's derivatives; what only enters the covariance (gain and position scatter, line level,
+and a mechanism's spread or pick-up) by Newton steps on the likelihood of the prediction at hand, which costs no model
+evaluation. Fisher's information between the two groups is zero for a normal likelihood, so they are taken in turns.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from underskin.diagnosis.likelihood import Curvature, Marginal, Moments, NoiseLevels
+from underskin.diagnosis.lines import Lines
+from underskin.diagnosis.scatter import GAIN_PRIOR, POSITION_PRIOR, level_prior
+from underskin.mechanisms.composition import SENSOR_SPREAD
+from underskin.mechanisms.mechanism import Normal, Parameter
+from underskin.mechanisms.model import Model, Prediction
+from underskin.units import Floats
+
+_STEP = 0.05  # of the finite differences in the covariance's logarithms
+_LARGEST_STEP = 1.0
+_CONVERGED = 0.01  # in log posterior
+_MOST_ITERATIONS = 25
+_FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
+_BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
+
+
+@dataclass(frozen=True)
+class CovarianceParameter:
+    """A coordinate that moves the covariance alone: its name, bounds and log prior density."""
+
+    name: str
+    low: float
+    high: float
+    log_density: Callable[[float], float]
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A model and the lines it is to explain, with or without positioning scatter."""
+
+    model: Model
+    lines: Lines
+    curvature: Curvature
+    placed: bool  # whether there is positioning scatter
+
+    @property
+    def mean_places(self) -> list[int]:
+        """The places of the model's parameters that move the mean."""
+        return [index for index, entry in enumerate(self.model.parameters) if not _moves_covariance(entry)]
+
+    @property
+    def covariance(self) -> tuple[CovarianceParameter, ...]:
+        """Gain scatter, line level, position scatter where there is one, then the model's own."""
+        level = level_prior(self.lines.noise.log_level_sd)
+        common = [
+            CovarianceParameter("gain", np.log(1e-3), np.log(0.5), GAIN_PRIOR.log_density),
+            CovarianceParameter("level", np.log(0.1), np.log(100.0), level.log_density),
+        ]
+        if self.placed:
+            common.append(CovarianceParameter("position", np.log(2e-5), np.log(6e-4), POSITION_PRIOR.log_density))
+        own = [
+            CovarianceParameter(entry.name, *entry.bounds, entry.log_prior)
+            for entry in self.model.parameters
+            if _moves_covariance(entry)
+        ]
+        return (*common, *own)
+
+
+def _moves_covariance(entry: Parameter) -> bool:
+    return entry.name in COVARIANCE_NAMES
+
+
+COVARIANCE_NAMES = ("spread", "pickup_charge")
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where a fit stands: the model's coordinates, the covariance's, and each sensor's most probable log gain."""
+
+    fit: Floats
+    covariance: Floats
+    bend: Floats
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """A point with what was worked out there; `cost` is minus the log posterior density (up to what all share)."""
+
+    point: Point
+    predicted_at: Floats
+    prediction: Prediction
+    moments: Moments
+    marginal: Marginal
+    cost: float
+
+
+class Fitter:
+    """Evaluates and improves points of one hypothesis."""
+
+    def __init__(self, hypothesis: Hypothesis) -> None:
+        """Prepare the names and bounds."""
+        self.hypothesis = hypothesis
+        self.parameters = hypothesis.model.parameters
+        self.places = hypothesis.mean_places
+        self.covariance = hypothesis.covariance
+        bounds = np.array([entry.bounds for entry in self.parameters]).reshape(-1, 2)
+        self.low, self.high = bounds.T
+        self._priors = np.array([_curvature_of_prior(entry) for entry in self.parameters])
+        self._own = [index for index, entry in enumerate(self.parameters) if _moves_covariance(entry)]
+        self._common = len(self.covariance) - len(self._own)
+        names = [entry.name for entry in self.parameters]
+        self._spread, self._pickup = (names.index(name) if name in names else None for name in COVARIANCE_NAMES)
+        sensors = int(hypothesis.lines.sensor.max()) + 1
+        self._no_bend = np.zeros(sensors)
+
+    def holds(self, point: Point) -> bool:
+        """Whether a point has this hypothesis' covariance parameters."""
+        return len(point.covariance) == len(self.covariance)
+
+    def start(self, own: Sequence[float] | Floats, parent: Point | None = None) -> Point:
+        """A point with these coordinates of the mechanisms, E and h of a parent or their centre, d33 as data say."""
+        fit = np.array([entry.start for entry in self.parameters])
+        fit[: len(own)] = own
+        if parent is not None:
+            fit[len(own) :] = parent.fit[len(parent.fit) - len(fit) + len(own) :]
+        covariance = [GAIN_PRIOR.middle, 0.0]
+        if self.hypothesis.placed:
+            covariance.append(POSITION_PRIOR.middle)
+        point = Point(fit, np.array([*covariance, *fit[self._own]]), self._no_bend)
+        place = next((index for index, entry in enumerate(self.parameters) if entry.name == "d33"), None)
+        if place is not None:
+            lines = self.hypothesis.lines
+            value = self.hypothesis.model.predict(fit).value
+            weight = 1 / (lines.deviation**2 + (0.03 * np.abs(value)) ** 2)
+            ratio = np.sum(weight * (value.conj() * lines.value).real) / np.sum(weight * np.abs(value) ** 2)
+            if ratio > 0:
+                fit[place] = np.clip(fit[place] + np.log(ratio), self.low[place], self.high[place])
+        return point
+
+    def evaluate(self, point: Point) -> Evaluated:
+        """Predict and weigh."""
+        hypothesis = self.hypothesis
+        prediction = hypothesis.model.predict(point.fit)
+        position = float(np.exp(point.covariance[2])) if hypothesis.placed else 0.0
+        lines = hypothesis.lines
+        for _ in range(_BENDINGS):
+            moments = Moments(lines, prediction, point.bend[lines.sensor], hypothesis.curvature, position)
+            at = self._weigh(point, point.fit, prediction, moments)
+            if self.levels(point, point.fit).spread < _FREE_SPREAD:
+                break
+            bend = np.clip(at.marginal.sensor_gains, -_LARGEST_BEND, _LARGEST_BEND)
+            if np.abs(bend - point.bend).max() < _BENT:
+                break
+            point = replace(point, bend=bend)
+        return at
+
+    def _weigh(self, point: Point, predicted_at: Floats, prediction: Prediction, moments: Moments) -> Evaluated:
+        marginal = Marginal(self.hypothesis.lines, moments, self.levels(point, predicted_at))
+        cost = -marginal.log_likelihood - self._log_prior(point)
+        return Evaluated(point, predicted_at, prediction, moments, marginal, cost)
+
+    def levels(self, point: Point, predicted_at: Floats) -> NoiseLevels:
+        """The noise levels at a point, for a prediction made at other coordinates of the covariance."""
+        position = float(np.exp(point.covariance[2])) if self.hypothesis.placed else 0.0
+        spread = SENSOR_SPREAD if self._spread is None else float(np.exp(point.fit[self._spread]))
+        pickup = 1.0
+        if self._pickup is not None:
+            pickup = float(np.exp(point.fit[self._pickup] - predicted_at[self._pickup]))
+        return NoiseLevels(
+            float(np.exp(point.covariance[0])), float(np.exp(point.covariance[1])), position, spread, pickup
+        )
+
+    def _with_own(self, fit: Floats, covariance: Floats) -> Floats:
+        if not self._own:
+            return fit
+        whole = fit.copy()
+        whole[self._own] = covariance[self._common :]
+        return whole
+
+    def _log_prior(self, point: Point) -> float:
+        own = sum(self.parameters[place].log_prior(point.fit[place]) for place in self.places)
+        return own + sum(
+            entry.log_density(value) for entry, value in zip(self.covariance, point.covariance.tolist(), strict=True)
+        )
+
+    def improve(self, start: Point, iterations: int = _MOST_ITERATIONS) -> Evaluated:
+        """The most probable point near the start."""
+        best = self.settle(self.evaluate(start), 3)
+        damping = 1e-3
+        for _ in range(iterations):
+            step = self._step(best, damping)
+            moved = replace(best.point, fit=np.clip(best.point.fit + step, self.low, self.high))
+            tried = self.settle(self.evaluate(moved), 1)
+            gained = best.cost - tried.cost
+            if gained > 0:
+                best = tried
+                damping = max(damping / 10, 1e-6)
+                if gained < _CONVERGED:
+                    break
+            elif damping > 1e4 or np.abs(step).max() < 1e-7:
+                break
+            else:
+                damping = max(damping * 10, 1e-2)
+                if gained > -_CONVERGED and damping > 1:
+                    break
+        return self.settle(best, 2)
+
+    def _step(self, at: Evaluated, damping: float) -> Floats:
+        """A Gauss–Newton step of the mean parameters, damped, within the bounds."""
+        information, gradient = self.posterior_equations(at)
+        places = np.array(self.places)
+        fit = at.point.fit[places]
+        low, high = self.low[places], self.high[places]
+        free = np.ones(len(places), dtype=bool)
+        step = np.zeros(len(fit))
+        for _ in range(len(places)):
+            matrix = information[np.ix_(free, free)]
+            matrix = matrix + damping * np.diag(np.diag(matrix)) + 1e-10 * np.eye(len(matrix))
+            step[:] = 0.0
+            step[free] = np.linalg.solve(matrix, gradient[free])
+            scale = np.abs(step) / np.maximum(_LARGEST_STEP, 0.3 * (high - low))
+            step /= max(1.0, scale.max())
+            leaving = free & (((fit <= low) & (step < 0)) | ((fit >= high) & (step > 0)))
+            if not leaving.any():
+                break
+            free &= ~leaving
+            if not free.any():
+                step[:] = 0.0
+                break
+        whole = np.zeros(len(self.parameters))
+        whole[places] = step
+        return whole
+
+    def posterior_equations(self, at: Evaluated) -> tuple[Floats, Floats]:
+        """Information and gradient of the log posterior in the mean parameters."""
+        information, gradient = at.marginal.normal_equations()
+        places = self.places
+        information, gradient = information[np.ix_(places, places)], gradient[places]
+        precision, centre = self._priors[places].T
+        return information + np.diag(precision), gradient - precision * (at.point.fit[places] - centre)
+
+    def settle(self, at: Evaluated, steps: int) -> Evaluated:
+        """Newton steps of the covariance parameters at a fixed prediction."""
+        for _ in range(steps):
+            gradient, hessian = self.covariance_equations(at)
+            low = np.array([entry.low for entry in self.covariance])
+            high = np.array([entry.high for entry in self.covariance])
+            eigenvalues, vectors = np.linalg.eigh(hessian)
+            step = -vectors @ ((vectors.T @ gradient) / np.maximum(np.abs(eigenvalues), 1.0))
+            step *= min(1.0, 0.7 / max(np.abs(step).max(), 1e-12))
+            for _ in range(4):
+                point = self._moved(at.point, np.clip(at.point.covariance + step, low, high))
+                tried = self._weigh(point, at.predicted_at, at.prediction, at.moments)
+                if tried.cost < at.cost:
+                    break
+                step = step / 4
+            else:
+                return at
+            gained, at = at.cost - tried.cost, tried
+            if gained < 1e-3:
+                break
+        return at
+
+    def _moved(self, point: Point, covariance: Floats) -> Point:
+        return replace(point, covariance=covariance, fit=self._with_own(point.fit, covariance))
+
+    def covariance_equations(self, at: Evaluated) -> tuple[Floats, Floats]:
+        """Gradient and Hessian of the cost in the covariance parameters, by central differences."""
+        here = at.point.covariance
+        count = len(here)
+        steps = _STEP * np.eye(count)
+        # Far enough inside the bounds for the differences
+        low = np.array([entry.low for entry in self.covariance]) + 2 * _STEP
+        high = np.array([entry.high for entry in self.covariance]) - 2 * _STEP
+        centre = np.clip(here, low, high)
+
+        def cost(change: Floats) -> float:
+            point = self._moved(at.point, centre + change)
+            return self._weigh(point, at.predicted_at, at.prediction, at.moments).cost
+
+        middle = at.cost if (centre == here).all() else cost(np.zeros(count))
+        up, down = [cost(step) for step in steps], [cost(-step) for step in steps]
+        gradient = (np.array(up) - down) / (2 * _STEP)
+        hessian = np.diag((np.array(up) + down - 2 * middle) / _STEP**2)
+        for a in range(count):
+            for b in range(a):
+                mixed = cost(steps[a] + steps[b]) - up[a] - up[b] + middle
+                hessian[a, b] = hessian[b, a] = mixed / _STEP**2
+        return gradient + hessian @ (here - centre), hessian
+
+
+def _curvature_of_prior(entry: Parameter) -> tuple[float, float]:
+    """Precision and centre of a parameter's prior; 0 where it is uniform."""
+    if isinstance(entry.prior, Normal):
+        return entry.prior.sd**-2, entry.prior.mean
+    return 0.0, 0.0

@@ -1,0 +1,210 @@
+"""How probable the recordings are under a model, with the noise of PHYSICS, section 8, marginalised exactly.
+
+Recording i of sensor s, rows j:  y_ij = m_ij (1 + g_i) e^(b_s) + ∂m_ij·δ_i + pickup_ij z_i + n_ij, with
+    n ~ N(0, κ² d_ij²) in real and imaginary part, g ~ N(0, s²), δ ~ N(0, p² I), z complex normal, b ~ N(0, τ²).
+The contact's place scales a recording by a real factor, so m and ∂m are one direction u in each recording; where m
+vanishes, u is that of ∂m. C_i = κ² D + q² (c cᵀ + (ic)(ic)ᵀ) + V_i u uᵀ, V_i = s² a² + p² |t|² + ½ p⁴ tr(H²) a², with
+m = a u and ∂m = t u; sensors add τ² m mᵀ over their recordings. All of it is taken out by Sherman and Morrison's
+identity, so that time is linear in rows and recordings. The covariance follows the model, so log|C| stays.
+
+e^b is linearised at `bend`, the most probable b of each sensor: Laplace's method for b. Where a contact sits on an
+extremum of σ, p acts in second order: on the mean by ½ p² ∇²σ, on the variance as above, H of the base model.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.diagnosis.lines import Lines
+from underskin.mechanisms.differentiated import Array
+from underskin.mechanisms.model import Prediction
+from underskin.units import Floats
+
+_FROM_SLOPES = 1e-3  # m: a recording whose response changes by more than itself over this way is led by its slopes
+
+
+@dataclass(frozen=True)
+class Curvature:
+    """Of σ over the contact's place, relative to σ (recordings,) [1/m²] and [1/m⁴]: ∇²σ/σ and tr(H²)/σ²."""
+
+    laplacian: Floats
+    square: Floats
+
+
+@dataclass(frozen=True)
+class NoiseLevels:
+    """`gain` s, `level` κ, `position` p [m] (0: none), `spread` τ, and the pick-up over the prediction's."""
+
+    gain: float
+    level: float
+    position: float
+    spread: float
+    pickup: float = 1.0
+
+
+class Moments:
+    """All inner products over rows that the likelihood of one prediction needs, with 1/d² as the weight.
+
+    Products are real, Re(a* b), summed over the rows of one recording. `bend` (recordings,) is b of each one's sensor;
+    `position` is the p at which the second-order mean is taken.
+    """
+
+    def __init__(
+        self, lines: Lines, prediction: Prediction, bend: Floats, curvature: Curvature, position: float
+    ) -> None:
+        """Weigh and sum."""
+        self._first = lines.first
+        self._lines = lines
+        factor = np.exp(bend) * (1 + 0.5 * position**2 * curvature.laplacian)
+        self._scale = (factor[lines.recording]) / lines.deviation
+        self._slopes = prediction.slopes
+        model = prediction.value * self._scale
+        residual = lines.value / lines.deviation - model * (1 - bend[lines.recording])
+        direction, self.along = model, np.ones(lines.recordings)
+        self.moved = np.zeros(lines.recordings)
+        if position > 0 and prediction.position_slopes is not None:
+            direction = self._direction(model, prediction.position_slopes * self._scale)
+        self._direction_rows = direction
+        self._residual = residual
+        self.second_order = curvature.square
+        self.uu = self._sum(direction, direction)
+        self.ur = self._sum(direction, residual)
+        self.rr = self._sum(residual, residual)
+        self.picked = prediction.pickup is not None
+        if prediction.pickup is not None:
+            self._pickup = prediction.pickup / lines.deviation
+            self.cc = self._sum(self._pickup, self._pickup)
+            self.cu = self._with_pickup(direction)
+            self.cr = self._with_pickup(residual)
+
+    def _direction(self, model: Array, slopes: Array) -> Array:
+        """u, and along it a (`along`) and |t|² (`moved`)."""
+        mm = self._sum(model, model)
+        sizes = np.stack([self._sum(slope, slope) for slope in slopes])
+        led = _FROM_SLOPES**2 * sizes.sum(axis=0) > mm
+        direction = model
+        if led.any():
+            larger = np.where((sizes[0] >= sizes[1])[self._lines.recording], slopes[0], slopes[1]) * _FROM_SLOPES
+            direction = np.where(led[self._lines.recording], larger, model)
+        uu = np.maximum(self._sum(direction, direction), 1e-300)
+        self.along = self._sum(direction, model) / uu
+        self.moved = (self._sum(direction, slopes[0]) / uu) ** 2 + (self._sum(direction, slopes[1]) / uu) ** 2
+        return direction
+
+    def _sum(self, a: Array, b: Array) -> Floats:
+        products = (a.conj() * b).real
+        return products if len(self._first) == len(products) else np.add.reduceat(products, self._first)
+
+    def _with_pickup(self, rows: Array) -> Array:
+        """c·x + i (ic)·x, as one complex number a recording."""
+        products = self._pickup * rows
+        return products if len(self._first) == len(products) else np.add.reduceat(products, self._first)
+
+    @cached_property
+    def slopes(self) -> tuple[Floats, Floats, Floats, NDArray[np.complex128] | None]:
+        """Of the model's derivatives J: JᵀJ (P, P); for each recording uᵀJ, Jᵀr, (c + i·ic)ᵀJ (recordings, P)."""
+        rows = self._slopes * self._scale
+        real = np.concatenate([rows.real, rows.imag], axis=1)
+
+        def summed(products: Array) -> Array:
+            if len(self._first) != products.shape[1]:
+                products = np.add.reduceat(products, self._first, axis=1)
+            return products.T
+
+        uj = summed((self._direction_rows.conj() * rows).real)
+        jr = summed((self._residual.conj() * rows).real)
+        return real @ real.T, uj, jr, summed(self._pickup * rows) if self.picked else None
+
+
+class Marginal:
+    """The likelihood of one prediction at one set of noise levels; what is needed of it is worked out when asked."""
+
+    def __init__(self, lines: Lines, moments: Moments, levels: NoiseLevels) -> None:
+        """Take out pick-up, gain and position, recording by recording, then the sensors."""
+        self._lines, self._moments, self._levels = lines, moments, levels
+        self._k2 = k2 = levels.level**2
+        uu, ur, rr = moments.uu / k2, moments.ur / k2, moments.rr / k2
+        log_determinant = 0.0
+        if moments.picked:
+            q2 = levels.pickup**2
+            inner = 1 + q2 * moments.cc / k2
+            self._phi = q2 / inner / k2**2
+            uu = uu - self._phi * np.abs(moments.cu) ** 2
+            ur = ur - self._phi * (moments.cu.conj() * moments.cr).real
+            rr = rr - self._phi * np.abs(moments.cr) ** 2
+            log_determinant += 2 * float(np.log(inner).sum())
+        self._uu, self._ur = uu, ur
+        a2 = moments.along**2
+        variance = levels.gain**2 * a2
+        if levels.position > 0:
+            p2 = levels.position**2
+            variance = variance + p2 * moments.moved + 0.5 * p2**2 * moments.second_order * a2
+        self._variance = variance
+        self._reduced = 1 / (1 + variance * uu)  # 1 − (share of u taken out)
+        self._shrink = variance * self._reduced
+        self._mm = a2 * uu * self._reduced  # mᵀ C_i⁻¹ m
+        self._mr = moments.along * ur * self._reduced
+        sensors = int(lines.sensor.max()) + 1
+        self._sensor_mm = np.bincount(lines.sensor, self._mm, sensors)
+        self._sensor_mr = np.bincount(lines.sensor, self._mr, sensors)
+        tau2 = levels.spread**2
+        self._sensor_shrink = tau2 / (1 + tau2 * self._sensor_mm)
+        scatter, freedom = lines.scatter
+        chi2 = rr.sum() - (self._shrink * ur**2).sum() - (self._sensor_shrink * self._sensor_mr**2).sum()
+        log_determinant += (2 * len(lines.value) + freedom) * np.log(k2) - np.log(self._reduced).sum()
+        log_determinant += np.log1p(tau2 * self._sensor_mm).sum()
+        self.log_likelihood = -0.5 * float(chi2 + scatter / k2 + log_determinant)
+
+    @property
+    def sensor_gains(self) -> Array:
+        """The most probable b of each sensor (sensors,), given the model."""
+        return self._sensor_shrink * self._sensor_mr
+
+    def normal_equations(self) -> tuple[Array, Array]:
+        """Jᵀ C⁻¹ J, the information on the parameters, and the gradient of the log likelihood.
+
+        The gradient is that by the mean and by the gain's and the sensors' columns, which follow the model,
+        ∂/∂θ (−½ log|C| − ½ rᵀC⁻¹r) with dC = s² (J mᵀ + m Jᵀ); what the position's columns add is left out.
+        """
+        moments, k2 = self._moments, self._k2
+        jj, uj, jr, cj = moments.slopes
+        jj, uj, jr = jj / k2, uj / k2, jr / k2
+        if cj is not None:
+            phi = self._phi[:, None]
+            jj = jj - ((phi * cj).conj().T @ cj).real
+            uj = uj - phi * (moments.cu[:, None].conj() * cj).real
+            jr = jr - phi * (moments.cr[:, None].conj() * cj).real
+        information = jj - uj.T @ (self._shrink[:, None] * uj)
+        jr = jr - uj * (self._shrink * self._ur)[:, None]
+        mj = uj * (moments.along * self._reduced)[:, None]
+        sensor = self._lines.sensor
+        by_sensor = _by_sensor(mj, sensor, len(self._sensor_shrink))
+        information -= by_sensor.T @ (by_sensor * self._sensor_shrink[:, None])
+        # From here on with the sensors' columns in C as well
+        gains = self.sensor_gains
+        jr = jr - mj * gains[sensor, None]
+        mr = self._mr - self._mm * gains[sensor]
+        left = 1 - self._sensor_shrink[sensor] * self._mm
+        own = self._levels.gain**2 * (jr * mr[:, None] - mj * left[:, None])
+        tau2 = self._levels.spread**2
+        sensor_mr = self._sensor_mr - self._sensor_mm * gains
+        sensor_left = 1 - self._sensor_shrink * self._sensor_mm
+        shared = _by_sensor(jr, sensor, len(gains)) * sensor_mr[:, None] - by_sensor * sensor_left[:, None]
+        return information, jr.sum(axis=0) + own.sum(axis=0) + tau2 * shared.sum(axis=0)
+
+    def gain_residuals(self) -> tuple[Floats, Floats]:
+        """How much each recording lies above its model (recordings,), relative, sensors' gains taken off; and the
+        standard deviation that line noise alone gives to it."""
+        along = self._moments.along
+        size = np.where(np.abs(along * self._uu) > 0, along * self._uu, np.inf)
+        gains = self.sensor_gains[self._lines.sensor]
+        deviation = 1 / (np.abs(along) * np.sqrt(np.maximum(self._uu, 1e-300)))
+        return self._ur / size - gains, deviation
+
+
+def _by_sensor(rows: Floats, sensor: NDArray[np.intp], sensors: int) -> Floats:
+    total = np.zeros((sensors, rows.shape[1]))
+    np.add.at(total, sensor, rows)
+    return total

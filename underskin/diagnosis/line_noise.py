@@ -1,0 +1,153 @@
+"""The noise of single lines, from how rough the lines are along frequency: no hypothesis enters.
+
+Real and imaginary part each have variance d² = rel(f)² A² + floor², A the recording's amplitude around the line.
+What all recordings share at a frequency is taken off, then each line is compared with its two neighbours,
+    e_j = z_j − λ z_(j−1) − (1−λ) z_(j+1)   (linear in log f),   E|e_j|²/2 = d_j² + λ² d_(j−1)² + (1−λ)² d_(j+1)²,
+which smooth misfit hardly reaches. log rel² is piecewise linear in log f; it and the floor are fitted with Student's
+likelihood, so that single wild lines (mains, a resonance between two lines) do not count, and the level is set by the
+median of |e|². Where `coherence` γ² is given, (1 − γ²)/γ² has the shape of (d/A)² (its n is unknown), and steadies it.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from underskin.units import Complexes, Floats
+
+_KNOTS_PER_DECADE = 2.0
+_SMOOTH = 1.0  # sd of the second difference of log rel² between knots
+_FREEDOM = 6.0
+_TYPICAL, _TYPICAL_SD = 1e-4, 3.0  # rel², and the sd of its logarithm: where hardly any line says anything
+_SHARED = 8  # recordings at a frequency from which what they share is taken off
+_WINDOW = 5
+
+
+@dataclass(frozen=True)
+class LineNoise:
+    """`deviation` (rows,) of real and imaginary part [C/N], and how well its level is known (sd of its logarithm)."""
+
+    deviation: Floats
+    log_level_sd: float
+    floor: float
+
+
+def line_noise(value: Complexes, frequency: Floats, recording: NDArray[np.intp], coherence: Floats) -> LineNoise:
+    """The noise of the rows, which run over recordings one after another, sorted by frequency within each."""
+    if len(value) == 0:
+        return LineNoise(np.zeros(0), 1.0, 0.0)
+    amplitude = local_amplitude(value, recording)
+    middle = _interior(recording, frequency)
+    z = _without_shared(value, frequency, recording)
+    log_f = np.log(frequency)
+    span = log_f[middle + 1] - log_f[middle - 1]
+    share = (log_f[middle + 1] - log_f[middle]) / span
+    weights = np.stack([np.ones(len(middle)), share**2, (1 - share) ** 2])
+    rows = np.stack([middle, middle - 1, middle + 1])
+    rough = np.abs(z[middle] - share * z[middle - 1] - (1 - share) * z[middle + 1]) ** 2 / 2
+    knots = _knots(log_f)
+    hats = _hats(log_f, knots)
+    scale = float(np.median(amplitude))
+    size2 = (amplitude / scale) ** 2
+    known = np.isfinite(coherence) & (coherence > 0) & (coherence < 1)
+    from_coherence = np.log((1 - coherence[known]) / coherence[known]) if known.any() else None
+
+    def variance(p: Floats) -> Floats:
+        return np.exp(hats @ p[:-2]) * size2 + np.exp(p[-2])
+
+    def objective(p: Floats) -> tuple[float, Floats]:
+        relative, floor = np.exp(hats @ p[:-2]) * size2, np.exp(p[-2])
+        d2 = relative + floor
+        v = (weights * d2[rows]).sum(axis=0)
+        u = rough / scale**2 / v
+        cost = np.sum(np.log(v)) + (_FREEDOM / 2 + 1) * np.sum(np.log1p(2 * u / _FREEDOM))
+        by_v = (1 - (_FREEDOM / 2 + 1) * (2 * u / _FREEDOM) / (1 + 2 * u / _FREEDOM)) / v
+        by_d2 = np.zeros(len(d2))
+        for row, weight in zip(rows, weights, strict=True):
+            by_d2 += np.bincount(row, by_v * weight, len(d2))
+        if from_coherence is not None:
+            # Noisy, and with an unknown n: one loose Gaussian a line; p[-1] is log(1/2n).
+            gap = np.log(d2[known] / size2[known]) - from_coherence - p[-1]
+            cost += 0.5 * np.sum(gap**2) / _COHERENCE_VARIANCE
+            by_d2[known] += gap / d2[known] / _COHERENCE_VARIANCE
+        bend = np.diff(p[:-2], 2) / _SMOOTH
+        cost += 0.5 * bend @ bend + 0.5 * np.sum(((p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2)
+        cost += 0.5 * ((p[-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2 + 0.5 * (p[-1] + 3.5) ** 2
+        by_p = np.zeros(len(p))
+        by_p[:-2] = hats.T @ (by_d2 * relative) + (p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD**2
+        by_p[:-2] += np.convolve(bend, [1, -2, 1]) / _SMOOTH if len(bend) else 0.0
+        by_p[-2] = by_d2.sum() * floor + (p[-2] - np.log(_TYPICAL)) / _TYPICAL_SD**2
+        by_p[-1] = (p[-1] + 3.5) - (gap.sum() / _COHERENCE_VARIANCE if from_coherence is not None else 0.0)
+        return float(cost), by_p
+
+    level = np.log(max(float(np.median(rough)) / scale**2, 1e-14)) if len(middle) else np.log(_TYPICAL)
+    start = np.concatenate([np.full(len(knots), level - 1.0), [level - 2.0, -3.5]])
+    p = minimize(objective, start, jac=True, method="L-BFGS-B", options={"maxiter": 200}).x
+    d2 = variance(p)
+    freedom = len(middle) / 1.5  # neighbouring differences share lines
+    if len(middle) > 10:
+        median = float(np.median(rough / scale**2 / (weights * d2[rows]).sum(axis=0)))
+        d2 = d2 * (median / np.log(2.0)) ** (freedom / (freedom + 30.0))
+    d2 = np.maximum(d2, (1e-5) ** 2 * size2)
+    sd = float(np.hypot(0.03, 1.0 / np.sqrt(1.0 + 2.0 * freedom)))
+    return LineNoise(scale * np.sqrt(d2), sd, float(scale * np.exp(p[-2] / 2)))
+
+
+_COHERENCE_VARIANCE = 0.5
+
+
+def local_amplitude(value: Complexes, recording: NDArray[np.intp]) -> Floats:
+    """|FRF| around each line: the median over five neighbours, or its own where that is larger (a sharp peak)."""
+    size = np.abs(value)
+    smooth = np.empty(len(size))
+    edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
+    for low, high in itertools.pairwise(edges):
+        own = size[low:high]
+        width = min(_WINDOW, len(own))
+        windows = np.lib.stride_tricks.sliding_window_view(own, width)
+        middle = np.median(windows, axis=1)
+        before = (width - 1) // 2
+        smooth[low:high] = np.concatenate(
+            [np.full(before, middle[0]), middle, np.full(len(own) - before - len(middle), middle[-1])]
+        )
+    return np.maximum(size, smooth)
+
+
+def _interior(recording: NDArray[np.intp], frequency: Floats) -> NDArray[np.intp]:
+    """Rows with a lower and a higher neighbour in their own recording."""
+    inner = np.arange(1, len(recording) - 1)
+    same = (recording[inner - 1] == recording[inner]) & (recording[inner + 1] == recording[inner])
+    apart = (frequency[inner] > frequency[inner - 1]) & (frequency[inner + 1] > frequency[inner])
+    return inner[same & apart & (frequency[inner - 1] > 0)]
+
+
+def _without_shared(value: Complexes, frequency: Floats, recording: NDArray[np.intp]) -> Complexes:
+    """Each recording's lines less its level times what all recordings have at that frequency, where many have it."""
+    level = np.array([np.median(value.real[recording == number]) for number in range(int(recording.max()) + 1)])
+    ratio = value / np.where(level == 0, 1.0, level)[recording]
+    _, line, count = np.unique(np.round(frequency, 9), return_inverse=True, return_counts=True)
+    if count[line].min() < _SHARED:
+        return value
+    shared = np.empty(len(count), dtype=complex)
+    strong = np.abs(level)[recording] > 0.3 * np.median(np.abs(level))
+    for number in range(len(count)):
+        chosen = ratio[(line == number) & strong]
+        chosen = chosen if len(chosen) else ratio[line == number]
+        shared[number] = np.median(chosen.real) + 1j * np.median(chosen.imag)
+    return value - level[recording] * shared[line]
+
+
+def _knots(log_f: Floats) -> Floats:
+    low, high = float(log_f.min()), float(log_f.max())
+    count = max(1, int(np.ceil((high - low) / np.log(10.0) * _KNOTS_PER_DECADE)))
+    return np.linspace(low, high, count + 1) if high > low else np.array([low])
+
+
+def _hats(log_f: Floats, knots: Floats) -> Floats:
+    """The piecewise linear functions (rows, knots) that are 1 at one knot and 0 at the others."""
+    if len(knots) == 1:
+        return np.ones((len(log_f), 1))
+    place = (log_f - knots[0]) / (knots[1] - knots[0])
+    return np.clip(1 - np.abs(place[:, None] - np.arange(len(knots))), 0, None)

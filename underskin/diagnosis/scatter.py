@@ -1,0 +1,69 @@
+"""What every hypothesis assumes of the noise beside the lines' own, with the same priors.
+
+- gain scatter of a recording, sd of its logarithm: equal density of the logarithm from 1 to 5 % (PHYSICS, section 8),
+  falling off outside, more slowly downwards: a careful rig is better than 1 %;
+- positioning scatter, in x and y: none in most rigs (0.7), else equal density of the logarithm from 0.05 to 0.3 mm;
+- line noise: its level as estimated from the lines' roughness, times a factor near 1.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+GAIN = (0.01, 0.05)
+GAIN_FALL = (0.35, 0.12)  # sd of the logarithm below and above
+POSITION = (0.05e-3, 0.3e-3)  # [m]
+POSITION_FALL = (0.15, 0.15)
+NO_POSITION = 0.7
+
+
+@dataclass(frozen=True)
+class Plateau:
+    """A density of a logarithm: constant between two values, falling off as half Gaussians outside."""
+
+    low: float
+    high: float
+    fall_low: float
+    fall_high: float
+
+    @classmethod
+    def of(cls, limits: tuple[float, float], falls: tuple[float, float]) -> "Plateau":
+        """From the values, not their logarithms."""
+        return cls(float(np.log(limits[0])), float(np.log(limits[1])), *falls)
+
+    @property
+    def middle(self) -> float:
+        """The middle of the constant part."""
+        return (self.low + self.high) / 2
+
+    def log_density(self, x: float) -> float:
+        """The logarithm of the density."""
+        area = self.high - self.low + np.sqrt(np.pi / 2) * (self.fall_low + self.fall_high)
+        outside = (self.low - x) / self.fall_low if x < self.low else max(x - self.high, 0.0) / self.fall_high
+        return float(-0.5 * outside**2 - np.log(area))
+
+
+@dataclass(frozen=True)
+class Bell:
+    """A normal density of a logarithm."""
+
+    mean: float
+    sd: float
+
+    @property
+    def middle(self) -> float:
+        """The mean."""
+        return self.mean
+
+    def log_density(self, x: float) -> float:
+        """The logarithm of the density."""
+        return float(-0.5 * ((x - self.mean) / self.sd) ** 2 - np.log(self.sd * np.sqrt(2 * np.pi)))
+
+
+GAIN_PRIOR = Plateau.of(GAIN, GAIN_FALL)
+POSITION_PRIOR = Plateau.of(POSITION, POSITION_FALL)
+
+
+def level_prior(log_level_sd: float) -> Bell:
+    """Of the factor on the lines' deviations; wider than the estimate's own error: noise is not quite normal."""
+    return Bell(0.0, float(np.hypot(log_level_sd, 0.05)))
