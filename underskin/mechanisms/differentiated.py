@@ -69,6 +69,10 @@ class Differentiated:
             return self
         return Differentiated(self.value[rows], self.slopes[:, rows])
 
+    def spread(self, rows: int) -> Differentiated:
+        """The same with that many rows, where it is a single one that stands for all."""
+        return Differentiated(np.broadcast_to(self.value, rows), np.broadcast_to(self.slopes, (len(self.slopes), rows)))
+
 
 def exp(x: Differentiated) -> Differentiated:
     """e^x."""
@@ -109,8 +113,6 @@ def variables(values: Sequence[float], slopes: Sequence[float]) -> list[Differen
 
 def sum_rows(x: Differentiated, owner: NDArray[np.intp], rows: int) -> Differentiated:
     """Row r of the answer is the sum of x's rows whose `owner` is r."""
+    x = x.spread(len(owner))
     value = np.bincount(owner, x.value, rows)
-    slopes = np.stack(
-        [np.bincount(owner, slope, rows) for slope in np.broadcast_to(x.slopes, (len(x.slopes), len(owner)))]
-    )
-    return Differentiated(value, slopes)
+    return Differentiated(value, np.stack([np.bincount(owner, slope, rows) for slope in x.slopes]))

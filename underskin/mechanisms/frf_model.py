@@ -101,7 +101,12 @@ class FrfModel:
         contacts = self._contacts(own, nuisances)
         sigma, inside = self._sigma_at_points(contacts, own, position)
         level = self._level(contacts, sigma, own, nuisances)
-        value, slopes = _on_rows(level, self._line_factor(contacts, own), self.design)
+        lines = self._line_factor(contacts, own)
+        value, slopes = _on_rows(
+            level.spread(len(self.design.point)),
+            None if lines is None else lines.spread(len(self.design.line_frequency)),
+            self.design,
+        )
         pickup = self._pickup(own)
         count = len(self.parameters)
         return Prediction(

@@ -1,6 +1,6 @@
 """A delay between the force's and the charge's channel.
 
-Law: FRF · exp(−iωt0).
+Law: FRF · exp(−iωt0), t0 the delay.
 
 Assumptions: one constant delay for all recordings; positive where the charge comes later than the force.
 
