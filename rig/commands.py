@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 import yaml
@@ -21,9 +21,10 @@ def run(
     """Carry out an experiment: campaign.json, truth.json, and raw recordings where asked for."""
     from rig.experiment import parse
     from rig.output import carry_out
+    from rig.reading import document
 
     try:
-        files = carry_out(parse(_document(experiment)), output_dir, tdms=tdms)
+        files = carry_out(parse(document(experiment)), output_dir, tdms=tdms)
     except (ValueError, OSError, yaml.YAMLError) as error:
         typer.echo(f"underskin rig: {experiment}: {' '.join(str(error).split())}", err=True)
         raise typer.Exit(2) from error
@@ -58,8 +59,3 @@ def draw(
         truths[name] = truth_of_lines(recorded)
     (output_dir / "truth.json").write_text(json.dumps(truths, ensure_ascii=False) + "\n", encoding="utf-8")
     typer.echo(f"{count} campaigns in {folder}, what they hide in {output_dir / 'truth.json'}")
-
-
-def _document(path: Path) -> Any:
-    text = path.read_text(encoding="utf-8")
-    return json.loads(text) if text.lstrip().startswith("{") else yaml.safe_load(text)
