@@ -10,7 +10,7 @@ TEST_PACKAGES = nginx openssl octave curl postgresql
 PIP_INSTALL = $(PYTHON) -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test check tables paper bench soak lock clean
+.PHONY: help serve test check tables paper mechanisms bench soak lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -32,11 +32,16 @@ check: $(VENV)/.dev ## format, lint, strict types, import direction
 	$(PYTHON) -m mypy
 	$(VENV)/bin/lint-imports
 
-tables: $(VENV)/.runtime ## solve the default table again
+tables: $(VENV)/.runtime ## solve the shipped tables again
 	$(VENV)/bin/underskin tablegen sigma --out tables/sigma.h5
+	$(VENV)/bin/underskin tablegen influence --out tables/influence.h5
+	$(VENV)/bin/underskin tablegen contact --out tables/contact.h5
 
 paper: $(VENV)/.dev ## regenerate docs/paper.md and its figures
 	$(PYTHON) -m docs.paper
+
+mechanisms: $(VENV)/.dev ## regenerate docs/mechanisms.md and its figures
+	$(PYTHON) -m docs.mechanisms
 
 bench: $(VENV)/.dev $(VENV)-tesseract/.installed ## measure speed, as ratios against peers in the same run
 	@scripts/system-packages.sh wrk

@@ -6,7 +6,21 @@ from contextlib import asynccontextmanager
 from fastapi import APIRouter, FastAPI, Security
 from starlette.types import ASGIApp
 
-from service import campaigns, d33, exports, frf, health, metrics, openapi, record, sigma, skins, tables, umbridge
+from service import (
+    campaigns,
+    d33,
+    exports,
+    frf,
+    health,
+    metrics,
+    openapi,
+    record,
+    sigma,
+    skins,
+    stress,
+    tables,
+    umbridge,
+)
 from service.dependencies import authorised
 from service.front import Front
 from service.gate import Gate
@@ -44,7 +58,7 @@ def create_api(settings: Settings, table: SigmaTable, gate: Gate, store: Databas
     api.state.store = store
     install_handlers(api)
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"])])
-    for noun in (sigma, frf, d33, tables, campaigns, exports, skins):
+    for noun in (sigma, frf, d33, stress, tables, campaigns, exports, skins):
         v1.include_router(noun.router)
     for router in (v1, umbridge.router, health.router, metrics.router, openapi.router):
         api.include_router(router)

@@ -8,16 +8,17 @@ from pydantic import BaseModel, Field
 
 from service.gate import OPEN
 from service.problems import MEDIA_TYPE, Problem
+from service.stress import StressRequest
 
 router = APIRouter(tags=["openapi"])
 
 DESCRIPTION = """\
 What is happening under the skin: σ, FRF and d33 of a piezoelectric electronic skin pressed by a sphere.
 
-Units are spelled in the names (`_mm`, `_mpa`, `_n`, `_pc_per_n`, `_hz`). Requests to POST routes under `/v1` are in
-columns: a single number holds for all rows. A row outside the table is answered `out_of_domain` with null, never
-extrapolated. `Accept: text/csv` returns columns as CSV, with NaN. Errors are RFC 9457 problems; under `/umbridge` they
-have the shape of that protocol.
+Units are spelled in the names (`_mm`, `_mpa`, `_n`, `_pc_per_n`, `_hz`). Requests to `/v1/sigma`, `/v1/frf` and
+`/v1/d33` are in columns: a single number holds for all rows. A row outside the table is answered `out_of_domain` with
+null, never extrapolated. `Accept: text/csv` returns columns as CSV, with NaN. Errors are RFC 9457 problems; under
+`/umbridge` they have the shape of that protocol.
 """
 
 
@@ -56,7 +57,7 @@ def _describe(api: FastAPI) -> dict[str, Any]:
     """The document without what depends on the keys; kept for the next time."""
     document = get_openapi(title=api.title, version=api.version, description=api.description, routes=api.routes)
     components = document["components"]
-    for model in (Problem, UmbridgeProblem):
+    for model in (Problem, UmbridgeProblem, StressRequest):
         schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
         components["schemas"].update(schema.pop("$defs"))
         components["schemas"][model.__name__] = schema

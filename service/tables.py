@@ -3,10 +3,14 @@
 from typing import Any
 
 import numpy as np
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 from pydantic import BaseModel, Field
 
 from service.dependencies import Table
+from service.more_tables import contact_table, influence_table
+from underskin.contact_table import ContactTable
+from underskin.influence import InfluenceTable
+from underskin.surrogate import SigmaTable
 from underskin.table_format import SIGMA_SCHEMA
 
 router = APIRouter(prefix="/v1", tags=["tables"])
@@ -38,15 +42,21 @@ class Tables(BaseModel):
 
 
 @router.get("/tables", operation_id="tables", summary="The tables in use")
-async def tables(table: Table) -> Tables:
+async def tables(request: Request, table: Table) -> Tables:
     """The tables that answers come from, with domain and origin."""
+    folder = request.app.state.settings.tables
+    return Tables(tables=[_entry(table), _entry(influence_table(folder)), _entry(contact_table(folder))])
+
+
+def _entry(table: SigmaTable | InfluenceTable | ContactTable) -> TableEntry:
     axes = [
         TableAxis(name=name, low=low, high=high, nodes=len(nodes))
         for (name, (low, high)), nodes in zip(table.domain.items(), table.axes, strict=True)
     ]
     about = {name: np.asarray(value).tolist() for name, value in table.attributes.items() if name not in _NAMED}
-    entry = TableEntry(name="sigma", table_schema=SIGMA_SCHEMA, table_sha256=table.sha256, axes=axes, about=about)
-    return Tables(tables=[entry])
+    schema = str(table.attributes["schema"])
+    name = str(table.attributes["quantity"])
+    return TableEntry(name=name, table_schema=schema, table_sha256=table.sha256, axes=axes, about=about)
 
 
 _NAMED = {"schema", "data_sha256", "default"}

@@ -14,6 +14,7 @@ import pytest
 import underskin
 from tests.conftest import UNDERSKIN, running
 from underskin import Client, Indenter, ServiceError, Skin, Unreachable, half_space
+from underskin.influence import load_influence
 from underskin.units import to_lab, to_si
 
 SKIN: dict[str, Any] = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16.0, "sensor_radius_mm": 1.5}
@@ -106,9 +107,10 @@ def test_a_column_of_100_000_rows(client: Client) -> None:
 
 
 def test_tables_and_health(client: Client) -> None:
-    (entry,) = client.tables()
+    entry, influence, _ = client.tables()
     assert (entry.name, entry.table_sha256) == ("sigma", TABLE.sha256)
     assert {axis.name: (axis.low, axis.high) for axis in entry.axes} == TABLE.domain
+    assert (influence.name, influence.table_sha256) == ("influence", load_influence().sha256)
     assert client.health() == "ok"
     assert client.ready() == TABLE.sha256
 

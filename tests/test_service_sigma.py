@@ -226,7 +226,8 @@ def test_every_answer_names_model_and_table(http: httpx.Client, query: str) -> N
 
 
 def test_the_tables_route_describes_the_table(http: httpx.Client) -> None:
-    (table,) = http.get("/v1/tables").json()["tables"]
+    table, *others = http.get("/v1/tables").json()["tables"]
+    assert [other["name"] for other in others] == ["influence", "contact"]
     assert (table["name"], table["table_sha256"]) == ("sigma", TABLE.sha256)
     assert {axis["name"]: (axis["low"], axis["high"]) for axis in table["axes"]} == TABLE.domain
     assert [axis["nodes"] for axis in table["axes"]] == [len(axis) for axis in TABLE.axes]

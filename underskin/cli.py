@@ -1,4 +1,4 @@
-"""The command `underskin`: sigma, frf and d33 from the shipped tables, and the commands of the other packages.
+"""The command `underskin`: sigma, frf, d33 and stress from the shipped tables, and the commands of the other packages.
 
 The other packages (the server, the table generator) hand in theirs through the entry-point group
 `underskin.commands`. Nothing heavy is imported before a command needs it, so that `underskin --help` answers at once.
@@ -151,6 +151,25 @@ def d33(
     }
     defaults = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": math.nan}
     _answer(given, defaults, input_file, csv, lambda table, columns: answers.d33(table, columns, units_checked))
+
+
+@app.command(no_args_is_help=True)
+def stress(
+    request: Annotated[
+        str, typer.Argument(metavar="FILE", help="JSON as for POST /v1/stress: skin, sensors and loads; - is stdin.")
+    ],
+    csv: Csv = False,
+) -> None:
+    """The charge on every sensor of an array under several contacts or a pressure map."""
+    from underskin import columns
+    from underskin.influence import load_influence
+    from underskin.stress_request import answer, read_file
+
+    found = answer(load_influence(), read_file(request))
+    write = columns.write_csv if csv else columns.write_table
+    write(found.columns, found.inside, len(found.sensors))
+    if not csv and not found.inside.all():
+        typer.echo(f"Out of the domain are sensors with no load within {found.reach_mm:g} mm.")
 
 
 def _answer(

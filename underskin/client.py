@@ -77,6 +77,19 @@ class D33Answer(PressedSkinAnswer):
 
 
 @dataclass(frozen=True)
+class StressAnswer(Answer):
+    """What each sensor bears: ids, places, charge with the table's error, and stress (compression positive)."""
+
+    sensor: tuple[str, ...]
+    x_mm: Floats
+    y_mm: Floats
+    charge_pc: Floats
+    charge_error_pc: Floats
+    mean_stress_mpa: Floats
+    reach_mm: float | None
+
+
+@dataclass(frozen=True)
 class TableAxis:
     """One axis of a table: limits (included) and the number of nodes."""
 
@@ -204,6 +217,12 @@ class Client:
         }
         return self._columns("d33", D33Answer, columns, lines)
 
+    def stress(self, request: Mapping[str, Any]) -> StressAnswer:
+        """Charge on every sensor of an array; `request` is the document that `POST /v1/stress` takes."""
+        document = self._request("POST", "/v1/stress", request)
+        values = {field.name: _field(field.name, document, single=False) for field in fields(StressAnswer)}
+        return StressAnswer(**values | {"sensor": tuple(document["sensor"])})
+
     def tables(self) -> tuple[TableEntry, ...]:
         """The tables that answers come from."""
         document = self._request("GET", "/v1/tables")
@@ -263,5 +282,5 @@ def _field(name: str, document: Mapping[str, Any], single: bool) -> Any:
         return tuple(Finding(**finding) for finding in value or ())
     if not isinstance(value, list):
         return value
-    array = np.array(value) if name == "status" else np.array(value, dtype=float)  # None becomes NaN
+    array = np.array(value) if name in ("status", "sensor") else np.array(value, dtype=float)  # None becomes NaN
     return array[0, ...] if single and name != "frequency_hz" else array

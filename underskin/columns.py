@@ -35,6 +35,10 @@ _NAMES = {
     "frf_uncertainty_pc_per_n": ("FRF uncertainty", "FRF ±"),
     "d33_pc_per_n": ("d33", "d33"),
     "d33_uncertainty_pc_per_n": ("d33 uncertainty", "d33 ±"),
+    "x_mm": ("sensor x", "x"),
+    "y_mm": ("sensor y", "y"),
+    "charge_pc": ("charge Q", "Q"),
+    "charge_error_pc": ("error of the charge", "Q ±"),
 }
 _PIPED_WIDTH = 200
 

@@ -19,6 +19,8 @@ from underskin.errors import TableError
 from underskin.units import Floats
 
 SIGMA_SCHEMA = "underskin-sigma/1"
+INFLUENCE_SCHEMA = "underskin-influence/1"
+CONTACT_SCHEMA = "underskin-contact/1"
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
@@ -122,7 +124,7 @@ def read_table(path: Path, schema: str) -> TableFile:
         raise TableError(f"table {path} is truncated or damaged: {error}. {_REMEDY}") from error
 
 
-_REMEDY = "Restore it from the distribution, or make it anew with `underskin tablegen sigma --out FILE`."
+_REMEDY = "Restore it from the distribution, or make it anew: `underskin tablegen sigma|influence|contact --out FILE`."
 
 
 def _verified(path: Path, file: h5py.File, schema: str) -> TableFile:

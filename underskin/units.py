@@ -58,6 +58,11 @@ LAB: dict[str, LabField] = {
         LabField("sample_rate_hz", "Hz", 1.0),
         LabField("frf_re_pc_per_n", "pC/N", 1e-12, signed=True),
         LabField("frf_im_pc_per_n", "pC/N", 1e-12, signed=True),
+        LabField("x_mm", "mm", 1e-3, signed=True),
+        LabField("y_mm", "mm", 1e-3, signed=True),
+        LabField("charge_error_pc", "pC", 1e-12),
+        LabField("normal_force_n", "N", 1.0, (1e-3, 1e3)),
+        LabField("pressure_mpa", "MPa", 1e6),
     )
 }
 

@@ -180,6 +180,17 @@ def increasing(field: str, value: Any, units_checked: bool) -> Floats:
     return column
 
 
+def rows(field: str, value: Any, units_checked: bool) -> Floats:
+    """Rows of finite numbers, equally many in each: (rows, columns)."""
+    if not isinstance(value, list | tuple) or not value:
+        raise InvalidInput(field, shown(value), "must be a list of rows of numbers")
+    found = [series(f"{field}[{index}]", row, units_checked) for index, row in enumerate(value)]
+    for index, row in enumerate(found):
+        if row.size != found[0].size:
+            raise InvalidInput(field, f"{row.size} columns", f"must have as many as row 0 ({found[0].size})", index)
+    return np.stack(found)
+
+
 def frequencies(field: str, value: Any, units_checked: bool) -> Floats:
     """An increasing column of frequencies above 0."""
     column = increasing(field, value, units_checked)
@@ -257,6 +268,8 @@ Count = Annotated[int, count]
 TimeOfDay = Annotated[str, time_of_day]
 Position = Annotated[tuple[float, float], position]
 Series = Annotated[Floats, series]
+Increasing = Annotated[Floats, increasing]
+Rows = Annotated[Floats, rows]
 Frequencies = Annotated[Floats, frequencies]
 Times = Annotated[Floats, not_falling]
 Coherence = Annotated[Floats, coherence]
