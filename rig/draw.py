@@ -14,6 +14,7 @@ from rig.effects import EFFECTS, FRF, UNCATALOGUED
 from rig.errors import RigError
 from rig.experiment import SCHEMA, parse
 from rig.recorded import RecordedLines, record_lines
+from rig.strengths import drawn_parameters, evenly_in_log, of_frf
 
 SHARES = {"none": 0.2, "single": 0.4, "pair": 0.2, "unknown": 0.2}
 CATALOGUED = tuple(name for name, effect in EFFECTS.items() if FRF in effect.kinds)
@@ -42,7 +43,8 @@ def drawn(seed: int, number: int, what: str | None = None) -> dict[str, Any]:
     for _ in range(200):
         names = _names(random, hidden)
         description = _description(random, f"drawn {seed}/{number}", set(names))
-        description["effects"] = {name: _strength(random, name, description) for name in names}
+        ranges = of_frf(description)
+        description["effects"] = {name: drawn_parameters(random, name, ranges) for name in names}
         try:
             record_lines(parse(description))
         except RigError:
@@ -67,11 +69,6 @@ def _names(random: np.random.Generator, what: str) -> list[str]:
             return names
 
 
-def _log(random: np.random.Generator, low: float, high: float) -> float:
-    """Even in the logarithm, to three digits."""
-    return float(f"{math.exp(random.uniform(math.log(low), math.log(high))):.3g}")
-
-
 def _description(random: np.random.Generator, name: str, effects: set[str]) -> dict[str, Any]:
     skin, spacing = _skin(random, effects)
     high = bool(effects & _NEEDS_HIGH_LINES) or random.random() < 0.4
@@ -83,12 +80,12 @@ def _description(random: np.random.Generator, name: str, effects: set[str]) -> d
         "design": _design(random, skin, spacing, effects),
         "lines": {"low_hz": 1.0, "high_hz": 1000.0 if high else 130.0, "count": int(random.integers(25, 76))},
         "noise": {
-            "gain": _log(random, 0.01, 0.05),
-            "position_mm": _log(random, 0.05, 0.3) if random.random() < 0.35 else 0.0,
-            "line": _log(random, 0.003, 0.03),
+            "gain": evenly_in_log(random, 0.01, 0.05),
+            "position_mm": evenly_in_log(random, 0.05, 0.3) if random.random() < 0.35 else 0.0,
+            "line": evenly_in_log(random, 0.003, 0.03),
             "low": float(random.uniform(0, 1.5)),
             "high": float(random.uniform(0, 1.5)),
-            "floor_pc_per_n": _log(random, 0.01, 0.1),
+            "floor_pc_per_n": evenly_in_log(random, 0.01, 0.1),
             "averages": float(random.choice([8, 16, 32])),
             "coherence": bool(random.random() < 0.7),
         },
@@ -101,13 +98,18 @@ def _skin(random: np.random.Generator, effects: set[str]) -> tuple[dict[str, Any
     prototype = random.random() < (0.1 if soft else 0.35)
     skin: dict[str, Any] = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16.0, "sensor_radius_mm": 1.5}
     if not prototype:
-        skin["thickness_mm"] = _log(random, 1.0, 4.0)
-        skin["youngs_modulus_mpa"] = _log(random, 0.4, 3.0 if soft else 16.0)
-        skin["sensor_radius_mm"] = _log(random, max(0.5, 0.25 * skin["thickness_mm"]), 1.3 * skin["thickness_mm"])
+        skin["thickness_mm"] = evenly_in_log(random, 1.0, 4.0)
+        skin["youngs_modulus_mpa"] = evenly_in_log(random, 0.4, 3.0 if soft else 16.0)
+        skin["sensor_radius_mm"] = evenly_in_log(
+            random, max(0.5, 0.25 * skin["thickness_mm"]), 1.3 * skin["thickness_mm"]
+        )
     arrays = [array for array in _ARRAYS if math.prod(array) >= 4] if effects & _NEEDS_SENSORS else list(_ARRAYS)
     columns, rows = arrays[random.integers(len(arrays))]
     pitch = 8.0 if prototype else float(f"{max(3.0, 2.2 * skin['sensor_radius_mm']) * random.uniform(1, 1.8):.2g}")
-    skin |= {"d33_pc_per_n": _log(random, 8, 30), "array": {"columns": columns, "rows": rows, "pitch_mm": pitch}}
+    skin |= {
+        "d33_pc_per_n": evenly_in_log(random, 8, 30),
+        "array": {"columns": columns, "rows": rows, "pitch_mm": pitch},
+    }
     if "bending_substrate" in effects or random.random() < 0.5:
         skin |= {"length_mm": round(pitch * (columns + 1.5), 1), "width_mm": round(pitch * (rows + 1.5), 1)}
     return skin, pitch
@@ -121,7 +123,7 @@ def _design(random: np.random.Generator, skin: Mapping[str, Any], pitch: float, 
     highest = min(_bearable(skin, indenters), float(random.uniform(1.5, 4.0)))
     count = int(random.integers(3, 11))
     preloads = sorted({float(f"{force:.2g}") for force in np.geomspace(min(lowest, 0.4 * highest), highest, count)})
-    dynamic = sorted({_log(random, 0.02, 0.2) for _ in range(2 if effects & _NEEDS_AMPLITUDES else 1)})
+    dynamic = sorted({evenly_in_log(random, 0.02, 0.2) for _ in range(2 if effects & _NEEDS_AMPLITUDES else 1)})
     design: dict[str, Any] = {
         "indenters_mm": indenters,
         "preloads_n": preloads,
@@ -141,7 +143,7 @@ def _design(random: np.random.Generator, skin: Mapping[str, Any], pitch: float, 
     if effects & _NEEDS_DWELL or random.random() < 0.3:
         design["dwells_s"] = [1.0, 5.0, 20.0, 60.0, 300.0][: int(random.integers(3, 6))]
     if effects & _NEEDS_CYCLES or random.random() < 0.4:
-        design["cycles_per_recording"] = _log(random, 10, 1000)
+        design["cycles_per_recording"] = evenly_in_log(random, 10, 1000)
     if effects & _NEEDS_TIME or random.random() < 0.6:
         design |= {"start": "2021-03-01T09:00:00Z", "minutes_per_recording": float(random.choice([3, 5, 10, 30]))}
     return design
@@ -152,76 +154,3 @@ def _bearable(skin: Mapping[str, Any], indenters: list[float]) -> float:
     modulus, h = skin["youngs_modulus_mpa"], skin["thickness_mm"]
     wide = (_WIDEST * h) ** 3 * modulus / (0.5625 * max(indenters))
     return float(min(wide, _HARDEST * min(indenters) ** 2 * modulus))
-
-
-def _strength(random: np.random.Generator, name: str, description: Mapping[str, Any]) -> dict[str, Any]:
-    """An effect's parameters, subtle to strong."""
-    skin, design, lines = (description[part] for part in ("skin", "design", "lines"))
-    sign = float(random.choice([-1, 1]))
-    cycles = design.get("cycles_per_recording", 1.0) * design["most_recordings"]
-    stress = 1.5 * design["preloads_n"][-1] / (math.pi * skin["thickness_mm"] ** 2)  # MPa, about, at the highest
-    angle = random.uniform(0, 2 * math.pi)
-    reach = skin["thickness_mm"] * _log(random, 0.08, 0.5)
-    inside_hz = _log(random, 8, 0.5 * lines["high_hz"])
-    laws: dict[str, Any] = {
-        "moving_contact_edge": lambda: {"mobile_fraction": round(random.uniform(0.3, 1), 3)},
-        "layered_contact": dict,
-        "misalignment": lambda: {"x_mm": round(reach * math.cos(angle), 3), "y_mm": round(reach * math.sin(angle), 3)},
-        "adhesion": lambda: {"work_j_per_m2": _log(random, 0.05, 2)},
-        "strain_stiffening": lambda: {"coefficient": _log(random, 1, 8), "law": _either(random, "linear", "limited")},
-        "compressible_layer": lambda: {"poisson_ratio": round(random.uniform(0.3, 0.49), 3)},
-        "interface_slip": lambda: {"glue_stiffness": _log(random, 0.05, 20)},
-        "preload_dependent_d33": lambda: {
-            "beta_per_mpa": sign * _log(random, 0.05, 0.6) / stress,
-            "saturation_mpa": stress * _log(random, 0.3, 3),
-            "law": _either(random, "linear", "saturating"),
-        },
-        "sensor_spread": lambda: {"sd": _log(random, 0.02, 0.25)},
-        "ageing": lambda: {
-            "rate": _log(random, 0.05, 0.35),
-            "cycles": cycles * _log(random, 0.02, 0.5),
-            "law": _either(random, "log", "exponential"),
-        },
-        "contact_resonance": lambda: {"tip_mass_g": _log(random, 0.1, 30), "damping": _log(random, 0.01, 0.15)},
-        "amplifier_high_pass": lambda: {"corner_hz": _log(random, 0.05, 3)},
-        "sensor_relaxation": lambda: (
-            {"law": "ladder", "exponent": _log(random, 0.003, 0.06)}
-            if random.random() < 0.5
-            else {"law": "step", "step": _log(random, 0.02, 0.5), "corner_hz": _log(random, 3, 100)}
-        ),
-        "contact_creep": lambda: {"fraction": round(random.uniform(0.1, 0.7), 3), "time_s": _log(random, 3, 150)},
-        "mains_pickup": lambda: {
-            "charge_pc": _log(random, 0.02, 0.6) * 0.2 * skin["d33_pc_per_n"] * design["dynamic_forces_n"][0],
-            "mains_hz": float(random.choice([50, 60])),
-        },
-        "amplitude_nonlinearity": lambda: {"mobility": round(random.uniform(0.3, 1), 3)},
-        "crosstalk": lambda: {"fraction": _log(random, 0.02, 0.3)},
-        "timing_delay": lambda: {"delay_us": _log(random, 2, 300)},
-        "modulus_error": lambda: {"factor": _log(random, 1.08, 1.6) ** sign},
-        "thickness_error": lambda: {"factor": _log(random, 1.03, 1.25) ** sign},
-        "bending_substrate": lambda: {"amplitude": sign * _log(random, 0.05, 0.4)},
-        "preload_leak": lambda: {"corner_hz": _log(random, 0.1, 3), "power": round(random.uniform(0.5, 2), 2)},
-        "temperature_drift": lambda: {
-            "amplitude": _log(random, 0.03, 0.25),
-            "period_h": design.get("minutes_per_recording", 5) / 60 * design["most_recordings"] * _log(random, 0.3, 1),
-        },
-        "stage_wobble": lambda: {"amplitude_mm": 2 * reach, "period_recordings": round(random.uniform(4, 20), 2)},
-        "hysteretic_d33": lambda: {"amplitude": sign * _log(random, 0.03, 0.25)},
-        "rattle": lambda: {
-            "hz": inside_hz,
-            "amplitude": sign * _log(random, 0.02, 0.3),
-            "damping": _log(random, 0.03, 0.2),
-        },
-        "notch": lambda: {"hz": inside_hz, "left": round(random.uniform(0, 0.9), 3), "width_hz": 0.25 * inside_hz},
-        "cable_motion": lambda: {"hz": inside_hz, "amplitude": sign * _log(random, 0.02, 0.4)},
-        "cracked_electrode": lambda: {
-            "amplitude": _log(random, 0.04, 0.3),
-            "at_cycle": float(round(cycles * random.uniform(0.2, 0.8))),
-        },
-    }
-    values: dict[str, Any] = laws[name]()
-    return values
-
-
-def _either(random: np.random.Generator, first: str, second: str) -> str:
-    return first if random.random() < 0.5 else second

@@ -169,14 +169,15 @@ def checked(kind: str, document: Any) -> dict[str, Values]:
                 values[parameter] = checks.number(f"{field}.{parameter}", entry[parameter], low, high)
             elif parameter not in effect.optional:
                 raise RigError(f"{field}.{parameter}", None, f"required, {low:g} to {high:g}")
-        for parameter in _needed_by_law(name, values):
+        for parameter in needed_by_law(name, values):
             if parameter not in values:
                 raise RigError(f"{field}.{parameter}", None, f"required by the law {values['law']}")
         result[name] = values
     return result
 
 
-def _needed_by_law(name: str, values: Values) -> tuple[str, ...]:
+def needed_by_law(name: str, values: Values) -> tuple[str, ...]:
+    """Which of an effect's optional parameters its law needs."""
     return {
         ("preload_dependent_d33", "saturating"): ("saturation_mpa",),
         ("sensor_relaxation", "ladder"): ("exponent",),

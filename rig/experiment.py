@@ -157,14 +157,14 @@ def parse(document: Any) -> Experiment:
     given = checks.mapping("experiment", document, known)
     checks.one_of("schema", given.get("schema"), (SCHEMA,))
     kind = checks.one_of("kind", given.get("kind", FRF), (FRF, INDENTATION, COMPRESSION))
+    for name in ("lines", "drive", "design") if kind != FRF else ("curves",):
+        if name in given:
+            raise RigError(name, given[name], f"not for recordings of kind {kind}")
     lines = _part(Lines, "lines", given["lines"]) if "lines" in given else None
     drive = _part(Drive, "drive", given["drive"]) if "drive" in given else None
     curves = _part(Curves, "curves", given.get("curves", {})) if kind != FRF else None
     if kind == FRF and (lines is None) == (drive is None):
         raise RigError("lines", given.get("lines"), "give either lines (FRF) or drive (time series)")
-    for name in ("lines", "drive", "design") if kind != FRF else ("curves",):
-        if name in given:
-            raise RigError(name, given[name], f"not for recordings of kind {kind}")
     for band, part in (("lines", lines), ("drive", drive)):
         if part is not None and not part.low_hz < part.high_hz:
             raise RigError(f"{band}.high_hz", part.high_hz, f"must be above low_hz, {part.low_hz:g}")

@@ -19,7 +19,7 @@ from rig.errors import RigError
 from rig.experiment import Experiment
 from rig.recorded import campaign, campaign_document, record_lines, recording_headers, skin_document
 from rig.time_domain import TimeSeries, record_series
-from rig.truth import truth_of, truth_of_bench, truth_of_lines
+from rig.truth import truth_of_bench, truth_of_curves, truth_of_lines
 
 _VOLTS_PER_NEWTON = 0.5
 _MILLIVOLTS_PER_PICOCOULOMB = 10.0
@@ -45,7 +45,8 @@ def carry_out(experiment: Experiment, folder: Path, *, tdms: bool = False) -> li
         raise RigError("design.offsets_mm", experiment.design.offsets_mm, "must be [[0, 0]] in TDMS, which keeps none")
     series: list[TimeSeries] = []
     if experiment.kind != FRF:
-        document, truth = campaign_of_curves(experiment, record_curves(experiment)), truth_of(experiment)
+        curves = record_curves(experiment)
+        document, truth = campaign_of_curves(experiment, curves), truth_of_curves(experiment, curves)
     elif experiment.lines is not None:
         lines = record_lines(experiment)
         document, truth = campaign(lines), truth_of_lines(lines)

@@ -4,9 +4,11 @@ from typing import Any
 
 from rig.bench import Bench
 from rig.effects import UNCATALOGUED
+from rig.elastomer import Curve
 from rig.experiment import Experiment
-from rig.identifiable import visibility
+from rig.identifiable import THRESHOLD, visibility
 from rig.recorded import RecordedLines
+from rig.visible_curves import chi2_gain
 
 SCHEMA = "truth/1"
 
@@ -35,6 +37,16 @@ def truth_of_bench(bench: Bench) -> dict[str, Any]:
     """The same with the sensors' true gains."""
     gains = [round(float(gain), 6) for gain in bench.sensor_gains]
     return {**truth_of(bench.experiment), "sensor_gains": gains}
+
+
+def truth_of_curves(experiment: Experiment, curves: list[Curve]) -> dict[str, Any]:
+    """The same with whether the effects show in the curves at all."""
+    gain = chi2_gain(experiment, curves)
+    return {
+        **truth_of(experiment),
+        "identifiable": gain > THRESHOLD if experiment.effects else True,
+        "chi2_gain_of_truth": round(gain, 2),
+    }
 
 
 def truth_of_lines(recorded: RecordedLines) -> dict[str, Any]:
