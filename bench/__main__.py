@@ -7,7 +7,7 @@ import time
 from importlib.metadata import version
 from pathlib import Path
 
-from bench import accuracy, batch, newton_step, orderings, single_requests, start, store
+from bench import accuracy, batch, mechanisms, newton_step, orderings, single_requests, start, store
 from bench.page import keep, markdown, write
 
 PARTS = {
@@ -17,6 +17,7 @@ PARTS = {
     "newton": newton_step.measure,
     "orderings": orderings.measure,
     "accuracy": accuracy.measure,
+    "mechanisms": mechanisms.measure,
     "store": store.measure,
 }
 _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem")

@@ -26,6 +26,7 @@ _SECTIONS = {
     "start": "Start and memory",
     "newton": "Finite elements against FElupe",
     "orderings": "What was tried for the solver",
+    "mechanisms": "Predictions of composed mechanisms",
 }
 
 _EXPLANATIONS = {
@@ -37,6 +38,8 @@ server and Tesseract Core's runtime, each serving the same spline.""",
     "start": "From starting the process to the first answer of `/ready`; resident memory after load.",
     "newton": "One Newton step at equal unknowns, on one core.",
     "orderings": "Factors of one step's matrix, on one core.",
+    "mechanisms": """One prediction of all lines with its derivatives with respect to all parameters and to the
+contacts' positions, under three mechanisms; processor time on one core.""",
 }
 
 

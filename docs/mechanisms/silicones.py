@@ -1,13 +1,18 @@
 """Three hyperelastic laws fitted to measured silicones: what the priors of strain_stiffening are built on.
 
+`python -m docs.mechanisms.silicones` fits the recordings under `UNDERSKIN_RECORDINGS` anew (silicones.json).
+
 Incompressible uniaxial nominal stress over E/3, with stretch λ (1 − strain in compression), I = λ² + 2/λ − 3:
 Yeoh  (λ − λ⁻²)(1 + 2 c2 I + 3 c3 I²);  Gent  (λ − λ⁻²)/(1 − I/J);  Ogden, one term,  (2/α)(λ^(α−1) − λ^(−α/2−1)).
 """
 
 import csv
+import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -16,6 +21,7 @@ from underskin.units import Floats
 
 Law = Callable[[Floats, Floats], Floats]  # stretch, shape parameters -> nominal stress over E/3
 _POINTS = 300
+RESULTS = Path(__file__).with_name("silicones.json")
 
 
 @dataclass(frozen=True)
@@ -73,11 +79,18 @@ def fit(sample: Sample, law: Law, start: tuple[float, ...]) -> Fit:
     modulus = np.polyfit(sample.strain, sample.stress_kpa, 1)[0]
 
     def residual(parameters: Floats) -> Floats:
-        with np.errstate(all="ignore"):
-            model = parameters[0] * modulus / 3 * law(stretch, parameters[1:])
-        return np.nan_to_num((model - sample.stress_kpa) / largest, nan=10.0, posinf=10.0, neginf=-10.0)
+        model = parameters[0] * modulus / 3 * law(stretch, parameters[1:])
+        return (model - sample.stress_kpa) / largest
 
-    found = least_squares(residual, [1.0, *start], x_scale=[1.0, *(0.1 for _ in start)], max_nfev=2000)
+    # Gent's stress ends where I reaches J.
+    ends = 0.999 / (stretch**2 + 2 / stretch - 3).max() if law is gent else np.inf
+    found = least_squares(
+        residual,
+        [1.0, *(min(value, ends / 2) for value in start)],
+        x_scale=[1.0, *(0.1 for _ in start)],
+        bounds=([-np.inf] * (1 + len(start)), [np.inf, *(ends for _ in start)]),
+        max_nfev=2000,
+    )
     return Fit(float(found.x[0] * modulus), found.x[1:], float(100 * np.sqrt(np.mean(found.fun**2))))
 
 
@@ -111,3 +124,28 @@ def _numbers(path: Path, delimiter: str, columns: int) -> Floats:
                 rows.append(numbers)
     values = np.array(rows)
     return values[: int(np.abs(values[:, 3]).argmax()) + 1]
+
+
+def main(results: Path = RESULTS) -> None:
+    """Fit everything in the folder that `UNDERSKIN_RECORDINGS` names and keep the numbers for the page."""
+    folder = Path(os.environ["UNDERSKIN_RECORDINGS"])
+    rows = []
+    for kind, samples in (("compression", compression_samples(folder)), ("tension", tension_samples(folder))):
+        for sample in samples:
+            for limit in (3.0, 0.4):
+                part = sample.up_to(limit)
+                largest = round(float(np.abs(part.strain).max()), 2)
+                row: dict[str, Any] = {"kind": kind, "sample": sample.name, "largest_strain": largest}
+                for name, (law, start) in LAWS.items():
+                    found = fit(part, law, start)
+                    row[name] = {
+                        "modulus_kpa": float(f"{found.modulus_kpa:.3g}"),
+                        "shape": [float(f"{value:.2g}") for value in found.shape],
+                        "residual_percent": float(f"{found.residual_percent:.2g}"),
+                    }
+                rows.append(row)
+    results.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

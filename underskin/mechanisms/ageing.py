@@ -23,6 +23,7 @@ class Ageing(Mechanism):
 
     name = "ageing"
     axes = ("load_cycles",)
+    needs = "load_cycles of every recording, not all the same"
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """Loss a decade, the cycles at which it sets in, and the shape."""

@@ -25,6 +25,7 @@ class AmplitudeNonlinearity(Mechanism):
 
     name = "amplitude_nonlinearity"
     axes = ("dynamic_force_n", "preload_n", "indenter_radius_mm")
+    needs = "dynamic_force_n below preload_n in every recording"
     contact_axes = ("dynamic_force_n",)
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:

@@ -21,6 +21,7 @@ class CompressibleLayer(Mechanism):
     name = "compressible_layer"
     kinds = ("frf", "indentation")
     axes = ("position_mm", "preload_n", "indenter_radius_mm")
+    needs = "a skin declared with poisson_ratio 0.5"
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The Poisson ratio."""

@@ -24,6 +24,7 @@ class ContactCreep(Mechanism):
     name = "contact_creep"
     kinds = ("frf", "indentation", "compression")
     axes = ("dwell_s", "preload_n", "indenter_radius_mm", "time_s")
+    needs = "frf: dwell_s of every recording, not all the same; curves: time_s"
     contact_axes = ("dwell_s",)
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:

@@ -33,10 +33,10 @@ class ContactResonance(Mechanism):
                 unit="g",
                 low=0.01,
                 high=2000.0,
-                prior=Normal(1.6, 1.8),
+                prior=Normal(0.7, 1.8),
                 scale="log",
                 limit=0.0,
-                reason="what sits in front of a force cell, from a bead to a shaker's table: 5 g within a factor of 6",
+                reason="what sits in front of a force cell, from a bead to a shaker's table: 2 g within a factor of 6",
             ),
             Parameter(
                 name="damping_ratio",

@@ -25,6 +25,7 @@ class Crosstalk(Mechanism):
 
     name = "crosstalk"
     axes = ("position_mm", "sensor")
+    needs = "at least two sensors, and presses within three thicknesses of a neighbour"
     needs_neighbours = True
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:

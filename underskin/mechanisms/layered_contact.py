@@ -20,6 +20,7 @@ class LayeredContact(Mechanism):
     name = "layered_contact"
     kinds = ("frf", "indentation")
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
+    needs = "a declared thickness_mm"
 
     def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
         """A thickness is needed."""

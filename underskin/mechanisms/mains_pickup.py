@@ -31,6 +31,7 @@ class MainsPickup(Mechanism):
 
     name = "mains_pickup"
     axes = ("frequency_hz", "dynamic_force_n")
+    needs = "a line within 3 Hz of 50 or 60 Hz"
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The charge."""

@@ -118,12 +118,13 @@ Values = Mapping[str, Differentiated]  # of one mechanism's parameters, by name,
 class Mechanism:
     """A law that the base model leaves out. Subclasses override what they need; every hook's default does nothing.
 
-    `axes` are names of the campaign's axes on which the effect shows.
+    `axes` are names of the campaign's axes on which the effect shows, `needs` says what the campaign must hold.
     """
 
     name: ClassVar[str]
     kinds: ClassVar[tuple[Kind, ...]] = ("frf",)
     axes: ClassVar[tuple[str, ...]]
+    needs: ClassVar[str] = "nothing beyond the recordings themselves"
     # What a model must prepare for it: further fields that tell contacts apart, the contacts' stiffness, neighbours,
     # room for an offset [m] and for a layer that much thicker or thinner.
     contact_axes: ClassVar[tuple[str, ...]] = ()

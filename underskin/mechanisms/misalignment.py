@@ -23,6 +23,7 @@ class Misalignment(Mechanism):
 
     name = "misalignment"
     axes = ("position_mm", "sensor", "preload_n", "indenter_radius_mm")
+    needs = "nothing; where every press is centred, only the length of the offset is a parameter"
     largest_offset = 1e-3 * _LARGEST_MM * np.sqrt(2)
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:

@@ -19,6 +19,7 @@ class ModulusError(Mechanism):
     name = "modulus_error"
     kinds = ("frf", "indentation", "compression")
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
+    needs = "a declared youngs_modulus_mpa"
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """True over declared modulus."""

@@ -20,6 +20,7 @@ class SensorSpread(Mechanism):
 
     name = "sensor_spread"
     axes = ("sensor",)
+    needs = "recordings of at least two sensors"
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The spread."""

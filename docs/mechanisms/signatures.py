@@ -1,0 +1,247 @@
+"""What each mechanism does to the recordings, over the axes on which it shows: the panels of its figure.
+
+A soft skin (h 2.5 mm, rT 1.5 mm, E 2 MPa) under spheres of 4 and 10 mm; values of the parameters as in `SHOWN`.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from underskin.mechanisms import CATALOGUE, Model, compose
+from underskin.recordings.campaign import (
+    Campaign,
+    CompressionRecording,
+    FrfRecording,
+    IndentationRecording,
+    Sensor,
+    SkinDescription,
+)
+from underskin.surrogate import SigmaTable
+from underskin.units import Floats
+
+SHOWN: dict[str, dict[str, float]] = {
+    "modulus_error": {"modulus_factor": 0.7},
+    "thickness_error": {"thickness_factor": 0.9},
+    "compressible_layer": {"poisson_ratio": 0.4},
+    "interface_slip": {"glue_stiffness": 0.3},
+    "contact_creep": {"relaxed_fraction": 0.4, "relaxation_time": 40.0},
+    "strain_stiffening": {"stiffening": 5.0, "second_over_first": 0.1, "third_over_first": 0.02},
+    "misalignment": {"offset": 0.7, "offset_x": 0.6, "offset_y": 0.3},
+    "layered_contact": {},
+    "adhesion": {"work_of_adhesion": 0.5},
+    "moving_contact_edge": {"mobile_fraction": 1.0},
+    "amplitude_nonlinearity": {"edge_mobility": 1.0},
+    "preload_dependent_d33": {"stress_coefficient": 2.0, "saturation_stress": 1.0},
+    "sensor_spread": {"spread": 0.12},
+    "crosstalk": {"fraction": 0.1},
+    "ageing": {"loss_per_decade": 0.15, "onset": 1000.0, "saturation": 0.0},
+    "contact_resonance": {"tip_mass": 2.0, "damping_ratio": 0.05},
+    "sensor_relaxation": {"exponent": 0.03, "step": 0.1, "step_frequency": 20.0},
+    "amplifier_high_pass": {"corner": 1.0},
+    "timing_delay": {"delay": 300.0},
+    "mains_pickup": {"pickup_charge": 0.05},
+    "instrument_compliance": {"stage_stiffness": 20.0},
+    "platen_friction": {"friction": 0.5},
+}
+SPHERES_MM = (4.0, 10.0)
+PRELOADS_N = (0.5, 3.0)
+_SKIN = SkinDescription(
+    poisson_ratio=0.5,
+    thickness_mm=2.5,
+    youngs_modulus_mpa=2.0,
+    sensor_radius_mm=1.5,
+    sensors=tuple(Sensor(f"s{number}", 5.0 * number, 0.0) for number in range(8)),
+)
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Curves over one axis; `logarithmic` says how the axis is drawn."""
+
+    axis: str
+    unit: str
+    curves: dict[str, tuple[Floats, Floats]]
+    logarithmic: bool = False
+
+
+def panels(name: str, table: SigmaTable) -> list[Panel]:
+    """The panels of one mechanism."""
+    return [make(name, table) for make in _PANELS[name]]
+
+
+def _recording(number: int, **changes: object) -> FrfRecording:
+    frequency = np.array([30.0])
+    plain = FrfRecording(
+        f"r{number}",
+        "s0",
+        indenter_radius_mm=4.0,
+        preload_n=1.0,
+        dynamic_force_n=0.09,
+        load_cycles=number,
+        dwell_s=float(number),
+        frequency_hz=frequency,
+        frf_re_pc_per_n=np.ones(1),
+        frf_im_pc_per_n=np.zeros(1),
+    )
+    return replace(plain, **changes)  # type: ignore[arg-type]
+
+
+def _fit(name: str, model: Model) -> Floats:
+    shown = SHOWN.get(name, {})
+    return np.array(
+        [
+            parameter.to_fit(shown[parameter.name]) if parameter.name in shown else parameter.start
+            for parameter in model.parameters
+        ]
+    )
+
+
+def _ratio(name: str, recordings: Sequence[FrfRecording], table: SigmaTable) -> Floats:
+    campaign = Campaign("signature", _SKIN, tuple(recordings))
+    with_it, base = compose([name], campaign, table), compose([], campaign, table)
+    value = with_it.predict(_fit(name, with_it)).value / base.predict(_fit("", base)).value
+    return np.asarray(value)
+
+
+def _percent(name: str, recordings: Sequence[FrfRecording], table: SigmaTable) -> Floats:
+    return 100 * (_ratio(name, recordings, table).real - 1)
+
+
+def _over_preload(name: str, table: SigmaTable) -> Panel:
+    preload = np.geomspace(0.1, 3.0, 40)
+    curves = {}
+    for sphere in SPHERES_MM:
+        rows = [_recording(i, preload_n=float(f), indenter_radius_mm=sphere) for i, f in enumerate(preload)]
+        curves[f"R = {sphere:g} mm"] = preload, _percent(name, rows, table)
+    return Panel("preload, N", "change of FRF, %", curves, logarithmic=True)
+
+
+def _over_position(name: str, table: SigmaTable) -> Panel:
+    """The FRF itself, since it nearly vanishes where the sphere is far."""
+    offset = np.linspace(-2.5, 4.5, 71)
+    rows = [_recording(i, position_mm=(float(x), 0.0)) for i, x in enumerate(offset)]
+    campaign = Campaign("signature", _SKIN, tuple(rows))
+    with_it, base = compose([name], campaign, table), compose([], campaign, table)
+    found = with_it.predict(_fit(name, with_it)).value.real * 1e12
+    usual = base.predict(_fit("", base)).value.real * 1e12
+    return Panel("position of the sphere, mm", "FRF, pC/N", {"base": (offset, usual), name: (offset, found)})
+
+
+def _over_dwell(name: str, table: SigmaTable) -> Panel:
+    dwell = np.geomspace(1, 1000, 40)
+    curves = {}
+    for preload in PRELOADS_N:
+        rows = [_recording(i, preload_n=preload, dwell_s=float(t)) for i, t in enumerate(dwell)]
+        curves[f"{preload:g} N"] = dwell, _percent(name, rows, table)
+    return Panel("dwell, s", "change of FRF, %", curves, logarithmic=True)
+
+
+def _over_cycles(name: str, table: SigmaTable) -> Panel:
+    cycles = np.geomspace(10, 1e5, 40)
+    rows = [_recording(i, load_cycles=int(n)) for i, n in enumerate(cycles)]
+    return Panel("load cycles", "change of FRF, %", {"": (cycles, _percent(name, rows, table))}, logarithmic=True)
+
+
+def _over_amplitude(name: str, table: SigmaTable) -> Panel:
+    amplitude = np.linspace(0.02, 0.95, 40)
+    curves = {}
+    for sphere in SPHERES_MM:
+        rows = [_recording(i, dynamic_force_n=float(a), indenter_radius_mm=sphere) for i, a in enumerate(amplitude)]
+        curves[f"R = {sphere:g} mm"] = amplitude, _percent(name, rows, table)
+    return Panel("dynamic force over preload", "change of FRF, %", curves)
+
+
+def _over_sensors(name: str, table: SigmaTable) -> Panel:
+    rows = [_recording(i, sensor=sensor.id) for i, sensor in enumerate(_SKIN.sensors)]
+    campaign = Campaign("signature", _SKIN, tuple(rows))
+    model = compose([name], campaign, table)
+    spread, _ = model.sensor_spread_of(_fit(name, model))
+    number = np.arange(1.0, len(rows) + 1)
+    gains = np.random.default_rng(5).normal(0, spread, len(rows))
+    band = 100 * np.expm1(np.full(len(rows), spread))
+    curves = {"one draw": (number, 100 * np.expm1(gains)), "± one sd": (number, band), "": (number, -band)}
+    return Panel("sensor", "change of FRF, %", curves)
+
+
+def _swept(name: str, table: SigmaTable, of: Callable[[Floats], Floats], unit: str) -> Panel:
+    frequency = np.geomspace(1, 1000, 300)
+    curves = {}
+    for preload in PRELOADS_N:
+        line = _recording(
+            0, preload_n=preload, frequency_hz=frequency, frf_re_pc_per_n=np.ones(300), frf_im_pc_per_n=np.zeros(300)
+        )
+        curves[f"{preload:g} N"] = frequency, of(_ratio(name, [line], table))
+    return Panel("frequency, Hz", unit, curves, logarithmic=True)
+
+
+def _over_frequency(name: str, table: SigmaTable) -> Panel:
+    return _swept(name, table, np.abs, "|FRF| over base")
+
+
+def _over_phase(name: str, table: SigmaTable) -> Panel:
+    return _swept(name, table, lambda ratio: np.degrees(np.angle(ratio)), "phase, degrees")
+
+
+def _pickup(name: str, table: SigmaTable) -> Panel:
+    frequency = np.linspace(30, 320, 600)
+    curves = {}
+    for force in (0.05, 0.2):
+        line = _recording(0, dynamic_force_n=force, frequency_hz=frequency, frf_re_pc_per_n=np.ones(600))
+        campaign = Campaign("signature", _SKIN, (replace(line, frf_im_pc_per_n=np.zeros(600)),))
+        model = compose([name], campaign, table)
+        pickup = model.predict(_fit(name, model)).pickup
+        assert pickup is not None
+        curves[f"Fd = {force:g} N"] = frequency, 1e12 * pickup
+    return Panel("frequency, Hz", "sd of pick-up, pC/N", curves)
+
+
+def _over_depth(name: str, table: SigmaTable) -> Panel:
+    way = np.append(np.linspace(0, 0.4, 60), np.linspace(0.4, -0.05, 60))
+    force = 4 / 3 * 2.0 / 0.75 * np.sqrt(4.0) * np.maximum(way, 0) ** 1.5
+    recording = IndentationRecording("i", 4.0, way, force, time_s=np.arange(120.0))
+    return _curve(name, Campaign("signature", _SKIN, (recording,)), table, "displacement, mm", way)
+
+
+def _over_strain(name: str, table: SigmaTable) -> Panel:
+    strain = np.append(np.linspace(0, 0.4, 60), np.linspace(0.4, 0, 60))
+    force = 2.0 * np.pi / 4 * 20.0**2 * strain
+    recording = CompressionRecording("c", 10.0, 20.0, 10.0 * strain, force, time_s=np.arange(120.0))
+    return _curve(name, Campaign("signature", _SKIN, (recording,)), table, "strain of a 20 mm × 10 mm cylinder", strain)
+
+
+def _curve(name: str, campaign: Campaign, table: SigmaTable, axis: str, way: Floats) -> Panel:
+    with_it, base = compose([name], campaign, table), compose([], campaign, table)
+    curves = {
+        "base": (way, base.predict(_fit("", base)).value),
+        name: (way, with_it.predict(_fit(name, with_it)).value),
+    }
+    return Panel(axis, "force, N", curves)
+
+
+Make = Callable[[str, SigmaTable], Panel]
+_PANELS: dict[str, tuple[Make, ...]] = {
+    "modulus_error": (_over_preload, _over_position),
+    "thickness_error": (_over_preload, _over_position),
+    "compressible_layer": (_over_preload, _over_position),
+    "interface_slip": (_over_preload, _over_position),
+    "contact_creep": (_over_dwell, _over_depth),
+    "strain_stiffening": (_over_preload, _over_strain),
+    "misalignment": (_over_preload, _over_position),
+    "layered_contact": (_over_preload, _over_depth),
+    "adhesion": (_over_preload, _over_position),
+    "moving_contact_edge": (_over_preload, _over_position),
+    "amplitude_nonlinearity": (_over_amplitude, _over_preload),
+    "preload_dependent_d33": (_over_preload, _over_position),
+    "sensor_spread": (_over_sensors,),
+    "crosstalk": (_over_position,),
+    "ageing": (_over_cycles,),
+    "contact_resonance": (_over_frequency, _over_phase),
+    "sensor_relaxation": (_over_frequency, _over_phase),
+    "amplifier_high_pass": (_over_frequency, _over_phase),
+    "timing_delay": (_over_phase,),
+    "mains_pickup": (_pickup,),
+    "instrument_compliance": (_over_depth,),
+    "platen_friction": (_over_strain,),
+}
+assert tuple(_PANELS) == tuple(CATALOGUE)

@@ -1,0 +1,133 @@
+"""docs/mechanisms.md as text: everything in it comes from the catalogue and from the fits to measured silicones."""
+
+import json
+from typing import Any
+
+import numpy as np
+
+from docs.mechanisms.signatures import SHOWN
+from docs.mechanisms.silicones import RESULTS
+from docs.paper.markdown import table
+from underskin.mechanisms import CATALOGUE, Mechanism, Normal, Parameter
+from underskin.mechanisms.frf_model import NUISANCES
+from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription
+
+_INTRODUCTION = """\
+# What may have been left out
+
+The mechanisms that a diagnosis can name, written by `make mechanisms` (`docs/mechanisms/`) from the catalogue itself
+(`underskin/mechanisms/`, one file each). A figure shows what one does to recordings on a soft skin (h 2.5 mm, rT
+1.5 mm, E 2 MPa) with its parameters at the value in the column *shown*.
+
+## How they act together
+
+`compose(names, campaign, table)` puts any set of them on the base model: Hertz' radius on a half space, the contact
+edge still, σ of the bonded finite-strain layer from the table, averaged over the sensor's disc at its offset. Whatever
+order they are named in, they act in this one: declared values (modulus_error, thickness_error) → material
+(compressible_layer, interface_slip, contact_creep, strain_stiffening) → contact radius and pressure (Hertz,
+layered_contact, adhesion, or both) → position (misalignment) → σ → increment with the load (moving_contact_edge, then
+amplitude_nonlinearity: both differentiate F σ at fixed R with everything before inside) → d33 under its own stress
+(preload_dependent_d33) → charge of the neighbours (crosstalk) → ageing → dynamics, line by line (contact_resonance,
+sensor_relaxation, amplifier_high_pass, timing_delay). mains_pickup stands beside, as a covariance, and sensor_spread as
+the variance of the sensors' gains. Curves: material → depth (instrument_compliance) → force (strain_stiffening,
+platen_friction) → relaxation in time (contact_creep).
+
+Where a mechanism leaves the table's ground (ν < 0.5, a yielding glue line, a pressure that is not Hertz') σ is the
+exact linear layer's plus what finite strain adds in the table at the mechanism's own a and L. Contacts beyond the
+table are continued along its tangent and marked: `valid` says which rows are inside as declared, `inside` which are at
+the parameters at hand. Every parameter's fit coordinate is its value, or its logarithm, and all derivatives are exact.
+Beside its own parameters every model of FRFs has the nuisances
+
+"""
+
+_SILICONES = """\
+## Measured silicones
+
+What strain_stiffening's priors are built on: three hyperelastic laws fitted to public measurements of silicone
+cylinders in compression and dumbbells in tension, over their range (up to 300 %) and up to 40 % strain
+(`python -m docs.mechanisms.silicones` fits them anew from the folder that `UNDERSKIN_RECORDINGS` names). E is the law's
+slope at zero strain; the residual is in percent of the largest stress. Yeoh's three terms hold everywhere; the shape
+parameters found over a part of the curve do not carry over to the whole, which is why their priors are wide.
+
+"""
+
+# A campaign on which every mechanism's parameters can be listed.
+_CAMPAIGN = Campaign(
+    "listing",
+    SkinDescription(poisson_ratio=0.5, sensors=(Sensor("s", 0.0, 0.0),)),
+    (FrfRecording("r", "s", 4.0, 1.0, 0.1, position_mm=(0.5, 0.0)),),
+)
+
+
+def document() -> str:
+    """The whole page."""
+    parts = [_INTRODUCTION, _parameters(NUISANCES, {}), _overview()]
+    parts += [_section(mechanism) for mechanism in CATALOGUE.values()]
+    return "\n".join([*parts, _SILICONES + _silicones()])
+
+
+def _overview() -> str:
+    rows = [
+        (f"[{name}](#{name})", ", ".join(mechanism.kinds), ", ".join(mechanism.axes))
+        for name, mechanism in CATALOGUE.items()
+    ]
+    return "## All of them\n\n" + table(("name", "recordings", "shows on"), rows)
+
+
+def _section(mechanism: Mechanism) -> str:
+    where = f"**Recordings:** {', '.join(mechanism.kinds)}. **Shows on:** {', '.join(mechanism.axes)}."
+    lines = [
+        f"## {mechanism.name}\n",
+        f"**Law.** {mechanism.law}\n",
+        f"**Assumptions.** {mechanism.assumptions}\n",
+        f"**Source.** {mechanism.source}\n",
+        f"{where} **Needs:** {mechanism.needs}.\n",
+    ]
+    found = {
+        parameter.name: parameter for kind in mechanism.kinds for parameter in mechanism.parameters(_CAMPAIGN, kind)
+    }
+    if found:
+        lines.append(_parameters(tuple(found.values()), SHOWN[mechanism.name]))
+    lines.append(f"![What {mechanism.name} does](figures/mechanism-{mechanism.name}.svg)\n")
+    return "\n".join(lines)
+
+
+def _parameters(parameters: tuple[Parameter, ...], shown: dict[str, float]) -> str:
+    header = ("parameter", "unit", "bounds", "prior", "base model at", *(("shown",) if shown else ()), "why this prior")
+    rows = []
+    for entry in parameters:
+        limit = "" if entry.limit is None else f"{entry.limit:g}".replace("inf", "∞")
+        value = (f"{shown[entry.name]:g}",) if shown else ()
+        rows.append(
+            (entry.name, entry.unit, f"{entry.low:g} to {entry.high:g}", _prior(entry), limit, *value, entry.reason)
+        )
+    return table(header, rows)
+
+
+def _prior(entry: Parameter) -> str:
+    if not isinstance(entry.prior, Normal):
+        return "even" if entry.scale == "linear" else "even in the logarithm"
+    if entry.scale == "linear":
+        return f"normal, {entry.prior.mean:g} ± {entry.prior.sd:g}"
+    return f"log-normal, {np.exp(entry.prior.mean):.3g}, factor {np.exp(entry.prior.sd):.3g}"
+
+
+def _silicones() -> str:
+    header = (
+        "sample",
+        "test",
+        "strain to",
+        "Yeoh: E, kPa; c2, c3; residual",
+        "Gent: E; 1/J; residual",
+        "Ogden: E; α; residual",
+    )
+    rows = []
+    for row in json.loads(RESULTS.read_text(encoding="utf-8")):
+        fitted = (_fitted(row[law]) for law in ("Yeoh", "Gent", "Ogden"))
+        rows.append((row["sample"], row["kind"], f"{row['largest_strain']:g}", *fitted))
+    return table(header, rows)
+
+
+def _fitted(found: dict[str, Any]) -> str:
+    shape = ", ".join(f"{value:g}" for value in found["shape"])
+    return f"{found['modulus_kpa']:g}; {shape}; {found['residual_percent']:g} %"
