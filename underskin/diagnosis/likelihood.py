@@ -123,7 +123,7 @@ class Marginal:
 
     def __init__(self, lines: Lines, moments: Moments, levels: NoiseLevels) -> None:
         """Take out pick-up, gain and position, recording by recording, then the sensors."""
-        self._lines, self._moments, self._levels = lines, moments, levels
+        self._lines, self._moments, self.levels = lines, moments, levels
         self._k2 = k2 = levels.level**2
         uu, ur, rr = moments.uu / k2, moments.ur / k2, moments.rr / k2
         log_determinant = 0.0
@@ -187,8 +187,8 @@ class Marginal:
         jr = jr - mj * gains[sensor, None]
         mr = self._mr - self._mm * gains[sensor]
         left = 1 - self._sensor_shrink[sensor] * self._mm
-        own = self._levels.gain**2 * (jr * mr[:, None] - mj * left[:, None])
-        tau2 = self._levels.spread**2
+        own = self.levels.gain**2 * (jr * mr[:, None] - mj * left[:, None])
+        tau2 = self.levels.spread**2
         sensor_mr = self._sensor_mr - self._sensor_mm * gains
         sensor_left = 1 - self._sensor_shrink * self._sensor_mm
         shared = _by_sensor(jr, sensor, len(gains)) * sensor_mr[:, None] - by_sensor * sensor_left[:, None]

@@ -5,43 +5,92 @@ probable. Singles are all fitted; pairs and triples grow greedily from the best.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
+import numpy as np
+
+from underskin.diagnosis.discrepancy import Discrepancy, discrepancy
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.mechanisms.catalogue import CATALOGUE
 from underskin.mechanisms.mechanism import Unsupported
 
+NOTHING_MISSING, NONE_OF_THESE = "nothing_missing", "none_of_these"
 PRIORS = {"nothing_missing": 0.30, "one": 0.42, "two": 0.16, "three": 0.02, "none_of_these": 0.10}
 _PARENTS = 3
+_SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
 
 
 @dataclass(frozen=True)
+class Answer:
+    """One of the rivals and its posterior probability: a set of mechanisms (maybe none), or `none_of_these`."""
+
+    explanation: Explanation | None  # None for none_of_these
+    probability: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """As a report names it."""
+        if self.explanation is None:
+            return (NONE_OF_THESE,)
+        return self.explanation.names or (NOTHING_MISSING,)
+
+
+@dataclass(frozen=True)
 class Search:
-    """All explanations tried, and the mechanisms that the campaign does not support, with the reason."""
+    """What was tried: explanations, processes on top of some of them, and what the campaign does not support."""
 
     explanations: tuple[Explanation, ...]
+    discrepancies: tuple[tuple[Explanation, Discrepancy], ...]
     unsupported: dict[str, str]
-
-    def log_weight(self, explanation: Explanation) -> float:
-        """Prior times evidence."""
-        return explanation.log_evidence + log_prior(len(explanation.names), self.supported)
 
     @property
     def supported(self) -> int:
         """How many mechanisms the campaign supports."""
         return len(CATALOGUE) - len(self.unsupported)
 
-    @property
-    def ranked(self) -> list[Explanation]:
-        """The most probable first."""
-        return sorted(self.explanations, key=self.log_weight, reverse=True)
+    def log_weight(self, explanation: Explanation) -> float:
+        """Prior times evidence."""
+        return explanation.log_evidence + log_prior(len(explanation.names), self.supported)
+
+    def shows(self, explanation: Explanation) -> bool:
+        """Whether each mechanism of a set shows: without it, evidence is lost. A set that holds one that does not says
+        no more than the smaller one, which stands for both."""
+        evidence = {frozenset(entry.names): entry.log_evidence for entry in self.explanations}
+        whole = frozenset(explanation.names)
+        smaller = [evidence.get(whole - {name}, -math.inf) for name in whole]
+        return all(explanation.log_evidence > without + _SHOWS for without in smaller)
+
+    @cached_property
+    def answers(self) -> list[Answer]:
+        """The rivals, the most probable first; their probabilities sum to 1."""
+        kept = [entry for entry in self.explanations if self.shows(entry)]
+        weights = [self.log_weight(entry) for entry in kept]
+        showing = [
+            process.log_evidence + log_prior_beneath(len(entry.names), self.supported)
+            for entry, process in self.discrepancies
+            if process.log_evidence > entry.log_evidence + _SHOWS
+        ]
+        if showing:
+            weights.append(float(np.logaddexp.reduce(showing)))
+        probabilities = np.exp(np.array(weights) - np.logaddexp.reduce(weights)).tolist()
+        rivals: list[Explanation | None] = [*kept, *([None] if showing else [])]
+        answers = [Answer(entry, value) for entry, value in zip(rivals, probabilities, strict=True)]
+        return sorted(answers, key=lambda answer: -answer.probability)
 
 
 def log_prior(size: int, supported: int) -> float:
     """The logarithm of the prior of one set of that many mechanisms."""
     share = PRIORS[("nothing_missing", "one", "two", "three")[size]]
     return math.log(share) - math.log(math.comb(supported, size))
+
+
+def log_prior_beneath(size: int, supported: int) -> float:
+    """The logarithm of the prior of something undescribed on top of one set: a mechanism like any other."""
+    if size == 0:
+        return math.log(PRIORS[NONE_OF_THESE])
+    return log_prior(size, supported) + math.log(PRIORS[NONE_OF_THESE] * PRIORS["two"] / PRIORS["one"])
 
 
 def search(bench: Workbench) -> Search:
@@ -60,14 +109,7 @@ def search(bench: Workbench) -> Search:
         found[frozenset((name,))] = single
     names = [name for name in CATALOGUE if name not in unsupported]
     for size in (2, 3):
-        result = Search(tuple(found.values()), unsupported)
-        ranked = result.ranked
-        parents = [entry for entry in ranked if len(entry.names) == size - 1][:_PARENTS]
-        best = result.log_weight(ranked[0])
-        parents = [entry for entry in parents if result.log_weight(entry) > best - _BEHIND]
-        if size == 3:
-            parents = parents[:1] if ranked[0] in parents else []
-        for parent in parents:
+        for parent in _parents(Search(tuple(found.values()), (), unsupported), size):
             for name in names:
                 chosen = frozenset((*parent.names, name))
                 if len(chosen) != size or chosen in found:
@@ -75,4 +117,17 @@ def search(bench: Workbench) -> Search:
                 grown = bench.explain(tuple(chosen), parent)
                 if grown is not None:
                     found[chosen] = grown
-    return Search(tuple(found.values()), unsupported)
+    result = Search(tuple(found.values()), (), unsupported)
+    best = sorted((entry for entry in result.explanations if entry.names), key=result.log_weight, reverse=True)[:2]
+    processes = tuple((entry, discrepancy(bench, entry)) for entry in (nothing, *best))
+    return replace(result, discrepancies=processes)
+
+
+def _parents(result: Search, size: int) -> list[Explanation]:
+    """The explanations, one mechanism smaller, from which sets of this size grow."""
+    ranked = sorted(result.explanations, key=result.log_weight, reverse=True)
+    best = result.log_weight(ranked[0])
+    if size == 3:
+        return ranked[:1] if len(ranked[0].names) == 2 else []
+    smaller = [entry for entry in ranked if len(entry.names) == size - 1][:_PARENTS]
+    return [entry for entry in smaller if result.log_weight(entry) > best - _BEHIND]

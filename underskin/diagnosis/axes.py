@@ -1,0 +1,39 @@
+"""The campaign's axes as numbers: what each recording was made at, on a scale where like distances mean alike."""
+
+from datetime import datetime
+
+import numpy as np
+
+from underskin.mechanisms.frf_design import frf_recordings, offsets
+from underskin.recordings.campaign import Campaign
+from underskin.units import Floats
+
+_LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n")
+_FROM_ZERO = ("load_cycles", "dwell_s")  # log(1 + x)
+
+
+def recording_axes(campaign: Campaign) -> dict[str, Floats]:
+    """Of each axis on which the recordings differ, one row a recording (recordings, 1 or 2).
+
+    `position_mm` is the contact's place seen from the sensor's centre; `recorded_at` is in hours from the first. An
+    axis that a recording lacks is left out.
+    """
+    entries = frf_recordings(campaign)
+    found: dict[str, Floats] = {}
+    for name in (*_LOGARITHMIC, *_FROM_ZERO):
+        values = [getattr(entry, name) for entry in entries]
+        if None in values:
+            continue
+        column = np.array(values, dtype=float)
+        found[name] = (np.log(column) if name in _LOGARITHMIC else np.log1p(column))[:, None]
+    found["position_mm"] = 1e3 * offsets(campaign)
+    times = [entry.recorded_at for entry in entries]
+    if None not in times:
+        found["recorded_at"] = hours(times)[:, None]
+    return {name: column for name, column in found.items() if np.ptp(column, axis=0).max() > 1e-9}
+
+
+def hours(times: list[str | None]) -> Floats:
+    """Hours since the first of these times (ISO 8601, UTC)."""
+    seconds = np.array([datetime.fromisoformat(str(time).replace("Z", "+00:00")).timestamp() for time in times])
+    return (seconds - seconds.min()) / 3600

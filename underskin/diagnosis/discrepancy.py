@@ -1,0 +1,217 @@
+"""Something that no mechanism here describes: a Gaussian process over the campaign's axes, as a full rival.
+
+FRF = model · (1 + δ), with the noise of every hypothesis and the model's parameters free (linearised at its best fit).
+Two kinds of δ, alone or together:
+- of a recording: real, a Matérn-3/2 process over one axis (preload, sphere, place, cycles, dwell, amplitude, time) or
+  over all of them, in features at landmarks (Nyström), so that time is linear in recordings;
+- of a line: complex, a Matérn-3/2 process over log frequency that all recordings share.
+Amplitudes and lengths are on grids of equal prior probability. An amplitude below 1.5 % is not looked for: a law that
+is right to that is not missing physics.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.special import logsumexp
+
+from underskin.diagnosis.axes import recording_axes
+from underskin.diagnosis.explanation import Explanation, Workbench
+from underskin.diagnosis.fit import Evaluated
+from underskin.diagnosis.lines import Lines
+from underskin.diagnosis.scatter import GAIN_PRIOR, level_prior
+from underskin.mechanisms.mechanism import Normal, Parameter
+from underskin.units import Floats
+
+AMPLITUDES = np.array([0.015, 0.05, 0.15, 0.5])
+_LENGTHS = (0.15, 0.4, 1.2)  # of a recording's axis, over its range
+_LINE_LENGTHS = (0.08, 0.25, 0.8)  # of the logarithm of frequency
+_LANDMARKS = 24
+_MOST_LINES = 160  # distinct frequencies, beyond which they are binned
+_LEAST_LINES = 8  # in a recording
+_GAINS = np.geomspace(0.005, 0.5, 16)
+_KINDS = {"recordings": 0.5, "lines": 0.4, "both": 0.1}
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """The evidence for δ on top of one explanation: log Z of the whole, and of δ over each axis against none."""
+
+    log_evidence: float
+    axes: dict[str, float]  # log evidence gained; "frequency_hz" for lines
+
+
+def discrepancy(bench: Workbench, explanation: Explanation) -> Discrepancy:
+    """What a process gains on top of an explanation."""
+    gains = _over_recordings(bench, explanation)
+    line_gain = _over_lines(bench, explanation)
+    each = []
+    if gains:
+        recordings = float(logsumexp(list(gains.values())) - np.log(len(gains)))
+        each.append(np.log(_KINDS["recordings"]) + recordings)
+    if line_gain is not None:
+        each.append(np.log(_KINDS["lines"]) + line_gain)
+    if gains and line_gain is not None:
+        each.append(np.log(_KINDS["both"]) + recordings + line_gain)
+        gains["frequency_hz"] = line_gain
+    elif line_gain is not None:
+        gains = {"frequency_hz": line_gain}
+    total = float(logsumexp(each)) if each else -np.inf
+    return Discrepancy(explanation.log_evidence + total, gains)
+
+
+def _matern(distance: Floats) -> Floats:
+    scaled = np.sqrt(3.0) * distance
+    return (1 + scaled) * np.exp(-scaled)
+
+
+def _features(axis: Floats, length: float) -> Floats:
+    """Features whose products are the process' covariance, at up to `_LANDMARKS` places (recordings, landmarks)."""
+    values = np.unique(np.round(axis, 9), axis=0)
+    chosen = values[np.unique(np.linspace(0, len(values) - 1, _LANDMARKS).round().astype(int))]
+
+    def kernel(a: Floats, b: Floats) -> Floats:
+        return _matern(np.sqrt(((a[:, None] - b[None]) ** 2).sum(axis=2)) / length)
+
+    root = np.linalg.cholesky(kernel(chosen, chosen) + 1e-8 * np.eye(len(chosen)))
+    return np.linalg.solve(root, kernel(chosen, axis)).T
+
+
+def _over_recordings(bench: Workbench, explanation: Explanation) -> dict[str, float]:
+    """The log evidence that a process over each axis gains."""
+    axes = {name: _normalised(column) for name, column in recording_axes(bench.collapsed.campaign).items()}
+    if bench.collapsed.recordings < 4 or not axes:
+        return {}
+    if len(axes) > 1:
+        axes["all"] = np.concatenate(list(axes.values()), axis=1) / np.sqrt(len(axes))
+    problem = _GainProblem(explanation.best.at, explanation.best.fitter.parameters, bench)
+    plain = problem.log_evidence(None)
+    found = {}
+    for name, column in axes.items():
+        each = [problem.log_evidence(_features(column, length)) for length in _LENGTHS]
+        found[name] = float(logsumexp(each) - np.log(len(each)) - plain)
+    return found
+
+
+def _normalised(column: Floats) -> Floats:
+    return (column - column.min(axis=0)) / np.ptp(column, axis=0).max()
+
+
+class _GainProblem:
+    """Each recording's gain residual, linear in the model's parameters, sensors' gains and a process' features."""
+
+    def __init__(self, at: Evaluated, parameters: tuple[Parameter, ...], bench: Workbench) -> None:
+        moments = at.moments
+        _, uj, _, _ = moments.slopes
+        size = moments.along * moments.uu
+        size = np.where(np.abs(size) > 1e-12 * np.abs(size).max(), size, 1e-12 * np.abs(size).max())
+        self._z = moments.ur / size
+        self._line = moments.uu / size**2
+        slopes = uj / size[:, None]
+        centre = np.array([entry.start for entry in parameters]) - at.point.fit
+        scale = np.array([_prior_sd(entry) for entry in parameters])
+        self._z = self._z - slopes @ centre
+        sensors = np.eye(int(bench.lines.sensor.max()) + 1)[bench.lines.sensor]
+        sensors = sensors[:, sensors.any(axis=0)]
+        spread = at.marginal.levels.spread
+        self._fixed = np.concatenate([slopes * scale, spread * sensors], axis=1)
+        position = at.marginal.levels.position
+        placed = position**2 * moments.moved / np.maximum(moments.along**2, 1e-12)
+        placed = placed + 0.5 * position**4 * moments.second_order
+        self._variances = [
+            (GAIN_PRIOR.log_density(float(np.log(gain))), gain**2 + placed + self._line) for gain in _GAINS
+        ]
+
+    def log_evidence(self, features: Floats | None) -> float:
+        """Over the scatters' and the amplitudes' priors, up to a constant."""
+        count = self._fixed.shape[1]
+        design = self._fixed if features is None else np.concatenate([self._fixed, features], axis=1)
+        amplitudes = np.ones(1) if features is None else AMPLITUDES
+        scale = np.ones((len(amplitudes), design.shape[1]))
+        scale[:, count:] = amplitudes[:, None]
+        each = []
+        for log_weight, variance in self._variances:
+            gram = design.T @ (design / variance[:, None])
+            moment = design.T @ (self._z / variance)
+            inner = gram * scale[:, :, None] * scale[:, None, :] + np.eye(len(gram))
+            root = np.linalg.cholesky(inner)
+            solved = np.linalg.solve(root, (scale * moment)[..., None])[..., 0]
+            log_determinant = np.log(variance).sum() + 2 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+            chi2 = (self._z**2 / variance).sum() - (solved**2).sum(axis=1)
+            each.append(log_weight - 0.5 * (chi2 + log_determinant))
+        return float(logsumexp(each) - np.log(len(amplitudes)))
+
+
+def _prior_sd(entry: Parameter) -> float:
+    if isinstance(entry.prior, Normal):
+        return entry.prior.sd
+    low, high = entry.bounds
+    return (high - low) / np.sqrt(12.0)
+
+
+def _over_lines(bench: Workbench, explanation: Explanation) -> float | None:
+    """The log evidence that a process over frequency gains, the level of the lines' noise free in both."""
+    lines = bench.lines
+    counts = np.bincount(lines.recording)
+    if counts.max() < _LEAST_LINES:
+        return None
+    relative, weight = line_residuals(lines, _whole_prediction(bench, explanation))
+    line, centres = _bins(lines.frequency)
+    total = np.bincount(line, weight, len(centres))
+    mean = np.bincount(line, weight * relative.real, len(centres)) / total
+    mean = mean + 1j * np.bincount(line, weight * relative.imag, len(centres)) / total
+    chi2 = float((weight * np.abs(relative) ** 2).sum())
+    freedom = 2 * len(relative) - lines.recordings
+    prior = level_prior(lines.noise.log_level_sd)
+
+    def cost(log_level: float, covariance: Floats | None) -> float:
+        k2 = np.exp(2 * log_level)
+        value = 0.5 * chi2 / k2 + freedom * log_level - prior.log_density(log_level)
+        if covariance is None:
+            return float(value)
+        noise = k2 / total
+        root = np.linalg.cholesky(covariance + np.diag(noise))
+        solved = np.linalg.solve(root, np.stack([mean.real, mean.imag], axis=1))
+        value += 0.5 * (solved**2).sum() - 0.5 * (np.abs(mean) ** 2 / noise).sum()
+        value += 2 * float(np.log(np.diag(root)).sum()) - float(np.log(noise).sum())
+        return float(value)
+
+    def best(covariance: Floats | None) -> float:
+        found = minimize_scalar(cost, bounds=(-1.0, 5.0), args=(covariance,), method="bounded", options={"xatol": 3e-3})
+        return -float(found.fun)
+
+    distance = np.abs(np.log(centres[:, None] / centres[None]))
+    each = [
+        best(amplitude**2 * _matern(distance / length))
+        for length, amplitude in itertools.product(_LINE_LENGTHS, AMPLITUDES)
+    ]
+    return float(logsumexp(each) - np.log(len(each)) - best(None))
+
+
+def _whole_prediction(bench: Workbench, explanation: Explanation) -> np.ndarray:
+    """The explanation's prediction on all lines."""
+    value = explanation.best.at.prediction.value
+    return value if len(value) == len(bench.lines.value) else value[bench.lines.recording]
+
+
+def line_residuals(lines: Lines, prediction: np.ndarray) -> tuple[np.ndarray, Floats]:
+    """Each line over its recording's own best real multiple of the model, less 1, and its weight 1/variance."""
+    first = lines.first
+    precision = lines.deviation**-2
+    along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, first)
+    size = np.add.reduceat(precision * np.abs(prediction) ** 2, first)
+    fitted = prediction * (along / size)[lines.recording]
+    safe = np.where(np.abs(fitted) > 0, fitted, 1.0)
+    return (lines.value - fitted) / safe, precision * np.abs(fitted) ** 2
+
+
+def _bins(frequency: Floats) -> tuple[np.ndarray, Floats]:
+    """Of each row its distinct frequency, or its bin where there are too many, and the frequencies."""
+    distinct, line = np.unique(np.round(frequency, 6), return_inverse=True)
+    if len(distinct) <= _MOST_LINES:
+        return line, distinct
+    edges = np.geomspace(distinct[0], distinct[-1] * (1 + 1e-9), _MOST_LINES + 1)
+    line = np.searchsorted(edges, frequency, side="right") - 1
+    used, line = np.unique(line, return_inverse=True)
+    return line, np.sqrt(edges[used] * edges[used + 1])
