@@ -36,7 +36,7 @@ EFFECTS: dict[str, Effect] = {
     "misalignment": Effect("every position is off by one vector", (FRF,), {"x_mm": (-5, 5), "y_mm": (-5, 5)}),
     "adhesion": Effect("JKR, on the layer where layered_contact is on", _PRESSED, {"work_j_per_m2": (0, 5)}),
     "strain_stiffening": Effect(
-        "with the contact strain e = 0.2 a/R (a cylinder: e = |u|/H): linear E (1 + c e), limited E/(1 − c e)",
+        "with the contact strain e = 0.2 a/R (of a cylinder: u/H): linear E (1 + c e), limited E/(1 − c e)",
         (FRF, INDENTATION, COMPRESSION),
         {"coefficient": (0, 20)},
         ("linear", "limited"),

@@ -1,5 +1,7 @@
 """What an experiment's description may hold, and what is said of one that cannot be used."""
 
+import re
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -7,10 +9,14 @@ import pytest
 from typer.testing import CliRunner
 
 from rig.commands import rig as command
+from rig.effects import KNOWN
 from rig.errors import RigError
-from rig.experiment import parse
+from rig.experiment import Curves, Design, Drive, Lines, Noise, Skin, parse
+from rig.reading import document
 from rig.recorded import record_lines
 from tests.rig_experiments import PARAMETERS, described
+
+DOCUMENTATION = Path(__file__).parent.parent / "docs" / "rig.md"
 
 
 def refused(*changes: Any) -> str:
@@ -95,3 +101,32 @@ def test_the_command_says_what_is_wrong_on_one_line(tmp_path: Path) -> None:
         assert not (tmp_path / "out").exists()
     answer = CliRunner().invoke(command, ["draw", "--output-dir", str(tmp_path), "--what", "magic"])
     assert answer.exit_code == 2
+
+
+def test_everything_is_documented() -> None:
+    text = DOCUMENTATION.read_text(encoding="utf-8")
+    for name, effect in KNOWN.items():
+        (row,) = [line for line in text.splitlines() if line.startswith(f"| `{name}` |")]
+        assert effect.law in row
+        assert all(f"`{word}`" in row for word in (*effect.parameters, *effect.laws))
+        assert ", ".join(effect.kinds) in row
+    for part in (Skin, Design, Lines, Drive, Noise, Curves):
+        for entry in fields(part):
+            assert re.search(rf"\b{entry.name}\b", text), f"{part.__name__}.{entry.name}"
+
+
+def test_the_documented_description_is_accepted(tmp_path: Path) -> None:
+    documents = []
+    for number, block in enumerate(re.findall(r"```yaml\n(.*?)```", DOCUMENTATION.read_text("utf-8"), re.DOTALL)):
+        file = tmp_path / f"{number}.yaml"
+        file.write_text(block, encoding="utf-8")
+        documents.append(document(file))
+    whole, drive, curves = documents
+    assert parse(whole).name == "prototype, a heavy tip"
+    parse({name: value for name, value in {**whole, **drive}.items() if name != "lines"})
+    parse({"schema": whole["schema"], "name": "x", "kind": "indentation", "skin": whole["skin"], **curves})
+    assert set(whole) >= {"skin", "design", "lines", "noise", "effects"}
+    assert set(drive["drive"]) == {entry.name for entry in fields(Drive)}
+    assert set(curves["curves"]) == {entry.name for entry in fields(Curves)}
+    assert set(whole["design"]) == {entry.name for entry in fields(Design)}
+    assert set(whole["noise"]) == {entry.name for entry in fields(Noise)}

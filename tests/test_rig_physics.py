@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import underskin
 from rig import effects, finite_strain_solve, linear_filters
 from rig.bench import Bench
 from rig.contact import sphere_contact
@@ -19,6 +20,7 @@ from rig.pressed import Pressed
 from rig.recorded import make_bench
 from tests.oracle import NEEDS_ORACLE
 from tests.rig_experiments import PARAMETERS, described
+from underskin.offset import positioned_sigma
 
 RHO = 0.6
 
@@ -210,3 +212,18 @@ def test_a_contact_beyond_what_was_solved_is_refused() -> None:
         bench(skin={"youngs_modulus_mpa": 0.5}).lines(FREQUENCY)
     with pytest.raises(RigError, match=r"contact radius.*lower preload_n"):
         bench(skin={"thickness_mm": 0.2, "sensor_radius_mm": 0.2}).lines(FREQUENCY)
+
+
+def test_the_base_model_is_that_of_the_tables() -> None:
+    """Two finite-element codes and two ways to transform, over what draws reach; sensors beside the contact too."""
+    random = np.random.default_rng(11)
+    a, load = random.uniform(0.05, 2.0, 300), 10 ** random.uniform(-4, -1, 300)
+    table = underskin.load_table()
+    spectrum = Layer().transmission(WAVENUMBERS) * hertz_shape(np.multiply.outer(a, WAVENUMBERS))
+    spectrum = spectrum + added_spectrum(a, load)
+    for rho in (0.3, 0.6, 1.2):
+        for offset in (0.0, 0.5, 1.0):
+            tabled = positioned_sigma(table, a, rho, load, np.full(300, offset), 0.0).sigma
+            found = base_stress(spectrum, rho, np.full(300, offset))
+            assert found == pytest.approx(tabled, rel=5e-4, abs=1e-5)
+            assert np.median(np.abs(found / tabled - 1)) < 2e-5

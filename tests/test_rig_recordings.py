@@ -70,6 +70,13 @@ def assert_agrees(frf: Frf, expected: np.ndarray, band: tuple[float, float]) -> 
     assert np.abs(off.mean()) < 0.3
 
 
+def test_a_sweep_has_the_frf_of_the_other_route() -> None:
+    bench, series = series_of({"kind": "sweep", "duration_s": 16.0}, {"amplifier_high_pass": {"corner_hz": 1.0}})
+    frf = broadband(series[0].force_n, series[0].charge_pc, RATE, block_samples=2048)  # two sweeps a block
+    inside = (frf.frequency > 20) & (frf.frequency < 550)
+    assert np.abs(frf.values / bench.lines(frf.frequency)[0] - 1)[inside].max() < 0.01
+
+
 def test_stepped_sine_has_the_frf_of_the_other_route() -> None:
     on = {"contact_resonance": {"tip_mass_g": 3.0, "damping": 0.1}, "timing_delay": {"delay_us": 100.0}}
     bench, series = series_of({"kind": "stepped_sine", "steps": 12}, on)
