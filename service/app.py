@@ -4,11 +4,13 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from fastapi import APIRouter, FastAPI, Security
+from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp
 
 from service import (
     campaigns,
     d33,
+    diagnoses,
     exports,
     frf,
     health,
@@ -22,6 +24,7 @@ from service import (
     umbridge,
 )
 from service.dependencies import authorised
+from service.diagnosing import Runner, Terms
 from service.front import Front
 from service.gate import Gate
 from service.handlers import install_handlers
@@ -29,15 +32,18 @@ from service.settings import Settings
 from service.store import Database
 from service.uploads import UploadFolder
 from underskin import __version__
-from underskin.surrogate import SigmaTable
+from underskin.surrogate import SIGMA_TABLE, SigmaTable
 
 
 @asynccontextmanager
 async def _lifespan(api: FastAPI) -> AsyncIterator[None]:
-    api.state.uploads = UploadFolder(api.state.settings.data)
+    state = api.state
+    state.uploads = UploadFolder(state.settings.data)
+    state.runner.start()
     yield
-    api.state.uploads.close()
-    api.state.store.close()
+    await run_in_threadpool(state.runner.stop)
+    state.uploads.close()
+    state.store.close()
     record.flush()
 
 
@@ -56,13 +62,21 @@ def create_api(settings: Settings, table: SigmaTable, gate: Gate, store: Databas
     api.state.table = table
     api.state.gate = gate
     api.state.store = store
+    api.state.runner = runner(settings, table, store)
     install_handlers(api)
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"])])
-    for noun in (sigma, frf, d33, stress, tables, campaigns, exports, skins):
+    for noun in (sigma, frf, d33, stress, tables, campaigns, diagnoses, exports, skins):
         v1.include_router(noun.router)
     for router in (v1, umbridge.router, health.router, metrics.router, openapi.router):
         api.include_router(router)
     return api
+
+
+def runner(settings: Settings, table: SigmaTable, store: Database) -> Runner:
+    """What runs the diagnoses."""
+    memory_bytes = int(settings.diagnosis_memory_mb * 1e6)
+    path = settings.tables / SIGMA_TABLE
+    return Runner(store, Terms(settings.diagnosis_workers, memory_bytes, path, table.sha256))
 
 
 def create_app(settings: Settings, table: SigmaTable, gate: Gate, store: Database) -> ASGIApp:

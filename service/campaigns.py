@@ -145,7 +145,7 @@ def listed(
         recorded_to=_time("recorded_to", recorded_to),
     )
     with store.reading() as connection:
-        rows = campaigns.listed(connection, filters, _before(cursor), limit + 1)
+        rows = campaigns.listed(connection, filters, before(cursor), limit + 1)
     page = [models.CampaignEntry(**models.entry(row, campaigns.state(row))) for row in rows[:limit]]
     return models.CampaignList(campaigns=page, next=str(rows[limit - 1].number) if len(rows) > limit else None)
 
@@ -249,7 +249,8 @@ def _time(name: str, text: str | None) -> str | None:
         raise InvalidInput(name, text, "must be a date and time like 2017-05-03T09:00:00Z") from None
 
 
-def _before(cursor: str | None) -> int | None:
+def before(cursor: str | None) -> int | None:
+    """The number that a page of a list ended with; raises InvalidInput."""
     if cursor is None:
         return None
     if not cursor.isascii() or not cursor.isdigit() or len(cursor) > 18:

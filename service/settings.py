@@ -1,5 +1,6 @@
 """Settings, from the environment (docs/settings.md)."""
 
+import os
 from pathlib import Path
 
 from pydantic import Field, field_validator
@@ -35,6 +36,18 @@ class Settings(BaseSettings):
         default="",
         description="Where campaigns are kept: postgresql://user:password@host/database. Left out: SQLite in the data "
         "folder.",
+    )
+    diagnosis_workers: int = Field(
+        default_factory=lambda: len(os.sched_getaffinity(0)),
+        ge=0,
+        le=1024,
+        description="How many diagnoses run at once, each in a process of its own; 0: this server runs none.",
+    )
+    diagnosis_memory_mb: float = Field(
+        default=2000,
+        ge=100,
+        le=1e6,
+        description="Memory that one diagnosis may take, in MB (10^6 bytes); one that needs more fails.",
     )
     hosts: str = Field(
         default="",

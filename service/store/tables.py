@@ -112,6 +112,47 @@ sensor_d33 = Table(
     sqlite_with_rowid=False,
 )
 
+# One diagnosis of a campaign with `excluded` of its recordings left out: exclusions are never taken back, so that their
+# number says which.
+diagnoses = Table(
+    "diagnoses",
+    metadata,
+    Column("number", _Number, primary_key=True),  # the order in which they are run
+    Column("id", String, nullable=False, unique=True),
+    Column("campaign", _Number, ForeignKey("campaigns.number"), nullable=False),
+    Column("excluded", Integer, nullable=False),
+    Column("table_sha256", String, nullable=False),
+    Column("version", String, nullable=False),  # of underskin
+    Column("state", String, nullable=False),
+    Column("progress", Float, nullable=False),  # 0 to 1
+    Column("asked_at", String, nullable=False),
+    Column("asked_from", Text),  # name of the API key
+    Column("started_at", String),
+    Column("ended_at", String),
+    Column("reason", Text),  # why it failed
+    Column("claimed_by", String),  # the server that runs it
+    Column("alive_at", Float),  # when that server last said so [s, by the database's clock]
+    Column("verdict", String),
+    Column("probability", Float),
+    Column("report", LargeBinary),  # report/1, compressed JSON; last, so that lists never read it
+    Index("diagnoses_of_campaign", "campaign", "number"),
+    Index("diagnoses_by_state", "state", "number"),
+)
+
+# Models of skins, one a diagnosis that was adopted; the last one is in force.
+models = Table(
+    "models",
+    metadata,
+    Column("number", _Number, primary_key=True),  # the order of adoption
+    Column("id", String, nullable=False, unique=True),
+    Column("skin_id", String, ForeignKey("skins.id"), nullable=False),
+    Column("version", Integer, nullable=False),  # counts those of the skin
+    Column("diagnosis", _Number, ForeignKey("diagnoses.number"), nullable=False),
+    Column("adopted_at", String, nullable=False),
+    Column("adopted_from", Text),  # name of the API key
+    UniqueConstraint("skin_id", "version", name="version_of_skin"),
+)
+
 # What was answered to a POST that carried an Idempotency-Key.
 answers = Table(
     "answers",

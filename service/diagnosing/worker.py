@@ -1,0 +1,92 @@
+"""The worker process: one campaign in, its report out, at the lowest priority and within a limit on memory.
+
+Standard input: a line of JSON (`Job`), then the campaign (`campaign/1`), then nothing until the runner ends: a worker
+whose runner is gone ends too. Standard output: a line of JSON for each progress, and a last one with report or error.
+"""
+
+import os
+import resource
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import orjson
+
+_NICENESS = 10
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a worker is told beside the campaign: where its bytes end, the table to use, what was left out and why."""
+
+    campaign_bytes: int
+    table: str
+    table_sha256: str
+    memory_bytes: int
+    excluded: tuple[tuple[str, str], ...]
+
+    def line(self) -> bytes:
+        """As the worker reads it."""
+        return orjson.dumps(asdict(self), option=orjson.OPT_APPEND_NEWLINE)
+
+
+def main() -> None:
+    """The process."""
+    said = os.fdopen(os.dup(1), "wb", buffering=0)
+    os.dup2(2, 1)  # what a library prints is no answer
+
+    def say(message: dict[str, Any]) -> None:
+        said.write(orjson.dumps(message, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_APPEND_NEWLINE))
+
+    os.nice(_NICENESS)
+    job = Job(**orjson.loads(sys.stdin.buffer.readline()))
+    campaign = sys.stdin.buffer.read(job.campaign_bytes)
+    threading.Thread(target=_end_with_the_runner, args=(sys.stdin.buffer,), daemon=True).start()
+    from underskin.errors import UnderskinError
+
+    try:
+        say({"report": _report(job, campaign, lambda share: say({"progress": share}))})
+    except UnderskinError as error:
+        say({"error": str(error)})
+    except MemoryError:
+        say({"error": f"it takes more than {job.memory_bytes / 1e6:g} MB of memory (UNDERSKIN_DIAGNOSIS_MEMORY_MB)"})
+
+
+def _report(job: Job, campaign: bytes, progress: Callable[[float], None]) -> dict[str, Any]:
+    """The report, with what was left out of it among the findings."""
+    from underskin.diagnosis import diagnose
+    from underskin.errors import TableError
+    from underskin.recordings.campaign import parse
+    from underskin.surrogate import load_table
+
+    table = load_table(Path(job.table))
+    if table.sha256 != job.table_sha256:
+        raise TableError(f"{job.table} changed since the server started: restart it")
+    _limit(job.memory_bytes)
+    report = diagnose(parse(orjson.loads(campaign)), table, progress=progress)
+    left_out = [
+        {"code": "excluded", "recording": name, "field": None, "statement": f"Left out: {reason}"}
+        for name, reason in job.excluded
+    ]
+    return {**report, "findings": left_out + list(report["findings"])}
+
+
+def _limit(memory_bytes: int) -> None:
+    """So much beyond what has been loaded."""
+    own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (own + memory_bytes, own + memory_bytes))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _end_with_the_runner(stdin: BinaryIO) -> None:
+    with suppress(OSError):
+        stdin.read(1)
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    main()

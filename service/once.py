@@ -1,0 +1,53 @@
+"""POST under an Idempotency-Key: the same request is answered the same and done once."""
+
+import hashlib
+from collections.abc import Callable
+from typing import Annotated, Any
+
+from fastapi import Depends, Header, Request
+from sqlalchemy import Connection
+
+from service.store import answers
+from service.store.engine import Database
+
+
+class Once:
+    """The request as a repetition of it would be recognised."""
+
+    def __init__(
+        self,
+        request: Request,
+        idempotency_key: Annotated[
+            str | None,
+            Header(
+                min_length=1,
+                max_length=255,
+                description="A text of your own: the same request under the same key is answered the same and done "
+                "once.",
+            ),
+        ] = None,
+    ) -> None:
+        key = request.scope["key"]
+        self.sender: str | None = None if key is None else key.name
+        self._path = request.url.path
+        self._key = idempotency_key
+
+    def answer(self, store: Database, told: Any, act: Callable[[Connection], dict[str, Any]]) -> dict[str, Any]:
+        """What `act` answers in a transaction of its own, or what it answered before; `told` is the request's body."""
+        if self._key is None:
+            with store.writing() as connection:
+                return act(connection)
+        digest = hashlib.sha256(repr([self._path, told]).encode()).hexdigest()
+        request = answers.Request(self.sender or "", self._key, digest)
+        with store.writing() as connection:
+            before = answers.replayed(connection, request)
+            if before is None and not answers.claim(connection, request):
+                before = answers.replayed(connection, request)
+            if before is not None:
+                return dict(before)
+            answer = act(connection)
+            answers.keep(connection, request, answer)
+        return answer
+
+
+IdempotentOnce = Annotated[Once, Depends()]

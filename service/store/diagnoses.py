@@ -1,0 +1,197 @@
+"""Diagnoses: asked for, claimed by one server, kept alive while they run, ended once.
+
+A server that runs a diagnosis says every few seconds that it is alive. One that has been silent for SILENT_S is taken
+for dead, and the diagnosis is claimed again, by the same server after a restart or by another.
+"""
+
+import secrets
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from sqlalchemy import Connection, Select, insert, select, text, update
+
+from service.store import campaigns as kept_campaigns
+from service.store import skins
+from service.store.campaigns import Excluded
+from service.store.codec import compressed, decompressed
+from service.store.errors import Conflict, Missing
+from service.store.tables import AnyRow, campaigns, diagnoses
+from service.store.times import now
+from underskin.recordings.campaign import Campaign
+
+State = Literal["queued", "running", "done", "failed", "cancelled"]
+SILENT_S = 20.0
+_ENDED = ("done", "failed", "cancelled")
+_USABLE = ("queued", "running", "done")
+
+# All but the report, and what is said of its campaign.
+_LISTED = (
+    *[column for column in diagnoses.c if column.name != "report"],
+    campaigns.c.id.label("campaign_id"),
+    campaigns.c.skin_id,
+    campaigns.c.withdrawn_at,
+    campaigns.c.withdraw_reason,
+    campaigns.c.corrected_by,
+    campaigns.c.excluded.label("excluded_now"),
+)
+
+
+@dataclass(frozen=True)
+class Filters:
+    """Which diagnoses a list shows; None does not filter."""
+
+    campaign: str | None = None
+    skin: str | None = None
+    state: State | None = None
+
+
+def rows() -> Select[Any]:
+    """Diagnoses without their reports, each with what is said of its campaign."""
+    return select(*_LISTED).join(campaigns, campaigns.c.number == diagnoses.c.campaign)
+
+
+def ask(connection: Connection, campaign_id: str, table_sha256: str, version: str, asked_from: str | None) -> AnyRow:
+    """The diagnosis of a campaign as it is now: the one there is, or a new one in the queue.
+
+    Raises Missing, and Conflict where the campaign is not current. One that failed or was cancelled is asked anew.
+    """
+    query = select(campaigns).where(campaigns.c.id == campaign_id).with_for_update()
+    campaign = connection.execute(query).first()
+    if campaign is None:
+        raise Missing(f"There is no campaign {campaign_id!r}.")
+    why = _unused(campaign)
+    if why is not None:
+        raise Conflict(f"Campaign {campaign_id!r} is not diagnosed: it was {why}.")
+    basis = {
+        "campaign": campaign.number,
+        "excluded": campaign.excluded,
+        "table_sha256": table_sha256,
+        "version": version,
+    }
+    same = [diagnoses.c[name] == value for name, value in basis.items()]
+    query = select(diagnoses.c.id).where(*same, diagnoses.c.state.in_(_USABLE)).order_by(diagnoses.c.number).limit(1)
+    found = connection.execute(query).scalar()
+    if found is None:
+        found = f"d-{secrets.token_hex(8)}"
+        asked = {"id": found, "state": "queued", "progress": 0.0, "asked_at": now(), "asked_from": asked_from}
+        connection.execute(insert(diagnoses), {**basis, **asked})
+    return find(connection, found)
+
+
+def find(connection: Connection, diagnosis_id: str) -> AnyRow:
+    """The row of a diagnosis; raises Missing."""
+    row = connection.execute(rows().where(diagnoses.c.id == diagnosis_id)).first()
+    if row is None:
+        raise Missing(f"There is no diagnosis {diagnosis_id!r}.")
+    return row
+
+
+def report_of(connection: Connection, number: int) -> dict[str, Any] | None:
+    """Its report/1, where it is done."""
+    blob = connection.execute(select(diagnoses.c.report).where(diagnoses.c.number == number)).scalar()
+    return None if blob is None else dict(decompressed(blob))
+
+
+def listed(connection: Connection, filters: Filters, before: int | None, limit: int) -> Sequence[AnyRow]:
+    """Rows of diagnoses, the latest first, those asked for before the number `before`."""
+    query = rows()
+    if filters.campaign is not None:
+        query = query.where(campaigns.c.id == filters.campaign)
+    if filters.skin is not None:
+        query = query.where(campaigns.c.skin_id.in_(skins.members(skins.root_of(filters.skin))))
+    if filters.state is not None:
+        query = query.where(diagnoses.c.state == filters.state)
+    if before is not None:
+        query = query.where(diagnoses.c.number < before)
+    return connection.execute(query.order_by(diagnoses.c.number.desc()).limit(limit)).all()
+
+
+def outdated(row: AnyRow) -> str | None:
+    """Why a diagnosis is not of its campaign as it is now; None where it is."""
+    return _unused(row) or ("changed: recordings were excluded since" if row.excluded != row.excluded_now else None)
+
+
+def cancel(connection: Connection, diagnosis_id: str) -> None:
+    """End it before it is done; raises Missing, and Conflict where it is done or has failed."""
+    this = diagnoses.c.id == diagnosis_id
+    state = connection.execute(select(diagnoses.c.state).where(this).with_for_update()).scalar()
+    if state is None:
+        raise Missing(f"There is no diagnosis {diagnosis_id!r}.")
+    if state in ("done", "failed"):
+        raise Conflict(f"Diagnosis {diagnosis_id!r} cannot be cancelled: its state is {state}.")
+    if state != "cancelled":
+        values = {"state": "cancelled", "ended_at": now(), "claimed_by": None, "alive_at": None}
+        connection.execute(update(diagnoses).where(this).values(**values))
+
+
+def claim(connection: Connection, server: str, table_sha256: str, version: str) -> AnyRow | None:
+    """Take the next diagnosis to run: a queued one, or a running one whose server is silent; None where there is none.
+
+    Servers that claim at once do not get the same one. It is run with the table and the version of the server that has
+    it now, whatever they were when it was asked for.
+    """
+    clock = _clock(connection)
+    silent = (diagnoses.c.alive_at < clock - SILENT_S) & (diagnoses.c.claimed_by != server)
+    waiting = (diagnoses.c.state == "queued") | ((diagnoses.c.state == "running") & silent)
+    query = select(diagnoses.c.number, diagnoses.c.id).where(waiting).order_by(diagnoses.c.number).limit(1)
+    row = connection.execute(query.with_for_update(skip_locked=True)).first()
+    if row is None:
+        return None
+    taken = {"state": "running", "claimed_by": server, "alive_at": clock, "progress": 0.0, "started_at": now()}
+    basis = {"table_sha256": table_sha256, "version": version}
+    connection.execute(update(diagnoses).where(diagnoses.c.number == row.number).values(**taken, **basis))
+    return find(connection, row.id)
+
+
+def keep_alive(connection: Connection, number: int, server: str, progress: float) -> bool:
+    """Say that it still runs here, and how far it is; False where it is no longer this server's."""
+    return _mine(connection, number, server, progress=progress, alive_at=_clock(connection))
+
+
+def finish(connection: Connection, number: int, server: str, report: dict[str, Any]) -> bool:
+    """Keep the report; False where it is no longer this server's."""
+    told = {"verdict": report["verdict"], "probability": report["probability"], "report": compressed(report)}
+    return _end(connection, number, server, state="done", progress=1.0, **told)
+
+
+def fail(connection: Connection, number: int, server: str, reason: str) -> bool:
+    """Keep why there is no report; False where it is no longer this server's."""
+    return _end(connection, number, server, state="failed", reason=reason)
+
+
+def release(connection: Connection, number: int, server: str) -> bool:
+    """Put it back into the queue."""
+    queued = {"state": "queued", "progress": 0.0, "started_at": None, "claimed_by": None, "alive_at": None}
+    return _mine(connection, number, server, **queued)
+
+
+def campaign_of(connection: Connection, row: AnyRow) -> tuple[Campaign, list[Excluded]]:
+    """The campaign as it was when its diagnosis was asked for, and what had been excluded from it by then."""
+    whole = kept_campaigns.load(connection, kept_campaigns.find(connection, row.campaign_id))
+    excluded = sorted(kept_campaigns.excluded_of(connection, row.campaign), key=lambda left: left.at)[: row.excluded]
+    names = {left.recording for left in excluded}
+    return replace(whole, recordings=tuple(entry for entry in whole.recordings if entry.id not in names)), excluded
+
+
+def _unused(campaign: AnyRow) -> str | None:
+    if campaign.withdrawn_at is not None:
+        return f"withdrawn: {campaign.withdraw_reason}"
+    return None if campaign.corrected_by is None else f"corrected by {campaign.corrected_by}"
+
+
+def _end(connection: Connection, number: int, server: str, **values: Any) -> bool:
+    return _mine(connection, number, server, ended_at=now(), claimed_by=None, alive_at=None, **values)
+
+
+def _mine(connection: Connection, number: int, server: str, **values: Any) -> bool:
+    this = (diagnoses.c.number == number) & (diagnoses.c.claimed_by == server) & (diagnoses.c.state == "running")
+    return bool(connection.execute(update(diagnoses).where(this).values(**values)).rowcount)
+
+
+def _clock(connection: Connection) -> float:
+    """Seconds by a clock that all servers of the store share."""
+    if connection.dialect.name == "sqlite":
+        return time.time()
+    return float(connection.execute(text("SELECT extract(epoch FROM clock_timestamp())")).scalar_one())

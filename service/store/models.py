@@ -1,0 +1,71 @@
+"""Models of skins, adopted from diagnoses; each stays, and the last one is in force."""
+
+import secrets
+from collections.abc import Sequence
+from typing import Any
+
+from sqlalchemy import Connection, Select, func, insert, select
+
+from service.store import diagnoses as kept
+from service.store import skins
+from service.store.errors import Conflict
+from service.store.tables import AnyRow, diagnoses, models
+from service.store.times import now
+
+_OWN = (
+    models.c.number.label("model_number"),
+    models.c.id.label("model_id"),
+    models.c.version,
+    models.c.skin_id.label("model_skin"),
+    models.c.adopted_at,
+    models.c.adopted_from,
+)
+
+
+def adopt(connection: Connection, root: str, diagnosis: AnyRow, adopted_from: str | None) -> AnyRow:
+    """Make a diagnosis the model of the skin `root`; the one in force, where it is that one already.
+
+    Raises Conflict where the diagnosis is of another skin, or not of its campaign as it is now.
+    """
+    skins.lock(connection, [root])
+    if skins.require_root(connection, diagnosis.skin_id) != root:
+        raise Conflict(f"Diagnosis {diagnosis.id!r} is of skin {diagnosis.skin_id!r}, not of {root!r}.")
+    why = kept.outdated(diagnosis)
+    if why is not None:
+        raise Conflict(f"Campaign {diagnosis.campaign_id!r} of diagnosis {diagnosis.id!r} was {why}.")
+    before = in_force(connection, root)
+    if before is not None and before.id == diagnosis.id:
+        return before
+    last = connection.execute(select(func.max(models.c.version)).where(_of_root(root))).scalar() or 0
+    row = {
+        "id": f"m-{secrets.token_hex(8)}",
+        "skin_id": root,
+        "version": last + 1,
+        "diagnosis": diagnosis.number,
+        "adopted_at": now(),
+        "adopted_from": adopted_from,
+    }
+    connection.execute(insert(models), row)
+    adopted = in_force(connection, root)
+    assert adopted is not None
+    return adopted
+
+
+def in_force(connection: Connection, root: str) -> AnyRow | None:
+    """The model adopted last for a skin or for one joined to it; None where there is none."""
+    return connection.execute(_rows(root).limit(1)).first()
+
+
+def of_skin(connection: Connection, root: str) -> Sequence[AnyRow]:
+    """All models of a skin and of those joined to it, the latest first."""
+    return connection.execute(_rows(root)).all()
+
+
+def _rows(root: str) -> Select[Any]:
+    """Rows of diagnoses as `diagnoses.rows` has them, with their models."""
+    query = kept.rows().add_columns(*_OWN).join(models, models.c.diagnosis == diagnoses.c.number)
+    return query.where(_of_root(root)).order_by(models.c.adopted_at.desc(), models.c.number.desc())
+
+
+def _of_root(root: str) -> Any:
+    return models.c.skin_id.in_(skins.members(root))
