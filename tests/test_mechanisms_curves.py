@@ -22,7 +22,7 @@ from tests.mechanism_campaigns import (
 from tests.oracle import NEEDS_ORACLE
 from underskin.contact import SphereOnLayer
 from underskin.layer import Layer
-from underskin.mechanisms import Model, compose
+from underskin.mechanisms import Normal, compose
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, SkinDescription
 from underskin.units import Floats
 
@@ -55,7 +55,7 @@ def test_the_base_model_is_hertz_with_a_contact_point() -> None:
 def test_where_no_modulus_is_declared_it_is_free_and_found_by_hertz() -> None:
     recorded = indentation(DEPTH, skin=replace(SKIN, youngs_modulus_mpa=None))
     model = compose([], recorded, table())
-    assert [parameter.unit for parameter in model.parameters] == ["MPa", "mm", "N"]
+    assert [parameter.unit for parameter in model.parameters] == ["MPa", "-", "mm", "N"]
     start = fit_of(model)
     assert np.exp(start[0]) == pytest.approx(E_MPA, rel=1e-3)
     assert model.predict(start).value == pytest.approx(hertz_force(DEPTH, R_MM, E_MPA), abs=2e-3)
@@ -175,20 +175,49 @@ def test_platens_that_hold_stiffen_by_gent_and_lindley_s_factor() -> None:
     assert ratio == pytest.approx(np.full(60, 1 + 2 * (30 / 80) ** 2), rel=1e-5)
 
 
-@pytest.mark.skipif("UNDERSKIN_RECORDINGS" not in os.environ, reason="UNDERSKIN_RECORDINGS names no folder")
+NEEDS_RECORDINGS = pytest.mark.skipif(
+    "UNDERSKIN_RECORDINGS" not in os.environ, reason="UNDERSKIN_RECORDINGS does not name the folder of real recordings"
+)
+
+
+def fitted(names: Sequence[str], recorded: Campaign, measured: Floats) -> tuple[Floats, float]:
+    """Fit with noise of 0.5 % and the priors: the fit coordinates, the residual in percent of the largest force."""
+    model = compose(names, recorded, table())
+    priors = [parameter.prior for parameter in model.parameters]
+    mean, sd = np.array([(prior.mean, prior.sd) for prior in priors if isinstance(prior, Normal)]).T
+    noise = 0.005 * measured.max()
+
+    def misfit(fit: Floats) -> Floats:
+        return np.append((model.predict(fit).value - measured) / noise, (fit - mean) / sd)
+
+    def slopes(fit: Floats) -> Floats:
+        return np.vstack([model.predict(fit).slopes.T / noise, np.diag(1 / sd)])
+
+    found = least_squares(misfit, fit_of(model), jac=slopes, x_scale=sd)
+    return found.x, 0.5 * float(np.sqrt(np.mean(found.fun[: len(measured)] ** 2)))
+
+
+@NEEDS_RECORDINGS
+def test_a_sphere_in_a_well_feels_the_thin_layer() -> None:
+    folder = Path(os.environ["UNDERSKIN_RECORDINGS"]) / "sphere-in-well/run_732_20251030"
+    for well, height_mm, modulus_mpa in (("E5", 7.95, 7.44), ("E6", 8.37, 6.78), ("E7", 8.85, 6.84)):
+        (path,) = folder.glob(f"well_{well}_*.csv")
+        lines = [line.split(",") for line in path.read_text().splitlines()]
+        rows = np.array([line for line in lines if len(line) == 4 and line[0][:1].isdigit()], dtype=float)
+        recording = IndentationRecording(well, 2.5, -rows[:, 1], -rows[:, 3])
+        recorded = Campaign("well", SkinDescription(poisson_ratio=0.5, thickness_mm=height_mm), (recording,))
+        _, on_half_space = fitted([], recorded, recording.force_n)
+        fit, on_layer = fitted(["layered_contact"], recorded, recording.force_n)
+        assert on_layer < 0.9 * on_half_space
+        assert np.exp(fit[0]) == pytest.approx(modulus_mpa, rel=0.02)
+
+
+@NEEDS_RECORDINGS
 def test_measured_silicone_is_not_linear_but_yeoh_s() -> None:
     path = Path(os.environ["UNDERSKIN_RECORDINGS"]) / "silicone-compression/EF30_0T/EF30_0T_A1.csv"
     rows = np.array([line.split(",")[:3] for line in path.read_text().splitlines()[8:-1:4]], dtype=float)
     recording = CompressionRecording("c", 30.0, 50.0, rows[:, 1], rows[:, 2])
     recorded = Campaign("measured", replace(SKIN, youngs_modulus_mpa=None), (recording,))
-    residual = {}
-    for names in ([], ["strain_stiffening"]):
-        model = compose(names, recorded, table())
-
-        def misfit(fit: Floats, model: Model = model) -> Floats:
-            return (model.predict(fit).value - rows[:, 2]) / rows[:, 2].max()
-
-        found = least_squares(misfit, fit_of(model))
-        residual[len(names)] = 100 * np.sqrt(np.mean(found.fun**2))
+    residual = [fitted(names, recorded, rows[:, 2])[1] for names in ([], ["strain_stiffening"])]
     assert residual[0] > 5
     assert residual[1] < 0.4

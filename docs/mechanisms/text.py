@@ -9,7 +9,7 @@ from docs.mechanisms.signatures import SHOWN
 from docs.mechanisms.silicones import RESULTS
 from docs.paper.markdown import table
 from underskin.mechanisms import CATALOGUE, Mechanism, Normal, Parameter
-from underskin.mechanisms.frf_model import NUISANCES
+from underskin.mechanisms.nuisances import FRF_NUISANCES
 from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription
 
 _INTRODUCTION = """\
@@ -61,7 +61,7 @@ _CAMPAIGN = Campaign(
 
 def document() -> str:
     """The whole page."""
-    parts = [_INTRODUCTION, _parameters(NUISANCES, {}), _overview()]
+    parts = [_INTRODUCTION, _parameters(FRF_NUISANCES, {}), _overview()]
     parts += [_section(mechanism) for mechanism in CATALOGUE.values()]
     return "\n".join([*parts, _SILICONES + _silicones()])
 

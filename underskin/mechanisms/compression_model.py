@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.errors import InvalidInput
-from underskin.mechanisms import curve_parameters
 from underskin.mechanisms.composition import Composition, Prediction
 from underskin.mechanisms.curve_state import Curve, stiffened
 from underskin.mechanisms.differentiated import Differentiated, constant
 from underskin.mechanisms.indentation_model import declared_modulus, times_of
 from underskin.mechanisms.mechanism import Mechanism, Parameter, Values
+from underskin.mechanisms.nuisances import contact_point, modulus_parameter
 from underskin.mechanisms.relaxation import relaxed
 from underskin.recordings import elastomer
 from underskin.recordings.campaign import Campaign, CompressionRecording
@@ -97,5 +97,5 @@ def _nuisances(recordings: Sequence[CompressionRecording], campaign: Campaign) -
         height = float(to_si("sample_height_mm", entry.sample_height_mm))
         unloaded = int(np.abs(entry.force_n).argmin())
         begins = float(to_si("displacement_mm", entry.displacement_mm[unloaded]))
-        points.append(curve_parameters.contact_point(entry.id, begins, _CONTACT_SD * height, 0.1 * height))
-    return [curve_parameters.modulus_parameter(campaign.skin, estimates), *points]
+        points.append(contact_point(entry.id, begins, _CONTACT_SD * height, 0.1 * height))
+    return [modulus_parameter(campaign.skin, estimates), *points]

@@ -73,7 +73,8 @@ class FrfDesign:
         frequencies = [lines_of(entry).frequency for entry in recordings]
         recording = np.repeat(np.arange(len(recordings)), [len(entry) for entry in frequencies])
         row_frequency = np.concatenate(frequencies)
-        lines, line = np.unique(np.column_stack([contact[recording], row_frequency]), axis=0, return_inverse=True)
+        distinct, frequency = np.unique(row_frequency, return_inverse=True)
+        lines, line = np.unique(contact[recording] * len(distinct) + frequency, return_inverse=True)
         return cls(
             recording_ids=tuple(entry.id for entry in recordings),
             sensor_ids=sensor_ids,
@@ -90,8 +91,8 @@ class FrfDesign:
             point_y=points[:, 2],
             neighbour_recording=pair_recording,
             neighbour_point=point[len(recordings) :],
-            line_contact=lines[:, 0].astype(np.intp),
-            line_frequency=lines[:, 1],
+            line_contact=lines // len(distinct),
+            line_frequency=distinct[lines % len(distinct)],
             recording=recording,
             line=line,
             row_dynamic_force=np.array([entry.dynamic_force_n for entry in recordings])[recording],

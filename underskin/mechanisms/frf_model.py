@@ -20,7 +20,8 @@ from underskin.mechanisms.composition import Composition, Prediction
 from underskin.mechanisms.contact_state import Contacts
 from underskin.mechanisms.differentiated import Array, Differentiated, chain, constant, sum_rows
 from underskin.mechanisms.frf_design import FrfDesign, Indices, largest_offset
-from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.mechanism import Mechanism, Values
+from underskin.mechanisms.nuisances import FRF_NUISANCES
 from underskin.mechanisms.offset_sigma import PROFILE_END, offset_sigma
 from underskin.mechanisms.pressed import press, stiffness
 from underskin.mechanisms.sigma_curves import layer_of, sigma_curves
@@ -28,39 +29,6 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate import SigmaTable
 from underskin.units import Floats, to_si
 
-_D33_PRIOR = Normal(mean=float(np.log(15.0)), sd=1.5)
-NUISANCES = (
-    Parameter(
-        name="d33",
-        unit="pC/N",
-        low=1e-3,
-        high=1e5,
-        prior=_D33_PRIOR,
-        scale="log",
-        limit=None,
-        reason="what is measured; PVDF and its copolymers have 5 to 40 pC/N, ceramics up to some hundred",
-    ),
-    Parameter(
-        name="youngs_modulus",
-        unit="-",
-        low=0.9,
-        high=1.1,
-        prior=Normal(0.0, 0.02),
-        scale="log",
-        limit=1.0,
-        reason="a declared modulus is good to 2 %; a larger error is the mechanism modulus_error",
-    ),
-    Parameter(
-        name="thickness",
-        unit="-",
-        low=0.95,
-        high=1.05,
-        prior=Normal(0.0, 0.01),
-        scale="log",
-        limit=1.0,
-        reason="a declared thickness is good to 1 %; a larger error is the mechanism thickness_error",
-    ),
-)
 _NUISANCE_STRETCH = 1.06  # the thickness' bounds
 _POSITION = 2  # two more variables: the contact's x and y
 
@@ -70,7 +38,7 @@ class FrfModel:
 
     def __init__(self, mechanisms: Sequence[Mechanism], campaign: Campaign, table: SigmaTable) -> None:
         """Work out everything that no parameter changes."""
-        self._composition = Composition(mechanisms, campaign, "frf", NUISANCES)
+        self._composition = Composition(mechanisms, campaign, "frf", FRF_NUISANCES)
         self.names = tuple(mechanism.name for mechanism in mechanisms)
         self.parameters = self._composition.parameters
         self._mechanisms = self._composition.mechanisms
@@ -152,11 +120,12 @@ class FrfModel:
             contacts.stiffness = stiffness(contacts, pressed, layer)
         curves = sigma_curves(self._sigma, contacts, pressed, rho, layer if contacts.layered else None)
         offset = self._offset(own, position) / contacts.thickness
+        place = self._sigma.place(offset.value)
         sigma = []
         inside = np.ones(len(design.point_contact), dtype=bool)
         for node in range(len(self._force)):
             contact = design.point_contact + node * len(design.force)
-            (value, *partial), by_offset = self._sigma.at(curves.coefficients, contact, offset.value)
+            (value, *partial), by_offset = self._sigma.at(curves.coefficients, contact, place)
             at_points = (variable[contact] for variable in curves.variables)
             sigma.append(chain(value, (by_offset, offset), *zip(partial, at_points, strict=True)))
             inside &= curves.inside[contact]

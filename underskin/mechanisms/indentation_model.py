@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from underskin.contact_curves import ContactCurves, CurveGrid
 from underskin.errors import InvalidInput
 from underskin.layer import Layer
-from underskin.mechanisms import curve_parameters, indentation_law
+from underskin.mechanisms import indentation_law
 from underskin.mechanisms.composition import Composition, Prediction
 from underskin.mechanisms.curve_state import Curve
 from underskin.mechanisms.differentiated import Differentiated, constant
 from underskin.mechanisms.mechanism import Mechanism, Parameter, Values
+from underskin.mechanisms.nuisances import THICKNESS, contact_point, force_offset, modulus_parameter
 from underskin.mechanisms.relaxation import relaxed
 from underskin.recordings import elastomer
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
@@ -76,7 +77,7 @@ class IndentationModel:
         curve = Curve(
             modulus=declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"],
             poisson_ratio=constant(self._skin.poisson_ratio, count),
-            thickness=None if thickness is None else constant(float(to_si("thickness_mm", thickness)), count),
+            thickness=None if thickness is None else to_si("thickness_mm", thickness) * nuisances["thickness"],
         )
         for mechanism in self._mechanisms:
             mechanism.on_curve(curve, own[mechanism.name])
@@ -155,6 +156,7 @@ def _nuisances(recordings: Sequence[IndentationRecording], campaign: Campaign) -
             raise InvalidInput(f"recordings[{entry.id}].{refusal.field}", refusal.value, refusal.allowed) from refusal
         estimates.append(hertz.modulus)
         span = float(np.ptp(to_si("displacement_mm", entry.displacement_mm)))
-        per_recording.append(curve_parameters.contact_point(entry.id, hertz.contact_point, 0.1 * span, 0.8 * span))
-        per_recording.append(curve_parameters.force_offset(entry.id, float(np.abs(entry.force_n).max())))
-    return [curve_parameters.modulus_parameter(campaign.skin, estimates), *per_recording]
+        per_recording.append(contact_point(entry.id, hertz.contact_point, 0.1 * span, 0.8 * span))
+        per_recording.append(force_offset(entry.id, float(np.abs(entry.force_n).max())))
+    thickness = [] if campaign.skin.thickness_mm is None else [THICKNESS]
+    return [modulus_parameter(campaign.skin, estimates), *thickness, *per_recording]

@@ -42,6 +42,15 @@ class Curves:
     inside: NDArray[np.bool_]
 
 
+@dataclass(frozen=True)
+class Place:
+    """The four functions of each offset that differ from 0, their values and their slopes (points, 4)."""
+
+    functions: NDArray[np.intp]
+    values: Floats
+    slopes: Floats
+
+
 class OffsetSigma:
     """σ(a/h, L^(1/3), rT/h, e/h) around one rT/h, for offsets up to `reach` (in h).
 
@@ -64,6 +73,8 @@ class OffsetSigma:
             values = basis.coefficients(values, axis)
         self._count = values.shape
         self._table = np.ascontiguousarray(values).reshape(-1, values.shape[-1])
+        # The first coefficient over L^(1/3) is the value at L = 0, and splines sum to 1.
+        self._strained = (values - values[:, :1]).reshape(-1, values.shape[-1])
         self.wavenumber, self._weight = _wavenumbers(float(offsets[-1] + rho[-1] + a[-1]))
         bessel = j0(np.multiply.outer(self.wavenumber, offsets)) * (self._weight * self.wavenumber / 3)[:, None]
         self._bessel = self.bases[3].coefficients(bessel, 1)
@@ -75,21 +86,17 @@ class OffsetSigma:
 
     def table_curves(self, a_over_h: Floats, cbrt_load: Floats, rt_over_h: float) -> Curves:
         """σ and ∂/∂(a/h), ∂/∂L^(1/3), ∂/∂(rT/h) of the table, one row a contact."""
-        a, x = (basis.nodes[-1] for basis in self.bases[:2])
-        return Curves(self._contract(a_over_h, cbrt_load, rt_over_h), (a_over_h <= a) & (cbrt_load <= x))
+        return self._curves(self._table, a_over_h, cbrt_load, rt_over_h)
 
     def finite_strain_curves(self, a_over_h: Floats, cbrt_load: Floats, rt_over_h: float) -> Curves:
         """What finite strain adds to the linear layer: the table less its own value at L = 0, same quantities."""
-        total = self.table_curves(a_over_h, cbrt_load, rt_over_h)
-        linear = self.table_curves(a_over_h, np.zeros_like(cbrt_load), rt_over_h).coefficients
-        linear[2] = 0.0
-        return Curves(total.coefficients - linear, total.inside)
+        return self._curves(self._strained, a_over_h, cbrt_load, rt_over_h)
 
     def linear_curves(self, transforms: Floats) -> Floats:
         """The Hankel integral of the transforms p̂ · M · 2 J1(kρ)/(kρ): (quantities, contacts, k) to (…, offsets)."""
         return np.asarray(transforms @ self._bessel)
 
-    def _contract(self, a: Floats, x: Floats, rt_over_h: float) -> Floats:
+    def _curves(self, table: Floats, a: Floats, x: Floats, rt_over_h: float) -> Curves:
         rows = len(a)
         first_a, value_a, slope_a = self.bases[0].weights(a)
         first_x, value_x, slope_x = self.bases[1].weights(x)
@@ -108,14 +115,19 @@ class OffsetSigma:
             )
         ):
             weights[:, number] = of_a[:, :, None, None] * of_x[:, None, :, None] * of_r[0]
-        contracted = np.matmul(weights.reshape(rows, 4, 64), self._table[index])
-        return np.ascontiguousarray(contracted.transpose(1, 0, 2))
+        contracted = np.matmul(weights.reshape(rows, 4, 64), table[index])
+        inside = (a <= self.bases[0].nodes[-1]) & (x <= self.bases[1].nodes[-1])
+        return Curves(np.ascontiguousarray(contracted.transpose(1, 0, 2)), inside)
 
-    def at(self, coefficients: Floats, contact: NDArray[np.intp], offset: Floats) -> tuple[Floats, Floats]:
-        """The quantities (quantities, points) of each point's contact at its e/h, and ∂σ/∂(e/h) (points,)."""
+    def place(self, offset: Floats) -> Place:
+        """Where offsets e/h (points,) lie among the curves' coefficients; at the grid's end where they are beyond."""
         first, value, slope = self.bases[3].weights(np.minimum(offset, self.bases[3].nodes[-1]))
-        near = coefficients[:, contact[:, None], first[:, None] + np.arange(4)]
-        return np.einsum("qpf,pf->qp", near, value), np.einsum("pf,pf->p", near[0], slope)
+        return Place(first[:, None] + np.arange(4), value, slope)
+
+    def at(self, coefficients: Floats, contact: NDArray[np.intp], place: Place) -> tuple[Floats, Floats]:
+        """The quantities (quantities, points) of each point's contact at its place, and ∂σ/∂(e/h) (points,)."""
+        near = coefficients[:, contact[:, None], place.functions]
+        return np.einsum("qpf,pf->qp", near, place.values), np.einsum("pf,pf->p", near[0], place.slopes)
 
 
 @lru_cache(maxsize=8)

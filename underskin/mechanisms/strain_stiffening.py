@@ -4,8 +4,9 @@ Law: FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a
 Curves: Yeoh's law, nominal stress (E/3)(λ⁻² − λ)(1 + 2 c2 I + 3 c3 I²), I = λ² + 2/λ − 3, λ = 1 − strain; under a
 sphere its secant ratio at ε multiplies the force.
 
-Assumptions: incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative strain. With
-c2 = c3 = 0 the curve is neo-Hookean, not a straight line: the base model is recovered at small strain.
+Assumptions: incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative strain; for
+FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0 a curve is neo-Hookean, not
+a straight line: the base model is recovered at small strain.
 
 Source: Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of Metals (1951), for 0.2 a/R; Lin, Dimitriadis
 & Horkay, J. Biomech. Eng. 129 (2007) 904.

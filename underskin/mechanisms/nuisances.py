@@ -1,4 +1,6 @@
-"""The nuisances of the curves: the modulus, and for each recording where the contact begins and what the cell shows."""
+"""The nuisances: factors on the declared modulus and thickness; of a curve, where its contact begins and what the cell
+shows without one.
+"""
 
 from collections.abc import Sequence
 
@@ -8,7 +10,37 @@ from underskin.mechanisms.mechanism import Normal, Parameter
 from underskin.recordings.campaign import SkinDescription
 from underskin.units import to_lab
 
-_DECLARED_SD = 0.02
+D33 = Parameter(
+    name="d33",
+    unit="pC/N",
+    low=1e-3,
+    high=1e5,
+    prior=Normal(float(np.log(15.0)), 1.5),
+    scale="log",
+    limit=None,
+    reason="what is measured; PVDF and its copolymers have 5 to 40 pC/N, ceramics up to some hundred",
+)
+YOUNGS_MODULUS = Parameter(
+    name="youngs_modulus",
+    unit="-",
+    low=0.9,
+    high=1.1,
+    prior=Normal(0.0, 0.02),
+    scale="log",
+    limit=1.0,
+    reason="a declared modulus is good to 2 %; a larger error is the mechanism modulus_error",
+)
+THICKNESS = Parameter(
+    name="thickness",
+    unit="-",
+    low=0.95,
+    high=1.05,
+    prior=Normal(0.0, 0.01),
+    scale="log",
+    limit=1.0,
+    reason="a declared thickness is good to 1 %; a larger error is the mechanism thickness_error",
+)
+FRF_NUISANCES = (D33, YOUNGS_MODULUS, THICKNESS)
 _WIDE_SD = 1.5
 _OFFSET_SHARE = 0.01  # of the largest force
 
@@ -16,16 +48,7 @@ _OFFSET_SHARE = 0.01  # of the largest force
 def modulus_parameter(skin: SkinDescription, estimates: Sequence[float]) -> Parameter:
     """A factor on the declared modulus, or the modulus itself, around the estimates [Pa], where none is declared."""
     if skin.youngs_modulus_mpa is not None:
-        return Parameter(
-            name="youngs_modulus",
-            unit="-",
-            low=0.9,
-            high=1.1,
-            prior=Normal(0.0, _DECLARED_SD),
-            scale="log",
-            limit=1.0,
-            reason="a declared modulus is good to 2 %; a larger error is the mechanism modulus_error",
-        )
+        return YOUNGS_MODULUS
     middle = float(to_lab("youngs_modulus_mpa", np.median(estimates)))
     return Parameter(
         name="youngs_modulus",
