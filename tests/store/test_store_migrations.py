@@ -45,7 +45,7 @@ def a_later_version(monkeypatch: pytest.MonkeyPatch, folder: Path, spoil: str = 
     shutil.copytree(migrate.SCRIPTS, scripts)
     (scripts / "versions" / "0003_next.py").write_text(NEXT.format(spoil=spoil))
     monkeypatch.setattr(migrate, "SCRIPTS", scripts)
-    monkeypatch.setattr(migrate, "VERSIONS", ("0001", "0003"))
+    monkeypatch.setattr(migrate, "VERSIONS", ("0001", "0002", "0003"))
 
 
 def test_the_migrations_make_the_tables_that_the_code_uses(store: Database) -> None:
@@ -57,6 +57,19 @@ def test_the_migrations_make_the_tables_that_the_code_uses(store: Database) -> N
         context = MigrationContext.configure(connection, opts={"compare_type": True})
         assert compare_metadata(context, metadata) == []
     assert ScriptDirectory(str(migrate.SCRIPTS)).get_current_head() == migrate.VERSIONS[-1]
+
+
+def test_the_first_schema_becomes_the_newest(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = database(place.database_url, place.folder)
+    with monkeypatch.context() as patch:
+        patch.setattr(migrate, "VERSIONS", ("0001",))
+        migrate.migrate(opened, place.folder)
+        with opened.reading() as connection:
+            assert "diagnoses" not in inspect(connection).get_table_names()
+    migrate.migrate(opened, place.folder)
+    with opened.reading() as connection:
+        assert set(metadata.tables) < set(inspect(connection).get_table_names())
+    opened.close()
 
 
 def test_an_older_store_is_backed_up_and_brought_up_to_date(
