@@ -269,3 +269,15 @@ def test_bad_requests_are_named() -> None:
         model_of(["ageing", "ageing"], "frf")
     with pytest.raises(InvalidInput, match="must hold 3 coordinates"):
         model_of([], "frf").predict(np.zeros(2))
+
+
+@pytest.mark.parametrize(("names", "kind"), [*(((name,), kind) for name, kind in EACH), *TRIPLES])
+def test_predictions_are_finite_at_every_bound(names: tuple[str, ...], kind: Kind) -> None:
+    model = model_of(names, kind)
+    low, high = np.array([parameter.bounds for parameter in model.parameters]).T
+    random = np.random.default_rng(7)
+    corners = [np.where(random.random(len(low)) < 0.5, low, high) for _ in range(4)]
+    for fit in (low, high, *corners):
+        answer = model.predict(fit)
+        assert np.isfinite(answer.value).all()
+        assert np.isfinite(answer.slopes).all()
