@@ -58,7 +58,7 @@ def main() -> None:
 
 def _report(job: Job, campaign: bytes, progress: Callable[[float], None]) -> dict[str, Any]:
     """The report, with what was left out of it among the findings."""
-    from underskin.diagnosis import diagnose
+    from underskin.diagnosis.diagnose import diagnosis_report
     from underskin.errors import TableError
     from underskin.recordings.campaign import parse
     from underskin.surrogate import load_table
@@ -67,9 +67,9 @@ def _report(job: Job, campaign: bytes, progress: Callable[[float], None]) -> dic
     if table.sha256 != job.table_sha256:
         raise TableError(f"{job.table} changed since the server started: restart it")
     _limit(job.memory_bytes)
-    report = diagnose(parse(orjson.loads(campaign)), table, progress=progress)
+    report = diagnosis_report(parse(orjson.loads(campaign)), table, progress=progress)
     left_out = [
-        {"code": "excluded", "recording": name, "field": None, "statement": f"Left out: {reason}"}
+        {"code": "excluded", "recording": name, "field": "", "statement": f"Left out: {reason}"}
         for name, reason in job.excluded
     ]
     return {**report, "findings": left_out + list(report["findings"])}
