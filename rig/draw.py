@@ -25,15 +25,21 @@ _ARRAYS = ((1, 1), (1, 1), (2, 2), (3, 3), (4, 2), (4, 4), (8, 4), (8, 8))
 _WIDEST, _HARDEST = 1.8, 0.06  # a/h and L of the base model
 _MOST = 110
 
-# What an effect needs of the design to act at all.
+# What an effect needs of the design to act at all, or to show. A lab looks for something: the design is made for the
+# effects that are there and, where there is none of the catalogue, for one that is not.
 _NEEDS_CYCLES = {"ageing", "cracked_electrode"}
 _NEEDS_DWELL = {"contact_creep"}
 _NEEDS_TIME = {"temperature_drift"}
 _NEEDS_SENSORS = {"sensor_spread", "crosstalk", "bending_substrate"}
-_NEEDS_POSITIONS = {"misalignment", "crosstalk", "interface_slip", "compressible_layer", "stage_wobble"}
+_NEEDS_POSITIONS = {
+    "misalignment", "crosstalk", "interface_slip", "compressible_layer", "thickness_error", "stage_wobble",
+}  # fmt: skip
 _NEEDS_HIGH_LINES = {"contact_resonance", "timing_delay", "rattle", "cable_motion"}
 _NEEDS_AMPLITUDES = {"amplitude_nonlinearity", "mains_pickup"}
-_NEEDS_SOFT = {"layered_contact", "adhesion", "contact_creep", "modulus_error", "strain_stiffening"}
+_NEEDS_WIDE = {
+    "moving_contact_edge", "amplitude_nonlinearity", "layered_contact", "adhesion", "contact_creep", "modulus_error",
+    "strain_stiffening",
+}  # fmt: skip
 
 
 def drawn(seed: int, number: int, what: str | None = None) -> dict[str, Any]:
@@ -42,7 +48,8 @@ def drawn(seed: int, number: int, what: str | None = None) -> dict[str, Any]:
     hidden = str(random.choice(list(SHARES), p=list(SHARES.values()))) if what is None else what
     for _ in range(200):
         names = _names(random, hidden)
-        description = _description(random, f"drawn {seed}/{number}", set(names))
+        sought = set(names) if set(names) & set(CATALOGUED) else {*names, str(random.choice(CATALOGUED))}
+        description = _description(random, f"drawn {seed}/{number}", sought)
         ranges = of_frf(description)
         description["effects"] = {name: drawn_parameters(random, name, ranges) for name in names}
         try:
@@ -81,7 +88,7 @@ def _description(random: np.random.Generator, name: str, effects: set[str]) -> d
         "lines": {"low_hz": 1.0, "high_hz": 1000.0 if high else 130.0, "count": int(random.integers(25, 76))},
         "noise": {
             "gain": evenly_in_log(random, 0.01, 0.05),
-            "position_mm": evenly_in_log(random, 0.05, 0.3) if random.random() < 0.35 else 0.0,
+            "position_mm": evenly_in_log(random, 0.05, 0.3) if random.random() < 0.3 else 0.0,
             "line": evenly_in_log(random, 0.003, 0.03),
             "low": float(random.uniform(0, 1.5)),
             "high": float(random.uniform(0, 1.5)),
@@ -94,12 +101,12 @@ def _description(random: np.random.Generator, name: str, effects: set[str]) -> d
 
 def _skin(random: np.random.Generator, effects: set[str]) -> tuple[dict[str, Any], float]:
     """A skin, in a third of cases the prototype's, and its pitch."""
-    soft = bool(effects & _NEEDS_SOFT)
-    prototype = random.random() < (0.1 if soft else 0.35)
+    wide = bool(effects & _NEEDS_WIDE)
+    prototype = random.random() < (0.05 if wide else 0.3)
     skin: dict[str, Any] = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16.0, "sensor_radius_mm": 1.5}
     if not prototype:
-        skin["thickness_mm"] = evenly_in_log(random, 1.0, 4.0)
-        skin["youngs_modulus_mpa"] = evenly_in_log(random, 0.4, 3.0 if soft else 16.0)
+        skin["thickness_mm"] = evenly_in_log(random, 1.0, 2.5 if wide else 4.0)
+        skin["youngs_modulus_mpa"] = evenly_in_log(random, 0.4, 3.0 if wide else 16.0)
         skin["sensor_radius_mm"] = evenly_in_log(
             random, max(0.5, 0.25 * skin["thickness_mm"]), 1.3 * skin["thickness_mm"]
         )
@@ -118,7 +125,8 @@ def _skin(random: np.random.Generator, effects: set[str]) -> tuple[dict[str, Any
 def _design(random: np.random.Generator, skin: Mapping[str, Any], pitch: float, effects: set[str]) -> dict[str, Any]:
     """Indenters, preloads up to what the skin bears, and what else the lab writes down."""
     sensors = skin["array"]["columns"] * skin["array"]["rows"]
-    indenters = sorted(random.choice(_INDENTERS, random.integers(1, 4), replace=False).tolist())
+    spheres = _INDENTERS[2 * skin["thickness_mm"] < _INDENTERS] if effects & _NEEDS_WIDE else _INDENTERS
+    indenters = sorted(random.choice(spheres, random.integers(1, 4), replace=False).tolist())
     lowest = float(random.choice([0.2, 0.3, 0.5]))
     highest = min(_bearable(skin, indenters), float(random.uniform(1.5, 4.0)))
     count = int(random.integers(3, 11))
@@ -133,7 +141,7 @@ def _design(random: np.random.Generator, skin: Mapping[str, Any], pitch: float, 
         "repeats": 1 if sensors > 1 else int(random.integers(1, 4)),
     }
     if effects & _NEEDS_POSITIONS or random.random() < 0.25:
-        reach = min(0.5 * pitch if sensors > 1 else math.inf, 1.2 * skin["thickness_mm"])
+        reach = min(0.7 * pitch if sensors > 1 else math.inf, 1.2 * skin["thickness_mm"])
         angles = random.uniform(0, 2 * math.pi, 5)
         ring = [[round(reach * s * math.cos(t), 2), round(reach * s * math.sin(t), 2)] for s, t in zip(
             (0.3, 0.5, 0.7, 0.85, 1.0), angles, strict=True)]  # fmt: skip

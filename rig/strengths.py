@@ -62,10 +62,10 @@ def of_frf(description: Mapping[str, Any]) -> Ranges:
     return {
         "moving_contact_edge": {"mobile_fraction": (0.3, 1)},
         "misalignment": {"x_mm": (0.08 * h, 0.5 * h)},
-        "adhesion": {"work_j_per_m2": (0.05, 2)},
+        "adhesion": {"work_j_per_m2": (0.2, 4)},
         "strain_stiffening": {"coefficient": (1, 8)},
         "compressible_layer": {"poisson_ratio": (0.3, 0.49)},
-        "interface_slip": {"glue_stiffness": (0.05, 20)},
+        "interface_slip": {"glue_stiffness": (0.01, 2)},
         "preload_dependent_d33": {
             "beta_per_mpa": (0.05 / stress, 0.6 / stress),
             "saturation_mpa": (0.3 * stress, 3 * stress),
@@ -78,7 +78,7 @@ def of_frf(description: Mapping[str, Any]) -> Ranges:
         "contact_creep": {"fraction": (0.1, 0.7), "time_s": (3, 150)},
         "mains_pickup": {"charge_pc": (0.02 * charge, 0.6 * charge)},
         "amplitude_nonlinearity": {"mobility": (0.3, 1)},
-        "crosstalk": {"fraction": (0.02, 0.3)},
+        "crosstalk": {"fraction": (0.05, 0.4)},
         "timing_delay": {"delay_us": (2, 300)},
         "modulus_error": {"factor": (1.08, 1.6)},
         "thickness_error": {"factor": (1.03, 1.25)},

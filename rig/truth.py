@@ -60,6 +60,7 @@ def truth_of_lines(recorded: RecordedLines) -> dict[str, Any]:
     return {
         **truth_of_bench(recorded.bench),
         "identifiable": seen.identifiable if on else True,
+        "every_effect_identifiable": all(gain > THRESHOLD for gain in each.values()),
         "chi2_gain_of_truth": round(seen.chi2_gain, 2),
         "chi2_gain_of_each": {name: round(gain, 2) for name, gain in each.items()},
         "base_rms_misfit_percent": round(seen.base_misfit_percent, 3),
