@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from underskin import cli_store
+from underskin import cli_diagnose, cli_store
 from underskin.errors import UnderskinError
 
 if TYPE_CHECKING:
@@ -200,6 +200,7 @@ def _answer(
 
 app.command("import", no_args_is_help=True)(cli_store.import_files)
 app.command("export", no_args_is_help=True)(cli_store.export_skin)
+cli_diagnose.add_commands(app)
 
 
 def _add_commands_of_other_packages() -> None:

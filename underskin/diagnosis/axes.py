@@ -15,8 +15,8 @@ _FROM_ZERO = ("load_cycles", "dwell_s")  # log(1 + x)
 def recording_axes(campaign: Campaign) -> dict[str, Floats]:
     """Of each axis on which the recordings differ, one row a recording (recordings, 1 or 2).
 
-    `position_mm` is the contact's place seen from the sensor's centre; `recorded_at` is in hours from the first. An
-    axis that a recording lacks is left out.
+    `position_mm` is the contact's place seen from the sensor's centre, `sensor` the sensor's own place on the skin
+    [mm], `recorded_at` is in hours from the first. An axis that a recording lacks is left out.
     """
     entries = frf_recordings(campaign)
     found: dict[str, Floats] = {}
@@ -27,6 +27,8 @@ def recording_axes(campaign: Campaign) -> dict[str, Floats]:
         column = np.array(values, dtype=float)
         found[name] = (np.log(column) if name in _LOGARITHMIC else np.log1p(column))[:, None]
     found["position_mm"] = 1e3 * offsets(campaign)
+    places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
+    found["sensor"] = np.array([places[entry.sensor] for entry in entries])
     times = [entry.recorded_at for entry in entries]
     if None not in times:
         found["recorded_at"] = hours(times)[:, None]

@@ -13,13 +13,14 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.special import logsumexp
 
 from underskin.diagnosis.axes import recording_axes
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.fit import Evaluated
-from underskin.diagnosis.lines import Lines
+from underskin.diagnosis.residuals import line_residuals, whole_prediction
 from underskin.diagnosis.scatter import GAIN_PRIOR, level_prior
 from underskin.mechanisms.mechanism import Normal, Parameter
 from underskin.units import Floats
@@ -156,8 +157,8 @@ def _over_lines(bench: Workbench, explanation: Explanation) -> float | None:
     counts = np.bincount(lines.recording)
     if counts.max() < _LEAST_LINES:
         return None
-    relative, weight = line_residuals(lines, _whole_prediction(bench, explanation))
-    line, centres = _bins(lines.frequency)
+    relative, weight = line_residuals(lines, whole_prediction(bench, explanation))
+    line, centres = frequency_bins(lines.frequency)
     total = np.bincount(line, weight, len(centres))
     mean = np.bincount(line, weight * relative.real, len(centres)) / total
     mean = mean + 1j * np.bincount(line, weight * relative.imag, len(centres)) / total
@@ -189,24 +190,7 @@ def _over_lines(bench: Workbench, explanation: Explanation) -> float | None:
     return float(logsumexp(each) - np.log(len(each)) - best(None))
 
 
-def _whole_prediction(bench: Workbench, explanation: Explanation) -> np.ndarray:
-    """The explanation's prediction on all lines."""
-    value = explanation.best.at.prediction.value
-    return value if len(value) == len(bench.lines.value) else value[bench.lines.recording]
-
-
-def line_residuals(lines: Lines, prediction: np.ndarray) -> tuple[np.ndarray, Floats]:
-    """Each line over its recording's own best real multiple of the model, less 1, and its weight 1/variance."""
-    first = lines.first
-    precision = lines.deviation**-2
-    along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, first)
-    size = np.add.reduceat(precision * np.abs(prediction) ** 2, first)
-    fitted = prediction * (along / size)[lines.recording]
-    safe = np.where(np.abs(fitted) > 0, fitted, 1.0)
-    return (lines.value - fitted) / safe, precision * np.abs(fitted) ** 2
-
-
-def _bins(frequency: Floats) -> tuple[np.ndarray, Floats]:
+def frequency_bins(frequency: Floats) -> tuple[NDArray[np.intp], Floats]:
     """Of each row its distinct frequency, or its bin where there are too many, and the frequencies."""
     distinct, line = np.unique(np.round(frequency, 6), return_inverse=True)
     if len(distinct) <= _MOST_LINES:

@@ -109,6 +109,18 @@ class Workbench:
         ordered = tuple(name for name in CATALOGUE if name in names)
         return Explanation(ordered, total, chosen, float(np.exp(each[1] - total)))
 
+    def refit(self, found: Explanation) -> Explanation | None:
+        """A set that was fitted to more recordings, fitted to these, from where it stood.
+
+        None where the set has other parameters here. Raises Unsupported.
+        """
+        placed = found.best.fitter.hypothesis.placed
+        fitter = Fitter(self.hypothesis(found.names, placed))
+        if [entry.name for entry in fitter.parameters] != [entry.name for entry in found.model.parameters]:
+            return None
+        best = laplace(fitter, fitter.improve(replace(found.point, bend=fitter.no_bend)))
+        return Explanation(found.names, best.log_evidence, best, float(placed))
+
     @staticmethod
     def _gains(at: Evaluated, parent: Explanation | None, placed: int) -> bool:
         if parent is None or int(parent.placed > 0.5) != placed:

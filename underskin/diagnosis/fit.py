@@ -113,7 +113,7 @@ class Fitter:
         names = [entry.name for entry in self.parameters]
         self._spread, self._pickup = (names.index(name) if name in names else None for name in COVARIANCE_NAMES)
         sensors = int(hypothesis.lines.sensor.max()) + 1
-        self._no_bend = np.zeros(sensors)
+        self.no_bend = np.zeros(sensors)
 
     def holds(self, point: Point) -> bool:
         """Whether a point has this hypothesis' covariance parameters."""
@@ -128,7 +128,7 @@ class Fitter:
         covariance = [GAIN_PRIOR.middle, 0.0]
         if self.hypothesis.placed:
             covariance.append(POSITION_PRIOR.middle)
-        point = Point(fit, np.array([*covariance, *fit[self._own]]), self._no_bend)
+        point = Point(fit, np.array([*covariance, *fit[self._own]]), self.no_bend)
         place = next((index for index, entry in enumerate(self.parameters) if entry.name == "d33"), None)
         if place is not None:
             lines = self.hypothesis.lines

@@ -55,7 +55,7 @@ class Moments:
         self, lines: Lines, prediction: Prediction, bend: Floats, curvature: Curvature, position: float
     ) -> None:
         """Weigh and sum."""
-        self._first = lines.first
+        self._first = self.lines_first = lines.first
         self._lines = lines
         factor = np.exp(bend) * (1 + 0.5 * position**2 * curvature.laplacian)
         self._scale = (factor[lines.recording]) / lines.deviation

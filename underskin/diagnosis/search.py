@@ -62,6 +62,12 @@ class Search:
         smaller = [evidence.get(whole - {name}, -math.inf) for name in whole]
         return all(explanation.log_evidence > without + _SHOWS for without in smaller)
 
+    def shown_or_nothing(self, answer: Answer) -> Explanation:
+        """The explanation that an answer stands on: for `none_of_these`, the one beneath its best process."""
+        if answer.explanation is not None:
+            return answer.explanation
+        return max(self.discrepancies, key=lambda pair: pair[1].log_evidence)[0]
+
     @cached_property
     def answers(self) -> list[Answer]:
         """The rivals, the most probable first; their probabilities sum to 1."""

@@ -1,0 +1,111 @@
+"""A campaign's diagnosis: findings → lines → search → residuals and location → held-out groups → plan → report."""
+
+import importlib.metadata
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy
+
+import underskin
+from underskin.diagnosis import held_out
+from underskin.diagnosis.confounding import confounding
+from underskin.diagnosis.explanation import Workbench
+from underskin.diagnosis.findings import Finding, inspect
+from underskin.diagnosis.lines import lines
+from underskin.diagnosis.locate import SEED, in_region, locate, region
+from underskin.diagnosis.plan import Limits, plan
+from underskin.diagnosis.remainder import describe
+from underskin.diagnosis.report import Diagnosis, report
+from underskin.diagnosis.residuals import residuals, whole_prediction
+from underskin.diagnosis.search import search
+from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
+from underskin.surrogate import SigmaTable
+
+_LEAST_RECORDINGS = 2
+_GAIN = 0.022  # the scatter that is expected of recordings before any explanation
+
+Progress = Callable[[float], None]
+NO_LIMITS = Limits()
+
+
+def diagnose(
+    campaign: Campaign, table: SigmaTable, progress: Progress = lambda _: None, limits: Limits = NO_LIMITS
+) -> Diagnosis:
+    """What recordings and model disagree about, and what physics was left out. Deterministic.
+
+    Raises InvalidInput where the campaign has no FRF recording.
+    """
+    provenance = _provenance(table)
+    frf = tuple(entry for entry in campaign.recordings if isinstance(entry, FrfRecording))
+    usable, found = inspect(replace(campaign, recordings=frf), table) if frf else (campaign, [])
+    kept = [entry for entry in usable.recordings if isinstance(entry, FrfRecording)]
+    if len(kept) < _LEAST_RECORDINGS:
+        lacking = (
+            f"{len(kept)} usable recording(s); at least {_LEAST_RECORDINGS} at different preloads or spheres are needed"
+        )
+        return Diagnosis(campaign.name, found, provenance, lacking=lacking)
+    bench = Workbench(lines(usable), table)
+    progress(0.05)
+    confounded = confounding(bench)
+    result = search(bench)
+    progress(0.7)
+    leader = result.answers[0]
+    nothing = next(entry for entry in result.explanations if not entry.names)
+    shown = result.shown_or_nothing(leader)
+    levels = shown.best.at.marginal.levels
+    gain = float(np.clip(levels.gain, 0.005, 0.05))
+    against_base = residuals(bench, nothing, gain, levels.position)
+    axes = locate(bench.lines, against_base)
+    ranges = region(bench.lines, against_base, axes)
+    inside = in_region(bench.lines, ranges)
+    predicted = whole_prediction(bench, nothing)
+    weight = bench.lines.deviation[inside] ** -2.0
+    measured = (predicted[inside].conj() * bench.lines.value[inside]).real
+    effect = 100 * float((weight * measured).sum() / (weight * np.abs(predicted[inside]) ** 2).sum() - 1)
+    progress(0.8)
+    ranked = [answer.explanation for answer in result.answers if answer.explanation is not None]
+    groups = held_out.hold_out(bench, ranked, nothing, result.supported)
+    progress(0.95)
+    shape = describe(bench, shown) if leader.explanation is None else ""
+    return Diagnosis(
+        campaign.name,
+        found,
+        provenance,
+        search=result,
+        bench=bench,
+        axes=axes,
+        region=ranges,
+        effect_percent=effect,
+        groups=groups,
+        confounded=confounded,
+        shape=shape,
+        next_experiment=plan(bench, result, limits),
+    )
+
+
+def diagnosis_report(
+    campaign: Campaign,
+    table: SigmaTable,
+    progress: Progress = lambda _: None,
+    refused: Sequence[RecordingProblem] = (),
+) -> dict[str, Any]:
+    """The report of a campaign's diagnosis (`report/1`); `refused` recordings are named among the findings."""
+    found = diagnose(campaign, table, progress)
+    problems = [
+        Finding("refused", entry.recording, entry.field, f"{entry.field} = {entry.value!r}: {entry.allowed}; left out")
+        for entry in refused
+    ]
+    progress(1.0)
+    return report(replace(found, findings=(*problems, *found.findings)))
+
+
+def _provenance(table: SigmaTable) -> dict[str, Any]:
+    return {
+        "underskin": importlib.metadata.version(underskin.__name__),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "tables": {"sigma": table.sha256},
+        "seed": SEED,
+    }

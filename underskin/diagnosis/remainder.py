@@ -1,0 +1,87 @@
+"""The shape of what no mechanism describes: on which axis it lies, and which simple form fits it best there.
+
+Forms over an axis x: power law (x^n), step (at a level of x), periodic (sine and cosine of one period), drift (linear
+in x), and over frequency also a peak (a Lorentzian, real and imaginary part free). They are compared by the Bayesian
+information criterion; what is said is a description, not an explanation.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from underskin.diagnosis.axes import recording_axes
+from underskin.diagnosis.discrepancy import frequency_bins
+from underskin.diagnosis.explanation import Explanation, Workbench
+from underskin.diagnosis.residuals import residuals
+from underskin.units import Floats
+
+_GRID = 40
+_LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n", "load_cycles", "dwell_s", "frequency_hz")
+
+
+def describe(bench: Workbench, explanation: Explanation) -> str:
+    """One or two sentences; the axis is the one where a form takes away most."""
+    levels = explanation.best.at.marginal.levels
+    left = residuals(bench, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
+    best: tuple[float, str] = (0.0, "")
+    for name, column in recording_axes(bench.lines.campaign).items():
+        for index in range(column.shape[1]):
+            gain, text = _best_form(column[:, index], left.gain[:, None], left.gain_deviation**-2, name)
+            axis = name if column.shape[1] == 1 else f"{name} ({'xy'[index]})"
+            best = max(best, (gain, f"{text} over {axis}"))
+    line, centres = frequency_bins(bench.lines.frequency)
+    if len(centres) >= 6:
+        total = np.bincount(line, left.line_weight, len(centres)).astype(float)
+        parts = [
+            np.bincount(line, left.line_weight * part, len(centres)) / total
+            for part in (left.line.real, left.line.imag)
+        ]
+        gain, text = _best_form(np.log(centres), np.stack(parts, axis=1), total, "frequency_hz")
+        best = max(best, (gain, f"{text} over frequency_hz"))
+    return f"What remains looks like {best[1]}." if best[1] else "What remains has no simple form over one axis."
+
+
+def _best_form(x: Floats, values: Floats, weight: Floats, axis: str) -> tuple[float, str]:
+    """The form of largest information criterion over a constant, and its words; values (rows, parts)."""
+    if np.ptp(x) <= 0:
+        return 0.0, ""
+    root = np.sqrt(weight)[:, None]
+
+    def misfit(basis: Floats) -> tuple[float, Floats]:
+        design = np.column_stack([np.ones(len(x)), basis])
+        coefficients = np.linalg.lstsq(design * root, values * root, rcond=None)[0]
+        return float((((values - design @ coefficients) * root) ** 2).sum()), coefficients
+
+    plain, _ = misfit(np.zeros((len(x), 0)))
+    best = (0.0, "")
+    price = np.log(len(x))
+    for basis, shapes, words in _forms(x, axis):
+        square, coefficients = misfit(basis)
+        gain = 0.5 * (plain - square - price * (shapes + basis.shape[1] * values.shape[1]))
+        if gain > best[0]:
+            size = 100 * float(np.abs(basis @ coefficients[1:]).max() if basis.size else 0.0)
+            best = (gain, f"{words}, up to {size:.2g} %")
+    return best
+
+
+def _forms(x: Floats, axis: str) -> Iterator[tuple[Floats, int, str]]:
+    """Basis functions, the number of shape parameters, and words. Logarithmic axes come as logarithms."""
+    logarithmic = axis in _LOGARITHMIC
+    span = float(np.ptp(x))
+    yield x[:, None], 0, "a power law" if logarithmic else "a drift"
+    levels = np.unique(x)
+    for edge in (levels[1:] + levels[:-1])[:: max(1, len(levels) // _GRID)] / 2:
+        value = np.exp(edge) if logarithmic else edge
+        yield (x > edge).astype(float)[:, None], 1, f"a step at {value:.4g}"
+    natural = np.exp(x) if logarithmic else x
+    if len(levels) >= 6:
+        for period in np.ptp(natural) / np.linspace(0.75, min(8.0, len(levels) / 3), _GRID):
+            angle = 2 * np.pi * natural / period
+            yield np.column_stack([np.sin(angle), np.cos(angle)]), 1, f"a periodic change of period {period:.3g}"
+    if axis == "frequency_hz":
+        for centre in np.linspace(x.min(), x.max(), 2 * _GRID):
+            for width in (0.05, 0.1, 0.2, 0.4):
+                if width < 0.5 * span:
+                    offset = (x - centre) / width
+                    bell = 1 / (1 + offset**2)
+                    yield np.column_stack([bell, offset * bell]), 2, f"a peak or notch at {np.exp(centre):.3g} Hz"
