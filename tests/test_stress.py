@@ -257,7 +257,7 @@ def test_the_command_names_what_is_wrong(tmp_path: Path) -> None:
 
 def test_a_wide_uniform_map_reaches_the_base_whole() -> None:
     """Three thicknesses inside its edges; 100 × 200 cells over 64 sensors."""
-    sensors = [{"id": f"{i}-{j}", "x_mm": 5.0 * i, "y_mm": 2.5 * j} for i in range(8) for j in range(8)]
+    sensors: list[Document] = [{"id": f"{i}-{j}", "x_mm": 5.0 * i, "y_mm": 2.5 * j} for i in range(8) for j in range(8)]
     x, y = np.linspace(0, 35, 200), np.linspace(0, 17.5, 100)
     request: Document = {**SKIN, "sensors": sensors}
     request["pressure_map"] = {

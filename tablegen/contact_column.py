@@ -1,0 +1,161 @@
+"""One column of the contact table: one material contact edge, pressed by ever smaller spheres up to the largest load.
+
+The mesh belongs to the edge, so each column has one, and every sphere starts from the one before. Its radius is chosen
+so that x = L^(1/3) falls near the wanted values; the exact ones are reached by interpolation along the column, where
+everything is smooth in x. What is kept is over its value by Hertz at the same force and sphere (PHYSICS, section 1).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+from threadpoolctl import threadpool_limits
+
+from tablegen.base_stress import BaseStress, disc_averages
+from tablegen.contact import ContactLayer, Pressed
+from tablegen.contact_mesh import contact_mesh
+from tablegen.discretisation import discretise
+from tablegen.neo_hookean import SHEAR_MODULUS, YOUNGS_MODULUS
+from tablegen.newton import State
+from underskin import hertz, linear_layer
+from underskin.errors import SolverError
+from underskin.hankel import normal_stress, punch_transform
+from underskin.units import Floats
+
+_SMALLEST_STEP = 1 / 32  # of the way from one sphere to the next
+_PLANE_STRAIN = YOUNGS_MODULUS / 0.75  # E' = E/(1 − ν²)
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """What one sphere does to the layer; lengths in thicknesses, forces in G h².
+
+    `sigma`, `sigma_increment`: σ of the force and of its increment, for each sensor radius.
+    `force_error`: force on the base over that on the sphere, minus 1. `lowest_pressure`: over the highest.
+    """
+
+    radius: float
+    force: float
+    contact_radius: float
+    indentation: float
+    stiffness: float
+    sigma: Floats
+    sigma_increment: Floats
+    force_error: float
+    lowest_pressure: float
+
+    @property
+    def cbrt_load(self) -> float:
+        """L^(1/3)."""
+        return float(np.cbrt(hertz.load_parameter(self.force, self.radius, YOUNGS_MODULUS)))
+
+    def over_hertz(self) -> Floats:
+        """Contact radius, indentation, stiffness over Hertz at this force, then σ and its increment."""
+        a = float(hertz.contact_radius(self.force, self.radius, YOUNGS_MODULUS))
+        ratios = (
+            self.contact_radius / a,
+            self.indentation * self.radius / a**2,
+            self.stiffness / (2 * a * _PLANE_STRAIN),
+        )
+        return np.concatenate([ratios, self.sigma, self.sigma_increment])
+
+
+def solve_contact_column(a: float, rho: Floats, cbrt_load: Floats, order: int) -> tuple[Floats, Floats, float]:
+    """R/h at each x of `cbrt_load` (ascending, > 0), `over_hertz` there (x, quantities), and the largest force error.
+
+    Raises SolverError that names the point.
+    """
+    with threadpool_limits(1):  # the same bits whatever the number of cores
+        spheres = list(_follow(a, rho, np.append(cbrt_load[0] / 2, cbrt_load), order))
+    x = np.array([sphere.cbrt_load for sphere in spheres])
+    values = np.array(
+        [np.append(sphere.radius * x_, sphere.over_hertz()) for sphere, x_ in zip(spheres, x, strict=True)]
+    )
+    resampled = np.asarray(make_interp_spline(x, values, k=5)(cbrt_load))
+    return resampled[:, 0] / cbrt_load, resampled[:, 1:], max(abs(sphere.force_error) for sphere in spheres)
+
+
+def press_spheres(a: float, radii: Floats, rho: Floats, order: int) -> list[Sphere]:
+    """Spheres of these radii (descending, in thicknesses), each touching up to the material radius `a` (a/h)."""
+    column = _Column(a, rho, order)
+    return [column.advance(float(radius)) for radius in radii]
+
+
+def _follow(a: float, rho: Floats, targets: Floats, order: int) -> Iterator[Sphere]:
+    """Spheres whose x is near each target, and the last one's at or beyond it."""
+    column = _Column(a, rho, order)
+    ratio = 1.0 + a  # of the force over Hertz's for a: a first guess
+    for target in targets:
+        sphere = column.advance(a / _strain(target, ratio))
+        ratio = sphere.cbrt_load**3 / (16 / 9 * (a / sphere.radius) ** 3)
+        yield sphere
+    while sphere.cbrt_load < targets[-1]:
+        sphere = column.advance(a / (1.02 * _strain(targets[-1], ratio)))
+        ratio = sphere.cbrt_load**3 / (16 / 9 * (a / sphere.radius) ** 3)
+        yield sphere
+
+
+def _strain(cbrt_load: float, ratio: float) -> float:
+    """a/R from L = (16/9) (a/R)³ · ratio."""
+    return float(cbrt_load * np.cbrt(9 / 16 / ratio))
+
+
+class _Column:
+    """The layer pressed up to one contact edge; knows the last sphere."""
+
+    def __init__(self, a: float, rho: Floats, order: int) -> None:
+        self.layer = ContactLayer(discretise(contact_mesh(a), order), a)
+        self.base = BaseStress(self.layer.discretisation)
+        self.a, self.rho = a, rho
+        self.now, self.strain = self.layer.untouched(), 0.0
+
+    def advance(self, radius: float) -> Sphere:
+        """To the next sphere, in smaller steps where Newton's method needs them."""
+        goal = self.a / radius
+        step = goal - self.strain
+        smallest = _SMALLEST_STEP * step
+        while self.strain < goal:
+            strain = min(goal, self.strain + step)
+            try:
+                self.now = self.layer.press(self._scaled(strain), self.a / strain)
+            except SolverError as failure:
+                step /= 2
+                if step < smallest:
+                    raise SolverError(f"contact edge {self.a:g} h, R = {radius:g} h: {failure}") from failure
+                continue
+            self.strain = strain
+        return self._sphere(radius)
+
+    def _scaled(self, strain: float) -> Pressed:
+        """The present state in proportion to a/R, which it follows nearly."""
+        now, factor = self.now, strain / self.strain if self.strain else 0.0
+        state = State(now.state.displacement * factor, now.state.pressure * factor)
+        return Pressed(state, now.multiplier * factor, now.indentation * factor)
+
+    def _sphere(self, radius: float) -> Sphere:
+        layer, base, now = self.layer, self.base, self.now
+        stress = base.at_points(layer.internal_force(now.state))
+        gained = base.at_points(layer.increment(now, radius))
+        force, stiffness = layer.force(now, radius), base.total_force(gained)
+        contact_radius = float(layer.surface(now, np.array([self.a]))[0, 0])
+        pressure = layer.pressure(now)
+        # F = 2π force and σ = (2π/3) · mean stress/F, for a mean over the disc; 2π cancels.
+        static = stress / (3 * force) - linear_layer.sigma(contact_radius, 0.0, base.points)
+        moving = gained / (3 * stiffness) - _punch(contact_radius, 0.0, base.points)
+        return Sphere(
+            radius=radius,
+            force=2 * np.pi * force * SHEAR_MODULUS,
+            contact_radius=contact_radius,
+            indentation=now.indentation,
+            stiffness=2 * np.pi * stiffness * SHEAR_MODULUS,
+            sigma=linear_layer.sigma(contact_radius, self.rho) + disc_averages(base.smooth(static), self.rho),
+            sigma_increment=_punch(contact_radius, self.rho, 0.0) + disc_averages(base.smooth(moving), self.rho),
+            force_error=base.total_force(stress) / force - 1,
+            lowest_pressure=float(pressure.min() / pressure.max()),
+        )
+
+
+def _punch(a: float, rho: Floats | float, offset: Floats | float) -> Floats:
+    """σ under the flat punch's pressure on the linear layer."""
+    return normal_stress(linear_layer.transmission, punch_transform, a, rho, offset)
