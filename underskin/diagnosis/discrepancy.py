@@ -4,12 +4,11 @@ FRF = model · (1 + δ), with the noise of every hypothesis and the model's para
 Two kinds of δ, alone or together:
 - of a recording: real, a Matérn-3/2 process over one axis (preload, sphere, place, cycles, dwell, amplitude, time) or
   over all of them, in features at landmarks (Nyström), so that time is linear in recordings;
-- of a line: complex, a Matérn-3/2 process over log frequency that all recordings share.
+- of a line: complex, a Matérn-3/2 process over log frequency, that all recordings share or that changes along an axis.
 Amplitudes and lengths are on grids of equal prior probability. An amplitude below 1.5 % is not looked for: a law that
 is right to that is not missing physics.
 """
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +20,8 @@ from underskin.diagnosis.axes import recording_axes
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.fit import Evaluated
 from underskin.diagnosis.residuals import line_residuals, whole_prediction
-from underskin.diagnosis.scatter import GAIN_PRIOR, level_prior
+from underskin.diagnosis.scatter import GAIN_PRIOR, Bell, level_prior
+from underskin.mechanisms.differentiated import Array
 from underskin.mechanisms.mechanism import Normal, Parameter
 from underskin.units import Floats
 
@@ -29,6 +29,8 @@ AMPLITUDES = np.array([0.015, 0.05, 0.15, 0.5])
 _LENGTHS = (0.15, 0.4, 1.2)  # of a recording's axis, over its range
 _LINE_LENGTHS = (0.08, 0.25, 0.8)  # of the logarithm of frequency
 _LANDMARKS = 24
+_INTERPLAY_LENGTH, _INTERPLAY_LANDMARKS = 0.4, 8  # where both frequency and a recording's axis count
+_LEAST_RECORDINGS = 4
 _MOST_LINES = 160  # distinct frequencies, beyond which they are binned
 _LEAST_LINES = 8  # in a recording
 _GAINS = np.geomspace(0.005, 0.5, 16)
@@ -45,21 +47,17 @@ class Discrepancy:
 
 def discrepancy(bench: Workbench, explanation: Explanation) -> Discrepancy:
     """What a process gains on top of an explanation."""
-    gains = _over_recordings(bench, explanation)
-    line_gain = _over_lines(bench, explanation)
-    each = []
-    if gains:
-        recordings = float(logsumexp(list(gains.values())) - np.log(len(gains)))
-        each.append(np.log(_KINDS["recordings"]) + recordings)
-    if line_gain is not None:
-        each.append(np.log(_KINDS["lines"]) + line_gain)
-    if gains and line_gain is not None:
-        each.append(np.log(_KINDS["both"]) + recordings + line_gain)
-        gains["frequency_hz"] = line_gain
-    elif line_gain is not None:
-        gains = {"frequency_hz": line_gain}
+    over = {"recordings": _over_recordings(bench, explanation), "lines": _over_lines(bench, explanation)}
+    gained = {kind: _mean(list(gains.values())) for kind, gains in over.items() if gains}
+    if len(gained) == 2:
+        gained["both"] = sum(gained.values())
+    each = [np.log(_KINDS[kind]) + gain for kind, gain in gained.items()]
     total = float(logsumexp(each)) if each else -np.inf
-    return Discrepancy(explanation.log_evidence + total, gains)
+    return Discrepancy(explanation.log_evidence + total, {**over["recordings"], **over["lines"]})
+
+
+def _mean(log_values: list[float]) -> float:
+    return float(logsumexp(log_values) - np.log(len(log_values)))
 
 
 def _matern(distance: Floats) -> Floats:
@@ -67,10 +65,10 @@ def _matern(distance: Floats) -> Floats:
     return (1 + scaled) * np.exp(-scaled)
 
 
-def _features(axis: Floats, length: float) -> Floats:
-    """Features whose products are the process' covariance, at up to `_LANDMARKS` places (recordings, landmarks)."""
+def _features(axis: Floats, length: float, landmarks: int = _LANDMARKS) -> Floats:
+    """Features whose products are the process' covariance, at up to so many places (rows, landmarks)."""
     values = np.unique(np.round(axis, 9), axis=0)
-    chosen = values[np.unique(np.linspace(0, len(values) - 1, _LANDMARKS).round().astype(int))]
+    chosen = values[np.unique(np.linspace(0, len(values) - 1, landmarks).round().astype(int))]
 
     def kernel(a: Floats, b: Floats) -> Floats:
         return _matern(np.sqrt(((a[:, None] - b[None]) ** 2).sum(axis=2)) / length)
@@ -82,7 +80,7 @@ def _features(axis: Floats, length: float) -> Floats:
 def _over_recordings(bench: Workbench, explanation: Explanation) -> dict[str, float]:
     """The log evidence that a process over each axis gains."""
     axes = {name: _normalised(column) for name, column in recording_axes(bench.collapsed.campaign).items()}
-    if bench.collapsed.recordings < 4 or not axes:
+    if bench.collapsed.recordings < _LEAST_RECORDINGS or not axes:
         return {}
     if len(axes) > 1:
         axes["all"] = np.concatenate(list(axes.values()), axis=1) / np.sqrt(len(axes))
@@ -151,43 +149,72 @@ def _prior_sd(entry: Parameter) -> float:
     return (high - low) / np.sqrt(12.0)
 
 
-def _over_lines(bench: Workbench, explanation: Explanation) -> float | None:
-    """The log evidence that a process over frequency gains, the level of the lines' noise free in both."""
+def _over_lines(bench: Workbench, explanation: Explanation) -> dict[str, float]:
+    """The log evidence that a process over frequency gains, the level of the lines' noise free in both: one that all
+    recordings share ("frequency_hz"), and for each axis one that changes along it."""
     lines = bench.lines
-    counts = np.bincount(lines.recording)
-    if counts.max() < _LEAST_LINES:
-        return None
+    if np.bincount(lines.recording).max() < _LEAST_LINES:
+        return {}
     relative, weight = line_residuals(lines, whole_prediction(bench, explanation))
+    noise = _LineNoise(
+        float((weight * np.abs(relative) ** 2).sum()),
+        2 * len(relative) - lines.recordings,
+        level_prior(lines.noise.log_level_sd),
+    )
+    plain = noise.best(np.zeros(0), np.zeros(0))
     line, centres = frequency_bins(lines.frequency)
     total = np.bincount(line, weight, len(centres))
-    mean = np.bincount(line, weight * relative.real, len(centres)) / total
-    mean = mean + 1j * np.bincount(line, weight * relative.imag, len(centres)) / total
-    chi2 = float((weight * np.abs(relative) ** 2).sum())
-    freedom = 2 * len(relative) - lines.recordings
-    prior = level_prior(lines.noise.log_level_sd)
-
-    def cost(log_level: float, covariance: Floats | None) -> float:
-        k2 = np.exp(2 * log_level)
-        value = 0.5 * chi2 / k2 + freedom * log_level - prior.log_density(log_level)
-        if covariance is None:
-            return float(value)
-        noise = k2 / total
-        root = np.linalg.cholesky(covariance + np.diag(noise))
-        solved = np.linalg.solve(root, np.stack([mean.real, mean.imag], axis=1))
-        value += 0.5 * (solved**2).sum() - 0.5 * (np.abs(mean) ** 2 / noise).sum()
-        value += 2 * float(np.log(np.diag(root)).sum()) - float(np.log(noise).sum())
-        return float(value)
-
-    def best(covariance: Floats | None) -> float:
-        found = minimize_scalar(cost, bounds=(-1.0, 5.0), args=(covariance,), method="bounded", options={"xatol": 3e-3})
-        return -float(found.fun)
-
+    sums = np.bincount(line, weight * relative.real, len(centres))
+    sums = sums + 1j * np.bincount(line, weight * relative.imag, len(centres))
     distance = np.abs(np.log(centres[:, None] / centres[None]))
-    each = [
-        best(amplitude**2 * _matern(distance / length))
-        for length, amplitude in itertools.product(_LINE_LENGTHS, AMPLITUDES)
-    ]
-    return float(logsumexp(each) - np.log(len(each)) - best(None))
+    each = []
+    for length in _LINE_LENGTHS:
+        root = np.linalg.cholesky(_matern(distance / length) + 1e-9 * np.eye(len(centres)))
+        each += noise.gains(root.T @ (total[:, None] * root), root.T @ sums)
+    found = {"frequency_hz": float(logsumexp(each) - np.log(len(each)) - plain)}
+    if lines.recordings < _LEAST_RECORDINGS:
+        return found
+    features = _features(_normalised(np.log(lines.frequency)[:, None]), _INTERPLAY_LENGTH, _INTERPLAY_LANDMARKS)
+    moments = np.add.reduceat(features * (weight * relative)[:, None], lines.first)
+    products = (features[:, :, None] * features[:, None, :] * weight[:, None, None]).reshape(len(features), -1)
+    grams = np.add.reduceat(products, lines.first).reshape(lines.recordings, *2 * (features.shape[1],))
+    for name, column in recording_axes(lines.campaign).items():
+        along = _features(_normalised(column), _INTERPLAY_LENGTH, _INTERPLAY_LANDMARKS)
+        size = along.shape[1] * features.shape[1]
+        gram = np.einsum("ra,rb,rfg->afbg", along, along, grams, optimize=True).reshape(size, size)
+        moment = (along.T @ moments).reshape(size)
+        found[f"frequency_hz and {name}"] = float(
+            logsumexp(noise.gains(gram, moment)) - np.log(len(AMPLITUDES)) - plain
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class _LineNoise:
+    """The lines' residuals without a process: Σ|·|²/d², its degrees of freedom, and the prior of the noise's level."""
+
+    chi2: float
+    freedom: int
+    prior: Bell
+
+    def gains(self, gram: Array, moment: Array) -> list[float]:
+        """log p of the lines with a process of each amplitude, at the level that suits it best."""
+        eigenvalues, vectors = np.linalg.eigh(gram)
+        eigenvalues = np.maximum(eigenvalues, 0.0)
+        square = np.abs(vectors.T @ moment) ** 2
+        return [self.best(eigenvalues * amplitude**2, square * amplitude**2) for amplitude in AMPLITUDES]
+
+    def best(self, eigenvalues: Array, square: Array) -> float:
+        """With AᵀW A's eigenvalues and |AᵀW r|² along them, at κ: χ²/κ² less Σ square/(κ⁴ (1 + λ/κ²))."""
+
+        def cost(log_level: float) -> float:
+            k2 = np.exp(2 * log_level)
+            inner = 1 + eigenvalues / k2
+            value = 0.5 * self.chi2 / k2 + self.freedom * log_level - self.prior.log_density(log_level)
+            return float(value - 0.5 * (square / inner).sum() / k2**2 + np.log(inner).sum())
+
+        found = minimize_scalar(cost, bounds=(-1.0, 5.0), method="bounded", options={"xatol": 1e-3})
+        return -float(found.fun)
 
 
 def frequency_bins(frequency: Floats) -> tuple[NDArray[np.intp], Floats]:

@@ -27,7 +27,7 @@ class PreloadDependentD33(Mechanism):
             Parameter(
                 name="stress_coefficient",
                 unit="1/MPa",
-                low=-2.0,
+                low=-8.0,
                 high=15.0,
                 prior=Normal(0.0, 3.0),
                 scale="linear",
