@@ -15,6 +15,7 @@ from service import (
     frf,
     health,
     metrics,
+    models,
     openapi,
     record,
     sigma,
@@ -65,7 +66,7 @@ def create_api(settings: Settings, table: SigmaTable, gate: Gate, store: Databas
     api.state.runner = runner(settings, table, store)
     install_handlers(api)
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"])])
-    for noun in (sigma, frf, d33, stress, tables, campaigns, diagnoses, exports, skins):
+    for noun in (sigma, frf, d33, stress, tables, campaigns, diagnoses, exports, skins, models):
         v1.include_router(noun.router)
     for router in (v1, umbridge.router, health.router, metrics.router, openapi.router):
         api.include_router(router)

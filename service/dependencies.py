@@ -63,7 +63,7 @@ def columns_route(
             with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
                 return respond(answer(table, parse(kind, body, content_type)), accept)
 
-        if len(body) <= _INLINE_BYTES:
+        if len(body) <= _INLINE_BYTES and b"adopted" not in body:  # that model is in the store
             return work()
         async with _threads:
             return await asyncio.to_thread(work)

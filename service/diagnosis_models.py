@@ -77,6 +77,7 @@ class ModelEntry(BaseModel):
     fit: dict[str, Any] = Field(description="How well the recordings are fitted before and after, as in `report/1`.")
     provenance: dict[str, Any] = Field(description="Versions, hashes of tables and seed, as in `report/1`.")
     needs: list[str] = Field(description="What `/v1/frf` and `/v1/d33` must be told beside what every skin needs.")
+    depends_on_frequency: bool = Field(description="Whether they must be told `frequency_hz` too.")
 
 
 class ModelVersions(BaseModel):

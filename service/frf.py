@@ -3,18 +3,21 @@
 from typing import Any, ClassVar
 
 import numpy as np
-from fastapi import APIRouter
+from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
-from service.answers import Columns
+from service.adopted import press, serving_of
+from service.answers import Accept, Columns
 from service.columns import Numbers, Signed, rows
-from service.dependencies import columns_body, columns_route
+from service.dependencies import Store, Table, columns_body, columns_route
 from service.skin_columns import (
+    ADOPTED_COLUMNS,
     FIELDS,
     PressedSkinAnswer,
     PressedSkinColumns,
-    require_known_model,
+    require_paper,
 )
+from service.store import Database
 from underskin import InvalidInput
 from underskin.answers import lab_columns, pressed
 from underskin.surrogate import SigmaTable
@@ -35,14 +38,17 @@ class FrfColumns(PressedSkinColumns):
     frequency_hz: Numbers | None = Field(
         default=None,
         min_length=1,
-        description="Frequencies of the spectra, the same for all rows [Hz]. The paper's model is flat and real.",
+        description="Frequencies of the spectra, the same for all rows [Hz]. The paper's model is flat and real; an "
+        "adopted one that depends on frequency needs them.",
     )
 
 
 class FrfAnswer(PressedSkinAnswer):
     """The FRF in columns."""
 
-    frf_pc_per_n: list[float | None] = Field(description="FRF on the plateau, charge over force [pC/N].")
+    frf_pc_per_n: list[float | None] = Field(
+        description="FRF on the plateau, charge over force; of an adopted model without its dynamics [pC/N]."
+    )
     frequency_hz: list[float] | None = Field(default=None, description="As asked, if it was [Hz].")
     frf_re_pc_per_n: list[list[float | None]] | None = Field(
         default=None, description="Real part, rows × frequencies; only with `frequency_hz` [pC/N]."
@@ -52,9 +58,11 @@ class FrfAnswer(PressedSkinAnswer):
     )
 
 
-def answer(table: SigmaTable, request: FrfColumns) -> Columns:
+def answer(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
     """FRF for each row."""
-    require_known_model(request)
+    if request.model == "adopted":
+        return _adopted_answer(table, store, request)
+    require_paper(request)
     columns = {name: request.column(name) for name in (*FIELDS, "d33_pc_per_n")}
     count = rows(columns)
     reached = pressed(table, columns, request.units_checked)
@@ -68,6 +76,30 @@ def answer(table: SigmaTable, request: FrfColumns) -> Columns:
         inside=reached.inside & np.isfinite(frf),
         shared={} if frequency is None else {"frequency_hz": frequency},
         columns={**lab_columns(reached), "frf_pc_per_n": frf, **spectra},
+        line_hz=frequency,
+    )
+
+
+def _adopted_answer(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
+    columns = {name: request.column(name) for name in _GIVEN if getattr(request, name) is not None}
+    count = rows(columns)
+    felt = press(serving_of(store, request), table, request, count)
+    felt.require_lines("frequency_hz")
+    d33 = checked("d33_pc_per_n", columns["d33_pc_per_n"], units_checked=request.units_checked)
+    found = {**felt.columns, "frf_pc_per_n": to_lab("frf_pc_per_n", d33 * felt.level)}
+    frequency = None
+    if request.frequency_hz is not None:
+        frequency = non_negative("frequency_hz", request.column("frequency_hz"))
+        response = np.where(felt.inside[:, None], felt.response(frequency), np.nan + 0j)
+        lines = to_lab("frf_pc_per_n", 1.0) * np.broadcast_to(d33, (count,))[:, None] * response
+        found |= {"frf_re_pc_per_n": lines.real, "frf_im_pc_per_n": np.where(np.isnan(lines.real), np.nan, lines.imag)}
+    return Columns(
+        rows=count,
+        model=request.model,
+        table_sha256=table.sha256,
+        inside=felt.inside & np.isfinite(found["frf_pc_per_n"]),
+        shared={"model_id": felt.serving.model_id, **({} if frequency is None else {"frequency_hz": frequency})},
+        columns=found,
         line_hz=frequency,
     )
 
@@ -95,12 +127,22 @@ EXAMPLE = {
     "d33_pc_per_n": 14.0,
 }
 
+_GIVEN = (*FIELDS, "d33_pc_per_n", *ADOPTED_COLUMNS)
+
 _ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": FrfAnswer, "content": {"text/csv": {}}}}
 
-router.post(
+
+@router.post(
     "/frf",
     operation_id="frf_columns",
     summary="FRF of a skin under a sphere",
     responses=_ANSWER,
     openapi_extra=columns_body(FrfColumns, EXAMPLE),
-)(columns_route(FrfColumns, answer))
+)
+async def frf_columns(request: Request, table: Table, store: Store, accept: Accept = "application/json") -> Response:
+    """In columns: a list has an entry a row, a single number holds for all rows. Accept: text/csv gives CSV."""
+
+    def work(table: SigmaTable, columns: FrfColumns) -> Columns:
+        return answer(table, store, columns)
+
+    return await columns_route(FrfColumns, work)(request, table, accept)

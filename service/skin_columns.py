@@ -5,8 +5,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from service.answers import AnswerInColumns
-from service.columns import ColumnsRequest, NonNegative, Positive
-from service.problems import Refusal
+from service.columns import ColumnsRequest, NonNegative, Positive, Signed
 from underskin import InvalidInput
 
 FIELDS = (
@@ -17,12 +16,13 @@ FIELDS = (
     "indenter_radius_mm",
     "preload_n",
 )
+ADOPTED_COLUMNS = ("offset_x_mm", "offset_y_mm", "dynamic_force_n", "dwell_s", "load_cycles")
 
 
 class PressedSkinColumns(ColumnsRequest):
     """A skin pressed by a sphere."""
 
-    constants: ClassVar[frozenset[str]] = frozenset({"model", "skin_id", "units_checked"})
+    constants: ClassVar[frozenset[str]] = frozenset({"model", "skin_id", "sensor", "units_checked"})
 
     thickness_mm: Positive = Field(description="Thickness h of the layer over the sensors [mm].")
     youngs_modulus_mpa: Positive = Field(description="Young's modulus E of the layer [MPa].")
@@ -38,6 +38,24 @@ class PressedSkinColumns(ColumnsRequest):
         "`adopted`: the model adopted for `skin_id`.",
     )
     skin_id: str | None = Field(default=None, description="The skin whose adopted model is meant.")
+    sensor: str | None = Field(
+        default=None, description="The sensor pressed, the same in all rows; with an adopted model that needs it."
+    )
+    offset_x_mm: Signed | None = Field(
+        default=None, description="The sphere's place from the sensor's centre, along x; with an adopted model [mm]."
+    )
+    offset_y_mm: Signed | None = Field(
+        default=None, description="The sphere's place from the sensor's centre, along y; with an adopted model [mm]."
+    )
+    dynamic_force_n: Positive | None = Field(
+        default=None, description="Amplitude of the oscillating force; with an adopted model that needs it [N]."
+    )
+    dwell_s: NonNegative | None = Field(
+        default=None, description="Time the preload has been held; with an adopted model that needs it [s]."
+    )
+    load_cycles: NonNegative | None = Field(
+        default=None, description="Load cycles the skin has seen; with an adopted model that needs it [-]."
+    )
     units_checked: bool = Field(
         default=False, description="Accept magnitudes that look like a slip of units (2.5 m, 16 Pa)."
     )
@@ -46,22 +64,28 @@ class PressedSkinColumns(ColumnsRequest):
 class PressedSkinAnswer(AnswerInColumns):
     """What reaches the sensor, row by row."""
 
-    contact_radius_mm: list[float | None] = Field(description="Hertz contact radius a [mm].")
-    a_over_h: list[float | None] = Field(description="a/h [-].")
+    model_id: str | None = Field(default=None, description="The adopted model that answered; only with that model.")
+    contact_radius_mm: list[float | None] = Field(
+        description="Hertz contact radius a; null with an adopted model, whose contact may be another [mm]."
+    )
+    a_over_h: list[float | None] = Field(description="a/h; null with an adopted model [-].")
     rt_over_h: list[float | None] = Field(description="rT/h [-].")
-    load_parameter: list[float | None] = Field(description="L = F/(R² E) [-].")
-    sigma: list[float | None] = Field(description="σ [-].")
-    rel_error: list[float | None] = Field(description="Bound on σ's relative error [-].")
+    load_parameter: list[float | None] = Field(description="L = F/(R² E); null with an adopted model [-].")
+    sigma: list[float | None] = Field(
+        description="σ; of an adopted model the one that FRF = d33 · (3/2) (rT/h)² σ asks for on the plateau [-]."
+    )
+    rel_error: list[float | None] = Field(
+        description="Bound on σ's relative error; of an adopted model its relative standard uncertainty within the "
+        "range of the campaign that was diagnosed [-]."
+    )
     mean_stress_mpa: list[float | None] = Field(
-        description="Static mean stress on the sensor, 3Fσ/(2πh²), positive in compression [MPa]."
+        description="Static mean stress on the sensor, 3Fσ/(2πh²), positive in compression; null with an adopted "
+        "model [MPa]."
     )
 
 
-def require_known_model(request: PressedSkinColumns) -> None:
-    """Refuses a model that does not exist: no skin has an adopted one."""
-    if request.model == "adopted":
-        if request.skin_id is None:
-            raise InvalidInput("skin_id", None, "is required with model adopted")
-        raise Refusal(404, f"Skin {request.skin_id!r} has no adopted model; use model paper.")
-    if request.skin_id is not None:
-        raise InvalidInput("skin_id", request.skin_id, "is used only with model adopted")
+def require_paper(request: PressedSkinColumns) -> None:
+    """Refuses what goes with an adopted model only."""
+    for name in ("skin_id", "sensor", *ADOPTED_COLUMNS):
+        if getattr(request, name) is not None:
+            raise InvalidInput(name, getattr(request, name), "is used only with model adopted")

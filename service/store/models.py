@@ -15,7 +15,7 @@ from service.store.times import now
 _OWN = (
     models.c.number.label("model_number"),
     models.c.id.label("model_id"),
-    models.c.version,
+    models.c.version.label("model_version"),
     models.c.skin_id.label("model_skin"),
     models.c.adopted_at,
     models.c.adopted_from,

@@ -1,0 +1,80 @@
+"""Models of skins: adopted from explained diagnoses, in force until another is."""
+
+from fastapi import APIRouter, Security
+from fastapi.responses import JSONResponse
+from sqlalchemy import Connection
+
+from service import diagnosis_models as answers
+from service.adopted import of_row
+from service.dependencies import SkinId, Store, authorised
+from service.once import IdempotentOnce
+from service.problems import Refusal
+from service.store import diagnoses, models, skins
+from service.store.errors import Conflict
+from service.store.tables import AnyRow
+
+router = APIRouter(prefix="/v1", tags=["skins"])
+
+WRITE = [Security(authorised, scopes=["write"])]
+
+
+@router.post(
+    "/skins/{skin_id}/model",
+    operation_id="adopt_model",
+    summary="Adopt a model",
+    status_code=201,
+    dependencies=WRITE,
+    responses={201: {"model": answers.ModelEntry}},
+)
+def adopt(skin_id: SkinId, adoption: answers.Adoption, once: IdempotentOnce, store: Store) -> JSONResponse:
+    """Makes an explained diagnosis the skin's model: `/v1/frf`, `/v1/d33`, the d33 of campaigns and the history serve
+    it on request from now on. Adopted already, it is answered as it is."""
+
+    def act(connection: Connection) -> dict[str, object]:
+        root = skins.require_root(connection, skin_id)
+        diagnosis = diagnoses.find(connection, adoption.diagnosis_id)
+        if diagnosis.state != "done":
+            raise Conflict(f"Diagnosis {diagnosis.id!r} has no report: its state is {diagnosis.state}.")
+        of_row(connection, diagnosis)  # which refuses what cannot serve
+        return _entry(connection, models.adopt(connection, root, diagnosis, once.sender)).model_dump()
+
+    return JSONResponse(once.answer(store, adoption.diagnosis_id, act), status_code=201)
+
+
+@router.get("/skins/{skin_id}/model", operation_id="skin_model", summary="The model in force")
+def in_force(skin_id: SkinId, store: Store) -> answers.ModelEntry:
+    """With the campaign and the evidence that it comes from; 404 where none was adopted."""
+    with store.reading() as connection:
+        root = skins.require_root(connection, skin_id)
+        row = models.in_force(connection, root)
+        if row is None:
+            raise Refusal(404, f"Skin {skin_id!r} has no adopted model.")
+        return _entry(connection, row)
+
+
+@router.get("/skins/{skin_id}/model/versions", operation_id="skin_model_versions", summary="All models it ever had")
+def versions(skin_id: SkinId, store: Store) -> answers.ModelVersions:
+    """Nothing is deleted: of the skin and of those joined to it."""
+    with store.reading() as connection:
+        root = skins.require_root(connection, skin_id)
+        found = [_entry(connection, row) for row in models.of_skin(connection, root)]
+    return answers.ModelVersions(skin_id=root, models=found)
+
+
+def _entry(connection: Connection, row: AnyRow) -> answers.ModelEntry:
+    report = diagnoses.report_of(connection, row.number)
+    assert report is not None
+    model = of_row(connection, row)
+    return answers.ModelEntry(
+        id=row.model_id,
+        version=row.model_version,
+        skin_id=row.model_skin,
+        adopted_at=row.adopted_at,
+        adopted_from=row.adopted_from,
+        diagnosis_id=row.id,
+        campaign_id=row.campaign_id,
+        outdated=diagnoses.outdated(row),
+        **{name: report[name] for name in ("mechanisms", "probability", "statement", "fit", "provenance")},
+        needs=list(model.needs),
+        depends_on_frequency=bool(model.of_lines),
+    )
