@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +15,18 @@ from service.store.engine import Database
 from service.store.errors import Conflict
 from service.store.tables import AnyRow
 from underskin import InvalidInput
-from underskin.adopted import AdoptedModel, adopted, pressed_campaign
 from underskin.answers import pressed
 from underskin.response import gain
 from underskin.surrogate import SigmaTable
 from underskin.units import Complexes, Floats, finite, non_negative
 
+# Imported where it is needed: signal processing takes a second to load, which a start need not wait for.
+if TYPE_CHECKING:
+    from underskin.adopted import AdoptedModel
+
 _LARGEST_LINES = 100_000  # distinct rows times frequencies: some seconds
 _MOST_KNOWN = 100
-_known: dict[str, AdoptedModel] = {}  # by diagnosis: what is done does not change, and to read its campaign takes long
+_known: "dict[str, AdoptedModel]" = {}  # by diagnosis, which do not change once done
 _ANY_LINE = np.array([1.0])
 
 
@@ -30,7 +34,7 @@ _ANY_LINE = np.array([1.0])
 class Serving:
     """The model in force of a skin, and its id."""
 
-    model: AdoptedModel
+    model: "AdoptedModel"
     model_id: str
 
 
@@ -50,8 +54,10 @@ def serving(store: Database, skin_id: str) -> Serving:
         return Serving(of_row(connection, row), row.model_id)
 
 
-def of_row(connection: Connection, row: AnyRow) -> AdoptedModel:
+def of_row(connection: Connection, row: AnyRow) -> "AdoptedModel":
     """The model of a diagnosis that is done; raises InvalidInput where it cannot serve."""
+    from underskin.adopted import adopted
+
     if row.id not in _known:
         report = diagnoses.report_of(connection, row.number)
         assert report is not None
@@ -133,13 +139,15 @@ def _distinct_columns(request: PressedSkinColumns, given: Mapping[str, Floats]) 
 
 
 def _response(
-    model: AdoptedModel,
+    model: "AdoptedModel",
     request: PressedSkinColumns,
     table: SigmaTable,
     rows: Mapping[str, Floats],
     frequency_hz: Floats | None,
 ) -> tuple[Complexes, NDArray[np.bool_]]:
     """FRF over d33 (rows, lines), on the plateau where there are no frequencies, and which rows are inside."""
+    from underskin.adopted import pressed_campaign
+
     lines = _ANY_LINE if frequency_hz is None else frequency_hz
     count = len(rows["preload_n"])
     if count * len(lines) > _LARGEST_LINES:

@@ -12,6 +12,7 @@ from starlette.concurrency import run_in_threadpool
 from service import campaign_models as models
 from service import inverting
 from service.accepting import Terms, accept
+from service.adopted import serving
 from service.d33_models import D33
 from service.dependencies import CampaignId, Store, Table, authorised
 from service.store import campaigns
@@ -195,6 +196,9 @@ def d33(
         float | None, Query(gt=0, description="Average from here [Hz], not over the flat zone.")
     ] = None,
     band_high_hz: Annotated[float | None, Query(gt=0, description="Average up to here [Hz].")] = None,
+    model: Annotated[
+        Literal["paper", "adopted"], Query(description="`adopted`: the model in force of the campaign's skin.")
+    ] = "paper",
 ) -> D33:
     """By sensor, indenter and preload, with uncertainty, and what it leaves out."""
     if (band_low_hz is None) != (band_high_hz is None):
@@ -202,6 +206,8 @@ def d33(
     band = None if band_low_hz is None or band_high_hz is None else (band_low_hz, band_high_hz)
     with store.reading() as connection:
         row = campaigns.find(connection, campaign_id)
+    if model == "adopted":
+        return D33(**inverting.adopted_answer(store, table, row, serving(store, row.skin_id), band))
     return D33(**inverting.answer(store, table, row, band))
 
 

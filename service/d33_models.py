@@ -74,6 +74,12 @@ class D33(BaseModel):
 
     campaign_id: str = Field(description="The campaign.")
     table_sha256: str = Field(description="SHA-256 of the table of σ.")
+    model: Literal["paper", "adopted"] = Field(default="paper", description="The model that the figures rest on.")
+    model_id: str | None = Field(default=None, description="Which adopted model.")
+    model_percent: float | None = Field(
+        default=None,
+        description="Standard deviation of all d33 together by an adopted model's parameters; not in intervals.",
+    )
     status: Literal["ok", "none"] = Field(description="`none`: no d33 can be told from it; `reason` says why.")
     reason: str | None = Field(description="Why there is none.")
     band: Band | None = Field(description="The lines that were averaged.")

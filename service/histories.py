@@ -1,13 +1,17 @@
 """d33 of a skin's sensors over time: points, trends, and what they leave out."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 
 from sqlalchemy import Connection
 
+from service import adopted, inverting
 from service import skin_models as models
 from service.store import campaigns, inversions, skins
+from service.store.engine import Database
 from service.store.tables import AnyRow
+from underskin import InvalidInput
+from underskin.surrogate import SigmaTable
 from underskin.trend import SIGNIFICANT, Trend, holm, trend
 
 _YEAR_S = 365.25 * 86400
@@ -17,12 +21,40 @@ def history(connection: Connection, root: str) -> models.History:
     """The history of a skin and of those joined to it, from what is kept."""
     by_sensor: dict[str, list[models.Point]] = {}
     for row in inversions.history(connection, root):
-        by_sensor.setdefault(row.sensor, []).append(_point(row))
+        values = (row.d33_pc_per_n, row.d33_uncertainty_pc_per_n)
+        by_sensor.setdefault(row.sensor, []).append(_point(row, values, None))
+    return _history(connection, root, by_sensor, {})
+
+
+def adopted_history(store: Database, table: SigmaTable, root: str) -> models.History:
+    """The same under the model in force; raises Refusal where there is none."""
+    serving = adopted.serving(store, root)
+    by_sensor: dict[str, list[models.Point]] = {}
+    unfit: dict[str, str] = {}
+    with store.reading() as connection:
+        rows = [row for row in campaigns.of_skin(connection, root) if campaigns.state(row) == "current"]
+    for row in rows:
+        try:
+            found = inverting.adopted_answer(store, table, row, serving, None)
+        except InvalidInput as error:
+            unfit[row.id] = f"cannot be told by the adopted model: {error}"
+            continue
+        for entry in found["sensors"]:
+            if entry["d33_pc_per_n"] is not None:
+                values = (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"])
+                by_sensor.setdefault(entry["sensor"], []).append(_point(row, values, serving.model_id))
+    with store.reading() as connection:
+        return _history(connection, root, by_sensor, unfit)
+
+
+def _history(
+    connection: Connection, root: str, by_sensor: dict[str, list[models.Point]], unfit: Mapping[str, str]
+) -> models.History:
     for points in by_sensor.values():
         points.sort(key=lambda point: point.time)
     names = sorted(by_sensor)
     used = {point.campaign_id for points in by_sensor.values() for point in points}
-    campaigns_out, recordings_out = _left_out(connection, root, used)
+    campaigns_out, recordings_out = _left_out(connection, root, used, unfit)
     return models.History(
         skin_id=root,
         joined=[joined(row) for row in skins.joined_to(connection, root)],
@@ -40,13 +72,15 @@ def joined(row: AnyRow) -> models.JoinedSkin:
     return models.JoinedSkin(id=row.id, joined_to=row.joined_to, joined_at=row.joined_at, reason=row.join_reason)
 
 
-def _point(row: AnyRow) -> models.Point:
+def _point(row: AnyRow, d33: tuple[float, float], model_id: str | None) -> models.Point:
     return models.Point(
         campaign_id=row.id,
         time=row.recorded_at or row.received_at,
         time_is="received" if row.recorded_at is None else "recorded",
-        d33_pc_per_n=row.d33_pc_per_n,
-        d33_uncertainty_pc_per_n=row.d33_uncertainty_pc_per_n,
+        model="paper" if model_id is None else "adopted",
+        model_id=model_id,
+        d33_pc_per_n=d33[0],
+        d33_uncertainty_pc_per_n=d33[1],
     )
 
 
@@ -75,11 +109,11 @@ def _answer(line: Trend, adjusted: float) -> models.TrendAnswer:
 
 
 def _left_out(
-    connection: Connection, root: str, used: Iterable[str]
+    connection: Connection, root: str, used: Iterable[str], unfit: Mapping[str, str]
 ) -> tuple[list[models.LeftOutCampaign], list[models.LeftOutRecording]]:
     whole, single = [], []
     for row in campaigns.of_skin(connection, root):
-        reason = _why_unused(row, row.id in used)
+        reason = unfit.get(row.id) or _why_unused(row, row.id in used)
         if reason is not None:
             whole.append(models.LeftOutCampaign(campaign_id=row.id, reason=reason))
         elif row.excluded:

@@ -4,6 +4,7 @@ import logging
 from collections.abc import Sequence
 from typing import Any
 
+from service.adopted import Serving
 from service.d33_models import of_inversion
 from service.store import campaigns, inversions
 from service.store.engine import Database, StorageFull
@@ -34,6 +35,35 @@ def answer(store: Database, table: SigmaTable, row: AnyRow, band_hz: Band | None
     document = {"campaign_id": row.id, "table_sha256": table.sha256, **found}
     if band_hz is None:
         _keep(store, row, document)
+    return document
+
+
+def adopted_answer(
+    store: Database, table: SigmaTable, row: AnyRow, serving: Serving, band_hz: Band | None
+) -> dict[str, Any]:
+    """The same under an adopted model: by the lines that the base model would have shown.
+
+    Raises InvalidInput where the campaign lacks what the model needs, or declares the skin otherwise.
+    """
+    with store.reading() as connection:
+        kept = inversions.find_adopted(connection, row, serving.model_id, table.sha256) if band_hz is None else None
+        if kept is not None:
+            return dict(kept)
+        campaign = campaigns.load(connection, row, with_excluded=False)
+        excluded = campaigns.excluded_of(connection, row.number)
+    translated, beyond = serving.model.as_base_model(campaign, table)
+    found = _inverted(translated, table, band_hz)
+    left_out = [(left.recording, left.reason) for left in excluded]
+    left_out += [(name, "beyond the table under the adopted model") for name in beyond]
+    found["left_out"] = [{"recording": name, "reason": reason} for name, reason in left_out] + found["left_out"]
+    model = {"model": "adopted", "model_id": serving.model_id, "model_percent": 100 * serving.model.unsure}
+    document = {"campaign_id": row.id, "table_sha256": table.sha256, **model, **found}
+    if band_hz is None:
+        try:
+            with store.writing() as connection:
+                inversions.keep_adopted(connection, row, serving.model_id, table.sha256, document)
+        except StorageFull:
+            logger.warning("no room to keep the d33 of a campaign", extra={"fields": {"campaign": row.id}})
     return document
 
 

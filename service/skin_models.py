@@ -55,6 +55,8 @@ class Point(BaseModel):
     campaign_id: str = Field(description="The campaign.")
     time: str = Field(description="When it was recorded, or else received, UTC.")
     time_is: Literal["recorded", "received"] = Field(description="Which of the two.")
+    model: Literal["paper", "adopted"] = Field(description="The model that d33 rests on.")
+    model_id: str | None = Field(description="Which adopted model; null with `paper`.")
     d33_pc_per_n: float = Field(description="d33 [pC/N].")
     d33_uncertainty_pc_per_n: float = Field(description="Its standard uncertainty [pC/N].")
 

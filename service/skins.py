@@ -1,6 +1,6 @@
 """Skins: listed, joined, their d33 over time; all that is kept of one as a file, and back."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import orjson
 from fastapi import APIRouter, Query, Security
@@ -59,10 +59,22 @@ def join(skin_id: SkinId, join: models.Join, store: Store) -> models.SkinDetail:
 
 
 @router.get("/skins/{skin_id}/history", operation_id="skin_history", summary="d33 over time")
-def history(skin_id: SkinId, store: Store, table: Table) -> models.History:
-    """d33 of each sensor in every current campaign, its trend and whether that is significant."""
+def history(
+    skin_id: SkinId,
+    store: Store,
+    table: Table,
+    model: Annotated[
+        Literal["paper", "adopted"], Query(description="`adopted`: d33 under the model in force of the skin.")
+    ] = "paper",
+) -> models.History:
+    """d33 of each sensor in every current campaign, its trend and whether that is significant; all by one model.
+
+    Campaigns that lack what an adopted model needs are left out, with the reason.
+    """
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
+    if model == "adopted":
+        return histories.adopted_history(store, table, root)
     inverting.complete(store, table, root)
     with store.reading() as connection:
         return histories.history(connection, root)

@@ -7,7 +7,7 @@ from sqlalchemy import Connection, delete, insert, select
 
 from service.store import skins
 from service.store.codec import compressed, decompressed
-from service.store.tables import AnyRow, campaigns, inversions, sensor_d33
+from service.store.tables import AnyRow, adopted_inversions, campaigns, inversions, sensor_d33
 
 
 def find(connection: Connection, campaign: AnyRow, table_sha256: str) -> Any | None:
@@ -42,6 +42,28 @@ def keep(
     ]
     if values:
         connection.execute(insert(sensor_d33), values)
+
+
+def find_adopted(connection: Connection, campaign: AnyRow, model_id: str, table_sha256: str) -> Any | None:
+    """The answer kept for a campaign as it is now, with this model and table; None where there is none."""
+    query = select(adopted_inversions.c.document).where(
+        adopted_inversions.c.campaign == campaign.number,
+        adopted_inversions.c.model_id == model_id,
+        adopted_inversions.c.revision == campaign.revision,
+        adopted_inversions.c.table_sha256 == table_sha256,
+    )
+    blob = connection.execute(query).scalar()
+    return None if blob is None else decompressed(blob)
+
+
+def keep_adopted(connection: Connection, campaign: AnyRow, model_id: str, table_sha256: str, document: Any) -> None:
+    """Keep an answer under an adopted model, unless the campaign changed since."""
+    query = select(campaigns.c.revision).where(campaigns.c.number == campaign.number).with_for_update()
+    if connection.execute(query).scalar() != campaign.revision:
+        return
+    connection.execute(delete(adopted_inversions).where(adopted_inversions.c.campaign == campaign.number))
+    row = {"revision": campaign.revision, "table_sha256": table_sha256, "document": compressed(document)}
+    connection.execute(insert(adopted_inversions), {"campaign": campaign.number, "model_id": model_id, **row})
 
 
 def missing_of_skin(connection: Connection, root: str, table_sha256: str) -> Sequence[AnyRow]:

@@ -139,6 +139,17 @@ diagnoses = Table(
     Index("diagnoses_by_state", "state", "number"),
 )
 
+# As `inversions`, under the model that was adopted for the skin; one a campaign, of the model asked for last.
+adopted_inversions = Table(
+    "adopted_inversions",
+    metadata,
+    Column("campaign", _Number, ForeignKey("campaigns.number"), primary_key=True),
+    Column("model_id", String, nullable=False),
+    Column("revision", Integer, nullable=False),
+    Column("table_sha256", String, nullable=False),
+    Column("document", LargeBinary, nullable=False),  # compressed JSON
+)
+
 # Models of skins, one a diagnosis that was adopted; the last one is in force.
 models = Table(
     "models",

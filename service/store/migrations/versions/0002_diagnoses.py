@@ -1,4 +1,4 @@
-"""Diagnoses, and the models adopted from them."""
+"""Diagnoses, the models adopted from them, and the d33 derived with those."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -10,7 +10,7 @@ NUMBER = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
 
 
 def upgrade() -> None:
-    """The tables `diagnoses` and `models` as they were at first."""
+    """The tables `diagnoses`, `models` and `adopted_inversions` as they were at first."""
     op.create_table(
         "diagnoses",
         sa.Column("number", NUMBER, nullable=False),
@@ -51,4 +51,14 @@ def upgrade() -> None:
         sa.PrimaryKeyConstraint("number"),
         sa.UniqueConstraint("id"),
         sa.UniqueConstraint("skin_id", "version", name="version_of_skin"),
+    )
+    op.create_table(
+        "adopted_inversions",
+        sa.Column("campaign", NUMBER, nullable=False),
+        sa.Column("model_id", sa.String(), nullable=False),
+        sa.Column("revision", sa.Integer(), nullable=False),
+        sa.Column("table_sha256", sa.String(), nullable=False),
+        sa.Column("document", sa.LargeBinary(), nullable=False),
+        sa.ForeignKeyConstraint(["campaign"], ["campaigns.number"]),
+        sa.PrimaryKeyConstraint("campaign"),
     )
