@@ -14,7 +14,7 @@ from underskin.diagnosis.curvature import curvature
 from underskin.diagnosis.evidence import Evidence, laplace
 from underskin.diagnosis.fit import Evaluated, Fitter, Hypothesis, Point
 from underskin.diagnosis.lines import Lines
-from underskin.diagnosis.scatter import NO_POSITION, POSITION
+from underskin.diagnosis.scatter import GAIN_PRIOR, NO_POSITION, POSITION
 from underskin.mechanisms.catalogue import CATALOGUE
 from underskin.mechanisms.model import Model, compose
 from underskin.surrogate import SigmaTable
@@ -22,6 +22,8 @@ from underskin.surrogate import SigmaTable
 _QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7, 0.9), 3: (0.2, 0.5, 0.8)}
 _KEPT_STARTS = 3
 _DECIDED = 0.999  # probability beyond which a parent's positioning scatter, or none, is its offspring's
+_POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
+_SHORT = 3  # iterations of a trial
 _LEAST_GAIN = 1.0  # in log posterior density
 _LEAST_SCATTER = 3e-3  # relative effect of positioning scatter on a recording below which it is not looked for
 
@@ -97,8 +99,7 @@ class Workbench:
                 weights[0] = 0.0
         if (parent is None and weights[0] < 0) or (parent is not None and parent.placed > 1 - _DECIDED):
             beside = starts or self._starts(fitters[1], names, parent)
-            moved = [at.point if fitters[1].holds(at.point) else _with_position(at.point) for at in beside]
-            best = min((fitters[1].improve(point) for point in moved), key=lambda entry: entry.cost)
+            best = min((fitters[1].improve(_placed_start(fitters[1], at)) for at in beside), key=lambda at: at.cost)
             if not self._gains(best, parent, 1):
                 return None
             found[1] = laplace(fitters[1], best)
@@ -177,7 +178,14 @@ def needs_lines(name: str) -> bool:
     return bool({"frequency_hz", "phase"} & set(CATALOGUE[name].axes))
 
 
-def _with_position(point: Point) -> Point:
-    gain, level, *own = point.covariance
-    start = float(np.log(np.sqrt(POSITION[0] * POSITION[1])))
-    return replace(point, covariance=np.array([gain, level, start, *own]))
+def _placed_start(fitter: Fitter, at: Evaluated) -> Point:
+    """The best of a few scales of positioning scatter, each after the steps that d33 needs to follow it."""
+    if fitter.holds(at.point):
+        return at.point
+    gain, level, *own = at.point.covariance
+    tried = []
+    for position in _POSITION_STARTS:
+        for scatter in (gain, GAIN_PRIOR.middle):
+            covariance = np.array([scatter, level, np.log(position), *own])
+            tried.append(fitter.improve(replace(at.point, covariance=covariance), _SHORT))
+    return min(tried, key=lambda entry: entry.cost).point

@@ -8,7 +8,8 @@ m = a u and ∂m = t u; sensors add τ² m mᵀ over their recordings. All of it
 identity, so that time is linear in rows and recordings. The covariance follows the model, so log|C| stays.
 
 e^b is linearised at `bend`, the most probable b of each sensor: Laplace's method for b. Where a contact sits on an
-extremum of σ, p acts in second order: on the mean by ½ p² ∇²σ, on the variance as above, H of the base model.
+extremum of σ, p acts in second order: on the mean by the factor exp(½ p² ∇²σ/σ), on the variance as above, with H of
+the base model.
 """
 
 from dataclasses import dataclass
@@ -57,7 +58,8 @@ class Moments:
         """Weigh and sum."""
         self._first = self.lines_first = lines.first
         self._lines = lines
-        factor = np.exp(bend) * (1 + 0.5 * position**2 * curvature.laplacian)
+        self._bend, self._laplacian, self._position = bend, curvature.laplacian, position
+        factor = np.exp(bend + 0.5 * position**2 * curvature.laplacian)
         self._scale = (factor[lines.recording]) / lines.deviation
         self._slopes = prediction.slopes
         model = prediction.value * self._scale
@@ -73,11 +75,22 @@ class Moments:
         self.ur = self._sum(direction, residual)
         self.rr = self._sum(residual, residual)
         self.picked = prediction.pickup is not None
+        self.cu: Array | None = None
+        self.cr: Array | None = None
         if prediction.pickup is not None:
             self._pickup = prediction.pickup / lines.deviation
             self.cc = self._sum(self._pickup, self._pickup)
             self.cu = self._with_pickup(direction)
             self.cr = self._with_pickup(residual)
+
+    def at_position(self, position: float) -> tuple[Array, Array, Array, Array | None]:
+        """a, uᵀr, rᵀr and (c + i·ic)ᵀr with the second-order mean at another p than these were summed at."""
+        if position == self._position:
+            return self.along, self.ur, self.rr, self.cr
+        factor = np.exp(0.5 * (position**2 - self._position**2) * self._laplacian)
+        less = (factor - 1) * (1 - self._bend) * self.along
+        cr = None if self.cr is None or self.cu is None else self.cr - less * self.cu
+        return self.along * factor, self.ur - less * self.uu, self.rr - 2 * less * self.ur + less**2 * self.uu, cr
 
     def _direction(self, model: Array, slopes: Array) -> Array:
         """u, and along it a (`along`) and |t|² (`moved`)."""
@@ -125,18 +138,21 @@ class Marginal:
         """Take out pick-up, gain and position, recording by recording, then the sensors."""
         self._lines, self._moments, self.levels = lines, moments, levels
         self._k2 = k2 = levels.level**2
-        uu, ur, rr = moments.uu / k2, moments.ur / k2, moments.rr / k2
+        along, ur, rr, cr = moments.at_position(levels.position)
+        self._along = along
+        uu, ur, rr = moments.uu / k2, ur / k2, rr / k2
         log_determinant = 0.0
-        if moments.picked:
+        self._cr = cr
+        if moments.cu is not None and cr is not None:
             q2 = levels.pickup**2
             inner = 1 + q2 * moments.cc / k2
             self._phi = q2 / inner / k2**2
             uu = uu - self._phi * np.abs(moments.cu) ** 2
-            ur = ur - self._phi * (moments.cu.conj() * moments.cr).real
-            rr = rr - self._phi * np.abs(moments.cr) ** 2
+            ur = ur - self._phi * (moments.cu.conj() * cr).real
+            rr = rr - self._phi * np.abs(cr) ** 2
             log_determinant += 2 * float(np.log(inner).sum())
         self._uu, self._ur = uu, ur
-        a2 = moments.along**2
+        a2 = along**2
         variance = levels.gain**2 * a2
         if levels.position > 0:
             p2 = levels.position**2
@@ -145,7 +161,7 @@ class Marginal:
         self._reduced = 1 / (1 + variance * uu)  # 1 − (share of u taken out)
         self._shrink = variance * self._reduced
         self._mm = a2 * uu * self._reduced  # mᵀ C_i⁻¹ m
-        self._mr = moments.along * ur * self._reduced
+        self._mr = along * ur * self._reduced
         sensors = int(lines.sensor.max()) + 1
         self._sensor_mm = np.bincount(lines.sensor, self._mm, sensors)
         self._sensor_mr = np.bincount(lines.sensor, self._mr, sensors)
@@ -171,14 +187,14 @@ class Marginal:
         moments, k2 = self._moments, self._k2
         jj, uj, jr, cj = moments.slopes
         jj, uj, jr = jj / k2, uj / k2, jr / k2
-        if cj is not None:
+        if cj is not None and moments.cu is not None and self._cr is not None:
             phi = self._phi[:, None]
             jj = jj - ((phi * cj).conj().T @ cj).real
             uj = uj - phi * (moments.cu[:, None].conj() * cj).real
-            jr = jr - phi * (moments.cr[:, None].conj() * cj).real
+            jr = jr - phi * (self._cr[:, None].conj() * cj).real
         information = jj - uj.T @ (self._shrink[:, None] * uj)
         jr = jr - uj * (self._shrink * self._ur)[:, None]
-        mj = uj * (moments.along * self._reduced)[:, None]
+        mj = uj * (self._along * self._reduced)[:, None]
         sensor = self._lines.sensor
         by_sensor = _by_sensor(mj, sensor, len(self._sensor_shrink))
         information -= by_sensor.T @ (by_sensor * self._sensor_shrink[:, None])
@@ -193,15 +209,6 @@ class Marginal:
         sensor_left = 1 - self._sensor_shrink * self._sensor_mm
         shared = _by_sensor(jr, sensor, len(gains)) * sensor_mr[:, None] - by_sensor * sensor_left[:, None]
         return information, jr.sum(axis=0) + own.sum(axis=0) + tau2 * shared.sum(axis=0)
-
-    def gain_residuals(self) -> tuple[Floats, Floats]:
-        """How much each recording lies above its model (recordings,), relative, sensors' gains taken off; and the
-        standard deviation that line noise alone gives to it."""
-        along = self._moments.along
-        size = np.where(np.abs(along * self._uu) > 0, along * self._uu, np.inf)
-        gains = self.sensor_gains[self._lines.sensor]
-        deviation = 1 / (np.abs(along) * np.sqrt(np.maximum(self._uu, 1e-300)))
-        return self._ur / size - gains, deviation
 
 
 def _by_sensor(rows: Floats, sensor: NDArray[np.intp], sensors: int) -> Floats:
