@@ -13,7 +13,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import SkinId, Store, authorised
 from service.problems import Refusal
-from service.store import importing, skins
+from service.store import diagnosis_export, importing, skins
 from service.store.engine import Database
 from service.store.export import export
 from service.uploads import Upload, full_disk_said, received
@@ -44,7 +44,9 @@ class Imported(BaseModel):
     responses={200: _FILE},
 )
 def export_skin(skin_id: SkinId, request: Request, store: Store) -> FileResponse:
-    """One HDF5 file (`skin-export/1`) with its campaigns in every state, those of skins joined to it, and its rigs."""
+    """One HDF5 file (`skin-export/1`) with its campaigns in every state, those of skins joined to it, its rigs,
+    diagnoses that have ended and models.
+    """
     with full_disk_said(), store.reading() as connection:
         root = skins.require_root(connection, skin_id)
         with tempfile.NamedTemporaryFile(dir=request.app.state.uploads.path, delete=False) as file:
@@ -81,7 +83,11 @@ def _import(store: Database, upload: Upload) -> Imported:
     with upload.path.open("rb") as stream:
         try:
             overview = read_overview(stream, label)
+            diagnosed = diagnosis_export.checked(
+                overview.diagnoses, overview.models, overview.campaigns, [row["id"] for row in overview.skins]
+            )
             with store.reading() as connection:
+                diagnosis_export.require_same(connection, diagnosed)
                 present = importing.known(connection, overview)
                 for campaign in _chunks(stream, label, present):
                     importing.require_same(connection, campaign)
@@ -89,6 +95,7 @@ def _import(store: Database, upload: Upload) -> Imported:
             missing = [name for name in overview.campaigns if name not in set(present)]
             for campaign in _chunks(stream, label, missing):
                 importing.add(store, campaign)
+            diagnosis_export.add(store, diagnosed)
         except FileError as error:
             raise InvalidInput("file", upload.label, f"{error.place}: {error.reason}".lstrip(": ")) from None
         except (ValidationError, KeyError, TypeError) as error:

@@ -6,7 +6,7 @@ Answers are the documents of the HTTP interface (docs/store.md, /openapi.json), 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from urllib.parse import quote
 from uuid import uuid4
 
@@ -17,6 +17,7 @@ from underskin.http_session import Session
 from underskin.recordings.campaign import Campaign, parse, to_dict
 
 Document = dict[str, Any]
+ModelName = Literal["paper", "adopted"]
 _TRIES = 3
 
 
@@ -43,7 +44,7 @@ class Campaigns:
         """
         document = to_dict(campaign) if isinstance(campaign, Campaign) else dict(campaign)
         content = orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
-        query = _query(skin=skin, corrects=corrects, reason=reason, all_or_nothing=all_or_nothing)
+        query = query_of(skin=skin, corrects=corrects, reason=reason, all_or_nothing=all_or_nothing)
         headers = {"Content-Type": "application/json", "Idempotency-Key": idempotency_key or uuid4().hex}
         return self._again(
             lambda: self._session.json("POST", "/v1/campaigns", **query, headers=headers, content=content)
@@ -62,7 +63,7 @@ class Campaigns:
         if not files:
             raise InvalidInput("files", [], "must name at least one file")
         headers = {"Idempotency-Key": idempotency_key or uuid4().hex}
-        query = _query(skin=skin, all_or_nothing=all_or_nothing)
+        query = query_of(skin=skin, all_or_nothing=all_or_nothing)
 
         def send() -> Document:
             with ExitStack() as opened:
@@ -88,7 +89,7 @@ class Campaigns:
             "recorded_from": recorded_from,
             "recorded_to": recorded_to,
         }
-        yield from _pages(self._session, "/v1/campaigns", "campaigns", state=state, **filters)
+        yield from pages(self._session, "/v1/campaigns", "campaigns", state=state, **filters)
 
     def get(self, campaign_id: str) -> Document:
         """A campaign and its recordings, without their arrays."""
@@ -98,10 +99,13 @@ class Campaigns:
         """A campaign as it was sent, arrays and all."""
         return parse(self._session.json("GET", _path(campaign_id, "document")))
 
-    def d33(self, campaign_id: str, band_hz: tuple[float, float] | None = None) -> Document:
+    def d33(
+        self, campaign_id: str, band_hz: tuple[float, float] | None = None, *, model: ModelName = "paper"
+    ) -> Document:
         """d33 by sensor, indenter and preload, over the flat zone or a band of your own, and what it leaves out."""
         low, high = (None, None) if band_hz is None else band_hz
-        return self._session.json("GET", _path(campaign_id, "d33"), **_query(band_low_hz=low, band_high_hz=high))
+        query = query_of(band_low_hz=low, band_high_hz=high, model=model)
+        return self._session.json("GET", _path(campaign_id, "d33"), **query)
 
     def withdraw(self, campaign_id: str, reason: str) -> Document:
         """Take it out of all figures; it can still be read."""
@@ -130,7 +134,7 @@ class Skins:
 
     def all(self, *, id_contains: str | None = None) -> Iterator[Document]:
         """Skins by id."""
-        yield from _pages(self._session, "/v1/skins", "skins", id_contains=id_contains)
+        yield from pages(self._session, "/v1/skins", "skins", id_contains=id_contains)
 
     def get(self, skin_id: str) -> Document:
         """A skin, and what was joined to it."""
@@ -140,9 +144,21 @@ class Skins:
         """Count the skin `other` as `skin_id` from now on."""
         return self._session.json("POST", _skin(skin_id, "join"), json={"skin_id": other, "reason": reason})
 
-    def history(self, skin_id: str) -> Document:
+    def history(self, skin_id: str, *, model: ModelName = "paper") -> Document:
         """d33 of each sensor over time, its trend, and what that leaves out."""
-        return self._session.json("GET", _skin(skin_id, "history"))
+        return self._session.json("GET", _skin(skin_id, "history"), **query_of(model=model))
+
+    def adopt(self, skin_id: str, diagnosis_id: str) -> Document:
+        """Make an explained diagnosis the skin's model, which `adopted` stands for from now on."""
+        return self._session.json("POST", _skin(skin_id, "model"), json={"diagnosis_id": diagnosis_id})
+
+    def model(self, skin_id: str) -> Document:
+        """The model in force, with the campaign and the evidence that it comes from."""
+        return self._session.json("GET", _skin(skin_id, "model"))
+
+    def models(self, skin_id: str) -> list[Document]:
+        """All models that the skin ever had, the latest adoption first."""
+        return list(self._session.json("GET", _skin(skin_id, "model", "versions"))["models"])
 
     def export(self, skin_id: str, file: str | Path, progress: Callable[[int], object] = lambda _: None) -> None:
         """Write all that is kept of a skin into one HDF5 file; `progress` hears how many bytes came."""
@@ -171,15 +187,16 @@ def _skin(skin_id: str, *more: str) -> str:
     return "/".join(("/v1/skins", quote(skin_id, safe=""), *more))
 
 
-def _query(**given: Any) -> dict[str, dict[str, Any]]:
+def query_of(**given: Any) -> dict[str, dict[str, Any]]:
     """What was given, as httpx takes a query."""
     return {"params": {name: value for name, value in given.items() if value is not None}}
 
 
-def _pages(session: Session, path: str, noun: str, **filters: str | None) -> Iterator[Document]:
+def pages(session: Session, path: str, noun: str, **filters: str | None) -> Iterator[Document]:
+    """The entries of a list, page after page."""
     cursor: str | None = None
     while True:
-        page = session.json("GET", path, **_query(limit=200, cursor=cursor, **filters))
+        page = session.json("GET", path, **query_of(limit=200, cursor=cursor, **filters))
         yield from page[noun]
         cursor = page["next"]
         if cursor is None:

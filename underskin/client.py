@@ -7,108 +7,32 @@
 Fields are named and meant as in the HTTP interface, in lab units. A single number holds for all rows; arrays must be
 equally long. Answers have one entry a row, or shape () where only single numbers were given; a row outside the model's
 domain has the status `out_of_domain` and NaN in all that depends on σ. Campaigns and skins: `client.campaigns` and
-`client.skins` (underskin.campaign_client).
+`client.skins` (underskin.campaign_client); diagnoses: `client.diagnoses` (underskin.diagnosis_client).
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from types import TracebackType
 from typing import Any, Literal, Self, TypeVar
 
 import numpy as np
 import orjson
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from underskin.campaign_client import Campaigns, Skins
+from underskin.client_answers import (
+    Adopted,
+    Answer,
+    D33Answer,
+    FrfAnswer,
+    SigmaAnswer,
+    StressAnswer,
+    TableAxis,
+    TableEntry,
+)
+from underskin.diagnosis_client import Diagnoses
 from underskin.http_session import Session
 from underskin.units import Finding, Floats
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What every answer in columns says: the model, the table's hash (None where none was read), status per row."""
-
-    model: str
-    table_sha256: str | None
-    status: NDArray[np.str_]
-
-
-@dataclass(frozen=True)
-class SigmaAnswer(Answer):
-    """σ and the bound on its relative error."""
-
-    sigma: Floats
-    rel_error: Floats
-
-
-@dataclass(frozen=True)
-class PressedSkinAnswer(Answer):
-    """What reaches the sensor; units as the names say, the rest dimensionless."""
-
-    contact_radius_mm: Floats
-    a_over_h: Floats
-    rt_over_h: Floats
-    load_parameter: Floats
-    sigma: Floats
-    rel_error: Floats
-    mean_stress_mpa: Floats
-
-
-@dataclass(frozen=True)
-class FrfAnswer(PressedSkinAnswer):
-    """The FRF on the plateau and, where frequencies were given, its parts with one more axis for them."""
-
-    frf_pc_per_n: Floats
-    frequency_hz: Floats | None = None
-    frf_re_pc_per_n: Floats | None = None
-    frf_im_pc_per_n: Floats | None = None
-
-
-@dataclass(frozen=True)
-class D33Answer(PressedSkinAnswer):
-    """d33 with its standard uncertainty, and the plateau that was inverted."""
-
-    frf_pc_per_n: Floats
-    frf_uncertainty_pc_per_n: Floats
-    d33_pc_per_n: Floats
-    d33_uncertainty_pc_per_n: Floats
-    findings: tuple[Finding, ...] = ()
-    frf_im_pc_per_n: Floats | None = None
-
-
-@dataclass(frozen=True)
-class StressAnswer(Answer):
-    """What each sensor bears: ids, places, charge with the table's error, and stress (compression positive)."""
-
-    sensor: tuple[str, ...]
-    x_mm: Floats
-    y_mm: Floats
-    charge_pc: Floats
-    charge_error_pc: Floats
-    mean_stress_mpa: Floats
-    reach_mm: float | None
-
-
-@dataclass(frozen=True)
-class TableAxis:
-    """One axis of a table: limits (included) and the number of nodes."""
-
-    name: str
-    low: float
-    high: float
-    nodes: int
-
-
-@dataclass(frozen=True)
-class TableEntry:
-    """A table in use: its quantity, format, hash, axes, and how it was made."""
-
-    name: str
-    table_schema: str
-    table_sha256: str
-    axes: tuple[TableAxis, ...]
-    about: Mapping[str, Any]
-
 
 _Answer = TypeVar("_Answer", bound=Answer)
 
@@ -123,6 +47,7 @@ class Client:
         self._session = Session(base_url, api_key, timeout)
         self.campaigns = Campaigns(self._session)
         self.skins = Skins(self._session)
+        self.diagnoses = Diagnoses(self._session)
 
     def __enter__(self) -> Self:
         return self
@@ -159,10 +84,11 @@ class Client:
         poisson_ratio: ArrayLike = 0.5,
         frequency_hz: ArrayLike | None = None,
         units_checked: bool = False,
+        adopted: Adopted | None = None,
     ) -> FrfAnswer:
         """The FRF of a skin under a sphere; `frequency_hz` (a list for all rows) adds spectra.
 
-        `units_checked` accepts magnitudes that look like a slip of units.
+        `units_checked` accepts magnitudes that look like a slip of units; `adopted` asks the skin's own model.
         """
         columns = {
             "thickness_mm": thickness_mm,
@@ -174,7 +100,7 @@ class Client:
             "d33_pc_per_n": d33_pc_per_n,
         }
         shared = {"frequency_hz": frequency_hz, "units_checked": units_checked}
-        return self._columns("frf", FrfAnswer, columns, shared)
+        return self._columns("frf", FrfAnswer, columns, shared, adopted)
 
     def d33(
         self,
@@ -192,11 +118,13 @@ class Client:
         frf_im_pc_per_n: ArrayLike | None = None,
         band_hz: tuple[float, float] | None = None,
         units_checked: bool = False,
+        adopted: Adopted | None = None,
     ) -> D33Answer:
         """d33 from plateau values `frf_pc_per_n`, or from lines averaged over a band.
 
         For lines give `frequency_hz` (for all rows), `frf_re_pc_per_n` and, if measured, `frf_im_pc_per_n` (rows ×
-        lines), and `band_hz`. `units_checked` accepts magnitudes that look like a slip of units.
+        lines), and `band_hz`. `units_checked` accepts magnitudes that look like a slip of units; `adopted` asks the
+        skin's own model.
         """
         columns = {
             "thickness_mm": thickness_mm,
@@ -215,7 +143,7 @@ class Client:
             "band_hz": band_hz,
             "units_checked": units_checked,
         }
-        return self._columns("d33", D33Answer, columns, lines)
+        return self._columns("d33", D33Answer, columns, lines, adopted)
 
     def stress(self, request: Mapping[str, Any]) -> StressAnswer:
         """Charge on every sensor of an array; `request` is the document that `POST /v1/stress` takes."""
@@ -240,8 +168,15 @@ class Client:
         return str(self._request("GET", "/ready")["table_sha256"])
 
     def _columns(
-        self, noun: str, kind: type[_Answer], columns: Mapping[str, ArrayLike | None], shared: Mapping[str, Any]
+        self,
+        noun: str,
+        kind: type[_Answer],
+        columns: Mapping[str, ArrayLike | None],
+        shared: Mapping[str, Any],
+        adopted: Adopted | None = None,
     ) -> _Answer:
+        if adopted is not None:
+            columns, shared = {**columns, **adopted.columns()}, {**shared, **adopted.shared()}
         arrays = {name: _array(value) for name, value in columns.items() if value is not None}
         others = {name: _shared(name, value) for name, value in shared.items() if value is not None}
         document = self._request("POST", f"/v1/{noun}", {**arrays, **others})

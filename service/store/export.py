@@ -8,7 +8,7 @@ from typing import Any
 
 from sqlalchemy import Connection, select
 
-from service.store import campaigns, skins
+from service.store import campaigns, diagnosis_export, skins
 from service.store.arrays import unpack
 from service.store.tables import AnyRow, recordings, rigs
 from service.store.tables import skins as skins_table
@@ -20,11 +20,14 @@ def export(connection: Connection, root: str, file: Path) -> None:
     of_root = select(skins_table).where(skins_table.c.root_id == root).order_by(skins_table.c.id)
     of_rigs = select(rigs).where(rigs.c.skin_id.in_(skins.members(root))).order_by(rigs.c.number)
     rows = list(campaigns.of_skin(connection, root))
+    diagnoses, models = diagnosis_export.exported(connection, root)
     overview = Overview(
         skin=root,
         skins=[_without(row) for row in connection.execute(of_root)],
         rigs=[_without(row, "number") for row in connection.execute(of_rigs)],
         campaigns=[row.id for row in rows],
+        diagnoses=diagnoses,
+        models=models,
     )
     with writing(file, overview) as target:
         for row in rows:

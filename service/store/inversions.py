@@ -58,7 +58,9 @@ def find_adopted(connection: Connection, campaign: AnyRow, model_id: str, table_
 
 def keep_adopted(connection: Connection, campaign: AnyRow, model_id: str, table_sha256: str, document: Any) -> None:
     """Keep an answer under an adopted model, unless the campaign changed since."""
-    query = select(campaigns.c.revision).where(campaigns.c.number == campaign.number).with_for_update()
+    # The id too: after a restore, a number may be another campaign's.
+    same = (campaigns.c.number == campaign.number) & (campaigns.c.id == campaign.id)
+    query = select(campaigns.c.revision).where(same).with_for_update()
     if connection.execute(query).scalar() != campaign.revision:
         return
     connection.execute(delete(adopted_inversions).where(adopted_inversions.c.campaign == campaign.number))

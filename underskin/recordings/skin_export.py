@@ -2,6 +2,7 @@
 
 /                     attributes schema, skin
 /skins, /rigs         JSON text: what is kept of skins and their rigs, a list of objects
+/diagnoses, /models   JSON text: diagnoses with their reports, and adopted models; absent in older files
 /campaigns/<id>       JSON text `about` (an object) and `recordings` (a list of objects, without arrays); for each
                       array the values of all recordings one behind another in `arrays/<name>`, how many of them
                       are whose in `lengths/<name>`, 0 for a recording without it
@@ -9,7 +10,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -44,12 +45,14 @@ class ExportedCampaign:
 
 @dataclass(frozen=True)
 class Overview:
-    """The skin, what is kept of it and of those joined to it, their rigs, and the ids of campaigns."""
+    """The skin, what is kept of it and of those joined to it, their rigs, diagnoses, models, and ids of campaigns."""
 
     skin: str
     skins: list[dict[str, Any]]
     rigs: list[dict[str, Any]]
     campaigns: list[str]
+    diagnoses: list[dict[str, Any]] = field(default_factory=list)
+    models: list[dict[str, Any]] = field(default_factory=list)
 
 
 @contextmanager
@@ -59,6 +62,8 @@ def writing(file: Path, overview: Overview) -> Iterator[Any]:
         target.attrs["schema"], target.attrs["skin"] = SCHEMA, overview.skin
         _write_text(target, "skins", overview.skins)
         _write_text(target, "rigs", overview.rigs)
+        _write_text(target, "diagnoses", overview.diagnoses)
+        _write_text(target, "models", overview.models)
         target.create_group("campaigns", track_order=True)
         yield target
 
@@ -88,6 +93,7 @@ def read_campaigns(stream: BinaryIO, file: str, names: Sequence[str]) -> list[Ex
 def _overview(stream: BinaryIO) -> dict[str, Any]:
     with _opened(stream) as source:
         rows = {name: _text(source, name) for name in ("skins", "rigs")}
+        rows |= {name: _text(source, name) for name in ("diagnoses", "models") if name in source}
         return {"skin": str(source.attrs["skin"]), **rows, "campaigns": list(source["campaigns"])}
 
 

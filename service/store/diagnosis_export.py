@@ -1,0 +1,179 @@
+"""Diagnoses that have ended, and the models adopted from them, in a skin's export: out, checked, and in.
+
+What waits or runs stays behind: it is asked for again elsewhere. Figures derived with models are computed again.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from sqlalchemy import Connection, insert, select
+
+from service.store import skins
+from service.store.codec import compressed, decompressed
+from service.store.engine import Database
+from service.store.errors import Conflict
+from service.store.tables import AnyRow, campaigns, diagnoses, models
+
+Text = Annotated[str, StringConstraints(max_length=4000)]
+Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^/\x00-\x1f]+$")]
+Time = Annotated[str, StringConstraints(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z$")]
+Share = Annotated[float, Field(ge=0, le=1, strict=False)]
+Number = Annotated[float, Field(allow_inf_nan=False, strict=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=False)]
+
+_ENDED = ("done", "failed", "cancelled")
+_DIAGNOSIS = (
+    "id", "excluded", "table_sha256", "version", "state", "progress", "asked_at", "asked_from", "started_at",
+    "ended_at", "reason", "verdict", "probability",
+)  # fmt: skip
+_MODEL = ("id", "skin_id", "version", "adopted_at", "adopted_from")
+
+
+class _Row(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class _Parameter(BaseModel):
+    name: str
+    value: Number
+    low: Number
+    high: Number
+
+
+class _Mechanism(BaseModel):
+    name: str
+    probability: Share
+    parameters: list[_Parameter]
+
+
+class _D33(BaseModel):
+    low: Positive
+    high: Positive
+
+
+class _Report(BaseModel):
+    """What is read again of a report; the rest is handed on."""
+
+    document: Literal["report/1"] = Field(alias="schema")
+    verdict: Literal["no_mismatch", "explained", "ambiguous", "unexplained", "insufficient_data"]
+    probability: Share
+    statement: str
+    mechanisms: list[_Mechanism]
+    fit: dict[str, Any] | None
+    d33: _D33 | None
+    provenance: dict[str, Any]
+
+
+class DiagnosisRow(_Row):
+    """A row of diagnoses."""
+
+    id: Annotated[str, StringConstraints(pattern=r"^d-[0-9a-f]{16}$")]
+    campaign_id: Id
+    excluded: int = Field(ge=0)
+    table_sha256: Text
+    version: Text
+    state: Literal["done", "failed", "cancelled"]
+    progress: Share
+    asked_at: Time
+    asked_from: Text | None
+    started_at: Time | None
+    ended_at: Time
+    reason: Text | None
+    verdict: Text | None
+    probability: Share | None
+    report: dict[str, Any] | None
+
+
+class ModelRow(_Row):
+    """A row of models."""
+
+    id: Annotated[str, StringConstraints(pattern=r"^m-[0-9a-f]{16}$")]
+    skin_id: Id
+    version: int = Field(ge=1)
+    diagnosis_id: Id
+    adopted_at: Time
+    adopted_from: Text | None
+
+
+@dataclass(frozen=True)
+class Checked:
+    """Diagnoses and models of an export that hold together."""
+
+    diagnoses: Sequence[DiagnosisRow]
+    models: Sequence[ModelRow]
+
+
+def exported(connection: Connection, root: str) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Diagnoses and models of a skin and of those joined to it, as an export has them."""
+    of_skin = skins.members(root)
+    query = select(diagnoses, campaigns.c.id.label("campaign_id")).join(campaigns)
+    query = query.where(campaigns.c.skin_id.in_(of_skin), diagnoses.c.state.in_(_ENDED))
+    found = [_diagnosis(row) for row in connection.execute(query.order_by(diagnoses.c.number))]
+    query = select(models, diagnoses.c.id.label("diagnosis_id")).join(diagnoses).where(models.c.skin_id.in_(of_skin))
+    return found, [_model(row) for row in connection.execute(query.order_by(models.c.number))]
+
+
+def checked(
+    found: Sequence[Mapping[str, Any]], adopted: Sequence[Mapping[str, Any]], campaign_ids: Sequence[str],
+    skin_ids: Sequence[str],
+) -> Checked:  # fmt: skip
+    """The rows of an export; raises pydantic's ValidationError, or KeyError where one refers to what is not there."""
+    rows = [DiagnosisRow.model_validate(row) for row in found]
+    model_rows = [ModelRow.model_validate(row) for row in adopted]
+    for row in rows:
+        if row.campaign_id not in set(campaign_ids):
+            raise KeyError(f"diagnosis {row.id}: campaign {row.campaign_id}")
+        if (row.state == "done") != (row.report is not None):
+            raise KeyError(f"diagnosis {row.id}: report")
+        if row.report is not None and _Report.model_validate(row.report).verdict != row.verdict:
+            raise KeyError(f"diagnosis {row.id}: verdict")
+    explained = {row.id for row in rows if row.verdict == "explained" and row.report and row.report["d33"]}
+    for model in model_rows:
+        if model.diagnosis_id not in explained or model.skin_id not in set(skin_ids):
+            raise KeyError(f"model {model.id}")
+    return Checked(rows, model_rows)
+
+
+def require_same(connection: Connection, file: Checked) -> None:
+    """Raises Conflict where a diagnosis or a version of a model is there already and differs."""
+    for row in file.diagnoses:
+        found = connection.execute(
+            select(diagnoses, campaigns.c.id.label("campaign_id")).join(campaigns).where(diagnoses.c.id == row.id)
+        ).first()
+        if found is not None and _diagnosis(found) != row.model_dump():
+            raise Conflict(f"Diagnosis {row.id!r} is there already and differs; nothing was imported.")
+    for model in file.models:
+        same = (models.c.id == model.id) | ((models.c.skin_id == model.skin_id) & (models.c.version == model.version))
+        query = select(models, diagnoses.c.id.label("diagnosis_id")).join(diagnoses).where(same)
+        for found in connection.execute(query):
+            if _model(found) != model.model_dump():
+                text = f"Model {model.version} of skin {model.skin_id!r} is there already and differs"
+                raise Conflict(f"{text}; nothing was imported.")
+
+
+def add(store: Database, file: Checked) -> None:
+    """Keep what is not there; the skins and campaigns are."""
+    with store.writing() as connection:
+        for row in file.diagnoses:
+            if connection.execute(select(diagnoses.c.number).where(diagnoses.c.id == row.id)).first() is None:
+                number = select(campaigns.c.number).where(campaigns.c.id == row.campaign_id)
+                values = row.model_dump(exclude={"campaign_id", "report"})
+                report = None if row.report is None else compressed(row.report)
+                campaign = connection.execute(number).scalar_one()
+                connection.execute(insert(diagnoses), {**values, "campaign": campaign, "report": report})
+        for model in file.models:
+            if connection.execute(select(models.c.number).where(models.c.id == model.id)).first() is None:
+                number = select(diagnoses.c.number).where(diagnoses.c.id == model.diagnosis_id)
+                values = model.model_dump(exclude={"diagnosis_id"})
+                connection.execute(insert(models), {**values, "diagnosis": connection.execute(number).scalar_one()})
+
+
+def _diagnosis(row: AnyRow) -> dict[str, Any]:
+    report = None if row.report is None else decompressed(row.report)
+    return {name: getattr(row, name) for name in _DIAGNOSIS} | {"campaign_id": row.campaign_id, "report": report}
+
+
+def _model(row: AnyRow) -> dict[str, Any]:
+    return {name: getattr(row, name) for name in _MODEL} | {"diagnosis_id": row.diagnosis_id}

@@ -1,0 +1,120 @@
+"""What the client answers, in columns, and what it takes beside them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from underskin.units import Finding, Floats
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What every answer in columns says: the model, the table's hash (None where none was read), status per row."""
+
+    model: str
+    table_sha256: str | None
+    status: NDArray[np.str_]
+
+
+@dataclass(frozen=True)
+class SigmaAnswer(Answer):
+    """σ and the bound on its relative error."""
+
+    sigma: Floats
+    rel_error: Floats
+
+
+@dataclass(frozen=True)
+class PressedSkinAnswer(Answer):
+    """What reaches the sensor; units as the names say, the rest dimensionless."""
+
+    contact_radius_mm: Floats
+    a_over_h: Floats
+    rt_over_h: Floats
+    load_parameter: Floats
+    sigma: Floats
+    rel_error: Floats
+    mean_stress_mpa: Floats
+
+
+@dataclass(frozen=True)
+class FrfAnswer(PressedSkinAnswer):
+    """The FRF on the plateau and, where frequencies were given, its parts with one more axis for them."""
+
+    frf_pc_per_n: Floats
+    model_id: str | None = None
+    frequency_hz: Floats | None = None
+    frf_re_pc_per_n: Floats | None = None
+    frf_im_pc_per_n: Floats | None = None
+
+
+@dataclass(frozen=True)
+class D33Answer(PressedSkinAnswer):
+    """d33 with its standard uncertainty, and the plateau that was inverted."""
+
+    frf_pc_per_n: Floats
+    frf_uncertainty_pc_per_n: Floats
+    d33_pc_per_n: Floats
+    d33_uncertainty_pc_per_n: Floats
+    findings: tuple[Finding, ...] = ()
+    model_id: str | None = None
+    frf_im_pc_per_n: Floats | None = None
+
+
+@dataclass(frozen=True)
+class StressAnswer(Answer):
+    """What each sensor bears: ids, places, charge with the table's error, and stress (compression positive)."""
+
+    sensor: tuple[str, ...]
+    x_mm: Floats
+    y_mm: Floats
+    charge_pc: Floats
+    charge_error_pc: Floats
+    mean_stress_mpa: Floats
+    reach_mm: float | None
+
+
+@dataclass(frozen=True)
+class Adopted:
+    """The model that was adopted for a skin, and what it may need of each row (`client.skins.model(...)["needs"]`)."""
+
+    skin_id: str
+    sensor: str | None = None
+    offset_x_mm: ArrayLike | None = None
+    offset_y_mm: ArrayLike | None = None
+    dynamic_force_n: ArrayLike | None = None
+    dwell_s: ArrayLike | None = None
+    load_cycles: ArrayLike | None = None
+
+    def columns(self) -> dict[str, ArrayLike | None]:
+        """Its columns."""
+        names = ("offset_x_mm", "offset_y_mm", "dynamic_force_n", "dwell_s", "load_cycles")
+        return {name: getattr(self, name) for name in names}
+
+    def shared(self) -> dict[str, str | None]:
+        """What holds for all rows."""
+        return {"model": "adopted", "skin_id": self.skin_id, "sensor": self.sensor}
+
+
+@dataclass(frozen=True)
+class TableAxis:
+    """One axis of a table: limits (included) and the number of nodes."""
+
+    name: str
+    low: float
+    high: float
+    nodes: int
+
+
+@dataclass(frozen=True)
+class TableEntry:
+    """A table in use: its quantity, format, hash, axes, and how it was made."""
+
+    name: str
+    table_schema: str
+    table_sha256: str
+    axes: tuple[TableAxis, ...]
+    about: Mapping[str, Any]
