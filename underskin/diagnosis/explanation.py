@@ -23,7 +23,7 @@ _QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7
 _KEPT_STARTS = 3
 _DECIDED = 0.999  # probability beyond which a parent's positioning scatter, or none, is its offspring's
 _POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
-_SHORT = 3  # iterations of a trial
+_SHORT = 2  # iterations of a trial
 _LEAST_GAIN = 1.0  # in log posterior density
 _LEAST_SCATTER = 3e-3  # relative effect of positioning scatter on a recording below which it is not looked for
 
@@ -185,7 +185,6 @@ def _placed_start(fitter: Fitter, at: Evaluated) -> Point:
     gain, level, *own = at.point.covariance
     tried = []
     for position in _POSITION_STARTS:
-        for scatter in (gain, GAIN_PRIOR.middle):
-            covariance = np.array([scatter, level, np.log(position), *own])
-            tried.append(fitter.improve(replace(at.point, covariance=covariance), _SHORT))
+        covariance = np.array([min(gain, GAIN_PRIOR.middle), level, np.log(position), *own])
+        tried.append(fitter.improve(replace(at.point, covariance=covariance), _SHORT))
     return min(tried, key=lambda entry: entry.cost).point

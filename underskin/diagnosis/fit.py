@@ -251,7 +251,7 @@ class Fitter:
             step = -vectors @ ((vectors.T @ gradient) / np.maximum(np.abs(eigenvalues), 1.0))
             step *= min(1.0, 0.7 / max(np.abs(step).max(), 1e-12))
             for _ in range(4):
-                point = self._moved(at.point, np.clip(at.point.covariance + step, low, high))
+                point = self.moved(at.point, np.clip(at.point.covariance + step, low, high))
                 tried = self._weigh(point, at.predicted_at, at.prediction, at.moments)
                 if tried.cost < at.cost:
                     break
@@ -263,7 +263,8 @@ class Fitter:
                 break
         return at
 
-    def _moved(self, point: Point, covariance: Floats) -> Point:
+    def moved(self, point: Point, covariance: Floats) -> Point:
+        """The point with other covariance parameters, a mechanism's own among the coordinates of the fit."""
         return replace(point, covariance=covariance, fit=self._with_own(point.fit, covariance))
 
     def covariance_equations(self, at: Evaluated) -> tuple[Floats, Floats]:
@@ -277,7 +278,7 @@ class Fitter:
         centre = np.clip(here, low, high)
 
         def cost(change: Floats) -> float:
-            point = self._moved(at.point, centre + change)
+            point = self.moved(at.point, centre + change)
             return self._weigh(point, at.predicted_at, at.prediction, at.moments).cost
 
         middle = at.cost if (centre == here).all() else cost(np.zeros(count))
