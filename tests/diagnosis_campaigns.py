@@ -19,13 +19,13 @@ class Made:
     mechanisms: Sequence[str] = ()
     parameters: Sequence[float] = ()
     preloads_n: Sequence[float] = (0.3, 0.6, 1.2, 2.4)
-    spheres_mm: Sequence[float] = (3.0, 6.0)
+    spheres_mm: Sequence[float] = (4.0, 8.0)
     offsets_mm: Sequence[float] = (0.0,)
     sensors: int = 2
     repeats: int = 1
     lines: int = 12
     highest_hz: float = 130.0
-    modulus_mpa: float = 1.0
+    modulus_mpa: float = 3.0
     thickness_mm: float = 2.0
     sensor_radius_mm: float = 1.0
     d33_pc_per_n: float = 15.0

@@ -113,7 +113,7 @@ def test_the_same_input_gives_the_same_report(table: SigmaTable) -> None:
 
 def test_twins_are_reported_as_such(table: SigmaTable) -> None:
     """At one amplitude a moving edge and a finite amplitude cannot be told apart; neither is guessed."""
-    made = replace(SENSORS, mechanisms=("moving_contact_edge",), parameters=(0.9,), modulus_mpa=0.6)
+    made = replace(SENSORS, mechanisms=("moving_contact_edge",), parameters=(0.9,), thickness_mm=1.2)
     report = diagnosis_report(campaign(made, table), table)
     assert report["verdict"] == "ambiguous"
     pairs = [{entry["mechanism"], entry["confounded_with"]} for entry in report["not_identifiable"]]
@@ -167,9 +167,9 @@ def test_too_little_is_said_to_be_too_little(count: int, table: SigmaTable) -> N
     assert "at least 2" in report["statement"]
 
 
-@pytest.mark.parametrize("count", [2, 3, 5])
+@pytest.mark.parametrize("count", [2, 5])
 def test_few_recordings_or_one_line_never_crash(count: int, table: SigmaTable) -> None:
-    for count_of_lines in (1, 2, 9):
+    for count_of_lines in (1, 9):
         whole = campaign(replace(SENSORS, lines=count_of_lines), table)
         report = diagnosis_report(replace(whole, recordings=whole.recordings[:count]), table)
         assert report["verdict"] in ("no_mismatch", "insufficient_data")
@@ -190,16 +190,15 @@ def test_the_command_writes_a_report_for_each_readable_file(tmp_path: Path, tabl
 
 
 def test_a_plan_separates_what_is_confusable(tmp_path: Path, table: SigmaTable) -> None:
-    made = replace(SENSORS, mechanisms=("strain_stiffening",), parameters=(6.0,), modulus_mpa=0.8)
+    made = replace(SENSORS, mechanisms=("strain_stiffening",), parameters=(8.0,), modulus_mpa=2.7)
     file = tmp_path / "palm.json"
     file.write_text(json.dumps(to_dict(campaign(made, table))), encoding="utf-8")
     result = CliRunner().invoke(app, ["plan", str(file), "--preload-n", "0.2", "3.0", "--recordings", "4"])
     assert result.exit_code == 0
     planned = json.loads(result.stdout)
-    if planned:
-        assert planned["probability_of_deciding"] > planned["without_it"]
-        assert sum(entry["repeats"] for entry in planned["recordings"]) <= 4
-        assert all(0.2 <= entry["preload_n"] <= 3.0 for entry in planned["recordings"])
+    assert planned["probability_of_deciding"] > planned["without_it"]
+    assert sum(entry["repeats"] for entry in planned["recordings"]) <= 4
+    assert all(0.2 <= entry["preload_n"] <= 3.0 for entry in planned["recordings"])
 
 
 @pytest.mark.skipif(SHARED is None, reason="UNDERSKIN_CAMPAIGNS is not set")

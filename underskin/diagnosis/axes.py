@@ -4,8 +4,8 @@ from datetime import datetime
 
 import numpy as np
 
-from underskin.mechanisms.frf_design import frf_recordings, offsets
-from underskin.recordings.campaign import Campaign
+from underskin.mechanisms.frf_design import offsets
+from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.units import Floats
 
 _LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n")
@@ -18,17 +18,19 @@ def recording_axes(campaign: Campaign) -> dict[str, Floats]:
     `position_mm` is the contact's place seen from the sensor's centre, `sensor` the sensor's own place on the skin
     [mm], `recorded_at` is in hours from the first. An axis that a recording lacks is left out.
     """
-    entries = frf_recordings(campaign)
+    entries = campaign.recordings
     found: dict[str, Floats] = {}
     for name in (*_LOGARITHMIC, *_FROM_ZERO):
-        values = [getattr(entry, name) for entry in entries]
+        values = [getattr(entry, name, None) for entry in entries]
         if None in values:
             continue
         column = np.array(values, dtype=float)
         found[name] = (np.log(column) if name in _LOGARITHMIC else np.log1p(column))[:, None]
-    found["position_mm"] = 1e3 * offsets(campaign)
-    places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-    found["sensor"] = np.array([places[entry.sensor] for entry in entries])
+    pressed = [entry for entry in entries if isinstance(entry, FrfRecording)]
+    if pressed:
+        found["position_mm"] = 1e3 * offsets(campaign)
+        places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
+        found["sensor"] = np.array([places[entry.sensor] for entry in pressed])
     times = [entry.recorded_at for entry in entries]
     if None not in times:
         found["recorded_at"] = hours(times)[:, None]

@@ -38,7 +38,9 @@ def confounding(bench: Workbench) -> list[Confounding]:
     base = fitter.evaluate(fitter.start(np.zeros(0)))
     names, signatures = [], []
     for name, mechanism in CATALOGUE.items():
-        parameters = mechanism.parameters(bench.lines.campaign)
+        if bench.kind not in mechanism.kinds:
+            continue
+        parameters = mechanism.parameters(bench.lines.campaign, bench.kind)
         if any(entry.name in COVARIANCE_NAMES for entry in parameters):
             continue
         try:

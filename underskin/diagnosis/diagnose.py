@@ -11,6 +11,7 @@ import scipy
 import underskin
 from underskin.diagnosis import held_out
 from underskin.diagnosis.confounding import confounding
+from underskin.diagnosis.curves import curve_lines
 from underskin.diagnosis.explanation import Workbench
 from underskin.diagnosis.findings import Finding, inspect
 from underskin.diagnosis.lines import lines
@@ -20,9 +21,11 @@ from underskin.diagnosis.remainder import describe
 from underskin.diagnosis.report import Diagnosis, report
 from underskin.diagnosis.residuals import residuals, whole_prediction
 from underskin.diagnosis.search import search
+from underskin.mechanisms.mechanism import Kind
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
 from underskin.surrogate import SigmaTable
 
+_CURVES: tuple[Kind, ...] = ("indentation", "compression")
 _LEAST_RECORDINGS = 2
 _GAIN = 0.022  # the scatter that is expected of recordings before any explanation
 
@@ -38,6 +41,10 @@ def diagnose(
     Raises InvalidInput where the campaign has no FRF recording.
     """
     provenance = _provenance(table)
+    for kind in _CURVES:
+        rows = curve_lines(campaign, kind)
+        if rows.recordings and not any(isinstance(entry, FrfRecording) for entry in campaign.recordings):
+            return _work_out(campaign.name, Workbench(rows, table), [], provenance, progress, limits)
     frf = tuple(entry for entry in campaign.recordings if isinstance(entry, FrfRecording))
     usable, found = inspect(replace(campaign, recordings=frf), table) if frf else (campaign, [])
     kept = [entry for entry in usable.recordings if isinstance(entry, FrfRecording)]
@@ -47,6 +54,18 @@ def diagnose(
         )
         return Diagnosis(campaign.name, found, provenance, lacking=lacking)
     bench = Workbench(lines(usable), table)
+    return _work_out(campaign.name, bench, found, provenance, progress, limits)
+
+
+def _work_out(
+    name: str,
+    bench: Workbench,
+    found: Sequence[Finding],
+    provenance: dict[str, Any],
+    progress: Progress,
+    limits: Limits,
+) -> Diagnosis:
+    """All steps after the rows are known."""
     progress(0.05)
     confounded = confounding(bench)
     result = search(bench)
@@ -70,7 +89,7 @@ def diagnose(
     progress(0.95)
     shape = describe(bench, shown) if leader.explanation is None else ""
     return Diagnosis(
-        campaign.name,
+        name,
         found,
         provenance,
         search=result,

@@ -158,7 +158,7 @@ def _over_lines(bench: Workbench, explanation: Explanation) -> dict[str, float]:
     relative, weight = line_residuals(lines, whole_prediction(bench, explanation))
     noise = _LineNoise(
         float((weight * np.abs(relative) ** 2).sum()),
-        2 * len(relative) - lines.recordings,
+        2 * len(relative) + lines.scatter[1] - lines.recordings,
         level_prior(lines.noise.log_level_sd),
     )
     plain = noise.best(np.zeros(0), np.zeros(0))

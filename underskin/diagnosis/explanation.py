@@ -13,6 +13,7 @@ import numpy as np
 from underskin.diagnosis.curvature import curvature
 from underskin.diagnosis.evidence import Evidence, laplace
 from underskin.diagnosis.fit import Evaluated, Fitter, Hypothesis, Point
+from underskin.diagnosis.likelihood import Curvature
 from underskin.diagnosis.lines import Lines
 from underskin.diagnosis.scatter import GAIN_PRIOR, NO_POSITION, POSITION
 from underskin.mechanisms.catalogue import CATALOGUE
@@ -57,7 +58,7 @@ def own_places(names: Sequence[str], lines: Lines) -> dict[str, slice]:
     places, first = {}, 0
     for name, mechanism in CATALOGUE.items():
         if name in names:
-            count = len(mechanism.parameters(lines.campaign))
+            count = len(mechanism.parameters(lines.campaign, lines.kind))
             places[name] = slice(first, first + count)
             first += count
     return places
@@ -67,16 +68,18 @@ class Workbench:
     """The lines of one campaign, whole and collapsed, and what fitting any set to them needs."""
 
     def __init__(self, lines: Lines, table: SigmaTable) -> None:
-        """Collapse, and work out how σ bends."""
+        """Collapse, and work out how σ bends; curves are not collapsed and have no place."""
         self.lines = lines
-        self.collapsed = lines.collapsed()
+        self.kind = kind = lines.kind
         self.table = table
-        self.curvature = curvature(self.collapsed, table)
+        self.collapsed = lines.collapsed() if kind == "frf" else lines
+        none = np.zeros(lines.recordings)
+        self.curvature = curvature(self.collapsed, table) if kind == "frf" else Curvature(none, none)
 
     def hypothesis(self, names: Sequence[str], placed: bool, *, whole: bool = False) -> Hypothesis:
         """The set's model on the lines that it needs; raises Unsupported."""
         lines = self.lines if whole or any(needs_lines(name) for name in names) else self.collapsed
-        return Hypothesis(compose(names, lines.campaign, self.table, "frf"), lines, self.curvature, placed)
+        return Hypothesis(compose(names, lines.campaign, self.table, self.kind), lines, self.curvature, placed)
 
     def explain(self, names: Sequence[str], parent: Explanation | None = None) -> Explanation | None:
         """The set's explanation; from a parent's, which has one mechanism less, where one is given.
@@ -130,7 +133,8 @@ class Workbench:
 
     def _position_matters(self, at: Evaluated) -> bool:
         slopes = at.prediction.position_slopes
-        assert slopes is not None
+        if slopes is None:
+            return False
         p = POSITION[1]
         size = np.abs(at.prediction.value) ** 2 + 1e-300
         first = (np.abs(slopes) ** 2).sum(axis=0) / size
@@ -146,7 +150,7 @@ class Workbench:
         free: list[int] = []
         axes: list[list[float]] = []
         new = [name for name in places if parent is None or name not in parent.names]
-        parameters = {name: CATALOGUE[name].parameters(lines.campaign) for name in new}
+        parameters = {name: CATALOGUE[name].parameters(lines.campaign, lines.kind) for name in new}
         quantiles = _QUANTILES.get(sum(map(len, parameters.values())), (0.5,))
         for name, place in places.items():
             if name in new:

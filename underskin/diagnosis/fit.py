@@ -22,6 +22,7 @@ _STEP = 0.05  # of the finite differences in the covariance's logarithms
 _LARGEST_STEP = 1.0
 _CONVERGED = 0.01  # in log posterior
 _MOST_ITERATIONS = 25
+_UNDECLARED = 0.2  # sd of the logarithm of a modulus beyond which it is as good as unknown
 _FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
 _BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
 
@@ -129,7 +130,7 @@ class Fitter:
         if self.hypothesis.placed:
             covariance.append(POSITION_PRIOR.middle)
         point = Point(fit, np.array([*covariance, *fit[self._own]]), self.no_bend)
-        place = next((index for index, entry in enumerate(self.parameters) if entry.name == "d33"), None)
+        place = next((index for index, entry in enumerate(self.parameters) if _is_scale(entry)), None)
         if place is not None:
             lines = self.hypothesis.lines
             value = self.hypothesis.model.predict(fit).value
@@ -290,6 +291,13 @@ class Fitter:
                 mixed = cost(steps[a] + steps[b]) - up[a] - up[b] + middle
                 hessian[a, b] = hessian[b, a] = mixed / _STEP**2
         return gradient + hessian @ (here - centre), hessian
+
+
+def _is_scale(entry: Parameter) -> bool:
+    """Whether the response is proportional to it, and little is known of it: d33, or a modulus that nobody declared."""
+    return entry.name == "d33" or (
+        entry.name == "youngs_modulus" and isinstance(entry.prior, Normal) and entry.prior.sd > _UNDECLARED
+    )
 
 
 def _curvature_of_prior(entry: Parameter) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from underskin.mechanisms.mechanism import Unsupported
 from underskin.mechanisms.model import Prediction as Predicted
 from underskin.mechanisms.model import compose
 
+_FURTHEST = 0.6  # of a curve's highest force
 _LEAST_KEPT = 3  # recordings that must remain
 _BEST = 10  # sets among which the choice is repeated
 _BEHIND = 15.0  # nats
@@ -67,8 +68,12 @@ class HeldOut:
 
 def groups(lines: Lines) -> dict[str, NDArray[np.bool_]]:
     """The rows of each group that can be left out, with enough recordings remaining."""
-    entries = frf_recordings(lines.campaign)
     found: dict[str, NDArray[np.bool_]] = {}
+    if lines.curves:
+        # A curve's contact point is its own, so what can be left out is the part of each curve that reaches furthest.
+        highest = np.maximum.reduceat(lines.value.real, lines.first)[lines.recording]
+        return {f"force_n above {_FURTHEST:.0%}": lines.value.real > _FURTHEST * highest}
+    entries = frf_recordings(lines.campaign)
 
     def add(name: str, column: Sequence[float | str | None], last: Callable[[list[float | str]], float | str]) -> None:
         if None in column or len(set(column)) < 2:
@@ -120,7 +125,7 @@ def hold_out(bench: Workbench, ranked: Sequence[Explanation], nothing: Explanati
 def _predict(smaller: Workbench, explanation: Explanation, bench: Workbench, rows: NDArray[np.bool_]) -> Prediction:
     """Some of the rows from a fit to others; sensors that were seen keep the gain that was found for them."""
     left = bench.lines.part(rows)
-    model = compose(explanation.names, bench.lines.campaign, bench.table, "frf")
+    model = compose(explanation.names, bench.lines.campaign, bench.table, bench.kind)
     point, levels = explanation.point, explanation.best.at.marginal.levels
     prediction = _some(model.predict(point.fit), rows)
     seen = np.isin(left.sensor, smaller.lines.sensor)
@@ -128,10 +133,12 @@ def _predict(smaller: Workbench, explanation: Explanation, bench: Workbench, row
     found = explanation.best.at.marginal.sensor_gains
     gains[: len(found)] = found
     value = prediction.value * np.exp(gains[left.sensor])[left.recording]
-    assert prediction.position_slopes is not None
     scatter = levels.gain**2 + np.where(seen, 0.0, levels.spread**2)
-    noise = scatter[left.recording] * np.abs(value) ** 2 + 2 * (levels.level * left.deviation) ** 2
-    noise = noise + levels.position**2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
+    noise = (
+        scatter[left.recording] * np.abs(value) ** 2 + (1 if left.curves else 2) * (levels.level * left.deviation) ** 2
+    )
+    if prediction.position_slopes is not None:
+        noise = noise + levels.position**2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
     if prediction.pickup is not None:
         noise = noise + 2 * prediction.pickup**2
     square = np.abs(left.value - value) ** 2

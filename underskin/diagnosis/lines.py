@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.line_noise import LineNoise, line_noise
+from underskin.mechanisms.composition import kind_of
 from underskin.mechanisms.frf_design import frf_recordings
-from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.mechanisms.mechanism import Kind
+from underskin.recordings.campaign import Campaign, FrfRecording, Recording
 from underskin.recordings.frf_estimation import lines_of
 from underskin.units import Complexes, Floats
 
@@ -41,6 +43,21 @@ class Lines:
     def recordings(self) -> int:
         """How many there are."""
         return len(self.sensor)
+
+    @property
+    def kind(self) -> Kind:
+        """Of the recordings; all are of one kind."""
+        return kind_of(self.campaign)
+
+    @property
+    def curves(self) -> bool:
+        """Whether the rows are samples of force, not lines of an FRF."""
+        return self.kind != "frf"
+
+    @property
+    def row_axes(self) -> tuple[str, ...]:
+        """The axes along which the rows of a recording run."""
+        return ("displacement_mm",) if self.curves else ("frequency_hz", "phase")
 
     @property
     def first(self) -> NDArray[np.intp]:
@@ -73,14 +90,11 @@ class Lines:
     def part(self, kept: NDArray[np.bool_]) -> "Lines":
         """Only some of the rows, each with the noise it had; recordings without a row are left out."""
         recordings = np.unique(self.recording[kept])
-        entries = [frf_recordings(self.campaign)[number] for number in recordings]
+        entries = [self.campaign.recordings[number] for number in recordings]
         rows = [np.flatnonzero(kept & (self.recording == number)) for number in recordings]
         campaign = replace(
             self.campaign,
-            recordings=tuple(
-                _with_lines(entry, self.frequency[own], self.value[own])
-                for entry, own in zip(entries, rows, strict=True)
-            ),
+            recordings=tuple(_with_rows(entry, self, own) for entry, own in zip(entries, rows, strict=True)),
         )
         order = np.concatenate(rows)
         return replace(
@@ -91,6 +105,7 @@ class Lines:
             frequency=self.frequency[order],
             recording=np.repeat(np.arange(len(rows)), [len(own) for own in rows]),
             sensor=self.sensor[recordings],
+            scatter=(0.0, self.scatter[1] and -len(order)),
         )
 
 
@@ -130,6 +145,15 @@ def lines(campaign: Campaign) -> Lines:
         sensor=np.array(sensors, dtype=np.intp),
         noise=noise,
     )
+
+
+def _with_rows(entry: Recording, lines: Lines, own: NDArray[np.intp]) -> Recording:
+    """A recording with only some of its rows, given by their places among all rows."""
+    if isinstance(entry, FrfRecording):
+        return _with_lines(entry, lines.frequency[own], lines.value[own])
+    rows = own - int(np.searchsorted(lines.recording, lines.recording[own[0]]))
+    time = None if entry.time_s is None else entry.time_s[rows]
+    return replace(entry, displacement_mm=entry.displacement_mm[rows], force_n=entry.force_n[rows], time_s=time)
 
 
 def _with_lines(entry: FrfRecording, frequency: Floats, value: Complexes) -> FrfRecording:

@@ -18,7 +18,6 @@ from underskin.diagnosis.discrepancy import frequency_bins
 from underskin.diagnosis.lines import Lines
 from underskin.diagnosis.residuals import Residuals
 from underskin.mechanisms.differentiated import Array
-from underskin.mechanisms.frf_design import frf_recordings
 from underskin.units import Floats
 
 PERMUTATIONS = 999
@@ -71,7 +70,7 @@ def locate(lines: Lines, residuals: Residuals) -> list[AxisResult]:
         found.append(AxisResult(name, (beyond + 1) / (PERMUTATIONS + 1), min(shares[name], 1.0)))
     if lines.recordings < 6:
         why = "fewer than 6 recordings, whose signs could be changed"
-        found += [AxisResult(name, None, 0.0, why) for name in ("frequency_hz", "phase")]
+        found += [AxisResult(name, None, 0.0, why) for name in lines.row_axes]
     return found
 
 
@@ -102,7 +101,7 @@ def _blocks(lines: Lines, bases: dict[str, Floats]) -> dict[str, NDArray[np.intp
     """Within which each axis' recordings may be exchanged: sensors, where each has several values of it; else days."""
     none = np.zeros(lines.recordings, dtype=np.intp)
     days = none
-    times = [entry.recorded_at for entry in frf_recordings(lines.campaign)]
+    times = [entry.recorded_at for entry in lines.campaign.recordings]
     if None not in times:
         days = np.unique([str(time)[:10] for time in times], return_inverse=True)[1].reshape(-1)
     axes = recording_axes(lines.campaign)
@@ -180,7 +179,10 @@ def _sign_flips(lines: Lines, residuals: Residuals, random: np.random.Generator)
         [np.ones((1, lines.recordings)), random.choice([-1.0, 1.0], (PERMUTATIONS, lines.recordings))]
     )
     found = {}
-    for name, part in (("frequency_hz", residuals.line.real), ("phase", residuals.line.imag)):
+    parts = {"frequency_hz": residuals.line.real, "phase": residuals.line.imag}
+    if lines.curves:
+        parts = {"displacement_mm": residuals.line.real}
+    for name, part in parts.items():
         sums = np.zeros((lines.recordings, len(centres)))
         np.add.at(sums, (lines.recording, line), residuals.line_weight * part)
         found[name] = ((signs @ sums) ** 2 / total).sum(axis=1)
@@ -195,7 +197,7 @@ def region(lines: Lines, residuals: Residuals, results: list[AxisResult]) -> dic
     line_misfit = residuals.line_weight * np.abs(residuals.line) ** 2
     if not telling:
         return {}
-    by_line = telling[0].axis in ("frequency_hz", "phase")
+    by_line = telling[0].axis in lines.row_axes
     misfit = line_misfit if by_line else recording_misfit
     columns = {}
     for entry in telling:
@@ -230,7 +232,10 @@ def _field(lines: Lines, name: str, by_line: bool) -> Array | None:
     """A field's values in lab units, of each row or of each recording; the distance in mm stands for a position."""
     if name == "frequency_hz":
         return lines.frequency if by_line else None
-    entries = frf_recordings(lines.campaign)
+    entries = lines.campaign.recordings
+    if name == "displacement_mm":
+        curves = [np.asarray(getattr(entry, name)) for entry in entries]
+        return np.concatenate(curves) if by_line else None
     column: Array
     if name == "position_mm":
         x, y = recording_axes(lines.campaign)[name].T

@@ -98,7 +98,7 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
         ],
         "findings": findings + _at_bounds(leader, named),
         "fit": _fit(diagnosis, shown),
-        "d33": _parameter(shown, _place(shown, "d33")),
+        "d33": None if diagnosis.bench.lines.curves else _parameter(shown, _place(shown, "d33")),
         "next_experiment": dict(diagnosis.next_experiment) or None,
         "provenance": dict(diagnosis.provenance),
     }
