@@ -6,6 +6,7 @@ penalty on the penetration gives first and Uzawa's iteration corrects. Lengths i
 points are (z, r).
 """
 
+import warnings
 from collections.abc import Sequence
 
 import felupe
@@ -16,9 +17,9 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from tests.felupe_layer import RIM, FelupeLayer, Floats, quadratic_mesh
 
-PENALTY = 1e4  # of G over the thickness
+_PENALTY = 1e4  # of G over the thickness
+_FIRST_STEP = 1 / 12  # of the indentation
 _CORRECTIONS = 1  # leaves a hundredth of the penetration, or less
-_STEPS = 8  # half as many diverge
 _GAUSS = np.polynomial.legendre.leggauss(2)
 
 
@@ -55,7 +56,7 @@ class Sphere:
         u = np.einsum("qn,enc->eqc", self.shape, self.field[0].values[self.edges])
         places = np.stack([u[..., 0] + self.indentation - self.radius, self.r + u[..., 1]], axis=-1)
         distance = np.hypot(places[..., 0], places[..., 1])
-        pressure = np.clip(self.multiplier + PENALTY * (self.radius - distance), 0, None)
+        pressure = np.clip(self.multiplier + _PENALTY * (self.radius - distance), 0, None)
         return pressure, places / distance[..., None], places
 
     def correct(self) -> None:
@@ -74,7 +75,7 @@ class Sphere:
         outer = normal[..., :, None] * normal[..., None, :]
         distance = np.hypot(places[..., 0], places[..., 1])[..., None, None]
         touching = (pressure > 0)[..., None, None]
-        tangent = touching * (PENALTY * outer - pressure[..., None, None] / distance * (np.eye(2) - outer))
+        tangent = touching * (_PENALTY * outer - pressure[..., None, None] / distance * (np.eye(2) - outer))
         blocks = np.einsum("eq,qm,qn,eqcd->emcnd", self.weight, self.shape, self.shape, tangent)
         numbers = (2 * self.edges[..., None] + np.arange(2)).reshape(len(self.edges), -1)
         rows = np.broadcast_to(numbers[:, :, None], (*numbers.shape, numbers.shape[1]))
@@ -90,24 +91,47 @@ def press(radius: float, indentation: float, a: float, rho: Sequence[float]) -> 
     """
     layer = FelupeLayer(a, _mesh(a))
     sphere = Sphere(layer.field, layer._nodes(1.0), radius)
-    for share in [*np.linspace(0, 1, _STEPS + 1)[1:], *[1.0] * _CORRECTIONS]:
-        if share == 1.0:
-            sphere.correct()
-        sphere.indentation = share * indentation
-        layer.field = felupe.newtonraphson(
-            x0=layer.field,
-            items=[layer.body, sphere],
-            dof0=layer.held,
-            dof1=layer.free,
-            ext0=layer.prescribed,
-            tol=1e-5,
-            maxiter=40,
-            verbose=0,
-        ).x
+    reached, step = 0.0, _FIRST_STEP
+    while reached < 1:
+        goal = min(1.0, reached + step)
+        sphere.indentation = goal * indentation
+        if not _solved(layer, sphere, goal / reached if reached else 1.0):
+            step /= 2
+            assert step > 1e-3
+            continue
+        reached = goal
+    for _ in range(_CORRECTIONS):
+        sphere.correct()
+        assert _solved(layer, sphere, 1.0)
     profile = layer._base_stress()
     primitive = profile.antiderivative()
     means = np.array([(primitive(x**2) - primitive(0.0)) / x**2 for x in rho])
     return sphere.force, sphere.contact_radius, 2 * np.pi / 3 * means / sphere.force
+
+
+def _solved(layer: FelupeLayer, sphere: Sphere, factor: float) -> bool:
+    """Newton's method from `factor` times the present state; where it fails, that state is back as it was."""
+    before = [part.values.copy() for part in layer.field.fields]
+    for part in layer.field.fields[:2]:  # displacement and pressure; the third is the ratio of volumes
+        part.values *= factor
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # an iteration that has left all bounds
+            felupe.newtonraphson(
+                x0=layer.field,
+                items=[layer.body, sphere],
+                dof0=layer.held,
+                dof1=layer.free,
+                ext0=layer.prescribed,
+                tol=1e-5,
+                maxiter=40,
+                verbose=0,
+            )
+    except (Warning, RuntimeError, felupe.tools._newton.NewtonConvergenceError):
+        for part, values in zip(layer.field.fields, before, strict=True):
+            part.values[:] = values
+        return False
+    return True
 
 
 def _mesh(a: float) -> felupe.Mesh:
