@@ -4,7 +4,7 @@ import logging
 from collections.abc import Sequence
 from typing import Any
 
-from service.d33_models import of_inversion
+from service.d33_models import of_inversion, of_moduli
 from service.store import campaigns, inversions
 from service.store.engine import Database, StorageFull
 from service.store.tables import AnyRow
@@ -19,6 +19,7 @@ Band = tuple[float, float]
 _NOTHING: dict[str, Any] = dict.fromkeys(
     ("band", "array", "sensor_spread_percent", "gain_scatter_percent", "position_scatter_mm", "declared_percent")
 )
+_EMPTY: dict[str, Any] = {"sensors": [], "cells": [], "findings": []}
 
 
 def answer(store: Database, table: SigmaTable, row: AnyRow, band_hz: Band | None) -> dict[str, Any]:
@@ -58,15 +59,17 @@ def complete(store: Database, table: SigmaTable, root: str) -> None:
 def _inverted(campaign: Campaign, table: SigmaTable, band_hz: Band | None) -> dict[str, Any]:
     # Imported here: statistics take half a second to load, which a start need not wait for.
     from underskin.inversion import invert
+    from underskin.recordings import elastomer
 
+    moduli, silent = of_moduli(elastomer.of_campaign(campaign))
     try:
         found = invert(campaign, table, band_hz)
     except InvalidInput as error:
         if band_hz is not None and error.field == "band_hz":
             raise
-        return {**_NOTHING, "status": "none", "reason": str(error), "sensors": [], "cells": [], "left_out": []}
+        return {**_NOTHING, "status": "none", "reason": str(error), **_EMPTY, "moduli": moduli, "left_out": silent}
     left_out = [{"recording": None, "reason": reason} for reason in found.left_out]
-    return {**of_inversion(found), "left_out": left_out}
+    return {**of_inversion(found), "moduli": moduli, "left_out": left_out + silent}
 
 
 def _keep(store: Database, row: AnyRow, document: dict[str, Any]) -> None:

@@ -24,7 +24,7 @@ from underskin.response import gain
 from underskin.sensor_flags import Flag, standing_out, unfit
 from underskin.skin import Indenter, Skin
 from underskin.surrogate import SigmaTable
-from underskin.units import Floats, to_si
+from underskin.units import Floats, findings, to_lab, to_si
 
 _MODULUS_UNSURE, _THICKNESS_UNSURE = 0.02, 0.01  # PHYSICS, section 8: what a declared value may be off by
 
@@ -74,7 +74,7 @@ class Inversion:
     gain: Estimate | None
     position: Estimate | None
     left_out: tuple[str, ...]  # in words, each sensor or recording that the campaign's d33 does without
-    findings: tuple[str, ...]  # in words, what was wrong with time series that were used all the same
+    findings: tuple[str, ...]  # in words, what looked wrong and was used all the same
     declared_percent: float  # change of d33 for E 2 % and h 1 % off, in quadrature
 
 
@@ -115,12 +115,18 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
         inside=inside,
     )
     found = _estimated(ids, rows, contact, zone)
-    findings = (
+    return replace(found, left_out=(*refused, *found.left_out), findings=_findings(recorded, measured, level))
+
+
+def _findings(recorded: Sequence[FrfRecording], measured: Sequence[Frf], level: Floats) -> tuple[str, ...]:
+    """In words, what is wrong with time series, and a level that looks like a slip of units."""
+    defects = [
         f"recording {item.id}: {defect.statement}"
         for item, frf in zip(recorded, measured, strict=True)
         for defect in frf.found
-    )
-    return replace(found, left_out=(*refused, *found.left_out), findings=tuple(findings))
+    ]
+    typical = to_lab("frf_pc_per_n", np.nanmedian(np.abs(level)))
+    return (*defects, *(f"FRF, median of the recordings: {one.statement}" for one in findings("frf_pc_per_n", typical)))
 
 
 def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfRecording], list[str]]:
