@@ -123,8 +123,8 @@ def _array(found: Inversion) -> Table:
         listed.add_row("d33 of the array", f"{value:.4g} ± {uncertainty:.2g} pC/N (95 %: {low:.4g} to {high:.4g})")
     for name, scatter, factor, unit in (
         ("spread over sensors", found.spread, 100.0, "%"),
-        ("gain of a recording", found.gain, 100.0, "%"),
-        ("position of the sphere", found.position, 1e3, "mm"),
+        ("scatter of gain", found.gain, 100.0, "%"),
+        ("scatter of position", found.position, 1e3, "mm"),
     ):
         if scatter is not None:
             value, low, high = (factor * float(part) for part in (scatter.value, scatter.low, scatter.high))

@@ -1,5 +1,6 @@
 """The commands that send campaigns to the service and fetch skins from it: import and export."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -35,14 +36,14 @@ def import_files(
     from rich.progress import Progress
 
     refused = 0
-    with _client(url, key) as client, Progress(console=Console(stderr=True)) as progress:
-        task = progress.add_task("importing", total=len(files))
-        for file in files:
-            lines = _sent(client, file, skin, rig, all_or_nothing)
-            refused += sum(not good for good, _ in lines)
-            for _, line in lines:
-                progress.console.print(f"{file}: {line}", markup=False, highlight=False)
-            progress.advance(task)
+    console = Console(stderr=True)
+    # The bar may take what is written to a terminal, to stay below it, but not what goes into a pipe.
+    bar = Progress(console=console, disable=not console.is_terminal, redirect_stdout=sys.stdout.isatty())
+    with _client(url, key) as client, bar:
+        for file in bar.track(files, description="importing"):
+            for good, line in _sent(client, file, skin, rig, all_or_nothing):
+                refused += not good
+                typer.echo(f"{file}: {line}", err=not good)
     if refused:
         raise typer.Exit(2)
 
@@ -57,10 +58,11 @@ def export_skin(
     from rich.console import Console
     from rich.progress import DownloadColumn, Progress, TextColumn
 
-    columns = (TextColumn("exporting"), DownloadColumn())
-    with _client(url, key) as client, Progress(*columns, console=Console(stderr=True)) as progress:
-        task = progress.add_task("", total=None)
-        client.skins.export(skin, file, lambda count: progress.advance(task, count))
+    console = Console(stderr=True)
+    bar = Progress(TextColumn("exporting"), DownloadColumn(), console=console, disable=not console.is_terminal)
+    with _client(url, key) as client, bar:
+        task = bar.add_task("", total=None)
+        client.skins.export(skin, file, lambda count: bar.advance(task, count))
     typer.echo(f"{file}: {file.stat().st_size / 1e6:.1f} MB")
 
 
@@ -79,8 +81,10 @@ def _sent(
             brought = client.skins.load(file)
             return [(True, f"skin {brought['skin_id']}: {brought['kept']} campaigns, {brought['present']} were there")]
         results = client.campaigns.post_files([file], skin=skin, rig=rig, all_or_nothing=all_or_nothing)
-    except (UnderskinError, OSError) as error:
+    except UnderskinError as error:
         return [(False, str(error))]
+    except OSError as error:
+        return [(False, f"cannot be opened: {error.strerror}")]
     return [line for result in results for line in _told(result)]
 
 

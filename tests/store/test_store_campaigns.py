@@ -146,6 +146,16 @@ def test_lists_are_paged_and_filtered(server: Server) -> None:
     assert server.http.get("/v1/campaigns?recorded_from=yesterday").status_code == 422
 
 
+def test_letters_beyond_ascii_are_found_in_either_case(server: Server) -> None:
+    post(server, campaign("Übung Eins"), skin="Äußere Haut")
+    for text in ("Übung", "übung", "ÜBUNG EINS"):
+        assert [entry["name"] for entry in listed(server, name_contains=text)] == ["Übung Eins"], text
+    for text in ("Äuß", "äußere"):
+        found = server.http.get("/v1/skins", params={"id_contains": text}).json()["skins"]
+        assert [entry["id"] for entry in found] == ["Äußere Haut"], text
+    assert listed(server, name_contains="ubung") == []
+
+
 def test_a_withdrawn_campaign_stays_and_says_why(server: Server) -> None:
     name = post(server, campaign("wrong sphere"))["id"]
     answer = server.http.post(f"/v1/campaigns/{name}/withdraw", json={"reason": "the sphere was the other one"})

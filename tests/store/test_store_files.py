@@ -119,4 +119,11 @@ def test_no_name_from_a_client_becomes_a_path(server: Server, tmp_path: Path) ->
     assert answer.status_code == 201
     assert not target.exists()
     kept = {path.name for path in server.place.folder.iterdir()}
-    assert kept <= {"underskin.sqlite3", "underskin.sqlite3-wal", "underskin.sqlite3-shm", "uploads", "migration.lock"}
+    assert kept <= {
+        "underskin.sqlite3",
+        "underskin.sqlite3-wal",
+        "underskin.sqlite3-shm",
+        "underskin.sqlite3.lock",
+        "uploads",
+        "migration.lock",
+    }

@@ -21,6 +21,8 @@ Model = TypeVar("Model")
 Check = Callable[[str, Any, bool], Any]  # name, value, units_checked
 
 LONGEST_NAME = 200
+_LARGEST_COUNT = 2**53
+_FREQUENCIES_HZ = (1e-6, 1e9)
 _COHERENCE_ROUNDING = 1e-6  # single-precision instruments write 1.0000001
 
 
@@ -135,10 +137,10 @@ def poisson_ratio(field: str, value: Any, units_checked: bool) -> float:  # noqa
 
 
 def count(field: str, value: Any, units_checked: bool) -> int:  # noqa: ARG001
-    """A whole number, 0 or greater."""
+    """A whole number, 0 to 2⁵³: as far as floats, and so JSON, hold every one."""
     result = number(field, value)
-    if result < 0 or not result.is_integer():
-        raise InvalidInput(field, shown(value), "must be a whole number, 0 or greater")
+    if result < 0 or not result.is_integer() or int(value) > _LARGEST_COUNT:
+        raise InvalidInput(field, shown(value), f"must be a whole number, 0 to {_LARGEST_COUNT}")
     return int(value)
 
 
@@ -181,9 +183,11 @@ def increasing(field: str, value: Any, units_checked: bool) -> Floats:
 
 
 def frequencies(field: str, value: Any, units_checked: bool) -> Floats:
-    """An increasing column of frequencies above 0."""
+    """An increasing column of frequencies above 0, from far below to far above what any instrument records."""
     column = increasing(field, value, units_checked)
     _refuse_where(field, column, column <= 0, "must be greater than 0 (leave out the line at 0 Hz)")
+    low, high = _FREQUENCIES_HZ
+    _refuse_where(field, column, (column < low) | (column > high), f"must be {low:g} to {high:g} Hz")
     return column
 
 

@@ -135,7 +135,7 @@ def band_average(stacks: Sequence[Stack], zone: FlatZone) -> tuple[Floats, Float
         total = weight.sum(axis=1)
         value = (weight * real).sum(axis=1) / total
         rest = real - value[:, None]
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             effective = total**2 / (weight**2).sum(axis=1)
             unbiased = effective / (effective - 1)
             mean[stack.rows] = value
