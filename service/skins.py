@@ -65,7 +65,7 @@ def history(skin_id: SkinId, store: Store, table: Table) -> models.History:
         root = skins.require_root(connection, skin_id)
     inverting.complete(store, table, root)
     with store.reading() as connection:
-        return histories.history(connection, root)
+        return histories.history(connection, root, table.sha256)
 
 
 def _detail(connection: Connection, skin_id: str) -> models.SkinDetail:

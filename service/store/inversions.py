@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import Connection, delete, insert, select
+from sqlalchemy import ColumnElement, Connection, delete, insert, select
 
 from service.store import skins
 from service.store.codec import compressed, decompressed
@@ -29,7 +29,9 @@ def keep(
     sensors: Mapping[str, tuple[float, float]],
 ) -> None:
     """Keep an answer and d33 with its standard uncertainty [pC/N] by sensor, unless the campaign changed since."""
-    query = select(campaigns.c.revision).where(campaigns.c.number == campaign.number).with_for_update()
+    # The id too: after a restore, a number may be another campaign's.
+    same = (campaigns.c.number == campaign.number) & (campaigns.c.id == campaign.id)
+    query = select(campaigns.c.revision).where(same).with_for_update()
     if connection.execute(query).scalar() != campaign.revision:
         return
     for table in (inversions, sensor_d33):
@@ -46,17 +48,13 @@ def keep(
 
 def missing_of_skin(connection: Connection, root: str, table_sha256: str) -> Sequence[AnyRow]:
     """Rows of the skin's current campaigns whose d33 is not kept as they are now."""
-    fresh = (
-        (inversions.c.campaign == campaigns.c.number)
-        & (inversions.c.revision == campaigns.c.revision)
-        & (inversions.c.table_sha256 == table_sha256)
-    )
-    query = select(campaigns).outerjoin(inversions, fresh).where(inversions.c.campaign.is_(None), *_current(root))
+    query = select(campaigns).outerjoin(inversions, _fresh(table_sha256))
+    query = query.where(inversions.c.campaign.is_(None), *_current(root))
     return connection.execute(query.order_by(campaigns.c.number)).all()
 
 
-def history(connection: Connection, root: str) -> Sequence[AnyRow]:
-    """d33 by sensor of all current campaigns of a skin and of those joined to it, in order of arrival."""
+def history(connection: Connection, root: str, table_sha256: str) -> Sequence[AnyRow]:
+    """d33 by sensor of all current campaigns, as they are now, of a skin and of those joined to it, by arrival."""
     query = (
         select(
             campaigns.c.id,
@@ -66,10 +64,20 @@ def history(connection: Connection, root: str) -> Sequence[AnyRow]:
             sensor_d33.c.d33_pc_per_n,
             sensor_d33.c.d33_uncertainty_pc_per_n,
         )
+        .join(inversions, _fresh(table_sha256))
         .join(sensor_d33, sensor_d33.c.campaign == campaigns.c.number)
         .where(*_current(root))
     )
     return connection.execute(query.order_by(campaigns.c.number, sensor_d33.c.sensor)).all()
+
+
+def _fresh(table_sha256: str) -> ColumnElement[bool]:
+    """Joins a campaign with what was derived from it as it is now, with this table."""
+    return (
+        (inversions.c.campaign == campaigns.c.number)
+        & (inversions.c.revision == campaigns.c.revision)
+        & (inversions.c.table_sha256 == table_sha256)
+    )
 
 
 def _current(root: str) -> tuple[Any, ...]:
