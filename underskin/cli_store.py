@@ -111,5 +111,6 @@ def _told(result: dict[str, Any]) -> list[tuple[bool, str]]:
     ]
     lines += [(True, note) for note in result["notes"]]
     if result["status"] == "ok":
-        lines.insert(0, (True, f"campaign {result['id']} of skin {result['skin_id']}, {len(kept)} recordings"))
+        count = f"{len(kept)} recording{'s' if len(kept) != 1 else ''}"
+        lines.insert(0, (True, f"campaign {result['id']} of skin {result['skin_id']}, {count}"))
     return lines
