@@ -60,7 +60,6 @@ def add(
     campaign = arrival.campaign
     named = arrival.skin_id or campaign.skin.id or (replaced.skin_id if replaced else None)
     campaign_id, skin_id = f"c-{secrets.token_hex(8)}", skins.require(connection, named)
-    times = [time for recording in campaign.recordings if (time := codec.recorded_at(recording))]
     row = {
         "id": campaign_id,
         "skin_id": skin_id,
@@ -71,7 +70,7 @@ def add(
         "source": arrival.source,
         "received_at": now(),
         "received_from": arrival.received_from,
-        "recorded_at": min(times, default=None),
+        "recorded_at": codec.earliest(campaign),
         "recordings": len(campaign.recordings),
         "excluded": 0,
         "revision": 0,

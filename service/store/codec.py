@@ -56,6 +56,11 @@ def recorded_at(recording: Recording) -> str | None:
         return None
 
 
+def earliest(campaign: Campaign) -> str | None:
+    """When the first of its recordings that say so was made, in the store's form."""
+    return min((time for recording in campaign.recordings if (time := recorded_at(recording))), default=None)
+
+
 def compressed(document: Any) -> bytes:
     """JSON, deflated."""
     return zlib.compress(orjson.dumps(document), 1)
