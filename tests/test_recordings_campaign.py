@@ -124,6 +124,7 @@ def test_the_concealed_campaigns_come_back_as_they_went_in(part: str) -> None:
         (FRF, "coherence", [0.5, 1.1, 0.5], "coherence[1]", "0 to 1"),
         (FRF, "sample_rate_hz", 100.0, "sample_rate_hz", "absent where the FRF"),
         (FRF, "colour", "red", "colour", "unknown field"),
+        (FRF, "", "red", '""', "unknown field"),
         (TIME_SERIES, "charge_pc", None, "charge_pc", "required"),
         (TIME_SERIES, "sample_rate_hz", float("inf"), "sample_rate_hz", "finite"),
         (INDENTATION, "force_n", [0.0], "force_n", "3 entries"),

@@ -35,7 +35,7 @@ def check_fields(
     """
     known = _checks(model)
     refused = [
-        InvalidInput(shown(name), shown(value), f"unknown field; known: {', '.join(known)}")
+        InvalidInput(named(name), shown(value), f"unknown field; known: {', '.join(known)}")
         for name, value in document.items()
         if name not in known
     ]
@@ -239,6 +239,11 @@ def shown(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return f"a list of {len(value)}"
     return f"a value of type {type(value).__name__}"
+
+
+def named(name: Any) -> str:
+    """A field's name as an error may show it, an empty one too."""
+    return str(shown(name)) or '""'
 
 
 def _shown_number(value: Any) -> Any:
