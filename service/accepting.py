@@ -9,16 +9,17 @@ import orjson
 from sqlalchemy import Connection
 
 from service.problems import Refusal
-from service.reading import Arrived, first_letter, read, require_usable
+from service.reading import Arrived, read, require_few
 from service.store import answers, campaigns, skins
 from service.store.engine import Database
 from service.uploads import Upload
 from underskin import InvalidInput
 from underskin.errors import FileError
-from underskin.recordings.rig_description import RigDescription, from_dict
+from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription, from_dict
 from underskin.recordings.rig_description import parse as parse_rig
 
 RIG = "rig"  # name of the form's part that is a rig description
+_MOST_ERRORS = 100  # in the problem of a request of which nothing is kept
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Terms:
             missing = "reason" if self.reason is None else "corrects"
             raise InvalidInput(missing, None, "corrects and reason go together")
         if self.skin is not None:
-            require_usable("skin", self.skin)
+            skins.require_usable("skin", self.skin)
 
     def request(self, uploads: Sequence[Upload]) -> answers.Request | None:
         """What makes a repetition of this request recognisable."""
@@ -63,14 +64,13 @@ def accept(store: Database, uploads: Sequence[Upload], terms: Terms) -> dict[str
         if before is not None:
             return dict(before)
     rig = _rig(store, uploads, terms)
-    files = [upload for upload in uploads if upload.field != RIG]
-    arrived = [found for upload in files for found in read(upload, rig, terms.most_json_bytes)]
+    arrived = _arrived(uploads, rig, terms)
     _require_keepable(arrived, terms)
     with store.writing() as connection:
         if request is not None and not answers.claim(connection, request):
             return dict(answers.replayed(connection, request) or {})
         results = [_kept(connection, found, terms, rig) for found in arrived]
-        answer = {"campaigns": results} if _is_batch(uploads) else results[0]
+        answer = {"campaigns": results} if uploads[0].in_form or arrived[0].in_list else results[0]
         if request is not None:
             answers.keep(connection, request, answer)
     return answer
@@ -81,7 +81,8 @@ def _rig(store: Database, uploads: Sequence[Upload], terms: Terms) -> RigDescrip
     for upload in uploads:
         if upload.field == RIG:
             try:
-                return parse_rig(upload.path.read_bytes(), upload.label or RIG)
+                with upload.path.open("rb") as file:
+                    return parse_rig(file.read(LARGEST_BYTES + 1), upload.label or RIG)
             except FileError as error:
                 raise InvalidInput(RIG, upload.label, f"{error.place}: {error.reason}".lstrip(": ")) from None
     if terms.skin is None:
@@ -91,8 +92,17 @@ def _rig(store: Database, uploads: Sequence[Upload], terms: Terms) -> RigDescrip
     return None if kept is None else from_dict(orjson.loads(kept))
 
 
-def _is_batch(uploads: Sequence[Upload]) -> bool:
-    return uploads[0].field is not None or first_letter(uploads[0]) == b"["
+def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, terms: Terms) -> list[Arrived]:
+    """The campaigns of all files."""
+    arrived: list[Arrived] = []
+    recordings = 0
+    for upload in uploads:
+        if upload.field != RIG:
+            found = read(upload, rig, terms.most_json_bytes)
+            arrived += found
+            recordings += sum(one.recordings for one in found)
+            require_few(len(arrived), recordings)
+    return arrived
 
 
 def _require_keepable(arrived: Sequence[Arrived], terms: Terms) -> None:
@@ -103,9 +113,11 @@ def _require_keepable(arrived: Sequence[Arrived], terms: Terms) -> None:
     if good and not (terms.all_or_nothing and spoilt):
         return
     errors = [error for found in arrived for error in _flat(found, many=len(arrived) > 1)]
-    count = len({error["field"] for error in errors})
     detail = f"Nothing was kept: {errors[0]['field']} {errors[0]['allowed']}" if errors else "No campaign was sent."
-    raise Refusal(422, detail + (f"; and {count - 1} more" if count > 1 else ""), title="Invalid input", errors=errors)
+    more = len(errors) - 1 + sum(found.untold for found in arrived)
+    if more > 0:
+        detail += f"; and {more} more"
+    raise Refusal(422, detail, title="Invalid input", errors=errors[:_MOST_ERRORS])
 
 
 def _flat(found: Arrived, *, many: bool) -> list[dict[str, Any]]:

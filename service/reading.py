@@ -1,22 +1,27 @@
 """From uploaded files to campaigns, with what is wrong in each."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import orjson
 
 from service.problems import Refusal
+from service.store import skins
 from service.uploads import Upload
 from underskin import InvalidInput
 from underskin.errors import FileError
+from underskin.recordings import formats
 from underskin.recordings.campaign import Campaign, RecordingProblem, from_dict
 from underskin.recordings.reading import read_file
 from underskin.recordings.rig_description import RigDescription
 
 _BOM = b"\xef\xbb\xbf"
-_LONGEST_ID = 200
 _UNNAMED = "the upload"
+
+MOST_CAMPAIGNS = 1000  # a request
+MOST_RECORDINGS = 50_000  # a request, good or not
+_MOST_ERRORS = 100  # told of each campaign
 
 
 @dataclass(frozen=True)
@@ -29,15 +34,24 @@ class Arrived:
     refused: list[dict[str, Any]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     by_rig: bool = False  # whether a rig description was needed to read it
+    in_list: bool = False  # whether it came in a JSON list
+    untold: int = 0  # errors beyond those listed
+
+    @property
+    def recordings(self) -> int:
+        """How many were sent, good or not."""
+        return len(self.refused) + (0 if self.campaign is None else len(self.campaign.recordings))
 
 
 def read(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> list[Arrived]:
     """The campaigns of a file, by its content: JSON may hold one or a list of them."""
-    if first_letter(upload) in (b"{", b"["):
-        return _read_json(upload, most_json_bytes)
+    label = upload.label or _UNNAMED
     try:
-        found = read_file(upload.path, upload.label or _UNNAMED, rig)
-        require_usable("skin.id", found.campaign.skin.id)
+        with upload.path.open("rb") as stream:
+            if formats.detect(stream, label) == "JSON":
+                return _read_json(upload, most_json_bytes)
+        found = read_file(upload.path, label, rig)
+        _require_usable(found.campaign)
     except FileError as error:
         allowed = ": ".join(part for part in (error.place, error.reason) if part)
         return [Arrived(upload.label, errors=[_error("file", upload.label, allowed)])]
@@ -46,19 +60,16 @@ def read(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> li
     return [_arrived(upload.label, found.campaign, found.problems, found.warnings, by_rig=rig is not None)]
 
 
-def first_letter(upload: Upload) -> bytes:
-    """What a file begins with, byte order mark and blanks aside."""
-    with upload.path.open("rb") as file:
-        return file.read(64).removeprefix(_BOM).lstrip()[:1]
+def require_few(campaigns: int, recordings: int) -> None:
+    """Refuses a request of more than can be answered in one go."""
+    for count, most, noun in ((campaigns, MOST_CAMPAIGNS, "campaigns"), (recordings, MOST_RECORDINGS, "recordings")):
+        if count > most:
+            raise Refusal(413, f"A request may bring up to {most} {noun}; send more in several requests.")
 
 
-def require_usable(name: str, skin_id: str | None) -> None:
-    """Refuses a skin's id that cannot be part of an address (InvalidInput)."""
-    if skin_id is None:
-        return
-    plain = skin_id.isprintable() and "/" not in skin_id and skin_id not in (".", "..")
-    if not plain or not skin_id.strip() or len(skin_id) > _LONGEST_ID:
-        raise InvalidInput(name, skin_id, f"must be a printable text of 1 to {_LONGEST_ID} characters without /")
+def _require_usable(campaign: Campaign) -> None:
+    if campaign.skin.id is not None:
+        skins.require_usable("skin.id", campaign.skin.id)
 
 
 def _read_json(upload: Upload, most_bytes: int) -> list[Arrived]:
@@ -68,20 +79,28 @@ def _read_json(upload: Upload, most_bytes: int) -> list[Arrived]:
     try:
         document = orjson.loads(upload.path.read_bytes().removeprefix(_BOM))
     except orjson.JSONDecodeError as error:
-        if upload.field is None:
+        if not upload.in_form:
             raise Refusal(
                 400, f"The body is not JSON: line {error.lineno}, column {error.colno}: {error.msg}."
             ) from None
         allowed = f"must be JSON; line {error.lineno}, column {error.colno}: {error.msg}"
         return [Arrived(upload.label, errors=[_error("file", upload.label, allowed)])]
-    documents = document if isinstance(document, list) else [document]
-    return [_checked(upload.label, entry) for entry in documents]
+    if not isinstance(document, list):
+        require_few(1, _recordings_in(document))
+        return [_checked(upload.label, document)]
+    require_few(len(document), sum(map(_recordings_in, document)))
+    return [replace(_checked(upload.label, entry), in_list=True) for entry in document]
+
+
+def _recordings_in(document: Any) -> int:
+    recordings = document.get("recordings") if isinstance(document, dict) else None
+    return len(recordings) if isinstance(recordings, list) else 0
 
 
 def _checked(label: str | None, document: Any) -> Arrived:
     try:
         campaign, problems = from_dict(document)
-        require_usable("skin.id", campaign.skin.id)
+        _require_usable(campaign)
     except InvalidInput as error:
         return Arrived(label, errors=[_invalid(error)])
     return _arrived(label, campaign, problems, [], by_rig=False)
@@ -97,13 +116,19 @@ def _arrived(
 ) -> Arrived:
     """A campaign with its refused recordings; one of which nothing is left is refused as a whole."""
     refused: dict[str, list[Mapping[str, Any]]] = {}
-    for problem in problems:
-        refused.setdefault(problem.recording, []).append(_error(problem.field, problem.value, problem.allowed))
+    count = 0
+    for count, problem in enumerate(problems, 1):
+        told = refused.setdefault(problem.recording, [])
+        if count <= _MOST_ERRORS:
+            told.append(_error(problem.field, problem.value, problem.allowed))
+    untold = max(0, count - _MOST_ERRORS)
+    if untold:
+        notes = [*notes, f"{len(refused)} recordings have {count} errors; the first {_MOST_ERRORS} are told"]
     entries = [{"id": name, "errors": errors} for name, errors in refused.items()]
     if campaign.recordings:
-        return Arrived(label, campaign, refused=entries, notes=notes, by_rig=by_rig)
+        return Arrived(label, campaign, refused=entries, notes=notes, by_rig=by_rig, untold=untold)
     nothing = _error("recordings", f"{len(entries)} refused", "must hold at least one recording without errors")
-    return Arrived(label, errors=[nothing], refused=entries, notes=notes)
+    return Arrived(label, errors=[nothing], refused=entries, notes=notes, untold=untold)
 
 
 def _invalid(error: InvalidInput) -> dict[str, Any]:
