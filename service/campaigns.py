@@ -1,24 +1,25 @@
 """Campaigns: sent, listed, read, withdrawn, corrected, their recordings excluded, their d33."""
 
 import asyncio
-import io
+from functools import partial
 from typing import Annotated, Any, Literal
 
 import orjson
 from fastapi import APIRouter, Header, Query, Request, Response, Security
+from fastapi.responses import StreamingResponse
 from sqlalchemy import Connection
 from starlette.concurrency import run_in_threadpool
 
 from service import campaign_models as models
-from service import inverting
+from service import documents, inverting
 from service.accepting import Terms, accept
 from service.d33_models import D33
 from service.dependencies import CampaignId, Store, Table, authorised
+from service.made_files import made_file
 from service.store import campaigns
 from service.store.times import stored
 from service.uploads import received
 from underskin import InvalidInput
-from underskin.recordings import hdf5_file, json_file
 
 router = APIRouter(prefix="/v1", tags=["campaigns"])
 
@@ -173,17 +174,18 @@ def one(campaign_id: CampaignId, store: Store) -> models.CampaignDetail:
 )
 def document(
     campaign_id: CampaignId,
+    request: Request,
     store: Store,
     file_format: Annotated[Literal["json", "hdf5"], Query(alias="format", description="JSON or HDF5.")] = "json",
 ) -> Response:
     """All recordings that were kept, arrays and all, those excluded later included."""
     with store.reading() as connection:
-        campaign = campaigns.load(connection, campaigns.find(connection, campaign_id))
+        row = campaigns.find(connection, campaign_id)
     if file_format == "json":
-        return Response(json_file.write(campaign), media_type="application/json")
-    stream = io.BytesIO()
-    hdf5_file.write(campaign, stream)
-    return Response(stream.getvalue(), media_type="application/x-hdf5")
+        return StreamingResponse(documents.json_parts(store, row), media_type="application/json")
+    return made_file(
+        request.app.state.uploads, f"{row.id}.h5", "application/x-hdf5", partial(documents.write_hdf5, store, row)
+    )
 
 
 @router.get("/campaigns/{campaign_id}/d33", operation_id="campaign_d33", summary="d33 of each sensor")

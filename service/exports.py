@@ -1,23 +1,22 @@
 """All that is kept of a skin as one file, and back."""
 
 import asyncio
-import tempfile
 from collections.abc import Iterator
-from pathlib import Path
+from functools import partial
 from typing import Any, BinaryIO
 
 from fastapi import APIRouter, Request, Security
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field, ValidationError
-from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import SkinId, Store, authorised
+from service.made_files import made_file
 from service.problems import Refusal
 from service.store import import_checks, importing, skins
 from service.store.engine import Database
 from service.store.export import export
-from service.uploads import Upload, full_disk_said, received
+from service.uploads import Upload, received
 from underskin import InvalidInput
 from underskin.errors import FileError
 from underskin.recordings.skin_export import ExportedCampaign, read_campaigns, read_overview
@@ -47,18 +46,9 @@ class Imported(BaseModel):
 )
 def export_skin(skin_id: SkinId, request: Request, store: Store) -> FileResponse:
     """One HDF5 file (`skin-export/1`) with its campaigns in every state, those of skins joined to it, and its rigs."""
-    with full_disk_said(), store.reading() as connection:
+    with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
-        with tempfile.NamedTemporaryFile(dir=request.app.state.uploads.path, delete=False) as file:
-            path = Path(file.name)
-        try:
-            export(connection, root, path)
-        except BaseException:
-            path.unlink()
-            raise
-    return FileResponse(
-        path, media_type=_MEDIA_TYPE, filename=f"{root}.h5", background=BackgroundTask(path.unlink, missing_ok=True)
-    )
+        return made_file(request.app.state.uploads, f"{root}.h5", _MEDIA_TYPE, partial(export, connection, root))
 
 
 @router.post(
