@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from underskin.mixed_model import Estimate
     from underskin.recordings.elastomer import RecordingModulus
 
+# Raised whenever the fields below, or the figures that underskin.inversion and underskin.recordings put into them,
+# change: what an earlier version kept is then computed anew.
+ANSWER_VERSION = 1
+
 
 class D33Value(BaseModel):
     """d33 with its uncertainty."""

@@ -5,17 +5,19 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, delete, insert, select
 
+from service.d33_models import ANSWER_VERSION
 from service.store import skins
 from service.store.codec import compressed, decompressed
 from service.store.tables import AnyRow, campaigns, inversions, sensor_d33
 
 
 def find(connection: Connection, campaign: AnyRow, table_sha256: str) -> Any | None:
-    """The answer kept for a campaign as it is now, with this table; None where there is none."""
+    """The answer kept for a campaign as it is now, with this table, by this software; None where there is none."""
     query = select(inversions.c.document).where(
         inversions.c.campaign == campaign.number,
         inversions.c.revision == campaign.revision,
         inversions.c.table_sha256 == table_sha256,
+        inversions.c.answer_version == ANSWER_VERSION,
     )
     blob = connection.execute(query).scalar()
     return None if blob is None else decompressed(blob)
@@ -36,8 +38,8 @@ def keep(
         return
     for table in (inversions, sensor_d33):
         connection.execute(delete(table).where(table.c.campaign == campaign.number))
-    row = {"revision": campaign.revision, "table_sha256": table_sha256, "document": compressed(document)}
-    connection.execute(insert(inversions), {"campaign": campaign.number, **row})
+    basis = {"revision": campaign.revision, "table_sha256": table_sha256, "answer_version": ANSWER_VERSION}
+    connection.execute(insert(inversions), {"campaign": campaign.number, **basis, "document": compressed(document)})
     values = [
         {"campaign": campaign.number, "sensor": name, "d33_pc_per_n": value, "d33_uncertainty_pc_per_n": uncertainty}
         for name, (value, uncertainty) in sensors.items()
@@ -72,11 +74,12 @@ def history(connection: Connection, root: str, table_sha256: str) -> Sequence[An
 
 
 def _fresh(table_sha256: str) -> ColumnElement[bool]:
-    """Joins a campaign with what was derived from it as it is now, with this table."""
+    """Joins a campaign with what was derived from it as it is now, with this table, by this software."""
     return (
         (inversions.c.campaign == campaigns.c.number)
         & (inversions.c.revision == campaigns.c.revision)
         & (inversions.c.table_sha256 == table_sha256)
+        & (inversions.c.answer_version == ANSWER_VERSION)
     )
 
 
