@@ -4,7 +4,6 @@ import csv
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
@@ -28,12 +27,18 @@ _HEADER = (
 
 @dataclass(frozen=True)
 class Told:
-    """A file, what was read, its d33 or why there is none, and what it says of the elastomer."""
+    """A file, or files by the name of their campaign: what was read, its d33 or why none, and what of the elastomer."""
 
-    file: Path
+    file: str
     reading: Reading
     found: Inversion | InvalidInput
     moduli: Sequence[RecordingModulus]
+
+    @property
+    def title(self) -> str:
+        """What the campaign is called, and the file that it is in."""
+        name = self.reading.campaign.name
+        return name if name == self.file else f"{name} ({self.file})"
 
     @property
     def is_of_use(self) -> bool:
@@ -64,7 +69,7 @@ def write_tables(everything: Iterable[Told]) -> None:
     """Each file's array, sensors and elastomer, and what was left out or looks wrong."""
     console = Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH)
     for told in everything:
-        console.print(Text(f"{told.reading.campaign.name} ({told.file})", style="bold"))
+        console.print(Text(told.title, style="bold"))
         if isinstance(told.found, Inversion):
             console.print(_array(told.found))
             console.print(_sensors(told.found))
@@ -84,7 +89,7 @@ def write_csv(everything: Iterable[Told]) -> None:
     writer.writerow(_HEADER)
     for told in everything:
         if isinstance(told.found, Inversion):
-            writer.writerows([str(told.file), *row] for row in _rows(told.found))
+            writer.writerows([told.file, *row] for row in _rows(told.found))
         for note in told.notes:
             print(f"underskin: {told.file}: {note}", file=sys.stderr)
 

@@ -139,6 +139,7 @@ def d33(
     rig: cli_campaign.Rig = None,
     band: cli_campaign.Band = None,
     figures: cli_campaign.Figures = None,
+    together: cli_campaign.Together = None,
 ) -> None:
     """The d33 of a sensor from its measured FRF, or of an array from files of its recordings.
 
@@ -158,9 +159,10 @@ def d33(
         for_columns = [f"--{name.replace('_', '-')}" for name, values in given.items() if values]
         for_columns += [name for name, used in (("--input", input_file), ("--units-checked", units_checked)) if used]
         cli_campaign.refuse(for_columns, "is for columns; files say it themselves")
-        cli_campaign.invert_files(files, rig, band, figures, csv)
+        cli_campaign.invert_files(files, rig, band, figures, together, csv)
         return
-    for_files = [name for name, used in (("--rig", rig), ("--band", band), ("--figures", figures)) if used]
+    only_files = (("--rig", rig), ("--band", band), ("--figures", figures), ("--together", together))
+    for_files = [name for name, used in only_files if used is not None]
     cli_campaign.refuse(for_files, "goes with FILE, and none is given")
 
     from underskin import answers
