@@ -152,6 +152,12 @@ def test_all_that_is_wrong_with_a_recording_is_said_at_once() -> None:
     assert {problem.recording for problem in problems} == {"r2"}
 
 
+def test_of_thousands_of_unknown_fields_some_are_said() -> None:
+    _, problems = from_dict(document(FRF, {**FRF, "id": "r2", **{f"x{number}": 1 for number in range(5000)}}))
+    assert 1 <= len(problems) < 100
+    assert {problem.recording for problem in problems} == {"r2"}
+
+
 def test_an_id_given_twice_is_refused_the_second_time() -> None:
     campaign, problems = from_dict(document(FRF, FRF))
     assert len(campaign.recordings) == 1

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields
 from datetime import datetime
 from functools import cache
+from itertools import islice
 from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -23,6 +24,7 @@ Check = Callable[[str, Any, bool], Any]  # name, value, units_checked
 LONGEST_NAME = 200
 _LARGEST_COUNT = 2**53
 _FREQUENCIES_HZ = (1e-6, 1e9)
+_MOST_UNKNOWN = 20  # unknown fields of one object that are told; a document may hold millions
 _COHERENCE_ROUNDING = 1e-6  # single-precision instruments write 1.0000001
 
 
@@ -34,10 +36,10 @@ def check_fields(
     `model` is a dataclass; a field that has a default may be left out or null.
     """
     known = _checks(model)
+    unknown = (name for name in document if name not in known)
     refused = [
-        InvalidInput(named(name), shown(value), f"unknown field; known: {', '.join(known)}")
-        for name, value in document.items()
-        if name not in known
+        InvalidInput(named(name), shown(document[name]), f"unknown field; known: {', '.join(known)}")
+        for name in islice(unknown, _MOST_UNKNOWN)
     ]
     values: dict[str, Any] = {}
     for name, (field_check, default) in known.items():
