@@ -9,12 +9,13 @@ import orjson
 from sqlalchemy import Connection
 
 from service.problems import Refusal
-from service.reading import Arrived, read, require_few
+from service.reading import Arrived, Found, arrived_as, joined, read, require_few
 from service.store import answers, campaigns, skins
 from service.store.engine import Database
 from service.uploads import Upload
 from underskin import InvalidInput
 from underskin.errors import FileError
+from underskin.recordings import fields
 from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription, from_dict
 from underskin.recordings.rig_description import parse as parse_rig
 
@@ -30,6 +31,7 @@ class Terms:
     corrects: str | None
     reason: str | None
     all_or_nothing: bool
+    together: str | None
     idempotency_key: str | None
     sender: str | None
     most_json_bytes: int
@@ -41,12 +43,16 @@ class Terms:
             raise InvalidInput(missing, None, "corrects and reason go together")
         if self.skin is not None:
             skins.require_usable("skin", self.skin)
+        if self.together is not None:
+            fields.name("together", self.together, False)
 
     def request(self, uploads: Sequence[Upload]) -> answers.Request | None:
         """What makes a repetition of this request recognisable."""
         if self.idempotency_key is None:
             return None
         told = [self.skin, self.corrects, self.reason, self.all_or_nothing]
+        if self.together is not None:  # otherwise as it always was: keys hold for as long as the store
+            told.append(self.together)
         sent = [[upload.field, upload.label, upload.sha256] for upload in uploads]
         digest = hashlib.sha256(repr([told, sent]).encode()).hexdigest()
         return answers.Request(self.sender or "", self.idempotency_key, digest)
@@ -93,16 +99,18 @@ def _rig(store: Database, uploads: Sequence[Upload], terms: Terms) -> RigDescrip
 
 
 def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, terms: Terms) -> list[Arrived]:
-    """The campaigns of all files."""
-    arrived: list[Arrived] = []
+    """The campaigns of all files; one of them all where they go together."""
+    found: list[Found] = []
     recordings = 0
     for upload in uploads:
         if upload.field != RIG:
-            found = read(upload, rig, terms.most_json_bytes)
-            arrived += found
-            recordings += sum(one.recordings for one in found)
-            require_few(len(arrived), recordings)
-    return arrived
+            more = read(upload, rig, terms.most_json_bytes)
+            found += more
+            recordings += sum(one.recordings for one in more)
+            require_few(len(found), recordings)
+    if terms.together is None or not found:
+        return [arrived_as(one) for one in found]
+    return [joined(found, terms.together, terms.skin)]
 
 
 def _require_keepable(arrived: Sequence[Arrived], terms: Terms) -> None:

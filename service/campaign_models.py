@@ -30,7 +30,7 @@ class RecordingResult(BaseModel):
 class CampaignResult(BaseModel):
     """What became of one campaign."""
 
-    file: str | None = Field(description="The name of the file that it came in, where it had one.")
+    file: str | None = Field(description="The name of the file that it came in, where it had one of its own.")
     status: Literal["ok", "refused"] = Field(description="`ok`: kept, with the recordings that are `ok`.")
     id: str | None = Field(description="Names the campaign from now on; null where it was refused.")
     skin_id: str | None = Field(description="The skin that it is of; null where it was refused.")

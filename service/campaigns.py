@@ -98,6 +98,14 @@ async def post(
     corrects: Annotated[str | None, Query(description="The campaign that this one replaces; it stays, unused.")] = None,
     reason: Annotated[models.Reason | None, Query(description="Why it is corrected.")] = None,
     all_or_nothing: Annotated[bool, Query(description="Keep nothing where any recording is refused.")] = False,
+    together: Annotated[
+        str | None,
+        Query(
+            description="Join all that is sent, such as a file a press, into one campaign of this name. All must be of "
+            "one skin; a file that cannot be read is a refused recording, by the file's name.",
+            examples=["palm 3 on Monday"],
+        ),
+    ] = None,
     idempotency_key: Annotated[
         str | None,
         Header(
@@ -109,12 +117,13 @@ async def post(
 ) -> Response:
     """Keeps the good recordings and says of each of the others what was wrong. What is answered is on the disk.
 
-    One campaign is answered with its own entry, a form or a list with one entry a campaign.
+    One campaign is answered with its own entry, a form or a list with one entry a campaign: one in all where they go
+    `together`.
     """
     settings = request.app.state.settings
     key = request.scope["key"]
     sender = None if key is None else key.name
-    terms = Terms(skin, corrects, reason, all_or_nothing, idempotency_key, sender, settings.max_body_bytes)
+    terms = Terms(skin, corrects, reason, all_or_nothing, together, idempotency_key, sender, settings.max_body_bytes)
     async with received(request, request.app.state.uploads) as uploads, _heavy:
         answer = await run_in_threadpool(accept, store, uploads, terms)
         await run_in_threadpool(inverting.derive, store, table, _ids(answer))
