@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.instrument_files import rig, tdms
+from tests.test_recordings_real import read, real
 from underskin.errors import InvalidInput
 from underskin.recordings import Reading, join, read_file
 from underskin.recordings.campaign import (
@@ -153,3 +154,13 @@ def test_a_campaign_needs_a_name_and_a_file() -> None:
     for name, files in (("", [("a", reading(press("a")))]), ("x", [])):
         with pytest.raises(InvalidInput):
             join(name, files)
+
+
+def test_wells_of_two_runs_of_a_real_instrument() -> None:
+    files = real("sphere-in-well/run_044*/well_*.csv") + real("sphere-in-well/run_045*/well_*.csv")
+    found = join("two runs", [(file.name, read(file, "sphere-in-well")) for file in files])
+    wells = [file.name.split("_")[1] for file in files]
+    assert ids(found) == [f"{file.stem} {well}" for file, well in zip(files, wells, strict=True)]
+    assert len(set(wells)) == len(files) / 2
+    assert not found.problems
+    assert not any("very numbers" in warning for warning in found.warnings)
