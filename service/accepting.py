@@ -9,16 +9,18 @@ import orjson
 from sqlalchemy import Connection
 
 from service.problems import Refusal
-from service.reading import Arrived, first_letter, read, require_usable
+from service.reading import Arrived, Found, arrived_as, joined, read, require_few
 from service.store import answers, campaigns, skins
 from service.store.engine import Database
 from service.uploads import Upload
 from underskin import InvalidInput
 from underskin.errors import FileError
-from underskin.recordings.rig_description import RigDescription, from_dict
+from underskin.recordings import fields
+from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription, from_dict
 from underskin.recordings.rig_description import parse as parse_rig
 
 RIG = "rig"  # name of the form's part that is a rig description
+_MOST_ERRORS = 100  # in the problem of a request of which nothing is kept
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,7 @@ class Terms:
     corrects: str | None
     reason: str | None
     all_or_nothing: bool
+    together: str | None
     idempotency_key: str | None
     sender: str | None
     most_json_bytes: int
@@ -39,13 +42,17 @@ class Terms:
             missing = "reason" if self.reason is None else "corrects"
             raise InvalidInput(missing, None, "corrects and reason go together")
         if self.skin is not None:
-            require_usable("skin", self.skin)
+            skins.require_usable("skin", self.skin)
+        if self.together is not None:
+            fields.name("together", self.together, False)
 
     def request(self, uploads: Sequence[Upload]) -> answers.Request | None:
         """What makes a repetition of this request recognisable."""
         if self.idempotency_key is None:
             return None
         told = [self.skin, self.corrects, self.reason, self.all_or_nothing]
+        if self.together is not None:  # otherwise as it always was: keys hold for as long as the store
+            told.append(self.together)
         sent = [[upload.field, upload.label, upload.sha256] for upload in uploads]
         digest = hashlib.sha256(repr([told, sent]).encode()).hexdigest()
         return answers.Request(self.sender or "", self.idempotency_key, digest)
@@ -63,14 +70,13 @@ def accept(store: Database, uploads: Sequence[Upload], terms: Terms) -> dict[str
         if before is not None:
             return dict(before)
     rig = _rig(store, uploads, terms)
-    files = [upload for upload in uploads if upload.field != RIG]
-    arrived = [found for upload in files for found in read(upload, rig, terms.most_json_bytes)]
+    arrived = _arrived(uploads, rig, terms)
     _require_keepable(arrived, terms)
     with store.writing() as connection:
         if request is not None and not answers.claim(connection, request):
             return dict(answers.replayed(connection, request) or {})
         results = [_kept(connection, found, terms, rig) for found in arrived]
-        answer = {"campaigns": results} if _is_batch(uploads) else results[0]
+        answer = {"campaigns": results} if uploads[0].in_form or arrived[0].in_list else results[0]
         if request is not None:
             answers.keep(connection, request, answer)
     return answer
@@ -81,7 +87,8 @@ def _rig(store: Database, uploads: Sequence[Upload], terms: Terms) -> RigDescrip
     for upload in uploads:
         if upload.field == RIG:
             try:
-                return parse_rig(upload.path.read_bytes(), upload.label or RIG)
+                with upload.path.open("rb") as file:
+                    return parse_rig(file.read(LARGEST_BYTES + 1), upload.label or RIG)
             except FileError as error:
                 raise InvalidInput(RIG, upload.label, f"{error.place}: {error.reason}".lstrip(": ")) from None
     if terms.skin is None:
@@ -91,8 +98,19 @@ def _rig(store: Database, uploads: Sequence[Upload], terms: Terms) -> RigDescrip
     return None if kept is None else from_dict(orjson.loads(kept))
 
 
-def _is_batch(uploads: Sequence[Upload]) -> bool:
-    return uploads[0].field is not None or first_letter(uploads[0]) == b"["
+def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, terms: Terms) -> list[Arrived]:
+    """The campaigns of all files; one of them all where they go together."""
+    found: list[Found] = []
+    recordings = 0
+    for upload in uploads:
+        if upload.field != RIG:
+            more = read(upload, rig, terms.most_json_bytes)
+            found += more
+            recordings += sum(one.recordings for one in more)
+            require_few(len(found), recordings)
+    if terms.together is None or not found:
+        return [arrived_as(one) for one in found]
+    return [joined(found, terms.together, terms.skin)]
 
 
 def _require_keepable(arrived: Sequence[Arrived], terms: Terms) -> None:
@@ -103,9 +121,11 @@ def _require_keepable(arrived: Sequence[Arrived], terms: Terms) -> None:
     if good and not (terms.all_or_nothing and spoilt):
         return
     errors = [error for found in arrived for error in _flat(found, many=len(arrived) > 1)]
-    count = len({error["field"] for error in errors})
     detail = f"Nothing was kept: {errors[0]['field']} {errors[0]['allowed']}" if errors else "No campaign was sent."
-    raise Refusal(422, detail + (f"; and {count - 1} more" if count > 1 else ""), title="Invalid input", errors=errors)
+    more = len(errors) - 1 + sum(found.untold for found in arrived)
+    if more > 0:
+        detail += f"; and {more} more"
+    raise Refusal(422, detail, title="Invalid input", errors=errors[:_MOST_ERRORS])
 
 
 def _flat(found: Arrived, *, many: bool) -> list[dict[str, Any]]:

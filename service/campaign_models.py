@@ -22,13 +22,15 @@ class RecordingResult(BaseModel):
 
     id: str = Field(description="Its id in the campaign, or its place where it has none.", examples=["r1"])
     status: Literal["ok", "refused"] = Field(description="`ok`: kept.")
-    errors: list[Refused] = Field(description="Why it was refused; empty where it was kept.")
+    errors: list[Refused] = Field(
+        description="Why it was refused; empty where it was kept, and where a note counts what is not told."
+    )
 
 
 class CampaignResult(BaseModel):
     """What became of one campaign."""
 
-    file: str | None = Field(description="The name of the file that it came in, where it had one.")
+    file: str | None = Field(description="The name of the file that it came in, where it had one of its own.")
     status: Literal["ok", "refused"] = Field(description="`ok`: kept, with the recordings that are `ok`.")
     id: str | None = Field(description="Names the campaign from now on; null where it was refused.")
     skin_id: str | None = Field(description="The skin that it is of; null where it was refused.")

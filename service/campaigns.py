@@ -1,25 +1,26 @@
 """Campaigns: sent, listed, read, withdrawn, corrected, their recordings excluded, their d33."""
 
 import asyncio
-import io
+from functools import partial
 from typing import Annotated, Any, Literal
 
 import orjson
 from fastapi import APIRouter, Header, Query, Request, Response, Security
+from fastapi.responses import StreamingResponse
 from sqlalchemy import Connection
 from starlette.concurrency import run_in_threadpool
 
 from service import campaign_models as models
-from service import inverting
+from service import documents, inverting
 from service.accepting import Terms, accept
 from service.adopted import serving
 from service.d33_models import D33
 from service.dependencies import CampaignId, Store, Table, authorised
+from service.made_files import made_file
 from service.store import campaigns
 from service.store.times import stored
 from service.uploads import received
 from underskin import InvalidInput
-from underskin.recordings import hdf5_file, json_file
 
 router = APIRouter(prefix="/v1", tags=["campaigns"])
 
@@ -98,6 +99,14 @@ async def post(
     corrects: Annotated[str | None, Query(description="The campaign that this one replaces; it stays, unused.")] = None,
     reason: Annotated[models.Reason | None, Query(description="Why it is corrected.")] = None,
     all_or_nothing: Annotated[bool, Query(description="Keep nothing where any recording is refused.")] = False,
+    together: Annotated[
+        str | None,
+        Query(
+            description="Join all that is sent, such as a file a press, into one campaign of this name. All must be of "
+            "one skin; a file that cannot be read is a refused recording, by the file's name.",
+            examples=["palm 3 on Monday"],
+        ),
+    ] = None,
     idempotency_key: Annotated[
         str | None,
         Header(
@@ -109,12 +118,13 @@ async def post(
 ) -> Response:
     """Keeps the good recordings and says of each of the others what was wrong. What is answered is on the disk.
 
-    One campaign is answered with its own entry, a form or a list with one entry a campaign.
+    One campaign is answered with its own entry, a form or a list with one entry a campaign: one in all where they go
+    `together`.
     """
     settings = request.app.state.settings
     key = request.scope["key"]
     sender = None if key is None else key.name
-    terms = Terms(skin, corrects, reason, all_or_nothing, idempotency_key, sender, settings.max_body_bytes)
+    terms = Terms(skin, corrects, reason, all_or_nothing, together, idempotency_key, sender, settings.max_body_bytes)
     async with received(request, request.app.state.uploads) as uploads, _heavy:
         answer = await run_in_threadpool(accept, store, uploads, terms)
         await run_in_threadpool(inverting.derive, store, table, _ids(answer))
@@ -174,17 +184,18 @@ def one(campaign_id: CampaignId, store: Store) -> models.CampaignDetail:
 )
 def document(
     campaign_id: CampaignId,
+    request: Request,
     store: Store,
     file_format: Annotated[Literal["json", "hdf5"], Query(alias="format", description="JSON or HDF5.")] = "json",
 ) -> Response:
     """All recordings that were kept, arrays and all, those excluded later included."""
     with store.reading() as connection:
-        campaign = campaigns.load(connection, campaigns.find(connection, campaign_id))
+        row = campaigns.find(connection, campaign_id)
     if file_format == "json":
-        return Response(json_file.write(campaign), media_type="application/json")
-    stream = io.BytesIO()
-    hdf5_file.write(campaign, stream)
-    return Response(stream.getvalue(), media_type="application/x-hdf5")
+        return StreamingResponse(documents.json_parts(store, row), media_type="application/json")
+    return made_file(
+        request.app.state.uploads, f"{row.id}.h5", "application/x-hdf5", partial(documents.write_hdf5, store, row)
+    )
 
 
 @router.get("/campaigns/{campaign_id}/d33", operation_id="campaign_d33", summary="d33 of each sensor")

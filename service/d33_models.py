@@ -1,15 +1,22 @@
 """What is answered on the d33 of a campaign, and how an inversion is put into it."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, Field
 
+from underskin import InvalidInput
 from underskin.units import to_lab
 
 if TYPE_CHECKING:
     from underskin.inversion import Inversion
     from underskin.mixed_model import Estimate
+    from underskin.recordings.elastomer import RecordingModulus
+
+# Raised whenever the fields below, or the figures that underskin.inversion and underskin.recordings put into them,
+# change: what an earlier version kept is then computed anew.
+ANSWER_VERSION = 1
 
 
 class D33Value(BaseModel):
@@ -69,8 +76,18 @@ class LeftOut(BaseModel):
     reason: str = Field(description="Why.")
 
 
+class Modulus(BaseModel):
+    """What a recording of kind `compression` or `indentation` says of the elastomer."""
+
+    recording: str = Field(description="The recording.")
+    kind: Literal["compression", "indentation"] = Field(description="Its kind.")
+    youngs_modulus_mpa: float = Field(description="Young's modulus of the elastomer [MPa].")
+    youngs_modulus_uncertainty_mpa: float = Field(description="Its standard uncertainty [MPa].")
+    statement: str = Field(description="Where the curve is straight, or how well Hertz' law fits it.")
+
+
 class D33(BaseModel):
-    """d33 of a campaign's sensors."""
+    """d33 of a campaign's sensors, and the modulus of its elastomer where that was recorded."""
 
     campaign_id: str = Field(description="The campaign.")
     table_sha256: str = Field(description="SHA-256 of the table of σ.")
@@ -94,6 +111,8 @@ class D33(BaseModel):
     )
     sensors: list[SensorD33] = Field(description="One entry a sensor that was recorded.")
     cells: list[CellD33] = Field(description="One entry a sensor, indenter and preload that was recorded.")
+    moduli: list[Modulus] = Field(description="One entry a recording of the elastomer alone.")
+    findings: list[str] = Field(description="What looked wrong and was used all the same, such as C/N taken for pC/N.")
     left_out: list[LeftOut] = Field(description="What the figures do without.")
 
 
@@ -135,7 +154,27 @@ def of_inversion(found: "Inversion") -> dict[str, Any]:
                 strict=True,
             )
         ],
+        "findings": list(found.findings),
     }  # fmt: skip
+
+
+def of_moduli(found: Sequence["RecordingModulus"]) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
+    """The entries of `moduli`, and those of `left_out` for recordings that tell none."""
+    moduli, left_out = [], []
+    for one in found:
+        if isinstance(one.found, InvalidInput):
+            left_out.append({"recording": one.recording, "reason": str(one.found)})
+            continue
+        moduli.append(
+            {
+                "recording": one.recording,
+                "kind": one.kind,
+                "youngs_modulus_mpa": float(to_lab("youngs_modulus_mpa", one.found.modulus)),
+                "youngs_modulus_uncertainty_mpa": float(to_lab("youngs_modulus_mpa", one.found.uncertainty)),
+                "statement": one.found.statement,
+            }
+        )
+    return moduli, left_out
 
 
 def _columns(estimate: "Estimate") -> list[list[float | None]]:

@@ -4,7 +4,7 @@ import logging
 
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
-from sqlalchemy.exc import DataError, OperationalError
+from sqlalchemy.exc import DataError, IntegrityError, OperationalError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
@@ -24,7 +24,7 @@ def install_handlers(api: FastAPI) -> None:
     api.add_exception_handler(InvalidInput, _handle)
     api.add_exception_handler(RequestValidationError, _handle)
     api.add_exception_handler(HTTPException, _handle)
-    for kind in (*_STATUS, StorageFull, DataError, OperationalError, Exception):
+    for kind in (*_STATUS, StorageFull, DataError, IntegrityError, OperationalError, Exception):
         api.add_exception_handler(kind, _handle)
 
 
@@ -75,6 +75,8 @@ def _of_the_store(request: Request, error: Exception) -> Refusal:
         return Refusal(507, "The disk is full: nothing of this request was kept. What is kept can be read.")
     if isinstance(error, DataError):
         return Refusal(422, "A text has a character that cannot be kept, such as NUL.")
+    if isinstance(error, IntegrityError):
+        return Refusal(409, "Another request kept the same at the same time: look at what is there, and send it again.")
     if isinstance(error, OperationalError):
         logger.error("the store failed: %s", error, extra={"fields": {"request_id": request.scope["request_id"]}})
         return Refusal(503, "The store does not answer; try again in a while.", headers={"Retry-After": "5"})

@@ -17,10 +17,10 @@ from underskin.trend import SIGNIFICANT, Trend, holm, trend
 _YEAR_S = 365.25 * 86400
 
 
-def history(connection: Connection, root: str) -> models.History:
+def history(connection: Connection, root: str, table_sha256: str) -> models.History:
     """The history of a skin and of those joined to it, from what is kept."""
     by_sensor: dict[str, list[models.Point]] = {}
-    for row in inversions.history(connection, root):
+    for row in inversions.history(connection, root, table_sha256):
         values = (row.d33_pc_per_n, row.d33_uncertainty_pc_per_n)
         by_sensor.setdefault(row.sensor, []).append(_point(row, values, None))
     return _history(connection, root, by_sensor, {})
@@ -131,4 +131,4 @@ def _why_unused(row: AnyRow, is_used: bool) -> str | None:
         case "corrected":
             return f"corrected by {row.corrected_by}"
         case _:
-            return None if is_used else "no d33 can be told from it; its /d33 says why"
+            return None if is_used else "no d33 of it is kept; its /d33 says why"

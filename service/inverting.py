@@ -4,8 +4,10 @@ import logging
 from collections.abc import Sequence
 from typing import Any
 
+import orjson
+
 from service.adopted import Serving
-from service.d33_models import of_inversion
+from service.d33_models import D33, of_inversion, of_moduli
 from service.store import campaigns, inversions
 from service.store.engine import Database, StorageFull
 from service.store.tables import AnyRow
@@ -20,6 +22,7 @@ Band = tuple[float, float]
 _NOTHING: dict[str, Any] = dict.fromkeys(
     ("band", "array", "sensor_spread_percent", "gain_scatter_percent", "position_scatter_mm", "declared_percent")
 )
+_EMPTY: dict[str, Any] = {"sensors": [], "cells": [], "findings": []}
 
 
 def answer(store: Database, table: SigmaTable, row: AnyRow, band_hz: Band | None) -> dict[str, Any]:
@@ -30,9 +33,18 @@ def answer(store: Database, table: SigmaTable, row: AnyRow, band_hz: Band | None
             return dict(kept)
         campaign = campaigns.load(connection, row, with_excluded=False)
         excluded = campaigns.excluded_of(connection, row.number)
-    found = _inverted(campaign, table, band_hz)
-    found["left_out"] = [{"recording": left.recording, "reason": left.reason} for left in excluded] + found["left_out"]
-    document = {"campaign_id": row.id, "table_sha256": table.sha256, **found}
+    document = {"campaign_id": row.id, "table_sha256": table.sha256}
+    left_out = [{"recording": left.recording, "reason": left.reason} for left in excluded]
+    try:
+        found = _inverted(campaign, table, band_hz)
+        document |= {**found, "left_out": left_out + found["left_out"]}
+        D33.model_validate(orjson.loads(orjson.dumps(document)))  # what is kept can be answered
+    except InvalidInput:  # of the band
+        raise
+    except Exception as error:
+        logger.exception("no d33 from a campaign", extra={"fields": {"campaign": row.id}})
+        reason = f"the figures cannot be computed ({type(error).__name__}: {error}); the server's log says more"
+        return {**document, **_none(reason), "moduli": [], "left_out": left_out}
     if band_hz is None:
         _keep(store, row, document)
     return document
@@ -88,22 +100,28 @@ def complete(store: Database, table: SigmaTable, root: str) -> None:
 def _inverted(campaign: Campaign, table: SigmaTable, band_hz: Band | None) -> dict[str, Any]:
     # Imported here: statistics take half a second to load, which a start need not wait for.
     from underskin.inversion import invert
+    from underskin.recordings import elastomer
 
+    moduli, silent = of_moduli(elastomer.of_campaign(campaign))
     try:
         found = invert(campaign, table, band_hz)
     except InvalidInput as error:
         if band_hz is not None and error.field == "band_hz":
             raise
-        return {**_NOTHING, "status": "none", "reason": str(error), "sensors": [], "cells": [], "left_out": []}
+        return {**_none(str(error)), "moduli": moduli, "left_out": silent}
     left_out = [{"recording": None, "reason": reason} for reason in found.left_out]
-    return {**of_inversion(found), "left_out": left_out}
+    return {**of_inversion(found), "moduli": moduli, "left_out": left_out + silent}
+
+
+def _none(reason: str) -> dict[str, Any]:
+    return {**_NOTHING, "status": "none", "reason": reason, **_EMPTY}
 
 
 def _keep(store: Database, row: AnyRow, document: dict[str, Any]) -> None:
     sensors = {
         entry["sensor"]: (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"])
         for entry in document["sensors"]
-        if entry["d33_pc_per_n"] is not None
+        if entry["d33_pc_per_n"] is not None and entry["d33_uncertainty_pc_per_n"] is not None
     }
     try:
         with store.writing() as connection:

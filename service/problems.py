@@ -85,7 +85,10 @@ def _is_umbridge(path: str) -> bool:
 
 def invalid_input(errors: Iterable[InvalidInput]) -> Refusal:
     """The problem of values that cannot be used: 422."""
-    found = [InvalidInput(error.field, _brief(error.value), error.allowed, error.index) for error in errors]
+    found = [
+        InvalidInput(_brief(error.field), _brief(error.value), _writable(error.allowed), error.index)
+        for error in errors
+    ]
     entries = [
         {"field": error.field, "index": error.index, "value": _in_json(error.value), "allowed": error.allowed}
         for error in found
@@ -137,8 +140,13 @@ def _brief(value: Any) -> Any:
         return "a very large integer"
     if value is None or isinstance(value, int | float):
         return value
-    text = value if isinstance(value, str) else reprlib.repr(value)
+    text = _writable(value if isinstance(value, str) else reprlib.repr(value))
     return text if len(text) <= 80 else text[:77] + "..."
+
+
+def _writable(text: str) -> str:
+    """Half of a surrogate pair, which JSON can escape, cannot be written as UTF-8."""
+    return text.encode("utf-8", "replace").decode()
 
 
 def _in_json(value: Any) -> Any:

@@ -77,7 +77,7 @@ def history(
         return histories.adopted_history(store, table, root)
     inverting.complete(store, table, root)
     with store.reading() as connection:
-        return histories.history(connection, root)
+        return histories.history(connection, root, table.sha256)
 
 
 def _detail(connection: Connection, skin_id: str) -> models.SkinDetail:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from fastapi import Request
 from python_multipart import MultipartParser
-from python_multipart.exceptions import MultipartParseError
+from python_multipart.exceptions import FormParserError
 from python_multipart.multipart import parse_options_header
 
 from service.problems import Refusal
@@ -32,12 +32,13 @@ _LONGEST_LABEL = 200
 
 @dataclass(frozen=True)
 class Upload:
-    """One file: where it was put, what the client calls it, which field of the form it was, its digest."""
+    """One file: where it was put, what the client calls it, which field it was if it was part of a form, its digest."""
 
     path: Path
     label: str | None
     field: str | None
     sha256: str
+    in_form: bool
 
 
 class UploadFolder:
@@ -104,7 +105,7 @@ async def _whole(request: Request, folder: Path) -> Upload:
             part.write(chunk)
     finally:
         part.close()
-    return part.upload()
+    return part.upload(in_form=False)
 
 
 async def _parts(request: Request, folder: Path, boundary: bytes) -> list[Upload]:
@@ -114,13 +115,13 @@ async def _parts(request: Request, folder: Path, boundary: bytes) -> list[Upload
         async for chunk in request.stream():
             parser.write(chunk)
         parser.finalize()
-    except MultipartParseError as error:
+    except FormParserError as error:  # of the boundary, too
         raise Refusal(400, f"The multipart form cannot be read: {error}.") from None
     finally:
         form.close()
     if not form.ended:
         raise Refusal(400, "The multipart form ends in the middle of a part.")
-    return [part.upload() for part in form.parts]
+    return [part.upload(in_form=True) for part in form.parts]
 
 
 @dataclass
@@ -141,10 +142,10 @@ class _Part:
     def close(self) -> None:
         self._file.close()
 
-    def upload(self) -> Upload:
+    def upload(self, *, in_form: bool) -> Upload:
         _, options = parse_options_header(self.headers.get(b"content-disposition", b""))
         label, name = options.get(b"filename"), options.get(b"name")
-        return Upload(self.path, _text(label), _text(name), self._digest.hexdigest())
+        return Upload(self.path, _text(label), _text(name), self._digest.hexdigest(), in_form)
 
 
 class _Form:

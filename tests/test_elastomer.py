@@ -83,16 +83,25 @@ def test_a_recording_that_starts_in_contact_has_its_contact_point_before_it() ->
     assert found.modulus == pytest.approx(16e6, rel=1e-3)
 
 
-def test_recordings_in_lab_units_give_the_same() -> None:
+@pytest.mark.parametrize(("height_mm", "diameter_mm"), [(10.0, 10.0), (12.5, 29.0), (30.0, 50.0)])
+def test_the_papers_reading_on_the_stated_geometry(height_mm: float, diameter_mm: float) -> None:
     strain = np.linspace(0, 0.3, 600)
     pressed = CompressionRecording(
-        id="c", sample_height_mm=10.0, sample_diameter_mm=10.0, displacement_mm=strain * 10,
-        force_n=paper_curve(strain) * np.pi / 4 * DIAMETER**2,
+        id="c", sample_height_mm=height_mm, sample_diameter_mm=diameter_mm, displacement_mm=strain * height_mm,
+        force_n=paper_curve(strain) * np.pi / 4 * (diameter_mm * 1e-3) ** 2,
     )  # fmt: skip
-    assert of_compression(pressed).modulus == pytest.approx(16e6, rel=0.01)
+    found = of_compression(pressed)
+    assert found.modulus == pytest.approx(16e6, rel=0.01)
+    assert found.leaves_at_stress == pytest.approx(2e6, rel=0.1)
+    assert "leaves the line at 2.11 MPa" in found.statement
+
+
+def test_an_indentation_in_lab_units_gives_the_same() -> None:
     depth = np.linspace(0, 0.4e-3, 200)
     indented = IndentationRecording(id="i", indenter_radius_mm=4.0, displacement_mm=depth * 1e3, force_n=hertz(depth))
-    assert of_indentation(indented, 0.5).modulus == pytest.approx(16e6, rel=1e-4)
+    found = of_indentation(indented, 0.5)
+    assert found.modulus == pytest.approx(16e6, rel=1e-4)
+    assert "contact from 0.1 mm" in found.statement
 
 
 def test_a_recording_that_does_not_load_is_refused() -> None:

@@ -1,16 +1,25 @@
 """The examples, run as they stand against a running service, and the bytes of the LabVIEW recipe."""
 
+import json
 import os
 import re
 import shutil
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import httpx
+import numpy as np
 import pytest
+
+from tests.conftest import running
+from underskin import Client, load_table
+from underskin.inversion import invert
+from underskin.recordings import read_file
+from underskin.units import to_lab
 
 ROOT = Path(__file__).parent.parent
 EXAMPLES = ROOT / "examples"
@@ -72,6 +81,59 @@ def test_octave_shows_why_it_is_refused(server_url: str, tmp_path: Path) -> None
     assert "rt_over_h" in answer.stderr
     assert "is required" in answer.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture(scope="module")
+def store_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A server whose store the examples fill."""
+    with running(tmp_path_factory.mktemp("store")) as started:
+        yield started.url
+
+
+@needs_curl
+def test_curl_sends_campaigns(store_url: str) -> None:
+    first, again = (run(["./curl_campaigns.sh"], store_url) for _ in range(2))
+    assert first.returncode == 0, first.stderr
+    assert again.stdout == first.stdout  # kept once
+    batch, d33, history = map(json.loads, first.stdout.splitlines()[1::2])
+    kept = [[entry["status"] for entry in one["recordings"]].count("ok") for one in batch["campaigns"]]
+    assert kept == [16, 16, 16, 16, 15]
+    (refused,) = (entry for entry in batch["campaigns"][4]["recordings"] if entry["status"] == "refused")
+    assert refused["errors"][0]["field"] == "preload_n"
+    assert d33["campaign_id"] == batch["campaigns"][4]["id"]
+    assert [len(sensor["points"]) for sensor in history["sensors"]] == [5, 5, 5, 5]
+    assert [sensor["trend"]["significant"] for sensor in history["sensors"]] == [False, False, True, False]
+
+
+def test_python_sends_campaigns(store_url: str) -> None:
+    answer = run([sys.executable, "python_campaigns.py"], store_url)
+    assert answer.returncode == 0, answer.stderr
+    assert "2017-09.csv: 15 of 16 recordings kept\n  s02 4 mm 2 N: preload_n = -2.0: must be" in answer.stdout
+    assert "palm 3 in 2017-09 (simulated): d33 13.07 ± 1.55 pC/N\n  s01: 14.01 ± 0.14 pC/N" in answer.stdout
+    # s03 loses 8 % of 13.7 pC/N a month
+    (slope,) = re.findall(r"s03: (\S+) pC/N a year, a trend", answer.stdout)
+    assert float(slope) == pytest.approx(-0.08 * 13.7 * 12, abs=1.0)
+    with Client(store_url) as client:
+        assert len(list(client.campaigns.all(skin="python-palm"))) == 5
+
+
+@needs_octave
+@needs_curl
+def test_octave_sends_campaigns(store_url: str) -> None:
+    answer = run(["octave-cli", "octave_campaigns.m"], store_url)
+    assert answer.returncode == 0, answer.stderr
+    assert "2017-07-03 r1: ok\n2017-07-03 r2: refused\n  preload_n = -1: must be" in answer.stdout
+    assert "d33 of the array = 14.27 +- 0.51 pC/N\n" in answer.stdout
+    assert "s01: 14.07 14.01 13.85 pC/N\ns02: 14.47 14.49 pC/N\n" in answer.stdout
+
+
+@pytest.mark.parametrize("month", ["05.csv", "06.csv", "07.json", "08.csv", "09.csv"])
+def test_the_simulated_campaigns_give_back_what_they_were_made_with(month: str) -> None:
+    file = EXAMPLES / "campaigns" / f"2017-{month}"
+    found = invert(read_file(file, file.name).campaign, load_table())
+    d33 = np.array([14.0, 14.4, 13.7 * (1 - 0.08 * (int(month[1]) - 5)), 14.2])
+    pull = (to_lab("d33_pc_per_n", found.sensors.value) - d33) / to_lab("d33_pc_per_n", found.sensors.uncertainty)
+    assert np.abs(pull).max() < 3
 
 
 def labview_blocks(language: str) -> list[str]:

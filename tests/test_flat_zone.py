@@ -153,3 +153,11 @@ def test_concealed_campaigns(name: str, low: tuple[float, float], high: tuple[fl
     )
     assert low[0] <= zone.low_hz <= low[1]
     assert high[0] <= zone.high_hz <= high[1]
+
+
+def test_recordings_whose_lines_do_not_overlap_have_a_zone_and_no_warning() -> None:
+    low, low_conditions = recorded(np.linspace(2, 20, 15), "")
+    high, high_conditions = recorded(np.linspace(200, 400, 15), "")
+    conditions = [*low_conditions, *((radius, 5 * preload) for radius, preload in high_conditions)]
+    zone = flat_zone(stacked([*low, *high]), conditions)
+    assert 2 <= zone.low_hz < zone.high_hz <= 400

@@ -12,6 +12,7 @@ from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf_estimation import Frf, broadband, estimate, lines_of, stepped_sine
 from underskin.recordings.signal_check import defects
+from underskin.recordings.stepped_sine import find_steps
 from underskin.units import Complexes, Floats
 
 RATE = 2000.0
@@ -58,6 +59,12 @@ def test_stepped_sine_recovers_a_known_system_and_its_phase() -> None:
     np.testing.assert_allclose(frf.frequency, tones, rtol=1e-4)
     np.testing.assert_allclose(frf.values, known_frf(np.array(tones)), rtol=2e-3)
     assert np.all(np.angle(frf.values) < 0)
+
+
+def test_a_sweep_is_not_taken_for_tones() -> None:
+    time = np.arange(round(1.25 * 4096)) / 4096
+    force = 2.0 + 0.09 * np.sin(2 * np.pi * (2.0 + (600.0 - 2.0) / 2.5 * time) * time)
+    assert find_steps(force, 4096.0) == []
 
 
 def test_a_pure_delay_turns_the_phase_by_minus_omega_t() -> None:

@@ -156,6 +156,83 @@ def test_a_contact_outside_the_table_is_left_out_and_said_so(table: SigmaTable) 
         invert(replace(campaign, skin=replace(campaign.skin, poisson_ratio=0.4)), table)
 
 
+def moved(campaign: Campaign, row: int, **changes: object) -> Campaign:
+    recording = replace(campaign.recordings[row], **changes)  # type: ignore[arg-type]
+    return replace(campaign, recordings=(*campaign.recordings[:row], recording, *campaign.recordings[row + 1 :]))
+
+
+@pytest.mark.parametrize("x_mm", [19.0, 250.0, 1e9, 1e308])
+def test_a_recording_far_off_its_sensor_costs_only_itself(table: SigmaTable, x_mm: float) -> None:
+    campaign = simulate(table, Rig(d33=np.array([14.0])), np.random.default_rng(11))
+    found = invert(moved(campaign, 0, position_mm=(x_mm, 0.0)), table)
+    rest = invert(replace(campaign, recordings=campaign.recordings[1:]), table)
+    assert found.campaign_d33 is not None
+    assert rest.campaign_d33 is not None
+    assert float(found.campaign_d33.value) == pytest.approx(float(rest.campaign_d33.value), rel=1e-6)
+    assert found.recordings.inside.tolist() == [False] + 9 * [True]
+    assert [line.split(":")[0] for line in found.left_out] == ["recording r0"]
+
+
+def test_a_skin_much_thinner_than_the_scatter_of_positions_is_inverted(table: SigmaTable) -> None:
+    rig = Rig(
+        d33=np.array([14.0, 14.0]), thickness_mm=0.1, sensor_radius_mm=0.06, modulus_mpa=100.0,
+        preloads_n=(0.02, 0.05, 0.1), indenters_mm=(4.0,),
+    )  # fmt: skip
+    found = invert(simulate(table, rig, np.random.default_rng(12)), table)
+    assert found.recordings.inside.all()
+    assert found.campaign_d33 is not None
+    assert covered(found.campaign_d33, np.array(14.0))
+
+
+def scaled(campaign: Campaign, row: int, factor: float) -> Campaign:
+    recording = campaign.recordings[row]
+    assert isinstance(recording, FrfRecording)
+    assert recording.frf_re_pc_per_n is not None
+    assert recording.frf_im_pc_per_n is not None
+    real, imaginary = factor * recording.frf_re_pc_per_n, factor * recording.frf_im_pc_per_n
+    return moved(campaign, row, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)
+
+
+@pytest.mark.parametrize("factor", [1000.0, 10.0, -1.0, 1e-3])
+@pytest.mark.parametrize("sensors", [1, 5])
+def test_a_recording_grossly_off_is_set_aside_and_named(table: SigmaTable, factor: float, sensors: int) -> None:
+    rig = Rig(d33=np.full(sensors, 14.0), preloads_n=(0.5, 2.0))
+    campaign = simulate(table, rig, np.random.default_rng(13))
+    found = invert(scaled(campaign, 0, factor), table)
+    assert found.campaign_d33 is not None
+    assert covered(found.campaign_d33, np.array(14.0))
+    assert covered(found.sensors, rig.d33).all()
+    assert [line.split(":")[0] for line in found.left_out] == ["recording r0"]
+    assert found.flags == ()
+
+
+def test_scatter_that_rigs_have_is_never_set_aside(table: SigmaTable) -> None:
+    random = np.random.default_rng(14)
+    for _ in range(60):
+        rig, _ = drawn(random)
+        assert invert(simulate(table, rig, random), table).left_out == ()
+
+
+def test_a_sensor_of_few_recordings_is_flagged_as_a_whole(table: SigmaTable) -> None:
+    rig = Rig(d33=np.array([14.0] * 8 + [3.0, 60.0]), preloads_n=(1.0,))
+    found = invert(simulate(table, rig, np.random.default_rng(15)), table)
+    assert codes(found) == {"s8": ["weak"], "s9": ["strong"]}
+
+
+@pytest.mark.parametrize("factor", [0.0, 1e-300, 1e200])
+def test_a_campaign_without_a_charge_that_can_be_is_refused(table: SigmaTable, factor: float) -> None:
+    campaign = simulate(table, Rig(d33=np.array([14.0]), preloads_n=(1.0,)), np.random.default_rng(16))
+    with pytest.raises(InvalidInput, match=r"recordings = .*(charge|below 1 C/N)"):
+        invert(scaled(scaled(campaign, 0, factor), 1, factor), table)
+
+
+def test_a_sensor_of_exact_zeros_is_dead(table: SigmaTable) -> None:
+    campaign = simulate(table, Rig(d33=np.full(3, 14.0), preloads_n=(1.0,)), np.random.default_rng(17))
+    found = invert(scaled(scaled(campaign, 0, 0.0), 1, 0.0), table)
+    assert codes(found) == {"s0": ["dead"]}
+    assert np.isfinite([found.sensors.value, found.sensors.low, found.sensors.high]).all()
+
+
 def test_the_users_band_is_used_and_a_campaign_without_frf_is_refused(table: SigmaTable) -> None:
     campaign = simulate(table, Rig(d33=np.array([14.0])), np.random.default_rng(8))
     assert invert(campaign, table, (10.0, 50.0)).zone.chosen_by_user

@@ -11,9 +11,13 @@ import pytest
 import underskin
 
 PUBLIC = {
+    "Campaign",
     "Client",
+    "FileError",
     "Indenter",
     "InvalidInput",
+    "Inversion",
+    "Reading",
     "ServiceError",
     "Sigma",
     "SigmaTable",
@@ -23,7 +27,9 @@ PUBLIC = {
     "Transmission",
     "UnderskinError",
     "Unreachable",
+    "invert",
     "load_table",
+    "read_file",
     "transmission",
 }
 
@@ -55,7 +61,7 @@ def test_unknown_name_is_an_attribute_error() -> None:
 def test_every_error_is_an_underskin_error() -> None:
     errors = [getattr(underskin, name) for name in PUBLIC if inspect.isclass(getattr(underskin, name))]
     raised = [error for error in errors if issubclass(error, Exception)]
-    assert len(raised) == 6
+    assert len(raised) == 7
     assert all(issubclass(error, underskin.UnderskinError) for error in raised)
 
 

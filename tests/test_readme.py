@@ -4,11 +4,13 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from service.settings import Settings
+from tests.conftest import running
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -44,25 +46,47 @@ def pattern(shown: str) -> str:
     return ".*".join(re.escape(re.sub(r"\s", "", piece)) for piece in shown.split("…"))
 
 
+Run = Callable[[list[str]], "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Stands for /tmp."""
+    return tmp_path_factory.mktemp("readme")
+
+
+@pytest.fixture(scope="module")
+def newcomer(folder: Path) -> Iterator[Run]:
+    """Runs a command as one who follows the page from its first line, with a service of one's own."""
+    with running(folder) as server:
+        environment = os.environ | {
+            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+            "UNDERSKIN_DATA": str(folder / "data"),
+            "UNDERSKIN_URL": server.url,
+        }
+
+        def run(command: list[str]) -> "subprocess.CompletedProcess[str]":
+            live = [part.replace(ADDRESS, server.url).replace("/tmp/", f"{folder}/") for part in command]
+            return subprocess.run(live, cwd=ROOT, env=environment, capture_output=True, text=True)
+
+        yield run
+
+
 @pytest.mark.parametrize(("command", "shown"), sessions())
-def test_command_prints_what_the_readme_shows(command: str, shown: str, server_url: str) -> None:
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    live = command.replace(ADDRESS, server_url).replace(".venv/bin/python", sys.executable)
-    answer = subprocess.run(
-        ["bash", "-euo", "pipefail", "-c", live], env=os.environ | {"PATH": path}, capture_output=True, text=True
-    )
+def test_command_prints_what_the_readme_shows(command: str, shown: str, newcomer: Run, folder: Path) -> None:
+    answer = newcomer(["bash", "-euo", "pipefail", "-c", command.replace(".venv/bin/python", sys.executable)])
     assert answer.returncode == 0, answer.stderr
-    printed = re.sub(r"\s", "", answer.stdout)
+    printed = re.sub(r"\s", "", answer.stdout.replace(f"{folder}/", "/tmp/"))
     assert re.fullmatch(pattern(shown), printed), f"{command}\nprints\n{answer.stdout}"
 
 
-def test_python_block_runs_and_prints_what_its_comment_says(server_url: str) -> None:
-    (block,) = blocks("python")
-    shown = re.search(r"print\(.*\)  # (.*)", block)
-    assert shown is not None
-    live = block.replace(ADDRESS, server_url)
-    answer = subprocess.run([sys.executable, "-c", live], capture_output=True, text=True, check=True)
-    assert re.fullmatch(pattern(shown[1]), re.sub(r"\s", "", answer.stdout)), answer.stdout
+@pytest.mark.parametrize("block", blocks("python"))
+def test_python_block_runs_and_prints_what_its_comment_says(block: str, newcomer: Run) -> None:
+    """After the commands, which send what the second block asks for."""
+    (shown,) = re.findall(r"# prints (.*)", block)
+    answer = newcomer([sys.executable, "-c", block])
+    assert answer.returncode == 0, answer.stderr
+    assert re.fullmatch(pattern(shown), re.sub(r"\s", "", answer.stdout)), answer.stdout
 
 
 def test_links_lead_to_files() -> None:

@@ -106,10 +106,14 @@ def test_the_concealed_campaigns_come_back_as_they_went_in(part: str) -> None:
         (FRF, "indenter_radius_mm", 0.004, "indenter_radius_mm", "was it given in m"),
         (FRF, "dynamic_force_n", -0.1, "dynamic_force_n", "greater than 0"),
         (FRF, "load_cycles", 1.5, "load_cycles", "whole number"),
+        (FRF, "load_cycles", 2**53 + 1, "load_cycles", "9007199254740992"),
+        (FRF, "load_cycles", 1e30, "load_cycles", "9007199254740992"),
         (FRF, "dwell_s", -1, "dwell_s", "0 or greater"),
         (FRF, "recorded_at", "yesterday", "recorded_at", "date and time"),
         (FRF, "position_mm", [1.0], "position_mm", "two numbers"),
         (FRF, "frequency_hz", [0.0, 1.0, 2.0], "frequency_hz[0]", "greater than 0"),
+        (FRF, "frequency_hz", [1e-300, 1.0, 2.0], "frequency_hz[0]", "1e-06 to 1e+09 Hz"),
+        (FRF, "frequency_hz", [1.0, 2.0, 1e300], "frequency_hz[2]", "1e-06 to 1e+09 Hz"),
         (FRF, "frequency_hz", [1.0, 3.0, 2.0], "frequency_hz[2]", "entry before"),
         (FRF, "frf_re_pc_per_n", [7.0, float("nan"), 7.0], "frf_re_pc_per_n[1]", "finite"),
         (FRF, "frf_re_pc_per_n", [7.0, "7.0", 7.0], "frf_re_pc_per_n[1]", "a number"),
@@ -120,6 +124,7 @@ def test_the_concealed_campaigns_come_back_as_they_went_in(part: str) -> None:
         (FRF, "coherence", [0.5, 1.1, 0.5], "coherence[1]", "0 to 1"),
         (FRF, "sample_rate_hz", 100.0, "sample_rate_hz", "absent where the FRF"),
         (FRF, "colour", "red", "colour", "unknown field"),
+        (FRF, "", "red", '""', "unknown field"),
         (TIME_SERIES, "charge_pc", None, "charge_pc", "required"),
         (TIME_SERIES, "sample_rate_hz", float("inf"), "sample_rate_hz", "finite"),
         (INDENTATION, "force_n", [0.0], "force_n", "3 entries"),
@@ -144,6 +149,12 @@ def test_a_bad_field_is_named_and_the_good_recordings_stay(
 def test_all_that_is_wrong_with_a_recording_is_said_at_once() -> None:
     _, problems = from_dict(document(FRF, {**FRF, "id": "r2", "preload_n": -1, "sensor": None, "x": 1}))
     assert {problem.field for problem in problems} == {"preload_n", "sensor", "x"}
+    assert {problem.recording for problem in problems} == {"r2"}
+
+
+def test_of_thousands_of_unknown_fields_some_are_said() -> None:
+    _, problems = from_dict(document(FRF, {**FRF, "id": "r2", **{f"x{number}": 1 for number in range(5000)}}))
+    assert 1 <= len(problems) < 100
     assert {problem.recording for problem in problems} == {"r2"}
 
 

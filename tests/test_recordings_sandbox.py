@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from tests.instrument_files import hdf5, tdms
-from tests.test_recordings_campaign import EVERYTHING
+from tests.test_recordings_campaign import EVERYTHING, INDENTATION, document
 from underskin.errors import FileError
 from underskin.recordings import read_contents, read_file
 from underskin.recordings.channels import Contents
@@ -48,13 +48,44 @@ def test_what_the_child_reads_arrives_unchanged(stream: BinaryIO) -> None:
 
 
 def test_a_small_file_that_unfolds_beyond_the_memory_limit_is_refused() -> None:
-    def bomb(target: Any) -> None:
-        target.create_dataset("force", (400_000_000,), "f8", chunks=(1_000_000,), compression="gzip")
+    data = matlab_73(lambda target: target.create_dataset("force", data=np.zeros(20_000_000), compression="gzip"))
+    assert len(data) < 1_000_000
+    with tempfile.TemporaryFile() as stream:
+        stream.write(data)
+        stream.flush()
+        with pytest.raises(FileError, match=r"bomb\.mat: .*more than 0\.1 GB of memory"):
+            parse_apart("MATLAB", stream, "bomb.mat", Limits(memory_bytes=107_374_182))
 
-    data = matlab_73(bomb)
-    assert len(data) < 100_000
-    with pytest.raises(FileError, match=r"bomb\.mat: .*more than 1 GB of memory"):
+
+def test_a_small_file_cannot_become_a_large_campaign() -> None:
+    data = matlab_73(lambda target: target.create_dataset("force", data=np.zeros(20_000_000), compression="gzip"))
+    with pytest.raises(FileError, match=r"bomb\.mat: it unfolds to more than \d+ MB, too much for a file of its size"):
         read_contents(data, "bomb.mat")
+
+
+def test_a_dataset_that_was_never_written_is_refused() -> None:
+    def declare(target: Any) -> None:
+        del target["recordings/000000/force_n"]
+        target.create_dataset("recordings/000000/force_n", (1_000_000,), "f8", fillvalue=1.0)
+
+    with pytest.raises(FileError, match=r"force_n: declares 8000000 bytes of data, of which the file stores 0"):
+        read_contents(altered_hdf5(declare), "bomb.h5")
+
+
+def altered_hdf5(change: Callable[[Any], None]) -> bytes:
+    buffer = io.BytesIO(hdf5(document(INDENTATION)))
+    with h5py.File(buffer, "r+") as target:
+        change(target)
+    return buffer.getvalue()
+
+
+def test_attributes_named_as_no_field_is_are_refused_one_by_one() -> None:
+    def rename(target: Any) -> None:
+        del target["recordings/000000"]
+        target.create_group("recordings/000000").attrs.update({"array": "<f8", "start": 0, "count": 10**9})
+
+    problems = read_file(altered_hdf5(rename), "a.h5").problems
+    assert {"array", "start", "count"} <= {problem.field for problem in problems}
 
 
 def test_a_file_that_takes_too_long_is_refused(stream: BinaryIO) -> None:
@@ -90,8 +121,8 @@ def test_the_childs_death_is_an_error_that_names_the_file(stream: BinaryIO, func
 
 
 def test_the_child_cannot_answer_more_than_it_may_hold(stream: BinaryIO) -> None:
-    with pytest.raises(FileError, match="File too large"):
-        call_apart(f"{__name__}:write_much", stream, "a", what="TDMS", limits=Limits(memory_bytes=300_000_000))
+    with pytest.raises(FileError, match=r"a: it unfolds to more than 16 MB"):
+        call_apart(f"{__name__}:write_much", stream, "a", what="TDMS")
 
 
 def test_the_child_knows_no_secrets(stream: BinaryIO, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,20 +3,35 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from underskin.errors import InvalidInput, ServiceError, SolverError, TableError, UnderskinError, Unreachable
+from underskin.errors import (
+    FileError,
+    InvalidInput,
+    ServiceError,
+    SolverError,
+    TableError,
+    UnderskinError,
+    Unreachable,
+)
 
 if TYPE_CHECKING:
     from underskin.client import Client
+    from underskin.inversion import Inversion, invert
     from underskin.prediction import Transmission, transmission
+    from underskin.recordings.campaign import Campaign
+    from underskin.recordings.reading import Reading, read_file
     from underskin.skin import Indenter, Skin
     from underskin.surrogate import Sigma, SigmaTable, load_table
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "Campaign",
     "Client",
+    "FileError",
     "Indenter",
     "InvalidInput",
+    "Inversion",
+    "Reading",
     "ServiceError",
     "Sigma",
     "SigmaTable",
@@ -26,19 +41,26 @@ __all__ = [
     "Transmission",
     "UnderskinError",
     "Unreachable",
+    "invert",
     "load_table",
+    "read_file",
     "transmission",
 ]
 
 # Imported on first use: SciPy takes longer to load than `underskin --help` to answer.
 _MODULES = {
+    "Campaign": "recordings.campaign",
     "Client": "client",
     "Indenter": "skin",
+    "Inversion": "inversion",
+    "Reading": "recordings.reading",
     "Sigma": "surrogate",
     "SigmaTable": "surrogate",
     "Skin": "skin",
     "Transmission": "prediction",
+    "invert": "inversion",
     "load_table": "surrogate",
+    "read_file": "recordings.reading",
     "transmission": "prediction",
 }
 

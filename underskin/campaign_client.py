@@ -57,13 +57,17 @@ class Campaigns:
         skin: str | None = None,
         rig: str | Path | None = None,
         all_or_nothing: bool = False,
+        together: str | None = None,
         idempotency_key: str | None = None,
     ) -> list[Document]:
-        """Send files as instruments write them; one entry a campaign. `rig` describes their channels."""
+        """Send files as instruments write them; one entry a campaign. `rig` describes their channels.
+
+        `together` is the name of the one campaign that they are joined into, such as a file a press.
+        """
         if not files:
             raise InvalidInput("files", [], "must name at least one file")
         headers = {"Idempotency-Key": idempotency_key or uuid4().hex}
-        query = query_of(skin=skin, all_or_nothing=all_or_nothing)
+        query = query_of(skin=skin, all_or_nothing=all_or_nothing, together=together)
 
         def send() -> Document:
             with ExitStack() as opened:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from underskin import cli_diagnose, cli_store
+from underskin import cli_campaign, cli_diagnose, cli_store
 from underskin.errors import UnderskinError
 
 if TYPE_CHECKING:
@@ -135,10 +135,16 @@ def d33(
     units_checked: UnitsChecked = False,
     input_file: Input = None,
     csv: Csv = False,
+    files: cli_campaign.Files = None,
+    rig: cli_campaign.Rig = None,
+    band: cli_campaign.Band = None,
+    figures: cli_campaign.Figures = None,
+    together: cli_campaign.Together = None,
 ) -> None:
-    """The d33 of a sensor from its measured FRF."""
-    from underskin import answers
+    """The d33 of a sensor from its measured FRF, or of an array from files of its recordings.
 
+    Files also tell the elastomer's modulus, where it was recorded on the same bench (compression, indentation).
+    """
     given = {
         "thickness_mm": thickness_mm,
         "youngs_modulus_mpa": youngs_modulus_mpa,
@@ -149,6 +155,18 @@ def d33(
         "frf_pc_per_n": frf_pc_per_n,
         "frf_uncertainty_pc_per_n": frf_uncertainty_pc_per_n,
     }
+    if files:
+        for_columns = [f"--{name.replace('_', '-')}" for name, values in given.items() if values]
+        for_columns += [name for name, used in (("--input", input_file), ("--units-checked", units_checked)) if used]
+        cli_campaign.refuse(for_columns, "is for columns; files say it themselves")
+        cli_campaign.invert_files(files, rig, band, figures, together, csv)
+        return
+    only_files = (("--rig", rig), ("--band", band), ("--figures", figures), ("--together", together))
+    for_files = [name for name, used in only_files if used is not None]
+    cli_campaign.refuse(for_files, "goes with FILE, and none is given")
+
+    from underskin import answers
+
     defaults = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": math.nan}
     _answer(given, defaults, input_file, csv, lambda table, columns: answers.d33(table, columns, units_checked))
 

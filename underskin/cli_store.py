@@ -1,5 +1,7 @@
 """The commands that send campaigns to the service and fetch skins from it: import and export."""
 
+import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,25 +26,31 @@ def import_files(
     files: Annotated[list[Path], typer.Argument(help="Campaigns, instrument files, or what `export` wrote.")],
     skin: Annotated[str | None, typer.Option(help="The skin that they are of, whatever they say.")] = None,
     rig: Annotated[Path | None, typer.Option(help="Rig description, for files that hold channels.")] = None,
+    together: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Join the files, all of one skin, into one campaign called NAME.")
+    ] = None,
     all_or_nothing: Annotated[
-        bool, typer.Option("--all-or-nothing", help="Keep nothing of a file in which any recording is refused.")
+        bool,
+        typer.Option("--all-or-nothing", help="Keep nothing of a file, or of a campaign, with a refused recording."),
     ] = False,
     url: Url = _LOCAL,
     key: Key = None,
 ) -> None:
-    """Send files to the service, one after the other; exit status 2 where anything was refused."""
+    """Send files to the service, one after the other or together; exit status 2 where anything was refused."""
     from rich.console import Console
     from rich.progress import Progress
 
     refused = 0
-    with _client(url, key) as client, Progress(console=Console(stderr=True)) as progress:
-        task = progress.add_task("importing", total=len(files))
-        for file in files:
-            lines = _sent(client, file, skin, rig, all_or_nothing)
-            refused += sum(not good for good, _ in lines)
-            for _, line in lines:
-                progress.console.print(f"{file}: {line}", markup=False, highlight=False)
-            progress.advance(task)
+    batches = [(str(file), [file]) for file in files] if together is None else [(together, files)]
+    terms = {"skin": skin, "rig": rig, "all_or_nothing": all_or_nothing, "together": together}
+    console = Console(stderr=True)
+    # The bar may take what is written to a terminal, to stay below it, but not what goes into a pipe.
+    bar = Progress(console=console, disable=not console.is_terminal, redirect_stdout=sys.stdout.isatty())
+    with _client(url, key) as client, bar:
+        for name, batch in bar.track(batches, description="importing"):
+            for good, line in _sent(client, batch, terms):
+                refused += not good
+                typer.echo(f"{name}: {line}", err=not good)
     if refused:
         raise typer.Exit(2)
 
@@ -57,10 +65,11 @@ def export_skin(
     from rich.console import Console
     from rich.progress import DownloadColumn, Progress, TextColumn
 
-    columns = (TextColumn("exporting"), DownloadColumn())
-    with _client(url, key) as client, Progress(*columns, console=Console(stderr=True)) as progress:
-        task = progress.add_task("", total=None)
-        client.skins.export(skin, file, lambda count: progress.advance(task, count))
+    console = Console(stderr=True)
+    bar = Progress(TextColumn("exporting"), DownloadColumn(), console=console, disable=not console.is_terminal)
+    with _client(url, key) as client, bar:
+        task = bar.add_task("", total=None)
+        client.skins.export(skin, file, lambda count: bar.advance(task, count))
     typer.echo(f"{file}: {file.stat().st_size / 1e6:.1f} MB")
 
 
@@ -70,17 +79,18 @@ def _client(url: str, key: str | None) -> "Client":
     return Client(url, api_key=key, timeout=_LONGEST_WAIT_S)
 
 
-def _sent(
-    client: "Client", file: Path, skin: str | None, rig: Path | None, all_or_nothing: bool
-) -> list[tuple[bool, str]]:
-    """What became of a file: whether it is good, and a line a campaign or refused recording."""
+def _sent(client: "Client", files: Sequence[Path], terms: Mapping[str, Any]) -> list[tuple[bool, str]]:
+    """What became of files sent at once: whether it is good, and a line a campaign or refused recording."""
     try:
-        if _is_export(file):
-            brought = client.skins.load(file)
+        if terms["together"] is None and _is_export(files[0]):
+            brought = client.skins.load(files[0])
             return [(True, f"skin {brought['skin_id']}: {brought['kept']} campaigns, {brought['present']} were there")]
-        results = client.campaigns.post_files([file], skin=skin, rig=rig, all_or_nothing=all_or_nothing)
-    except (UnderskinError, OSError) as error:
+        results = client.campaigns.post_files(files, **terms)
+    except UnderskinError as error:
         return [(False, str(error))]
+    except OSError as error:
+        place = f"{error.filename} " if len(files) > 1 else ""
+        return [(False, f"{place}cannot be opened: {error.strerror}")]
     return [line for result in results for line in _told(result)]
 
 
@@ -107,5 +117,6 @@ def _told(result: dict[str, Any]) -> list[tuple[bool, str]]:
     ]
     lines += [(True, note) for note in result["notes"]]
     if result["status"] == "ok":
-        lines.insert(0, (True, f"campaign {result['id']} of skin {result['skin_id']}, {len(kept)} recordings"))
+        count = f"{len(kept)} recording{'s' if len(kept) != 1 else ''}"
+        lines.insert(0, (True, f"campaign {result['id']} of skin {result['skin_id']}, {count}"))
     return lines

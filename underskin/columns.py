@@ -40,7 +40,7 @@ _NAMES = {
     "charge_pc": ("charge Q", "Q"),
     "charge_error_pc": ("error of the charge", "Q ±"),
 }
-_PIPED_WIDTH = 200
+PIPED_WIDTH = 200  # of a table that goes into a file or a pipe
 
 
 def gather(
@@ -117,7 +117,7 @@ def write_csv(columns: Mapping[str, Floats], inside: NDArray[np.bool_], count: i
 
 def write_table(columns: Mapping[str, Floats], inside: NDArray[np.bool_], count: int) -> None:
     """What is the same in all rows as a list, the rest as a table, rounded to be read."""
-    console = Console(highlight=False, width=None if sys.stdout.isatty() else _PIPED_WIDTH)
+    console = Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH)
     varying = {name: values for name, values in columns.items() if values.size > 1 and np.unique(values).size > 1}
     listed = Table.grid(padding=(0, 2))
     for name, values in columns.items():

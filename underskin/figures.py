@@ -96,7 +96,7 @@ def frf_versus_preload(
             name=f"{size:g} mm, measured",
             text=[recordings[row] for row in np.flatnonzero(chosen).tolist()],
             hovertemplate=f"%{{text}}<br>sphere {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.3g}} pC/N<extra></extra>",
-            marker={"color": colour, "symbol": marker, "size": 8},
+            marker={"color": colour, "symbol": marker, "size": 8, "opacity": 0.7},
         )
         at, first = np.unique(preload[chosen], return_index=True)
         figure.add_scatter(
@@ -118,10 +118,10 @@ def response_per_sensor(
     d33_pc_per_n: ArrayLike,
     low_pc_per_n: ArrayLike,
     high_pc_per_n: ArrayLike,
-    array_pc_per_n: tuple[float, float],
+    array_pc_per_n: tuple[float, float] | None,
     reasons: Sequence[str],
 ) -> go.Figure:
-    """d33 of each sensor with its 95 % interval, and that of the array (low, high) as a band.
+    """d33 of each sensor with its 95 % interval, and that of the array (low, high), where there is one, as a band.
 
     Raises InvalidInput where a column's length differs from that of `sensors`.
     """
@@ -129,10 +129,11 @@ def response_per_sensor(
         sensors, d33_pc_per_n=d33_pc_per_n, low_pc_per_n=low_pc_per_n, high_pc_per_n=high_pc_per_n
     )
     figure = go.Figure()
-    figure.add_hrect(
-        y0=array_pc_per_n[0], y1=array_pc_per_n[1], fillcolor=_COLOURS[5], opacity=0.35, line_width=0,
-        annotation_text="array, 95 %",
-    )  # fmt: skip
+    if array_pc_per_n is not None:
+        low_end, high_end = array_pc_per_n
+        figure.add_hrect(
+            y0=low_end, y1=high_end, fillcolor=_COLOURS[5], opacity=0.35, line_width=0, annotation_text="array, 95 %"
+        )
     plain = np.array([not reason for reason in reasons])
     for name, chosen, style in (("sensor", plain, 0), ("stands out", ~plain, 1)):
         if not chosen.any():

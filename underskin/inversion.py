@@ -23,9 +23,11 @@ from underskin.recordings.frf_estimation import Frf, lines_of
 from underskin.response import gain
 from underskin.sensor_flags import Flag, standing_out, unfit
 from underskin.skin import Indenter, Skin
+from underskin.stray_recordings import strays
 from underskin.surrogate import SigmaTable
-from underskin.units import Floats, to_si
+from underskin.units import Floats, findings, to_lab, to_si
 
+_LEAST_CHARGE, _MOST_CHARGE = 1e-24, 1.0  # FRF [C/N] that can be a measured one
 _MODULUS_UNSURE, _THICKNESS_UNSURE = 0.02, 0.01  # PHYSICS, section 8: what a declared value may be off by
 
 
@@ -44,7 +46,7 @@ class RecordingD33:
     rel_error: Floats  # of σ, the table's bound
     d33: Floats
     d33_uncertainty: Floats
-    inside: NDArray[np.bool_]  # contact within the table's domain, and a line in the band
+    inside: NDArray[np.bool_]  # contact within the table's domain, and a line in the band with a charge that can be
 
 
 @dataclass(frozen=True)
@@ -74,14 +76,15 @@ class Inversion:
     gain: Estimate | None
     position: Estimate | None
     left_out: tuple[str, ...]  # in words, each sensor or recording that the campaign's d33 does without
-    findings: tuple[str, ...]  # in words, what was wrong with time series that were used all the same
+    findings: tuple[str, ...]  # in words, what looked wrong and was used all the same
     declared_percent: float  # change of d33 for E 2 % and h 1 % off, in quadrature
 
 
 def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] | None = None) -> Inversion:
     """The d33 of a campaign's `frf` recordings, over its flat zone or the band given.
 
-    Raises InvalidInput where the campaign has no frf recording, none within the table's domain, or none in the band.
+    Raises InvalidInput where the campaign has no frf recording, none within the table's domain, none in the band, or
+    none with any charge.
     """
     recorded = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
     if not recorded:
@@ -93,9 +96,13 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
     zone = flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
     contact = _Contact.of(campaign, recorded, table)
-    inside = contact.felt.inside & np.isfinite(contact.positioned.sigma) & np.isfinite(level)
+    inside = contact.felt.inside & np.isfinite(contact.positioned.sigma) & (np.hypot(level, noise) < _MOST_CHARGE)
     if not inside.any():
-        raise InvalidInput("recordings", campaign.name, "must hold one within the table's domain and the band")
+        raise InvalidInput(
+            "recordings", campaign.name, "must hold one within the table's domain and the band, below 1 C/N"
+        )
+    if np.abs(level[inside]).max() < _LEAST_CHARGE:
+        raise InvalidInput("recordings", campaign.name, "must hold one that shows charge: there is none in any")
     seen = gain(contact.positioned.sigma, contact.felt.rt_over_h)
     d33, uncertainty = level / seen, noise / np.abs(seen)
     ids = tuple(dict.fromkeys(item.sensor for item in recorded))
@@ -115,12 +122,18 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
         inside=inside,
     )
     found = _estimated(ids, rows, contact, zone)
-    findings = (
+    return replace(found, left_out=(*refused, *found.left_out), findings=_findings(recorded, measured, level))
+
+
+def _findings(recorded: Sequence[FrfRecording], measured: Sequence[Frf], level: Floats) -> tuple[str, ...]:
+    """In words, what is wrong with time series, and a level that looks like a slip of units."""
+    defects = [
         f"recording {item.id}: {defect.statement}"
         for item, frf in zip(recorded, measured, strict=True)
         for defect in frf.found
-    )
-    return replace(found, left_out=(*refused, *found.left_out), findings=tuple(findings))
+    ]
+    typical = to_lab("frf_pc_per_n", np.nanmedian(np.abs(level)))
+    return (*defects, *(f"FRF, median of the recordings: {one.statement}" for one in findings("frf_pc_per_n", typical)))
 
 
 def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfRecording], list[str]]:
@@ -183,11 +196,13 @@ class _Contact:
 
 
 def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone: FlatZone) -> Inversion:
-    good = np.flatnonzero(rows.inside)
+    moments = [contact.positioned.scattered(p / contact.thickness) for p in mixed_model.POSITIONS]
+    mean, variance = (np.array(part) for part in zip(*moments, strict=True))
+    stray = _strays(rows, np.sqrt((mean[-1] - 1) ** 2 + np.maximum(variance[-1], 0)))
+    good = np.setdiff1d(np.flatnonzero(rows.inside), stray)
     sensor, d33, noise = rows.sensor[good], rows.d33[good], rows.d33_uncertainty[good]
     misfits, pilot = unfit(sensor, d33, noise, len(ids))
-    moments = [contact.positioned.scattered(p / contact.thickness) for p in mixed_model.POSITIONS]
-    mean, variance = (np.array(part)[:, good] for part in zip(*moments, strict=True))
+    mean, variance = mean[:, good], variance[:, good]
     measured = Rows(d33, noise, pilot[sensor], mean, variance)
     plain = np.array([number not in misfits for number in sensor])
     model = None
@@ -214,10 +229,18 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
         spread=model.spread if model and len(set(sensor[plain])) > 1 else None,
         gain=model.gain if model else None,
         position=model.position if model else None,
-        left_out=_left_out(ids, rows, misfits),
+        left_out=_left_out(ids, rows, stray, misfits),
         findings=(),
         declared_percent=100 * float(np.nanmedian(contact.declared[good])),
     )  # fmt: skip
+
+
+def _strays(rows: RecordingD33, position: Floats) -> NDArray[np.intp]:
+    """The rows inside that are grossly off; `position` as `strays` takes it."""
+    good = np.flatnonzero(rows.inside)
+    condition = np.unique(np.column_stack([rows.indenter_radius, rows.preload])[good], axis=0, return_inverse=True)[1]
+    far = strays(rows.sensor[good], condition.reshape(-1), rows.d33[good], rows.d33_uncertainty[good], position[good])
+    return good[far]
 
 
 def _expected_scatter(model: MixedModel, rows: Rows) -> Floats:
@@ -234,9 +257,13 @@ def _cells(rows: RecordingD33, good: NDArray[np.intp]) -> tuple[NDArray[np.intp]
     return cell.reshape(-1), good[where], count
 
 
-def _left_out(ids: tuple[str, ...], rows: RecordingD33, misfits: dict[int, tuple[str, str]]) -> tuple[str, ...]:
+def _left_out(
+    ids: tuple[str, ...], rows: RecordingD33, stray: NDArray[np.intp], misfits: dict[int, tuple[str, str]]
+) -> tuple[str, ...]:
     outside = [
         f"recording {rows.ids[row]}: its contact is outside the table's domain, or it has no line in the band"
         for row in np.flatnonzero(~rows.inside)
     ]
-    return (*outside, *(f"sensor {ids[number]}: {reason}" for number, (_, reason) in misfits.items()))
+    d33 = to_lab("d33_pc_per_n", rows.d33)
+    off = [f"recording {rows.ids[row]}: its d33 of {d33[row]:.3g} pC/N is grossly off all others" for row in stray]
+    return (*outside, *off, *(f"sensor {ids[number]}: {reason}" for number, (_, reason) in misfits.items()))

@@ -7,6 +7,8 @@ sphere's position (m_i the mean and v_i the variance of what it does to σ_i), u
 is built along the model, never along the data. Given (t, g, p), μ is normal by generalised least squares (flat prior,
 so the likelihood of (t, g, p) is the restricted one); (t, g, p) are marginalised on a grid under the priors below.
 The interval is that of the mixture: at few sensors or recordings it has the wide tails of Student's t.
+A large spread of few sensors is what it knows least: of intervals said to hold 95 %, with sensors that differ by 10 %
+(relative standard deviation) 90 % hold the d33 of the population with 4 of them, and 87 % with 2.
 
 Priors: g log-normal, PHYSICS' 1–5 %; t zero, or half-Cauchy (Gelman 2006); p zero in most rigs, or 0.05–0.3 mm.
 """

@@ -21,7 +21,8 @@ _SCATTER_NODES = 7  # Gauss–Hermite, in x and y
 class PositionedSigma:
     """σ against the offset for each row (contact): `sigma` at the commanded offset, and what scatter makes of it.
 
-    NaN where the table's profile does not reach.
+    NaN where the table's profile does not reach: at that contact, or so far off. Scatter is followed as far as it does,
+    and beyond that σ, all but gone there, is held.
     """
 
     sigma: Floats
@@ -49,14 +50,23 @@ def positioned_sigma(
     largest_scatter_over_h: float,
 ) -> PositionedSigma:
     """σ(e) of contacts (rows) on one skin, ready for scatter up to the largest given."""
+    farthest, largest_disc = table.profile_reach, table.domain["rt_over_h"][1]
+    disc_known = rt_over_h <= largest_disc
+    rt_over_h = min(rt_over_h, largest_disc)
     reach = float(np.max(offset_over_h, initial=0.0)) + 4 * largest_scatter_over_h
-    offsets = np.arange(0.0, reach + 4 * _SPACING, _SPACING)
-    radii = np.arange(0.0, offsets[-1] + rt_over_h + 4 * _SPACING, _SPACING)
+    offsets = _grid(min(reach + 4 * _SPACING, farthest - rt_over_h))
+    radii = np.minimum(_grid(min(offsets[-1] + rt_over_h + 4 * _SPACING, farthest)), farthest)
     profile = table.profile(radii, a_over_h[:, None], load_parameter[:, None])
     sigma = profile @ _disc_average(radii, offsets, rt_over_h).T
     curve = CubicSpline(offsets, np.nan_to_num(sigma), axis=1, bc_type=((1, np.zeros(len(sigma))), "not-a-knot"))
     commanded = _each_row(curve, offset_over_h[:, None])[:, 0]
-    return PositionedSigma(np.where(np.isnan(sigma).any(axis=1), np.nan, commanded), offset_over_h, curve)
+    seen = disc_known & (offset_over_h <= offsets[-1]) & np.isfinite(sigma).all(axis=1)
+    return PositionedSigma(np.where(seen, commanded, np.nan), offset_over_h, curve)
+
+
+def _grid(end: float) -> Floats:
+    """0 to the end, which a last point may pass by rounding alone."""
+    return _SPACING * np.arange(np.floor(end / _SPACING + 1e-9) + 1)
 
 
 def _disc_average(radii: Floats, offsets: Floats, rt_over_h: float) -> Floats:
@@ -72,9 +82,9 @@ def _disc_average(radii: Floats, offsets: Floats, rt_over_h: float) -> Floats:
 
 
 def _each_row(curve: CubicSpline, at: Floats) -> Floats:
-    """Row i of the curve at the points of row i: (rows, points)."""
-    last = len(curve.x) - 2
-    cell = np.clip((at / _SPACING).astype(int), 0, last)
+    """Row i of the curve at the points of row i (rows, points); beyond its end, the curve's end."""
+    at = np.minimum(at, curve.x[-1])
+    cell = np.minimum((at / _SPACING).astype(int), len(curve.x) - 2)
     step = at - curve.x[cell]
     row = np.arange(len(at))[:, None]
     c = curve.c  # (power, cell, row), highest power first

@@ -11,6 +11,7 @@ from scipy.stats import t as student
 from underskin.units import Floats
 
 _DEAD = 0.05  # of the array's d33
+_LEAST_PILOT = 1e-3  # of the array's d33: a dead sensor may give exact zeros
 _OUTLYING = 5.0  # robust deviations
 _WEAK, _STRONG = 0.6, 1 / 0.6  # of the array's d33, and outlying
 _LEAST_SPREAD = 0.03  # of the array's d33, below which sensors are not told apart
@@ -41,6 +42,12 @@ class Measured(Protocol):
     def preload(self) -> Floats: ...  # noqa: D102
 
 
+def typical_size(d33: Floats) -> float:
+    """The median magnitude of recordings that show any charge: dead sensors may give exact zeros."""
+    size = np.abs(d33)
+    return float(np.median(size[size >= 1e-9 * size.max()]))
+
+
 def unfit(
     sensor: NDArray[np.intp], d33: Floats, noise: Floats, count: int
 ) -> tuple[dict[int, tuple[str, str]], Floats]:
@@ -48,7 +55,7 @@ def unfit(
 
     The pilot is the array's median for those that do belong, the sensor's own magnitude for the others.
     """
-    typical = float(np.median(np.abs(d33)))
+    typical = typical_size(d33)
     weight = 1 / (noise**2 + (_LEAST_SPREAD * typical) ** 2)
     total = np.bincount(sensor, weight, count)
     with np.errstate(invalid="ignore"):
@@ -72,7 +79,7 @@ def unfit(
         elif outlying and size[number] > _STRONG * array:
             found[number] = ("strong", f"strong: {percent}")
     pilot = np.full(count, array)
-    pilot[list(found)] = size[list(found)]
+    pilot[list(found)] = np.maximum(size[list(found)], _LEAST_PILOT * array)
     return found, pilot
 
 

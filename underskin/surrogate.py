@@ -65,6 +65,11 @@ class SigmaTable:
             "load_parameter": (float(x[0]) ** 3, float(x[-1]) ** 3),
         }
 
+    @property
+    def profile_reach(self) -> float:
+        """The largest r/h of the profile, included."""
+        return float(self._profile_axes[1][-1])
+
     def sigma(self, a_over_h: ArrayLike, rt_over_h: ArrayLike, load_parameter: ArrayLike = 0.0) -> Sigma:
         """σ with its error; the arguments broadcast. Raises nothing: rows outside the domain are NaN."""
         points, inside, shape = _points(self.axes, a_over_h, rt_over_h, load_parameter)

@@ -27,6 +27,7 @@ def make(database: Database, file: Path) -> None:
     try:
         if database.is_sqlite:
             _copy_sqlite(_sqlite_file(database), part)
+            _make_one_file(part)
         else:
             _pg("pg_dump", database, "--format=custom", "--no-owner", "--file", str(part))
         verify(database, part)
@@ -78,8 +79,14 @@ def _copy_sqlite(source: Path, target: Path) -> None:
         raise StoreError(f"{source} cannot be copied to {target}: {error}") from error
 
 
+def _make_one_file(copy: Path) -> None:
+    """Without a write-ahead log, so that it can be read where nothing can be written beside it."""
+    with closing(sqlite3.connect(copy)) as connection:
+        connection.execute("PRAGMA journal_mode = DELETE")
+
+
 def _open_sqlite(file: Path) -> sqlite3.Connection:
-    return sqlite3.connect(f"{file.absolute().as_uri()}?mode=rw", uri=True, timeout=60)
+    return sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True, timeout=60)
 
 
 def _sqlite_file(database: Database) -> Path:

@@ -8,6 +8,7 @@ from typing import Any, Literal
 from sqlalchemy import Connection, Select, func, insert, select, update
 
 from service.store import codec, skins
+from service.store.engine import Database
 from service.store.errors import Conflict, Missing
 from service.store.tables import AnyRow, campaigns, recordings
 from service.store.times import now
@@ -17,6 +18,7 @@ State = Literal["current", "corrected", "withdrawn"]
 
 # All that lists show of a recording: not its arrays.
 _LISTED = [column for column in recordings.c if column.name not in ("campaign", "position", "arrays")]
+_AT_A_TIME = 8  # recordings read at once for a document
 CURRENT = campaigns.c.withdrawn_at.is_(None) & campaigns.c.corrected_by.is_(None)
 
 
@@ -60,7 +62,6 @@ def add(
     campaign = arrival.campaign
     named = arrival.skin_id or campaign.skin.id or (replaced.skin_id if replaced else None)
     campaign_id, skin_id = f"c-{secrets.token_hex(8)}", skins.require(connection, named)
-    times = [time for recording in campaign.recordings if (time := codec.recorded_at(recording))]
     row = {
         "id": campaign_id,
         "skin_id": skin_id,
@@ -71,7 +72,7 @@ def add(
         "source": arrival.source,
         "received_at": now(),
         "received_from": arrival.received_from,
-        "recorded_at": min(times, default=None),
+        "recorded_at": codec.earliest(campaign),
         "recordings": len(campaign.recordings),
         "excluded": 0,
         "revision": 0,
@@ -136,6 +137,23 @@ def load(connection: Connection, row: AnyRow, *, with_excluded: bool = True) -> 
     if not with_excluded:
         query = query.where(recordings.c.excluded_at.is_(None))
     return codec.campaign_of(row.about, tuple(map(codec.recording_of, connection.execute(query))))
+
+
+def documents(store: Database, number: int) -> Iterator[dict[str, Any]]:
+    """The recordings of a campaign as campaign/1 has them, in order, a few in memory at a time.
+
+    No connection is held between them: what is kept of a recording's document never changes.
+    """
+    query = select(recordings.c.kind, recordings.c.scalars, recordings.c.arrays)
+    query = query.where(recordings.c.campaign == number).order_by(recordings.c.position).limit(_AT_A_TIME)
+    start = 0
+    while True:
+        with store.reading() as connection:
+            rows = connection.execute(query.where(recordings.c.position >= start)).all()
+        yield from map(codec.document_of, rows)
+        if len(rows) < _AT_A_TIME:
+            return
+        start += _AT_A_TIME
 
 
 def withdraw(connection: Connection, campaign_id: str, reason: str) -> None:

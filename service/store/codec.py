@@ -48,12 +48,23 @@ def recording_of(row: AnyRow) -> Recording:
     return KINDS[row.kind](**values)
 
 
+def document_of(row: AnyRow) -> dict[str, Any]:
+    """The recording as campaign/1 has it, its arrays as such, from a row with kind, scalars and arrays."""
+    scalars = {name: value for name, value in row.scalars.items() if (name, value) != ("kind", "frf")}
+    return {**scalars, **unpack(row.arrays)}
+
+
 def recorded_at(recording: Recording) -> str | None:
     """When it was recorded, in the store's form; None where the recording does not say, or not usably."""
     try:
         return None if recording.recorded_at is None else stored(recording.recorded_at)
     except ValueError:
         return None
+
+
+def earliest(campaign: Campaign) -> str | None:
+    """When the first of its recordings that say so was made, in the store's form."""
+    return min((time for recording in campaign.recordings if (time := recorded_at(recording))), default=None)
 
 
 def compressed(document: Any) -> bytes:

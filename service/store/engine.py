@@ -1,19 +1,21 @@
 """The database behind the store: SQLite in the data folder, or PostgreSQL by URL."""
 
 import errno
+import fcntl
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
 import orjson
-from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
+from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url, text
 from sqlalchemy.exc import ArgumentError, DBAPIError
 
 SQLITE_FILE = "underskin.sqlite3"
 _BUSY_S = 60.0  # how long a write waits for another process's write
 _PG_DISK_FULL = "53100"
+_PG_WRITING = 7236412  # any number, the same for all servers of a database; a migration has another
 _SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
 
 
@@ -45,13 +47,41 @@ class Database:
     @contextmanager
     def writing(self) -> Iterator[Connection]:
         """A transaction that commits at the end of the block; raises StorageFull where there was no room."""
+        sole_writer = self._locked_file() if self.is_sqlite else nullcontext()
         try:
-            with self.engine.connect().execution_options(write=True) as connection, connection.begin():
+            with (
+                sole_writer,
+                self.engine.connect().execution_options(write=True) as connection,
+                connection.begin(),
+            ):
+                if not self.is_sqlite:
+                    connection.execute(text("SELECT pg_advisory_xact_lock_shared(:number)"), {"number": _PG_WRITING})
                 yield connection
         except (DBAPIError, OSError) as error:
             if is_full(error):
                 raise StorageFull(str(error)) from error
             raise
+
+    @contextmanager
+    def without_writers(self) -> Iterator[None]:
+        """While the block lasts nobody writes, in this process or another: what is under way ends, the others wait."""
+        if self.is_sqlite:
+            with self._locked_file():
+                yield
+            return
+        with self.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
+            connection.execute(text("SELECT pg_advisory_lock(:number)"), {"number": _PG_WRITING})
+            try:
+                yield
+            finally:
+                connection.execute(text("SELECT pg_advisory_unlock(:number)"), {"number": _PG_WRITING})
+
+    @contextmanager
+    def _locked_file(self) -> Iterator[None]:
+        """SQLite has one writer at a time anyway; this lock also covers what SQLite's own cannot span, a restore."""
+        with Path(f"{self.url.database}.lock").open("a") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield
 
     def close(self) -> None:
         """Close all connections."""
@@ -82,8 +112,8 @@ def is_full(error: BaseException) -> bool:
 
 
 def _engine(url: URL) -> Engine:
-    def deserialise(text: str) -> Any:
-        return orjson.loads(text)
+    def deserialise(document: str) -> Any:
+        return orjson.loads(document)
 
     def serialise(value: Any) -> str:
         return orjson.dumps(value).decode()
@@ -103,6 +133,12 @@ def _prepare_sqlite(connection: sqlite3.Connection, _: object) -> None:
     connection.isolation_level = None  # we say BEGIN ourselves: Python would say it too late
     for pragma in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
         connection.execute(f"PRAGMA {pragma}")
+    # SQLite's own knows the letters of ASCII only.
+    connection.create_function("lower", 1, _lower, deterministic=True)
+
+
+def _lower(value: str | None) -> str | None:
+    return None if value is None else value.lower()
 
 
 def _begin_sqlite(connection: Connection) -> None:

@@ -3,19 +3,21 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import Connection, delete, insert, select
+from sqlalchemy import ColumnElement, Connection, delete, insert, select
 
+from service.d33_models import ANSWER_VERSION
 from service.store import skins
 from service.store.codec import compressed, decompressed
 from service.store.tables import AnyRow, adopted_inversions, campaigns, inversions, sensor_d33
 
 
 def find(connection: Connection, campaign: AnyRow, table_sha256: str) -> Any | None:
-    """The answer kept for a campaign as it is now, with this table; None where there is none."""
+    """The answer kept for a campaign as it is now, with this table, by this software; None where there is none."""
     query = select(inversions.c.document).where(
         inversions.c.campaign == campaign.number,
         inversions.c.revision == campaign.revision,
         inversions.c.table_sha256 == table_sha256,
+        inversions.c.answer_version == ANSWER_VERSION,
     )
     blob = connection.execute(query).scalar()
     return None if blob is None else decompressed(blob)
@@ -29,13 +31,15 @@ def keep(
     sensors: Mapping[str, tuple[float, float]],
 ) -> None:
     """Keep an answer and d33 with its standard uncertainty [pC/N] by sensor, unless the campaign changed since."""
-    query = select(campaigns.c.revision).where(campaigns.c.number == campaign.number).with_for_update()
+    # The id too: after a restore, a number may be another campaign's.
+    same = (campaigns.c.number == campaign.number) & (campaigns.c.id == campaign.id)
+    query = select(campaigns.c.revision).where(same).with_for_update()
     if connection.execute(query).scalar() != campaign.revision:
         return
     for table in (inversions, sensor_d33):
         connection.execute(delete(table).where(table.c.campaign == campaign.number))
-    row = {"revision": campaign.revision, "table_sha256": table_sha256, "document": compressed(document)}
-    connection.execute(insert(inversions), {"campaign": campaign.number, **row})
+    basis = {"revision": campaign.revision, "table_sha256": table_sha256, "answer_version": ANSWER_VERSION}
+    connection.execute(insert(inversions), {"campaign": campaign.number, **basis, "document": compressed(document)})
     values = [
         {"campaign": campaign.number, "sensor": name, "d33_pc_per_n": value, "d33_uncertainty_pc_per_n": uncertainty}
         for name, (value, uncertainty) in sensors.items()
@@ -70,17 +74,13 @@ def keep_adopted(connection: Connection, campaign: AnyRow, model_id: str, table_
 
 def missing_of_skin(connection: Connection, root: str, table_sha256: str) -> Sequence[AnyRow]:
     """Rows of the skin's current campaigns whose d33 is not kept as they are now."""
-    fresh = (
-        (inversions.c.campaign == campaigns.c.number)
-        & (inversions.c.revision == campaigns.c.revision)
-        & (inversions.c.table_sha256 == table_sha256)
-    )
-    query = select(campaigns).outerjoin(inversions, fresh).where(inversions.c.campaign.is_(None), *_current(root))
+    query = select(campaigns).outerjoin(inversions, _fresh(table_sha256))
+    query = query.where(inversions.c.campaign.is_(None), *_current(root))
     return connection.execute(query.order_by(campaigns.c.number)).all()
 
 
-def history(connection: Connection, root: str) -> Sequence[AnyRow]:
-    """d33 by sensor of all current campaigns of a skin and of those joined to it, in order of arrival."""
+def history(connection: Connection, root: str, table_sha256: str) -> Sequence[AnyRow]:
+    """d33 by sensor of all current campaigns, as they are now, of a skin and of those joined to it, by arrival."""
     query = (
         select(
             campaigns.c.id,
@@ -90,10 +90,21 @@ def history(connection: Connection, root: str) -> Sequence[AnyRow]:
             sensor_d33.c.d33_pc_per_n,
             sensor_d33.c.d33_uncertainty_pc_per_n,
         )
+        .join(inversions, _fresh(table_sha256))
         .join(sensor_d33, sensor_d33.c.campaign == campaigns.c.number)
         .where(*_current(root))
     )
     return connection.execute(query.order_by(campaigns.c.number, sensor_d33.c.sensor)).all()
+
+
+def _fresh(table_sha256: str) -> ColumnElement[bool]:
+    """Joins a campaign with what was derived from it as it is now, with this table, by this software."""
+    return (
+        (inversions.c.campaign == campaigns.c.number)
+        & (inversions.c.revision == campaigns.c.revision)
+        & (inversions.c.table_sha256 == table_sha256)
+        & (inversions.c.answer_version == ANSWER_VERSION)
+    )
 
 
 def _current(root: str) -> tuple[Any, ...]:

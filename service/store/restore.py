@@ -16,9 +16,10 @@ def restore(store: Database, file: Path, before: Path) -> None:
     """
     backup.verify(store, file)
     require_known(_version(store, file))
-    if version(store) is not None:
-        backup.make(store, before)
-    backup.replace_with(store, file)
+    with store.without_writers():  # what is acknowledged after the backup would be lost
+        if version(store) is not None:
+            backup.make(store, before)
+        backup.replace_with(store, file)
     migrate(store, before.parent.parent)
 
 

@@ -92,7 +92,8 @@ recordings = Table(
     UniqueConstraint("campaign", "id", name="recording_of_campaign"),
 )
 
-# Derived from a campaign at one revision with one table of σ; computed again when either has changed.
+# Derived from a campaign at one revision, with one table of σ, by one version of the answer; computed again when any of
+# them has changed.
 inversions = Table(
     "inversions",
     metadata,
@@ -100,6 +101,7 @@ inversions = Table(
     Column("revision", Integer, nullable=False),
     Column("table_sha256", String, nullable=False),
     Column("document", LargeBinary, nullable=False),  # the answer of /v1/campaigns/{id}/d33, compressed JSON
+    Column("answer_version", Integer, nullable=False, server_default="0"),  # service.d33_models.ANSWER_VERSION
 )
 
 sensor_d33 = Table(

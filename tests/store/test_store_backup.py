@@ -2,10 +2,16 @@
 
 import sqlite3
 import subprocess
+import threading
 from contextlib import closing
 from pathlib import Path
 
+import pytest
+
+from service.store import Database, backup, campaigns, open_store
+from service.store.restore import restore
 from tests.store.server import Place, Server, campaign, running
+from underskin.recordings.campaign import parse
 
 
 def names(server: Server) -> set[str]:
@@ -42,6 +48,48 @@ def test_a_backup_moves_to_another_machine(server: Server, tmp_path: Path) -> No
     assert other.command("restore", str(tmp_path / "b")).returncode == 0
     with running(other) as there:
         assert names(there) == {"moved"}
+
+
+def test_what_is_acknowledged_during_a_restore_is_in_the_store_or_in_its_backup(
+    place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = open_store(place.database_url, place.folder)
+    file, undo = (tmp_path / f"{name}{backup.suffix(store)}" for name in ("file", "undo"))
+    undo = place.folder / "backups" / undo.name
+    backup.make(store, file)
+    make = backup.make
+
+    def write() -> None:
+        with store.writing() as connection:
+            campaigns.add(connection, campaigns.Arrival(parse(campaign("meanwhile")), None))
+
+    writer = threading.Thread(target=write)
+
+    def make_and_be_written(database: Database, target: Path) -> None:
+        make(database, target)
+        writer.start()
+        writer.join(2)  # time for a write that does not wait
+
+    monkeypatch.setattr(backup, "make", make_and_be_written)
+    restore(store, file, undo)
+    writer.join()
+    with store.reading() as connection:
+        assert [row.name for row in campaigns.listed(connection, campaigns.Filters(), None, 9)] == ["meanwhile"]
+    store.close()
+
+
+def test_a_backup_of_sqlite_is_one_file_that_is_only_read(tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir()
+    store = open_store("", tmp_path / "data")
+    file = tmp_path / "alone" / "kept"
+    backup.make(store, file)
+    backup.verify(store, file)
+    restore(store, file, tmp_path / "data" / "backups" / "undo")
+    store.close()
+    assert file.read_bytes()[18:20] == b"\x01\x01"  # SQLite's header: no write-ahead log
+    assert [path.name for path in file.parent.iterdir()] == ["kept"]
+    with closing(sqlite3.connect(tmp_path / "data" / "underskin.sqlite3")) as connection:
+        assert connection.execute("PRAGMA journal_mode").fetchone() == ("wal",)
 
 
 def test_what_is_no_backup_is_refused_and_changes_nothing(server: Server, tmp_path: Path) -> None:

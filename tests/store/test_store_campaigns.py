@@ -146,6 +146,16 @@ def test_lists_are_paged_and_filtered(server: Server) -> None:
     assert server.http.get("/v1/campaigns?recorded_from=yesterday").status_code == 422
 
 
+def test_letters_beyond_ascii_are_found_in_either_case(server: Server) -> None:
+    post(server, campaign("Übung Eins"), skin="Äußere Haut")
+    for text in ("Übung", "übung", "ÜBUNG EINS"):
+        assert [entry["name"] for entry in listed(server, name_contains=text)] == ["Übung Eins"], text
+    for text in ("Äuß", "äußere"):
+        found = server.http.get("/v1/skins", params={"id_contains": text}).json()["skins"]
+        assert [entry["id"] for entry in found] == ["Äußere Haut"], text
+    assert listed(server, name_contains="ubung") == []
+
+
 def test_a_withdrawn_campaign_stays_and_says_why(server: Server) -> None:
     name = post(server, campaign("wrong sphere"))["id"]
     answer = server.http.post(f"/v1/campaigns/{name}/withdraw", json={"reason": "the sphere was the other one"})
@@ -204,6 +214,10 @@ def test_odd_texts_are_refused_and_break_nothing(server: Server) -> None:
     for band in ("inf", "nan", "1e308", "-1"):
         answer = server.http.get(f"/v1/campaigns/{name}/d33?band_low_hz=1&band_high_hz={band}")
         assert answer.status_code in (200, 422), band
+    as_json = {"Content-Type": "application/json"}
+    for half in (b'{"reason": "\\ud800"}', b'{"\\udfff": 1, "reason": "?"}'):  # halves of a pair
+        answer = server.http.post(f"/v1/campaigns/{name}/withdraw", content=half, headers=as_json)
+        assert (answer.status_code, answer.headers["content-type"]) == (422, "application/problem+json")
     for text in ("\x00", "\U0001f600", "x" * 1001):
         body = {"recording": text, "reason": text}
         assert server.http.post(f"/v1/campaigns/{name}/exclusions", json=body).status_code in (404, 422)

@@ -1,12 +1,18 @@
 """A skin as one file: elsewhere it is as it was here, to the last digit."""
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
+import orjson
 import pytest
 
+from tests.store.conftest import emptied
 from tests.store.server import Server, campaign
+from tests.store.test_store_files import CSV, RIG
 
 
 def fill(server: Server) -> None:
@@ -85,6 +91,28 @@ def test_what_differs_here_refuses_the_whole_file(server: Server, elsewhere: Ser
     assert state(elsewhere) == before
 
 
+def test_a_skin_joined_through_another_is_elsewhere_as_it_was_here(server: Server, elsewhere: Server) -> None:
+    for name in ("a", "b", "c"):  # by id, those that refer come first
+        assert server.http.post("/v1/campaigns", json=campaign(name), params={"skin": name}).status_code == 201
+    for skin, other in (("b", "a"), ("c", "b")):
+        joined = server.http.post(f"/v1/skins/{skin}/join", json={"skin_id": other, "reason": "one skin"})
+        assert joined.status_code == 200
+    file = server.http.get("/v1/skins/a/export").content
+    for _ in range(2):
+        answer = sent(elsewhere, file)
+        assert answer.status_code == 200, answer.text
+        assert elsewhere.http.get("/v1/skins/a").json() == server.http.get("/v1/skins/a").json()
+
+
+def test_the_same_file_many_times_at_once_is_kept_once(server: Server, elsewhere: Server) -> None:
+    server.http.post("/v1/campaigns?skin=palm", json=[campaign("one"), campaign("two")])
+    file = server.http.get("/v1/skins/palm/export").content
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(lambda _: sent(elsewhere, file), range(4)))
+    assert [answer.status_code for answer in answers] == [200] * 4
+    assert sum(answer.json()["kept"] for answer in answers) == 2
+
+
 def _link_out(file: h5py.File) -> None:
     file["campaigns/outside"] = h5py.ExternalLink("/etc/passwd", "/")
 
@@ -94,22 +122,89 @@ def _drop_rows(file: h5py.File) -> None:
 
 
 def _spoil_array(file: h5py.File) -> None:
-    name = next(iter(file["campaigns"]))
+    name = list(file["campaigns"])[-2]
     file[f"campaigns/{name}/arrays/frf_re_pc_per_n"][0] = float("nan")
 
 
-@pytest.mark.parametrize("spoil", [_link_out, _drop_rows, _spoil_array])
-def test_a_file_that_was_tampered_with_is_refused(
-    server: Server, elsewhere: Server, tmp_path: Path, spoil: Any
+def _edited(place: str, **values: Any) -> Callable[[h5py.File], None]:
+    """Changes an object, or the first of a list, in JSON text; `place` may name the last campaign."""
+
+    def spoil(file: h5py.File) -> None:
+        path = place.format(last=list(file["campaigns"])[-1])
+        document = orjson.loads(file[path][()].tobytes())
+        row = document[0] if isinstance(document, list) else document
+        row.update({name: value(row[name]) if callable(value) else value for name, value in values.items()})
+        del file[path]
+        file[path] = np.frombuffer(orjson.dumps(document), np.uint8)
+
+    return spoil
+
+
+def _rename_skin(file: h5py.File) -> None:
+    file.attrs["skin"] = "nowhere"
+
+
+def _rename_all(file: h5py.File) -> None:
+    file.attrs["skin"] = ".."
+    _edited("skins", id="..", root_id="..")(file)
+    _edited("rigs", skin_id="..")(file)
+    for name in file["campaigns"]:
+        _edited(f"campaigns/{name}/about", skin_id="..")(file)
+
+
+def _rename_last(file: h5py.File) -> None:
+    file.move(f"campaigns/{list(file['campaigns'])[-1]}", "campaigns/c-0123456789abcdef")
+
+
+def _add_long_name(file: h5py.File) -> None:
+    file["campaigns"].create_group("n" * 60_000)
+
+
+ABOUT = "campaigns/{last}/about"
+SPOILT = {
+    "link out": _link_out,
+    "no skins": _drop_rows,
+    "array": _spoil_array,
+    "skin": _rename_skin,
+    "campaign's name": _rename_last,
+    "long name": _add_long_name,
+    "rig no JSON": _edited("rigs", document="not json"),
+    "rig no rig": _edited("rigs", document='{"schema": "rig/2"}'),
+    "rig of another skin": _edited("rigs", skin_id="finger"),
+    "refused": _edited(ABOUT, refused=[{"bad": 1}]),
+    "physics": _edited(ABOUT, about=lambda about: {**about, "skin": {**about["skin"], "poisson_ratio": 7}}),
+    "two names": _edited(ABOUT, name="another"),
+    "another skin": _edited(ABOUT, skin_id="elsewhere"),
+    "half withdrawn": _edited(ABOUT, withdraw_reason="fell down"),
+    "exclusion": _edited("campaigns/{last}/recordings", excluded_at="yesterday"),
+    "dots": _rename_all,
+    "another root": _edited("skins", root_id="finger"),
+    "joined to itself": _edited("skins", joined_to="palm", joined_at="2017-05-03T09:00:00.000000Z", join_reason="?"),
+}
+
+
+@pytest.fixture(scope="module")
+def whole(servers: Callable[[str], Server]) -> bytes:
+    """An export of more campaigns than are read at a time, with a rig."""
+    server = emptied(servers("sqlite"))
+    server.http.post("/v1/campaigns?skin=palm", json=[campaign(f"{number}", sensors=1, lines=3) for number in range(9)])
+    form = [("rig", ("bench.yaml", RIG)), ("file", ("cut.csv", CSV))]
+    assert server.http.post("/v1/campaigns?skin=palm", files=form).status_code == 201
+    return server.http.get("/v1/skins/palm/export").content
+
+
+@pytest.mark.parametrize("spoil", SPOILT.values(), ids=SPOILT)
+def test_of_a_file_that_was_tampered_with_nothing_is_kept(
+    whole: bytes, elsewhere: Server, tmp_path: Path, spoil: Any
 ) -> None:
-    server.http.post("/v1/campaigns?skin=palm", json=campaign("one"))
     file = tmp_path / "palm.h5"
-    file.write_bytes(server.http.get("/v1/skins/palm/export").content)
+    file.write_bytes(whole)
     with h5py.File(file, "r+") as opened:
         spoil(opened)
     answer = sent(elsewhere, file.read_bytes())
     assert answer.status_code == 422, answer.text
     assert elsewhere.http.get("/v1/campaigns?state=all").json()["campaigns"] == []
+    assert elsewhere.http.get("/v1/skins").json()["skins"] == []
 
 
 @pytest.mark.parametrize("content", [b"", b"not HDF5", b"\x89HDF\r\n\x1a\n" + bytes(500)])

@@ -73,6 +73,10 @@ def test_limits_hold_as_the_upload_streams(place: Place) -> None:
         as_file = server.http.post("/v1/campaigns", files={"file": ("a.json", document)})
         assert (as_file.status_code, "UNDERSKIN_MAX_BODY_MB" in as_file.json()["detail"]) == (413, True)
 
+        for blanks in (b" " * 70, b"\n" * 3000):
+            led = server.http.post("/v1/campaigns", content=blanks + document, headers={"Content-Type": "text/plain"})
+            assert (led.status_code, "UNDERSKIN_MAX_BODY_MB" in led.json()["detail"]) == (413, True)
+
         streamed = server.http.post("/v1/campaigns", content=iter([b" " * 100_000] * 50))
         assert (streamed.status_code, "UNDERSKIN_MAX_UPLOAD_MB" in streamed.json()["detail"]) == (413, True)
         assert server.http.post("/v1/campaigns", json=campaign("fits")).status_code == 201
@@ -84,6 +88,50 @@ def test_a_broken_form_is_refused(server: Server) -> None:
     for body in (b"", b"no form", b'--x\r\nContent-Disposition: form-data; name="file"; filename="a"\r\n\r\nhalf'):
         answer = server.http.post("/v1/campaigns", content=body, headers=headers)
         assert answer.status_code in (400, 422), answer.text
+
+
+def test_a_boundary_that_is_too_long_is_refused(server: Server) -> None:
+    headers = {"Content-Type": f"multipart/form-data; boundary={'x' * 500}"}
+    answer = server.http.post("/v1/campaigns", content=b"--x--", headers=headers)
+    assert (answer.status_code, "oundary" in answer.json()["detail"]) == (400, True)
+
+
+def test_parts_of_a_form_need_no_name(server: Server) -> None:
+    parts = [
+        b'--x\r\nContent-Disposition: form-data; filename="%s.json"\r\n\r\n%s\r\n'
+        % (name.encode(), orjson.dumps(campaign(name)))
+        for name in ("one", "two")
+    ]
+    headers = {"Content-Type": "multipart/form-data; boundary=x"}
+    for some in (parts, parts[:1]):
+        answer = server.http.post("/v1/campaigns", content=b"".join(some) + b"--x--\r\n", headers=headers)
+        assert answer.status_code == 201, answer.text
+        assert [entry["status"] for entry in answer.json()["campaigns"]] == ["ok"] * len(some)
+
+
+def test_a_request_may_bring_so_much_and_no_more(server: Server) -> None:
+    many = orjson.dumps([0] * 1001)
+    half = ("file", ("half.json", orjson.dumps([0] * 501)))
+    recordings = orjson.dumps({**campaign("x"), "recordings": [0] * 50_001})
+    answers = [server.http.post("/v1/campaigns", content=body) for body in (many, recordings)]
+    answers.append(server.http.post("/v1/campaigns", files=[half, half]))
+    for answer in answers:
+        assert (answer.status_code, "several requests" in answer.json()["detail"]) == (413, True)
+        assert len(answer.content) < 1000
+
+
+def test_of_many_errors_the_first_are_told_and_all_counted(server: Server) -> None:
+    document = campaign("mixed", lines=3)
+    bad = [{**document["recordings"][0], "id": f"bad {number}", "preload_n": -1} for number in range(150)]
+    answer = server.http.post("/v1/campaigns", json={**document, "recordings": [*bad, document["recordings"][0]]})
+    assert answer.status_code == 201, answer.text
+    result = answer.json()
+    assert [entry["status"] for entry in result["recordings"]] == ["ok"] + ["refused"] * 150
+    assert sum(len(entry["errors"]) for entry in result["recordings"]) == 100
+    assert result["notes"] == ["150 recordings have 150 errors; the first 100 are told"]
+    none = server.http.post("/v1/campaigns", json={**document, "recordings": bad})
+    assert (none.status_code, len(none.json()["errors"])) == (422, 100)
+    assert none.json()["detail"].endswith("; and 150 more")
 
 
 def test_what_a_killed_server_was_sent_is_cleared_away(place: Place) -> None:
@@ -119,4 +167,11 @@ def test_no_name_from_a_client_becomes_a_path(server: Server, tmp_path: Path) ->
     assert answer.status_code == 201
     assert not target.exists()
     kept = {path.name for path in server.place.folder.iterdir()}
-    assert kept <= {"underskin.sqlite3", "underskin.sqlite3-wal", "underskin.sqlite3-shm", "uploads", "migration.lock"}
+    assert kept <= {
+        "underskin.sqlite3",
+        "underskin.sqlite3-wal",
+        "underskin.sqlite3-shm",
+        "underskin.sqlite3.lock",
+        "uploads",
+        "migration.lock",
+    }

@@ -14,13 +14,14 @@ from service.store import Database, StoreError, database, migrate
 from service.store.tables import metadata
 from tests.store.server import Place, campaign, running
 
+NEWEST = migrate.VERSIONS[-1]
 NEXT = '''"""What a later underskin might add."""
 
 import sqlalchemy as sa
 from alembic import op
 
-revision = "0004"
-down_revision = "0003"
+revision = "next"
+down_revision = "{newest}"
 
 
 def upgrade() -> None:
@@ -43,9 +44,9 @@ def a_later_version(monkeypatch: pytest.MonkeyPatch, folder: Path, spoil: str = 
     """An underskin that knows one version more."""
     scripts = folder / "migrations"
     shutil.copytree(migrate.SCRIPTS, scripts)
-    (scripts / "versions" / "0004_next.py").write_text(NEXT.format(spoil=spoil))
+    (scripts / "versions" / "next.py").write_text(NEXT.format(newest=NEWEST, spoil=spoil))
     monkeypatch.setattr(migrate, "SCRIPTS", scripts)
-    monkeypatch.setattr(migrate, "VERSIONS", ("0001", "0003", "0004"))
+    monkeypatch.setattr(migrate, "VERSIONS", (*migrate.VERSIONS, "next"))
 
 
 def test_the_migrations_make_the_tables_that_the_code_uses(store: Database) -> None:
@@ -79,7 +80,7 @@ def test_an_older_store_is_backed_up_and_brought_up_to_date(
     migrate.migrate(store, place.folder)
     with store.reading() as connection:
         assert "colour" in {column["name"] for column in inspect(connection).get_columns("skins")}
-        assert migrate.version_of(connection) == "0004"
+        assert migrate.version_of(connection) == "next"
     (made,) = (place.folder / "backups").iterdir()
     assert names_in(made) == ["kept"]
 
@@ -91,7 +92,7 @@ def test_without_a_backup_there_is_no_migration(
     (place.folder / "backups").write_text("in the way")
     with pytest.raises((OSError, StoreError)):
         migrate.migrate(store, place.folder)
-    assert migrate.version(store) == "0003"
+    assert migrate.version(store) == NEWEST
 
 
 def test_a_migration_that_fails_leaves_the_store_as_it_was(
@@ -102,7 +103,7 @@ def test_a_migration_that_fails_leaves_the_store_as_it_was(
         migrate.migrate(store, place.folder)
     with store.reading() as connection:
         assert "colour" not in {column["name"] for column in inspect(connection).get_columns("skins")}
-        assert migrate.version_of(connection) == "0003"
+        assert migrate.version_of(connection) == NEWEST
 
 
 def names_in(backup: Path) -> list[str]:

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.store.server import Place, Server, campaign, running
@@ -112,6 +113,38 @@ def test_figures_say_what_they_leave_out(server: Server) -> None:
     assert again.status_code == 409
     absent = server.http.post(f"/v1/campaigns/{kept}/exclusions", json={"recording": "r9", "reason": "?"})
     assert absent.status_code == 404
+
+
+def test_d33_shows_what_looks_wrong_and_the_elastomers_modulus(server: Server) -> None:
+    document = campaign("in C/N", d33=14e-12)
+    strain = np.linspace(0, 0.1, 30)
+    block = {
+        "kind": "compression",
+        "sample_height_mm": 10.0,
+        "sample_diameter_mm": 12.0,
+        "displacement_mm": (10 * strain).tolist(),
+        "force_n": (16 * np.pi / 4 * 12**2 * strain).tolist(),
+    }
+    blocks = [{**block, "id": "block"}, {**block, "id": "idle", "force_n": [0.0] * 30}]
+    document["recordings"] += blocks
+    found = server.http.get(f"/v1/campaigns/{sent(server, document)}/d33").json()
+    (finding,) = found["findings"]
+    assert "was it given in C/N?" in finding
+    (modulus,) = found["moduli"]
+    assert (modulus["recording"], modulus["kind"]) == ("block", "compression")
+    assert modulus["youngs_modulus_mpa"] == pytest.approx(16)
+    assert "not seen to leave the line" in modulus["statement"]
+    assert [entry["recording"] for entry in found["left_out"]] == ["idle"]
+    alone = server.http.get(f"/v1/campaigns/{sent(server, {**document, 'recordings': blocks})}/d33").json()
+    assert (alone["status"], alone["findings"], alone["moduli"]) == ("none", [], [modulus])
+    usual = server.http.get(f"/v1/campaigns/{sent(server, campaign('usual'))}/d33").json()
+    assert (usual["findings"], usual["moduli"]) == ([], [])
+
+
+def sent(server: Server, document: dict[str, Any]) -> str:
+    answer = server.http.post("/v1/campaigns", json=document)
+    assert answer.status_code == 201, answer.text
+    return str(answer.json()["id"])
 
 
 def test_changes_need_a_key_of_scope_write(place: Place) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from underskin.errors import InvalidInput
 from underskin.recordings import fields as field
-from underskin.recordings.fields import shown
+from underskin.recordings.fields import named, shown
 
 SCHEMA = "campaign/1"
 
@@ -166,7 +166,7 @@ def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
     document = field.mapping("campaign", document)
     for name in document:
         if name not in ("schema", "name", "skin", "recordings", "units_checked"):
-            raise InvalidInput(shown(name), shown(document[name]), "unknown field of a campaign")
+            raise InvalidInput(named(name), shown(document[name]), "unknown field of a campaign")
     if document.get("schema") != SCHEMA:
         raise InvalidInput("schema", shown(document.get("schema")), f"must be {SCHEMA}")
     units_checked = field.flag("units_checked", document.get("units_checked", False), False)
@@ -290,8 +290,8 @@ def _unequal_lengths(recording: Recording) -> list[InvalidInput]:
 
 
 def _label(entry: Any, index: int) -> str:
-    named = entry.get("id") if isinstance(entry, Mapping) else None
-    return shown(named) if isinstance(named, str) and named else f"recordings[{index}]"
+    called = entry.get("id") if isinstance(entry, Mapping) else None
+    return shown(called) if isinstance(called, str) and called else f"recordings[{index}]"
 
 
 def _place(error: InvalidInput) -> str:

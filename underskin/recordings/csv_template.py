@@ -26,6 +26,7 @@ _SEPARATORS = ("\t", ";", ",")
 _POSITION = {"position_x_mm": 0, "position_y_mm": 1}
 _TEXTS = ("id", "kind", "sensor", "recorded_at", "name", "skin.id")
 _SKIN_FIELDS = tuple(f"skin.{entry.name}" for entry in fields(SkinDescription) if entry.name != "sensors")
+_KNOWN = {entry.name for kind in KINDS.values() for entry in fields(kind)} | set(_POSITION)
 _FLAGS = {"true": True, "false": False}
 
 
@@ -87,7 +88,7 @@ class _Template:
             document["skin"][field] = self._value(f"skin.{field}", values[0], factor)
 
     def _recordings(self, table: int) -> list[dict[str, Any]]:
-        headings = [self._field(cell, table) for cell in self.rows[table]]
+        headings = self._headings(table)
         recordings: dict[str, dict[str, Any]] = {}
         current: dict[str, Any] | None = None
         for index, row in enumerate(self.rows[table + 1 :], start=table + 1):
@@ -99,15 +100,32 @@ class _Template:
                 raise FileError(self.file, f"line {index + 1}", "the first row of the table needs an id")
             if len(row) > len(headings):
                 raise FileError(self.file, f"line {index + 1}", f"has {len(row)} cells under {len(headings)} headings")
-            for (field, factor), cell in zip(headings, row, strict=False):
-                if cell:
-                    self._add(current, field, self._value(field, cell, factor), index)
-        return list(recordings.values())
+            cells = [*row, *[""] * (len(headings) - len(row))]
+            line = {name: self._value(name, cell, factor) for (name, factor), cell in zip(headings, cells, strict=True)}
+            self._add_entries(current, {field: line.pop(field) for field in COLUMNS if field in line})
+            for field, value in line.items():
+                if value is not None:
+                    self._add(current, field, value, index)
+        return [_without_unused(recording) for recording in recordings.values()]
+
+    def _headings(self, table: int) -> list[tuple[str, float]]:
+        """The field of each column and the factor to its unit, each field once."""
+        headings: dict[str, float] = {}
+        for cell in self.rows[table]:
+            field, factor = self._field(cell, table)
+            if field in headings:
+                raise FileError(self.file, f"line {table + 1}", f"{cell!r} is a second column of {field}")
+            headings[field] = factor
+        return list(headings.items())
+
+    def _add_entries(self, recording: dict[str, Any], line: dict[str, Any]) -> None:
+        """A row's entries of the columns, if it has any; one that is missing beside others is for the checks."""
+        if any(value is not None for value in line.values()):
+            for field, value in line.items():
+                recording.setdefault(field, []).append(value)
 
     def _add(self, recording: dict[str, Any], field: str, value: Any, index: int) -> None:
-        if field in COLUMNS:
-            recording.setdefault(field, []).append(value)
-        elif field in _POSITION:
+        if field in _POSITION:
             recording.setdefault("position_mm", [None, None])[_POSITION[field]] = value
         elif recording.setdefault(field, value) != value:
             before = recording[field]
@@ -115,8 +133,7 @@ class _Template:
 
     def _field(self, heading: str, index: int) -> tuple[str, float]:
         """The field of a heading and the factor to its unit."""
-        known = {entry.name for kind in KINDS.values() for entry in fields(kind)} | set(_POSITION)
-        if heading in known or f"skin.{heading}" in _SKIN_FIELDS:
+        if heading in _KNOWN or f"skin.{heading}" in _SKIN_FIELDS:
             return heading, 1.0
         found = lab_field(heading)
         if found is None:
@@ -129,3 +146,12 @@ class _Template:
             return None
         number = None if field in _TEXTS else text.number(cell, self.decimal)
         return cell if number is None else number * factor
+
+
+def _without_unused(recording: dict[str, Any]) -> dict[str, Any]:
+    """The recording without the columns that it leaves empty, which are another kind's."""
+    return {
+        name: value
+        for name, value in recording.items()
+        if name not in COLUMNS or any(entry is not None for entry in value)
+    }

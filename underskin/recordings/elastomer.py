@@ -11,8 +11,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from underskin.errors import InvalidInput
-from underskin.recordings.campaign import CompressionRecording, IndentationRecording
-from underskin.units import Floats, to_si
+from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
+from underskin.units import Floats, to_lab, to_si
 
 _STRAIGHT = 0.02  # largest departure from a straight line, of the stress it spans
 _LEAVES = 0.02  # departure from that line, of the stress, at which the curve is no longer linear
@@ -37,6 +37,15 @@ class CompressionModulus:
     leaves_at_strain: float | None
     leaves_at_stress: float | None
 
+    @property
+    def statement(self) -> str:
+        """Where it is straight, in words."""
+        straight = f"straight from {100 * self.first_strain:.3g} to {100 * self.last_strain:.3g} % strain"
+        if self.leaves_at_strain is None or self.leaves_at_stress is None:
+            return f"{straight}, and not seen to leave the line"
+        stress = float(to_lab("mean_stress_mpa", self.leaves_at_stress))
+        return f"{straight}; leaves the line at {stress:.3g} MPa, {100 * self.leaves_at_strain:.3g} % from its foot"
+
 
 @dataclass(frozen=True)
 class IndentationModulus:
@@ -51,6 +60,41 @@ class IndentationModulus:
     contact_point: float
     force_offset: float
     residual: float
+
+    @property
+    def statement(self) -> str:
+        """Where contact begins and what Hertz leaves, in words."""
+        contact = float(to_lab("displacement_mm", self.contact_point))
+        return f"Hertz, contact from {contact:.4g} mm; it leaves {self.residual:.2g} N (root mean square)"
+
+
+@dataclass(frozen=True)
+class RecordingModulus:
+    """What a recording says of the elastomer; `found` is the reason where it says nothing."""
+
+    recording: str
+    kind: str
+    found: CompressionModulus | IndentationModulus | InvalidInput
+
+
+def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
+    """What each recording of kind `compression` or `indentation` says of the elastomer."""
+    return [
+        RecordingModulus(recording.id, recording.kind, _found(recording, campaign.skin.poisson_ratio))
+        for recording in campaign.recordings
+        if not isinstance(recording, FrfRecording)
+    ]
+
+
+def _found(
+    recording: CompressionRecording | IndentationRecording, poisson_ratio: float
+) -> CompressionModulus | IndentationModulus | InvalidInput:
+    try:
+        if isinstance(recording, CompressionRecording):
+            return of_compression(recording)
+        return of_indentation(recording, poisson_ratio)
+    except InvalidInput as error:
+        return error
 
 
 def of_compression(recording: CompressionRecording) -> CompressionModulus:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields
 from datetime import datetime
 from functools import cache
+from itertools import islice
 from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -21,6 +22,9 @@ Model = TypeVar("Model")
 Check = Callable[[str, Any, bool], Any]  # name, value, units_checked
 
 LONGEST_NAME = 200
+_LARGEST_COUNT = 2**53
+_FREQUENCIES_HZ = (1e-6, 1e9)
+_MOST_UNKNOWN = 20  # unknown fields of one object that are told; a document may hold millions
 _COHERENCE_ROUNDING = 1e-6  # single-precision instruments write 1.0000001
 
 
@@ -32,10 +36,10 @@ def check_fields(
     `model` is a dataclass; a field that has a default may be left out or null.
     """
     known = _checks(model)
+    unknown = (name for name in document if name not in known)
     refused = [
-        InvalidInput(shown(name), shown(value), f"unknown field; known: {', '.join(known)}")
-        for name, value in document.items()
-        if name not in known
+        InvalidInput(named(name), shown(document[name]), f"unknown field; known: {', '.join(known)}")
+        for name in islice(unknown, _MOST_UNKNOWN)
     ]
     values: dict[str, Any] = {}
     for name, (field_check, default) in known.items():
@@ -135,10 +139,10 @@ def poisson_ratio(field: str, value: Any, units_checked: bool) -> float:  # noqa
 
 
 def count(field: str, value: Any, units_checked: bool) -> int:  # noqa: ARG001
-    """A whole number, 0 or greater."""
+    """A whole number, 0 to 2⁵³: as far as floats, and so JSON, hold every one."""
     result = number(field, value)
-    if result < 0 or not result.is_integer():
-        raise InvalidInput(field, shown(value), "must be a whole number, 0 or greater")
+    if result < 0 or not result.is_integer() or int(value) > _LARGEST_COUNT:
+        raise InvalidInput(field, shown(value), f"must be a whole number, 0 to {_LARGEST_COUNT}")
     return int(value)
 
 
@@ -192,9 +196,11 @@ def rows(field: str, value: Any, units_checked: bool) -> Floats:
 
 
 def frequencies(field: str, value: Any, units_checked: bool) -> Floats:
-    """An increasing column of frequencies above 0."""
+    """An increasing column of frequencies above 0, from far below to far above what any instrument records."""
     column = increasing(field, value, units_checked)
     _refuse_where(field, column, column <= 0, "must be greater than 0 (leave out the line at 0 Hz)")
+    low, high = _FREQUENCIES_HZ
+    _refuse_where(field, column, (column < low) | (column > high), f"must be {low:g} to {high:g} Hz")
     return column
 
 
@@ -246,6 +252,11 @@ def shown(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return f"a list of {len(value)}"
     return f"a value of type {type(value).__name__}"
+
+
+def named(name: Any) -> str:
+    """A field's name as an error may show it, an empty one too."""
+    return str(shown(name)) or '""'
 
 
 def _shown_number(value: Any) -> Any:

@@ -16,7 +16,7 @@ from scipy.ndimage import median_filter
 
 from underskin.errors import InvalidInput
 from underskin.recordings.frf_estimation import Frf
-from underskin.recordings.zone_reason import reason_of
+from underskin.recordings.zone_reason import levels_of, reason_of
 from underskin.units import Complexes, Floats
 
 FLATNESS = 0.02
@@ -135,7 +135,7 @@ def band_average(stacks: Sequence[Stack], zone: FlatZone) -> tuple[Floats, Float
         total = weight.sum(axis=1)
         value = (weight * real).sum(axis=1) / total
         rest = real - value[:, None]
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             effective = total**2 / (weight**2).sum(axis=1)
             unbiased = effective / (effective - 1)
             mean[stack.rows] = value
@@ -260,6 +260,5 @@ def _slope(log_frequency: Floats, curve: Floats) -> float:
 def _is_flat(log_frequency: Floats, curves: Floats, noise: Floats, slope: float) -> bool:
     law = 1 + slope * (log_frequency - log_frequency.mean())
     shape = curves / law
-    level = np.nanmean(shape, axis=1, keepdims=True)
-    departure = np.abs(shape / level - 1) - _BEYOND_NOISE * noise
+    departure = np.abs(shape / levels_of(shape) - 1) - _BEYOND_NOISE * noise
     return not bool(np.any(departure > FLATNESS))

@@ -6,6 +6,8 @@
 /recordings/<number>     attributes for single values, a dataset for each column
 """
 
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any, BinaryIO
 
 import h5py
@@ -21,16 +23,21 @@ MAGIC = b"\x89HDF\r\n\x1a\n"
 def write(campaign: Campaign, stream: BinaryIO) -> None:
     """Write the campaign into an open binary file."""
     document = to_dict(campaign)
-    with h5py.File(stream, "w", libver="latest") as target:
-        _write_attributes(target, {name: document[name] for name in document if name not in ("skin", "recordings")})
-        skin = dict(document["skin"])
+    write_document(document, document["recordings"], stream)
+
+
+def write_document(about: Mapping[str, Any], recordings: Iterable[Mapping[str, Any]], file: Path | BinaryIO) -> None:
+    """Write a campaign document whose recordings come one by one; what `about` has of them is not read."""
+    with h5py.File(file, "w", libver="latest") as target:
+        _write_attributes(target, {name: about[name] for name in about if name not in ("skin", "recordings")})
+        skin = dict(about["skin"])
         sensors = skin.pop("sensors", [])
         _write_attributes(target.create_group("skin"), skin)
         for name in ("id", "x_mm", "y_mm") if sensors else ():
             target[f"skin/sensors/{name}"] = [sensor[name] for sensor in sensors]
-        recordings = target.create_group("recordings")
-        for number, recording in enumerate(document["recordings"]):
-            group = recordings.create_group(f"{number:06d}")
+        groups = target.create_group("recordings")
+        for number, recording in enumerate(recordings):
+            group = groups.create_group(f"{number:06d}")
             _write_attributes(group, {name: value for name, value in recording.items() if name not in COLUMNS})
             for name in recording.keys() & set(COLUMNS):
                 group[name] = np.array(recording[name], dtype=np.float64)

@@ -1,4 +1,6 @@
-"""What an HDF5 file from outside may not hold: anything that leads out of it, or back to where the walk has been."""
+"""What an HDF5 file from outside may not hold: anything that leads out of it, or back to where the walk has been, and
+data that were never written.
+"""
 
 from typing import Any
 
@@ -8,10 +10,13 @@ from underskin.errors import FileError
 
 _DEEPEST = 8
 _MOST_OBJECTS = 200_000
+_SMALL = 100_000  # bytes, which a dataset may declare without any stored
+_LARGEST_COMPRESSION = 1100  # deflate's is 1032
 
 
 def refuse_outside(source: Any, file: str) -> None:
-    """Raises FileError at a soft or external link, external storage, a virtual dataset, or a group met again."""
+    """Raises FileError at a soft or external link, external storage, a virtual dataset, a group met again, or a dataset
+    that declares more than the file can have stored."""
     seen: set[Any] = set()
     _walk(source, "", 0, seen, file)
 
@@ -30,5 +35,13 @@ def _walk(group: Any, path: str, depth: int, seen: set[Any], file: str) -> None:
         seen.add(address)
         if isinstance(item, h5py.Group):
             _walk(item, here, depth + 1, seen, file)
-        elif isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
-            raise FileError(file, here, "keeps its data in another file: only data in the file itself is read")
+        elif isinstance(item, h5py.Dataset):
+            _refuse_dataset(item, here, file)
+
+
+def _refuse_dataset(item: Any, here: str, file: str) -> None:
+    if item.external or item.is_virtual:
+        raise FileError(file, here, "keeps its data in another file: only data in the file itself is read")
+    stored = item.id.get_storage_size()
+    if item.shape is not None and item.nbytes > _SMALL + _LARGEST_COMPRESSION * stored:
+        raise FileError(file, here, f"declares {item.nbytes} bytes of data, of which the file stores {stored}")

@@ -17,6 +17,7 @@ from underskin.recordings.channels import Block, Channel, Contents, with_distinc
 
 MAGIC = "LabVIEW Measurement"
 _END_OF_HEADER = "***End_of_Header***"
+_MOST_EMPTY = 10  # parts of channels for each number that there is
 _SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
 
 
@@ -93,15 +94,15 @@ class _Reader:
         """The acquisitions of a segment."""
         count = self._count(segment)
         decimal = self.decimal or ("," if self._has_decimal_commas(segment) else ".")
-        columns = [1 + 2 * channel if self.x_columns == "Multi" else 1 + channel for channel in range(count)]
-        names = [*segment.names, *[""] * (max(columns) + 1)]
+        step = 2 if self.x_columns == "Multi" else 1
+        names = [*segment.names, *[""] * (1 + step * count)]
         channels = [
             Channel(
-                names[column] or f"channel {channel + 1}",
+                names[1 + step * channel] or f"channel {channel + 1}",
                 _entry(segment, "Y_Unit_Label", channel),
-                self._column(segment, column, decimal),
+                np.array(values, dtype=np.float64),
             )
-            for channel, column in enumerate(columns)
+            for channel, values in enumerate(self._columns(segment, count, step, decimal))
         ]
         return self._acquisitions(segment, with_distinct_names(channels))
 
@@ -116,28 +117,38 @@ class _Reader:
     def _has_decimal_commas(self, segment: _Segment) -> bool:
         return self.separator != "," and any("," in cell for cell in segment.rows[0][1][:-1])
 
-    def _column(self, segment: _Segment, column: int, decimal: str) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-        """A channel's numbers: a channel with fewer samples has empty cells at its end."""
-        values: list[float] = []
+    def _columns(self, segment: _Segment, count: int, step: int, decimal: str) -> list[list[float]]:
+        """The channels' numbers: a channel with fewer samples has empty cells, or none, at its end."""
+        columns: list[list[float]] = [[] for _ in range(count)]
         for index, (line, cells) in enumerate(segment.rows):
-            cell = cells[column].strip() if column < len(cells) else ""
-            value = text.number(cell, decimal)
-            if value is not None and len(values) == index:
-                values.append(value)
-            elif cell:
-                raise FileError(self.file, f"line {line}, column {column + 1}", f"{cell[:40]!r} is no number here")
-        return np.array(values, dtype=np.float64)
+            for channel, written in enumerate(cells[1 : 1 + step * count : step]):
+                cell, values = written.strip(), columns[channel]
+                value = text.number(cell, decimal)
+                if value is not None and len(values) == index:
+                    values.append(value)
+                elif cell:
+                    place = f"line {line}, column {2 + step * channel}"
+                    raise FileError(self.file, place, f"{cell[:40]!r} is no number here")
+        return columns
+
+    def _step(self, cell: str) -> float | None:
+        """A step of the abscissa: the decimal mark is its own where the header names none."""
+        return text.number(cell, self.decimal or ("," if "," in cell else "."))
 
     def _acquisitions(self, segment: _Segment, channels: tuple[Channel, ...]) -> list[Block]:
         """The channels cut into runs of the stated number of samples."""
         steps = {_entry(segment, "Delta_X", channel) for channel in range(len(channels))}
-        step = text.number(steps.pop(), self.decimal or ".") if len(steps) == 1 else None
+        step = self._step(steps.pop()) if len(steps) == 1 else None
         is_time = _entry(segment, "X_Dimension", 0) in ("Time", "")
         rate = 1 / step if step is not None and step > 1e-12 and is_time else None
         samples = {_entry(segment, "Samples", channel) for channel in range(len(channels))}
         stated = samples.pop() if len(samples) == 1 else ""
         length = max(len(channel.values) for channel in channels)
         run = int(stated) if stated.isascii() and stated.isdigit() and 0 < len(stated) < 10 and int(stated) else length
+        present = sum(len(channel.values) for channel in channels)
+        if run and length // run * len(channels) > _MOST_EMPTY * present:
+            reason = f"Samples = {run} cuts {present} numbers of {len(channels)} channels into {length // run} parts"
+            raise FileError(self.file, f"line {segment.rows[0][0]}", reason)
         if run and length % run:
             self.warnings.append(f"the last acquisition was interrupted after {length % run} of {run} samples")
         return [

@@ -23,10 +23,10 @@ from underskin.errors import FileError, InvalidInput
 from underskin.recordings import fields as field
 from underskin.recordings import json_file, text
 from underskin.recordings.campaign import COLUMNS, KINDS, SkinDescription
-from underskin.recordings.fields import mapping, shown
+from underskin.recordings.fields import mapping, named, shown
 
 SCHEMA = "rig/1"
-_LARGEST_BYTES = 1_000_000
+LARGEST_BYTES = 1_000_000
 BLOCK_NAME = "block"  # a property that every part of a file has: a TDMS group, a MATLAB structure
 COMPLEX_FRF = "frf_pc_per_n"  # a channel of complex numbers, both parts of the FRF
 
@@ -80,8 +80,8 @@ def parse(data: bytes, file: str) -> RigDescription:
 
     Raises FileError where the text is neither, InvalidInput where a field cannot be used.
     """
-    if len(data) > _LARGEST_BYTES:
-        raise FileError(file, "", f"a rig description may have up to {_LARGEST_BYTES} bytes")
+    if len(data) > LARGEST_BYTES:
+        raise FileError(file, "", f"a rig description may have up to {LARGEST_BYTES} bytes")
     if data.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] == b"{":
         return from_dict(json_file.document(data, file))
     try:
@@ -100,7 +100,7 @@ def from_dict(document: Any) -> RigDescription:
     document = mapping("rig", document)
     for name in document:
         if name not in ("schema", "name", "kind", "skin", "recording", "channels", "units_checked"):
-            raise InvalidInput(shown(name), shown(document[name]), "unknown field of a rig description")
+            raise InvalidInput(named(name), shown(document[name]), "unknown field of a rig description")
     if document.get("schema") != SCHEMA:
         raise InvalidInput("schema", shown(document.get("schema")), f"must be {SCHEMA}")
     kind = document.get("kind", "frf")
@@ -150,7 +150,7 @@ def _channels(kind: str, document: Any) -> dict[str, ChannelMapping]:
 def _known(prefix: str, document: Mapping[str, Any], known: set[str]) -> Mapping[str, Any]:
     for name in document:
         if name not in known:
-            raise InvalidInput(f"{prefix}.{shown(name)}", shown(document[name]), f"must be one of {sorted(known)}")
+            raise InvalidInput(f"{prefix}.{named(name)}", shown(document[name]), f"must be one of {sorted(known)}")
     return document
 
 

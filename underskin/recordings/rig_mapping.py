@@ -15,6 +15,7 @@ from underskin.recordings.rig_description import BLOCK_NAME, COMPLEX_FRF, Channe
 from underskin.recordings.unit_labels import field_unit, labelled_unit, unit
 from underskin.units import LAB, Floats
 
+_TEXTS = ("id", "sensor", "recorded_at")
 _SAMPLING_JITTER = 0.01  # of a sample: more is not evenly sampled
 
 
@@ -35,12 +36,17 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> tuple[dict[str,
     stem = _printable(PurePath(file).stem)
     recordings = []
     for number, block in enumerate(blocks, start=1):
-        label = f"{stem} {_printable(block.name) or number}" if len(blocks) > 1 else stem
+        label = _label(stem, _printable(block.name) or str(number)) if len(blocks) > 1 else stem
         stated = _stated(contents, block)
         common = {name: _common(name, value, stated, file) for name, value in rig.recording.items()}
         recordings.append({"id": label, "kind": rig.kind, **common, **_Mapped(rig, block, file, warnings).fields()})
     document = {"schema": SCHEMA, "name": stem, "skin": rig.skin, "recordings": recordings}
     return {**document, "units_checked": rig.units_checked}, list(dict.fromkeys(warnings))
+
+
+def _label(stem: str, part: str) -> str:
+    """The file's name and the part's; the file's is cut where both make more than an id may have."""
+    return f"{stem[: max(0, LONGEST_NAME - 1 - len(part))]} {part}".strip()
 
 
 def _printable(name: str) -> str:
@@ -63,8 +69,10 @@ def _common(name: str, value: Any | Property, stated: Mapping[str, str | float],
         raise FileError(file, f"property {value.property!r}", f"is not in the file, which states {known}")
     found = stated[value.property]
     number = text.number(found, ".") if isinstance(found, str) else found
-    if name not in LAB or number is None:
+    if number is None or name in _TEXTS:
         return found
+    if name not in LAB:
+        return number
     label = labelled_unit(value.property)
     return number * _factor(label, name, file, f"property {value.property!r}") if label else number
 

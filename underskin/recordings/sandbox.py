@@ -6,6 +6,7 @@ arrays, so that nothing it says is run here. When it dies, that is an error that
 
 import importlib
 import os
+import secrets
 import struct
 import subprocess
 import sys
@@ -25,13 +26,20 @@ from underskin.recordings.formats import parse
 
 @dataclass(frozen=True)
 class Limits:
-    """What one file may take: `memory_bytes` beyond the interpreter's own, `seconds` by the clock."""
+    """What one file may take: `memory_bytes` beyond the interpreter's own, `seconds` by the clock. The answer about it
+    may be `unfolding` times as long as the file, and 16 MB."""
 
     memory_bytes: int = 1 << 30
     seconds: float = 60.0
+    unfolding: float = 16.0
+
+    def answer_bytes(self, file_bytes: int) -> int:
+        """How long the answer about a file of this size may be."""
+        return min(self.memory_bytes, _SHORT_ANSWER + int(self.unfolding * file_bytes))
 
 
 _DEFAULT = Limits()
+_SHORT_ANSWER = 16 << 20
 _INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR")
 _LAST_WORDS = 500
 _LENGTH = struct.Struct("<Q")
@@ -57,11 +65,13 @@ def call_apart(
     The answer is made of what JSON has and arrays of one axis; `what` the file is read as goes into errors. Raises
     FileError as `parse_apart`.
     """
+    longest = limits.answer_bytes(stream.seek(0, os.SEEK_END))
     stream.seek(0)
     environment = {key: os.environ[key] for key in _INHERITED if key in os.environ}
     environment |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "HDF5_PLUGIN_PATH": os.devnull}
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))  # the packages of this process
-    command = [sys.executable, "-P", "-m", __name__, function, str(limits.memory_bytes), str(limits.seconds), *given]
+    bounds = [str(limits.memory_bytes), str(limits.seconds), str(longest)]
+    command = [sys.executable, "-P", "-m", __name__, function, *bounds, *given]
     with tempfile.TemporaryFile() as answer, tempfile.TemporaryFile() as said:
         child = subprocess.Popen(command, stdin=stream, stdout=answer, stderr=said, env=environment)
         try:
@@ -90,20 +100,23 @@ def _end(status: int, said: BinaryIO) -> str:
 
 def _understood(answer: bytes, file: str) -> dict[str, Any]:
     (size,) = _LENGTH.unpack_from(answer)
-    told = orjson.loads(answer[_LENGTH.size : _LENGTH.size + size])
+    header = orjson.loads(answer[_LENGTH.size : _LENGTH.size + size])
+    told = header["told"]
     if "error" in told:
         raise FileError(file, told["error"]["place"], told["error"]["reason"])
-    return dict(_with_arrays(told, memoryview(answer)[_LENGTH.size + size :]))
+    return dict(_with_arrays(told, header["mark"], memoryview(answer)[_LENGTH.size + size :]))
 
 
-def _with_arrays(told: Any, buffer: memoryview) -> Any:
+def _with_arrays(told: Any, mark: str, buffer: memoryview) -> Any:
+    """What was told, with the array that each {mark: [type, start, count]} stands for."""
     if isinstance(told, list):
-        return [_with_arrays(entry, buffer) for entry in told]
+        return [_with_arrays(entry, mark, buffer) for entry in told]
     if not isinstance(told, dict):
         return told
-    if told.keys() == {"array", "start", "count"}:
-        return np.frombuffer(buffer, dtype=told["array"], count=told["count"], offset=told["start"]).copy()
-    return {name: _with_arrays(value, buffer) for name, value in told.items()}
+    if told.keys() == {mark}:
+        kind, start, count = told[mark]
+        return np.frombuffer(buffer, dtype=kind, count=count, offset=start).copy()
+    return {name: _with_arrays(value, mark, buffer) for name, value in told.items()}
 
 
 def _parsed(stream: BinaryIO, name: str) -> dict[str, Any]:
@@ -113,16 +126,18 @@ def _parsed(stream: BinaryIO, name: str) -> dict[str, Any]:
 
 def _main() -> None:
     """The child: file on standard input, answer on standard output."""
-    function, memory_bytes, seconds, given = sys.argv[1], int(sys.argv[2]), float(sys.argv[3]), sys.argv[4:]
-    _limit(memory_bytes, seconds)
+    function, memory_bytes, seconds, longest, *given = sys.argv[1:]
+    _limit(int(memory_bytes), float(seconds))
     module, _, name = function.partition(":")
     try:
         with os.fdopen(0, "rb") as stream:
             answer = _encoded(getattr(importlib.import_module(module), name)(stream, *given))
+        if sum(memoryview(part).nbytes for part in answer) > int(longest):
+            raise FileError("", "", f"it unfolds to more than {int(longest) >> 20} MB, too much for a file of its size")
     except FileError as error:
         answer = _encoded({"error": {"place": error.place, "reason": error.reason}})
     except MemoryError:
-        reason = f"reading it takes more than {memory_bytes / (1 << 30):.3g} GB of memory"
+        reason = f"reading it takes more than {int(memory_bytes) / (1 << 30):.3g} GB of memory"
         answer = _encoded({"error": {"place": "", "reason": reason}})
     with os.fdopen(1, "wb") as out:
         for part in answer:
@@ -140,6 +155,8 @@ def _limit(memory_bytes: int, seconds: float) -> None:
 
 
 def _encoded(answer: dict[str, Any]) -> list[Any]:
+    """The answer's parts. Nothing in a file can pass for an array: their mark is not to be guessed."""
+    mark = secrets.token_hex(16)
     arrays: list[Any] = []
     position = 0
 
@@ -150,9 +167,9 @@ def _encoded(answer: dict[str, Any]) -> list[Any]:
         array = np.ascontiguousarray(value)
         arrays.append(array.data)
         start, position = position, position + array.nbytes
-        return {"array": array.dtype.str, "start": start, "count": array.size}
+        return {mark: [array.dtype.str, start, array.size]}
 
-    header = orjson.dumps(answer, default=plain)
+    header = orjson.dumps({"mark": mark, "told": answer}, default=plain)
     return [_LENGTH.pack(len(header)), header, *arrays]
 
 

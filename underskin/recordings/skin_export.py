@@ -20,11 +20,12 @@ import orjson
 
 from underskin.errors import FileError
 from underskin.recordings.hdf5_links import refuse_outside
-from underskin.recordings.sandbox import call_apart
+from underskin.recordings.sandbox import Limits, call_apart
 from underskin.units import Floats
 
 SCHEMA = "skin-export/1"
 _NOTHING = np.empty(0)
+_LIMITS = Limits(unfolding=1000.0)  # a column of a simulated campaign may hold one value, and its gzip next to nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +82,12 @@ def write_campaign(target: Any, name: str, campaign: ExportedCampaign) -> None:
 
 def read_overview(stream: BinaryIO, file: str) -> Overview:
     """What an export holds, read in a child process; raises FileError where it is none, or damaged."""
-    return Overview(**call_apart(f"{__name__}:_overview", stream, file, what=SCHEMA))
+    return Overview(**call_apart(f"{__name__}:_overview", stream, file, what=SCHEMA, limits=_LIMITS))
 
 
 def read_campaigns(stream: BinaryIO, file: str, names: Sequence[str]) -> list[ExportedCampaign]:
     """Some campaigns of an export, read in a child process; raises FileError."""
-    told = call_apart(f"{__name__}:_campaigns", stream, file, orjson.dumps(names).decode(), what=SCHEMA)
+    told = call_apart(f"{__name__}:_campaigns", stream, file, orjson.dumps(names).decode(), what=SCHEMA, limits=_LIMITS)
     return [ExportedCampaign(**campaign) for campaign in told["campaigns"]]
 
 

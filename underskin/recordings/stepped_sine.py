@@ -14,6 +14,7 @@ from scipy.signal import resample_poly
 from underskin.units import Complexes, Floats
 
 _SAME_PERIOD = 0.05
+_DRIFT = 0.025  # of the period, from a run's first half to its second: a sweep's runs drift by about 0.05
 _FEWEST_CYCLES = 4
 _FINE = 8  # samples a cycle
 _COVERED = 0.7  # a force that dwells on tones does so for most of its time
@@ -116,10 +117,17 @@ def _even_runs(crossings: Floats) -> list[tuple[float, float, int]]:
             mean = (places[index] - places[start]) / (index - start)
             if abs(places[index + 1] - places[index] - mean) < _SAME_PERIOD * mean:
                 continue
-        if index - start >= _FEWEST_CYCLES:
+        if index - start >= _FEWEST_CYCLES and not _drifts(places[start : index + 1]):
             runs.append((places[start], places[index], index - start))
         start = index
     return runs
+
+
+def _drifts(crossings: list[float]) -> bool:
+    """Whether the period changes over a run: a sweep passes through tones and dwells on none."""
+    half = len(crossings) // 2
+    first, second = crossings[half] - crossings[0], crossings[-1] - crossings[-1 - half]
+    return abs(second - first) > _DRIFT * first
 
 
 def _refined(signal: Floats, start: float, end: float, cycles: int) -> float:

@@ -21,8 +21,7 @@ def reason_of(
 ) -> str:
     """The reason for a zone over `bins` (first, last) of the `curves` (conditions and all, bins) over `middle_hz`."""
     first, last = bins
-    levels = np.nanmean(curves[:, first : last + 1], axis=1, keepdims=True)
-    departure = curves / levels - 1
+    departure = curves / levels_of(curves[:, first : last + 1]) - 1
     parts = [f"{low_hz:.4g} to {high_hz:.4g} Hz: no resonance in any recording"]
     if last + 1 < len(middle_hz):
         parts.append(_above(high_hz, middle_hz, departure, conditions, last))
@@ -35,6 +34,12 @@ def reason_of(
     if left_out_hz:
         parts.append(f"lines left out as mains pick-up: {', '.join(f'{line:g}' for line in left_out_hz)} Hz")
     return "; ".join(parts)
+
+
+def levels_of(curves: Floats) -> Floats:
+    """The mean of each curve over the bins that it has, (curves, 1); NaN where it has none."""
+    filled = np.isfinite(curves).sum(axis=1, keepdims=True)
+    return np.nansum(curves, axis=1, keepdims=True) / np.where(filled, filled, np.nan)
 
 
 def _above(

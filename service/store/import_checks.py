@@ -1,0 +1,164 @@
+"""What an export must be to come into the store: nothing that the service could not have kept itself.
+
+Every check raises InvalidInput, or pydantic's ValidationError, KeyError or TypeError where a row has another shape.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import orjson
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+from service.campaign_models import RecordingResult
+from service.store import codec
+from service.store.skins import require_usable
+from underskin import InvalidInput
+from underskin.recordings import rig_description
+from underskin.recordings.campaign import SCHEMA, Campaign, parse
+from underskin.recordings.skin_export import ExportedCampaign, Overview
+
+Text = Annotated[str, StringConstraints(max_length=1000, pattern=r"^[^\x00]*$")]
+CampaignId = Annotated[str, StringConstraints(pattern=r"^c-[0-9a-f]{16}$")]
+Time = Annotated[str, StringConstraints(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z$")]
+
+
+class _Row(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class SkinRow(_Row):
+    """A row of skins."""
+
+    id: str
+    root_id: str
+    created_at: Time
+    joined_to: str | None
+    joined_at: Time | None
+    join_reason: Text | None
+
+
+class RigRow(_Row):
+    """A row of rigs."""
+
+    skin_id: str
+    document: str
+    created_at: Time
+
+
+class CampaignRow(_Row):
+    """A row of campaigns, but for its number and what its recordings say."""
+
+    id: CampaignId
+    skin_id: str
+    name: str
+    about: dict[str, Any]
+    notes: list[str]
+    refused: list[dict[str, Any]]
+    source: Text | None
+    received_at: Time
+    received_from: Text | None
+    recorded_at: Time | None
+    recordings: int = Field(ge=1)
+    excluded: int = Field(ge=0)
+    corrects: CampaignId | None
+    correct_reason: Text | None
+    corrected_by: CampaignId | None
+    withdrawn_at: Time | None
+    withdraw_reason: Text | None
+
+
+class ExclusionRow(_Row):
+    """Whether a recording is excluded."""
+
+    excluded_at: Time | None
+    exclude_reason: Text | None
+
+
+@dataclass(frozen=True)
+class CheckedOverview:
+    """Rows of the skins and their rigs, ready to be kept."""
+
+    skins: list[SkinRow]
+    rigs: list[RigRow]
+
+
+@dataclass(frozen=True)
+class CheckedCampaign:
+    """A campaign with its row and its exclusions, ready to be kept."""
+
+    row: dict[str, Any]
+    campaign: Campaign
+    exclusions: list[ExclusionRow]
+
+
+def overview(found: Overview) -> CheckedOverview:
+    """The skins, one of them the root of all, and rigs of theirs."""
+    rows = [SkinRow.model_validate(row) for row in found.skins]
+    rigs = [RigRow.model_validate(row) for row in found.rigs]
+    _require_joined(found.skin, rows)
+    ids = {row.id for row in rows}
+    for rig in rigs:
+        _require(rig.skin_id in ids, "rigs", rig.skin_id, "must be of a skin in the file")
+        try:
+            rig_description.from_dict(orjson.loads(rig.document))
+        except orjson.JSONDecodeError as error:
+            raise InvalidInput("rigs", None, f"must be JSON: {error.msg}") from None
+    return CheckedOverview(rows, rigs)
+
+
+def campaign(found: ExportedCampaign, name: str, skins: Sequence[SkinRow]) -> CheckedCampaign:
+    """The campaign that the file has under `name`, checked as an upload is."""
+    state = CampaignRow.model_validate(found.about)
+    _require(state.id == name, "id", state.id, f"must be {name}, as the file names it")
+    _require(state.skin_id in {row.id for row in skins}, "skin_id", state.skin_id, "must be a skin in the file")
+    _require_together(state, "corrects", "correct_reason")
+    _require_together(state, "withdrawn_at", "withdraw_reason")
+    for entry in state.refused:
+        RecordingResult.model_validate(entry)
+    exclusions = [ExclusionRow(**{key: row[key] for key in ExclusionRow.model_fields}) for row in found.recordings]
+    for exclusion in exclusions:
+        _require_together(exclusion, "excluded_at", "exclude_reason")
+    entries = [{**row["scalars"], **arrays} for row, arrays in zip(found.recordings, found.arrays, strict=True)]
+    parsed = parse({**state.about, "schema": SCHEMA, "recordings": entries})
+    _require(state.name == parsed.name, "name", state.name, f"must be {parsed.name!r}, as the campaign says")
+    row = {
+        **state.model_dump(),
+        "about": codec.about(parsed),
+        "recordings": len(parsed.recordings),
+        "excluded": sum(entry.excluded_at is not None for entry in exclusions),
+        "recorded_at": codec.earliest(parsed),
+        "revision": 0,
+    }
+    return CheckedCampaign(row, parsed, exclusions)
+
+
+def _require_joined(root: str, rows: Sequence[SkinRow]) -> None:
+    """Each skin once, with an id of ours; every one but the root joined to another, and so in the end to the root."""
+    joined_to = {row.id: row.joined_to for row in rows}
+    _require(root in joined_to, "skin", root, "must be one of the file's skins")
+    _require(len(joined_to) == len(rows), "skins", len(rows), "must have ids that differ")
+    for row in rows:
+        require_usable("skins.id", row.id)
+        _require(row.root_id == root, "skins.root_id", row.root_id, f"must be {root!r}")
+        _require((row.joined_to is None) == (row.id == root), "skins.joined_to", row.joined_to, "must lead to the skin")
+        _require_together(row, "joined_to", "joined_at", "join_reason")
+    leading = {root}
+    for row in rows:
+        passed: dict[str | None, None] = {}
+        name: str | None = row.id
+        while name not in leading:
+            _require(name in joined_to and name not in passed, "skins.joined_to", row.id, "must lead to the skin")
+            passed[name] = None
+            name = joined_to[str(name)]
+        leading |= {str(one) for one in passed}
+
+
+def _require_together(row: BaseModel, *names: str) -> None:
+    given = {getattr(row, name) is None for name in names}
+    _require(len(given) == 1, names[-1], getattr(row, names[-1]), f"goes together with {names[0]}")
+
+
+def _require(holds: bool, field: str, value: Any, allowed: str) -> None:
+    if not holds:
+        raise InvalidInput(field, value, allowed)
