@@ -44,7 +44,7 @@ class Settings(BaseSettings):
         description="How many diagnoses run at once, each in a process of its own; 0: this server runs none.",
     )
     diagnosis_memory_mb: float = Field(
-        default=2000,
+        default=2000.0,
         ge=100,
         le=1e6,
         description="Memory that one diagnosis may take, in MB (10^6 bytes); one that needs more fails.",

@@ -40,7 +40,7 @@ def design(made: Made) -> Campaign:
     """Every sensor under every sphere, preload and offset, with lines of 1."""
     sensors = tuple(Sensor(id=f"s{number}", x_mm=PITCH_MM * number, y_mm=0.0) for number in range(made.sensors))
     frequency = np.round(np.geomspace(1.0, made.highest_hz, made.lines), 4)
-    recordings = []
+    recordings: list[FrfRecording] = []
     for _ in range(made.repeats):
         for sensor in sensors:
             for sphere in made.spheres_mm:
@@ -54,7 +54,7 @@ def design(made: Made) -> Campaign:
                                 indenter_radius_mm=sphere,
                                 preload_n=preload,
                                 dynamic_force_n=made.dynamic_forces_n[number % len(made.dynamic_forces_n)],
-                                load_cycles=float(100 * (number + 1)),
+                                load_cycles=100 * (number + 1),
                                 dwell_s=(1.0, 10.0, 100.0)[number % 3],
                                 recorded_at=f"2020-01-{1 + number // 20:02d}T10:{number % 20:02d}:00Z",
                                 position_mm=(sensor.x_mm + offset, sensor.y_mm),

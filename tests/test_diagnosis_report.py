@@ -12,10 +12,11 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.diagnosis_campaigns import Made, campaign
+from tests.mechanism_campaigns import indentation_campaign
 from underskin.cli import app
 from underskin.diagnosis.diagnose import diagnosis_report
-from underskin.mechanisms import CATALOGUE
-from underskin.recordings.campaign import Campaign, FrfRecording, to_dict
+from underskin.mechanisms import CATALOGUE, compose
+from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, to_dict
 from underskin.surrogate import SigmaTable, load_table
 
 SHARED = os.environ.get("UNDERSKIN_CAMPAIGNS")
@@ -68,7 +69,7 @@ def test_nothing_is_found_where_nothing_is_missing(table: SigmaTable) -> None:
         (replace(SENSORS, mechanisms=("amplifier_high_pass",), parameters=(0.6,)), 0.6),
         (replace(SENSORS, mechanisms=("ageing",), parameters=(0.2, 300.0, 0.0)), None),
         (replace(SENSORS, mechanisms=("sensor_spread",), parameters=(0.2,), sensors=6), None),
-        (replace(SENSORS, mechanisms=("misalignment",), parameters=(0.5, 0.4), offsets_mm=(-1.0, 1.0)), 0.5),
+        (Made(("misalignment",), (0.5, 0.4), offsets_mm=(-2.0, 0.0, 2.0)), 0.5),
     ],
 )
 def test_what_is_missing_is_named_with_its_parameters(made: Made, value: float | None, table: SigmaTable) -> None:
@@ -212,3 +213,20 @@ def test_campaigns_of_another_rig(name: str, verdict: str, table: SigmaTable) ->
     report = diagnosis_report(read_file(Path(SHARED) / "open" / f"{name}.json", name).campaign, table)
     assert report["verdict"] == verdict
     assert names(report) <= set(CATALOGUE)
+
+
+def test_curves_are_diagnosed_too(table: SigmaTable) -> None:
+    """A thin layer under a sphere, diagnosed from force against depth."""
+    empty = indentation_campaign()
+    model = compose(("layered_contact",), empty, table, "indentation")
+    force = model.predict(np.array([entry.start for entry in model.parameters])).value.real
+    random = np.random.default_rng(1)
+    recordings = []
+    for number, entry in enumerate(empty.recordings):
+        assert isinstance(entry, IndentationRecording)
+        own = force[model.recording == number]
+        recordings.append(replace(entry, force_n=own + 1e-3 * np.abs(own).max() * random.normal(size=len(own))))
+    report = diagnosis_report(replace(empty, recordings=tuple(recordings)), table)
+    assert report["verdict"] == "explained"
+    assert names(report) == {"layered_contact"}
+    assert report["d33"] is None

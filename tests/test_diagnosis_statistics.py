@@ -62,7 +62,7 @@ def test_the_likelihood_is_that_of_the_whole_covariance_matrix(made: Made, place
     covariance = np.diag(deviation**2)
     same = which[:, None] == which[None, :]
     gain = levels.gain**2 + 0.5 * levels.position**4 * curvature.square[which]
-    covariance += np.outer(model, model) * same * (gain if placed else levels.gain**2)
+    covariance += np.outer(model, model) * same * gain[:, None]
     covariance += np.outer(model, model) * (sensor[:, None] == sensor[None, :]) * levels.spread**2
     if placed:
         assert prediction.position_slopes is not None
@@ -74,7 +74,7 @@ def test_the_likelihood_is_that_of_the_whole_covariance_matrix(made: Made, place
             covariance += np.outer(column, column) * same
     exact = multivariate_normal.logpdf(real(used.value), model, covariance, allow_singular=True)
     # What all hypotheses share is left out: 2π and the lines' own deviations
-    shared = -0.5 * len(model) * np.log(2 * np.pi) - np.log(np.tile(used.deviation, 2)).sum()
+    shared = -0.5 * len(model) * np.log(2 * np.pi) - 2 * float(np.log(used.deviation).sum())
     assert at.marginal.log_likelihood == pytest.approx(exact - shared, abs=1e-6 * abs(exact))
 
 

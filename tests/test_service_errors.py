@@ -70,11 +70,11 @@ def test_every_route_refuses_in_the_same_shape(http: httpx.Client) -> None:
     for method, path in all_routes(http):
         problem_of(http.request(method, path, headers={"Host": "evil.example"}), 421)
         allowed = {other for other, same in all_routes(http) if same == path}
-        refused = http.request("DELETE", path)
+        refused = http.request("PUT", path)
         problem_of(refused, 405)
         assert set(refused.headers["allow"].split(", ")) == allowed
         problem_of(http.request(method, path + "/nothing/here"), 404)
-        if method == "POST":
+        if method == "POST" and not path.endswith("/diagnosis"):  # which takes no body
             invalid = 400 if path.startswith("/umbridge/") else 422
             problem_of(http.post(path, json={}), invalid)
             problem_of(http.post(path, json=[1, 2]), invalid)

@@ -22,7 +22,7 @@ from service.store.times import now
 from underskin.recordings.campaign import Campaign
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]
-SILENT_S = 20.0
+SILENT_S = 10.0
 _ENDED = ("done", "failed", "cancelled")
 _USABLE = ("queued", "running", "done")
 

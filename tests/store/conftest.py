@@ -36,7 +36,7 @@ def place(request: pytest.FixtureRequest, tmp_path: Path) -> Place:
 def servers(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Callable[[str], Server]]:
-    """Servers by name, started when first asked for: to start one takes longer than most tests."""
+    """Servers by name, started when first asked for, since that takes longer than most tests; they run no diagnoses."""
     started: dict[str, Server] = {}
     with ExitStack() as stack:
 
@@ -44,7 +44,7 @@ def servers(
             if name not in started:
                 folder = tmp_path_factory.mktemp(name)
                 url = request.getfixturevalue("cluster").new_database() if name == "postgresql" else ""
-                started[name] = stack.enter_context(running(Place(folder, url)))
+                started[name] = stack.enter_context(running(Place(folder, url), UNDERSKIN_DIAGNOSIS_WORKERS="0"))
             return started[name]
 
         yield server

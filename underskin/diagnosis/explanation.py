@@ -161,7 +161,7 @@ class Workbench:
         tried: dict[tuple[int, ...], Evaluated] = {}
         for index in itertools.product(*(range(len(axis)) for axis in axes)):
             own[free] = [axis[at] for axis, at in zip(axes, index, strict=True)]
-            tried[index] = fitter.settle(fitter.evaluate(fitter.start(own, parent.point if parent else None)), 2)
+            tried[index] = fitter.settle(fitter.begin(own, parent.point if parent else None), 1)
         lowest = [index for index in tried if _is_lowest(index, tried)]
         return sorted((tried[index] for index in lowest), key=lambda entry: entry.cost)[:_KEPT_STARTS]
 
@@ -187,8 +187,11 @@ def _placed_start(fitter: Fitter, at: Evaluated) -> Point:
     if fitter.holds(at.point):
         return at.point
     gain, level, *own = at.point.covariance
+    # Where positioning scatter is large, what was fitted without it may be far off: also from d33 afresh
+    fresh = replace(at.point, fit=fitter.start(at.point.fit[: len(at.point.fit) - fitter.nuisances]).fit)
+    fresh = replace(fresh, bend=fitter.no_bend)
     tried = []
-    for position in _POSITION_STARTS:
+    for begin, position in itertools.product((at.point, fresh), _POSITION_STARTS):
         covariance = np.array([min(gain, GAIN_PRIOR.middle), level, np.log(position), *own])
-        tried.append(fitter.improve(replace(at.point, covariance=covariance), _SHORT))
+        tried.append(fitter.improve(replace(begin, covariance=covariance), _SHORT))
     return min(tried, key=lambda entry: entry.cost).point

@@ -13,6 +13,7 @@ import numpy as np
 from underskin.diagnosis.likelihood import Curvature, Marginal, Moments, NoiseLevels
 from underskin.diagnosis.lines import Lines
 from underskin.diagnosis.scatter import GAIN_PRIOR, POSITION_PRIOR, level_prior
+from underskin.mechanisms.catalogue import CATALOGUE
 from underskin.mechanisms.composition import SENSOR_SPREAD
 from underskin.mechanisms.mechanism import Normal, Parameter
 from underskin.mechanisms.model import Model, Prediction
@@ -69,6 +70,12 @@ class Hypothesis:
         return (*common, *own)
 
 
+def own_parameters(hypothesis: Hypothesis) -> int:
+    """How many of the model's parameters are its mechanisms' own; they come first."""
+    campaign, kind = hypothesis.lines.campaign, hypothesis.lines.kind
+    return sum(len(CATALOGUE[name].parameters(campaign, kind)) for name in hypothesis.model.names)
+
+
 def _moves_covariance(entry: Parameter) -> bool:
     return entry.name in COVARIANCE_NAMES
 
@@ -113,6 +120,7 @@ class Fitter:
         self._common = len(self.covariance) - len(self._own)
         names = [entry.name for entry in self.parameters]
         self._spread, self._pickup = (names.index(name) if name in names else None for name in COVARIANCE_NAMES)
+        self.nuisances = len(names) - own_parameters(hypothesis)
         sensors = int(hypothesis.lines.sensor.max()) + 1
         self.no_bend = np.zeros(sensors)
 
@@ -120,8 +128,8 @@ class Fitter:
         """Whether a point has this hypothesis' covariance parameters."""
         return len(point.covariance) == len(self.covariance)
 
-    def start(self, own: Sequence[float] | Floats, parent: Point | None = None) -> Point:
-        """A point with these coordinates of the mechanisms, E and h of a parent or their centre, d33 as data say."""
+    def _uncentred(self, own: Sequence[float] | Floats, parent: Point | None) -> Point:
+        """A point with these coordinates of the mechanisms, and the nuisances of a parent or at their centre."""
         fit = np.array([entry.start for entry in self.parameters])
         fit[: len(own)] = own
         if parent is not None:
@@ -129,21 +137,45 @@ class Fitter:
         covariance = [GAIN_PRIOR.middle, 0.0]
         if self.hypothesis.placed:
             covariance.append(POSITION_PRIOR.middle)
-        point = Point(fit, np.array([*covariance, *fit[self._own]]), self.no_bend)
+        return Point(fit, np.array([*covariance, *fit[self._own]]), self.no_bend)
+
+    def start(
+        self, own: Sequence[float] | Floats, parent: Point | None = None, prediction: Prediction | None = None
+    ) -> Point:
+        """A point with these coordinates of the mechanisms, E and h of a parent or their centre, d33 as data say."""
+        point = self._uncentred(own, parent)
+        fit = point.fit
         place = next((index for index, entry in enumerate(self.parameters) if _is_scale(entry)), None)
         if place is not None:
             lines = self.hypothesis.lines
-            value = self.hypothesis.model.predict(fit).value
+            value = (prediction or self.hypothesis.model.predict(fit)).value
             weight = 1 / (lines.deviation**2 + (0.03 * np.abs(value)) ** 2)
             ratio = np.sum(weight * (value.conj() * lines.value).real) / np.sum(weight * np.abs(value) ** 2)
             if ratio > 0:
                 fit[place] = np.clip(fit[place] + np.log(ratio), self.low[place], self.high[place])
         return point
 
-    def evaluate(self, point: Point) -> Evaluated:
-        """Predict and weigh."""
+    def begin(self, own: Sequence[float] | Floats, parent: Point | None = None) -> Evaluated:
+        """The start of these coordinates, evaluated with a single prediction where d33 only scales it."""
+        prediction = self.hypothesis.model.predict(self._uncentred(own, parent).fit)
+        point = self.start(own, parent, prediction)
+        names = [entry.name for entry in self.parameters]
+        if "d33" not in names:
+            return self.evaluate(point)
+        factor = float(np.exp(point.fit[names.index("d33")] - self._uncentred(own, parent).fit[names.index("d33")]))
+        slopes = prediction.position_slopes
+        scaled = replace(
+            prediction,
+            value=factor * prediction.value,
+            slopes=factor * prediction.slopes,
+            position_slopes=None if slopes is None else factor * slopes,
+        )
+        return self.evaluate(point, scaled)
+
+    def evaluate(self, point: Point, prediction: Prediction | None = None) -> Evaluated:
+        """Predict, where that was not done already, and weigh."""
         hypothesis = self.hypothesis
-        prediction = hypothesis.model.predict(point.fit)
+        prediction = prediction or hypothesis.model.predict(point.fit)
         position = float(np.exp(point.covariance[2])) if hypothesis.placed else 0.0
         lines = hypothesis.lines
         for _ in range(_BENDINGS):
@@ -245,7 +277,7 @@ class Fitter:
     def settle(self, at: Evaluated, steps: int) -> Evaluated:
         """Newton steps of the covariance parameters at a fixed prediction."""
         for _ in range(steps):
-            gradient, hessian = self.covariance_equations(at)
+            gradient, hessian = self.covariance_equations(at, mixed=False)
             low = np.array([entry.low for entry in self.covariance])
             high = np.array([entry.high for entry in self.covariance])
             eigenvalues, vectors = np.linalg.eigh(hessian)
@@ -268,8 +300,8 @@ class Fitter:
         """The point with other covariance parameters, a mechanism's own among the coordinates of the fit."""
         return replace(point, covariance=covariance, fit=self._with_own(point.fit, covariance))
 
-    def covariance_equations(self, at: Evaluated) -> tuple[Floats, Floats]:
-        """Gradient and Hessian of the cost in the covariance parameters, by central differences."""
+    def covariance_equations(self, at: Evaluated, *, mixed: bool = True) -> tuple[Floats, Floats]:
+        """Gradient and Hessian of the cost in the covariance parameters, by differences; the mixed terms on request."""
         here = at.point.covariance
         count = len(here)
         steps = _STEP * np.eye(count)
@@ -287,9 +319,9 @@ class Fitter:
         gradient = (np.array(up) - down) / (2 * _STEP)
         hessian = np.diag((np.array(up) + down - 2 * middle) / _STEP**2)
         for a in range(count):
-            for b in range(a):
-                mixed = cost(steps[a] + steps[b]) - up[a] - up[b] + middle
-                hessian[a, b] = hessian[b, a] = mixed / _STEP**2
+            for b in range(a if mixed else 0):
+                both = cost(steps[a] + steps[b]) - up[a] - up[b] + middle
+                hessian[a, b] = hessian[b, a] = both / _STEP**2
         return gradient + hessian @ (here - centre), hessian
 
 

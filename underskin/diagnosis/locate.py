@@ -202,7 +202,7 @@ def region(lines: Lines, residuals: Residuals, results: list[AxisResult]) -> dic
     columns = {}
     for entry in telling:
         name = "frequency_hz" if entry.axis == "phase" else entry.axis
-        column = _field(lines, name, by_line)
+        column = axis_values(lines, name, by_line)
         if column is not None:
             columns[name] = column
     kept = np.ones(len(misfit), dtype=bool)
@@ -222,13 +222,13 @@ def in_region(lines: Lines, ranges: dict[str, list[float | str]]) -> NDArray[np.
     """Which rows lie in a region."""
     kept = np.ones(len(lines.value), dtype=bool)
     for name, limits in ranges.items():
-        column = _field(lines, name, True)
+        column = axis_values(lines, name, True)
         assert column is not None
         kept &= (column == limits[0]) if len(limits) == 1 else ((column >= limits[0]) & (column <= limits[1]))
     return kept
 
 
-def _field(lines: Lines, name: str, by_line: bool) -> Array | None:
+def axis_values(lines: Lines, name: str, by_line: bool) -> Array | None:
     """A field's values in lab units, of each row or of each recording; the distance in mm stands for a position."""
     if name == "frequency_hz":
         return lines.frequency if by_line else None
