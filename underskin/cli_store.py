@@ -16,7 +16,7 @@ Url = Annotated[str, typer.Option(envvar="UNDERSKIN_URL", help="Where the servic
 Key = Annotated[
     str | None, typer.Option(envvar="UNDERSKIN_API_KEY", help="API key of scope write, where keys are needed.")
 ]
-_LOCAL = "http://127.0.0.1:8000"
+LOCAL = "http://127.0.0.1:8000"
 _LONGEST_WAIT_S = 600.0
 
 
@@ -27,7 +27,7 @@ def import_files(
     all_or_nothing: Annotated[
         bool, typer.Option("--all-or-nothing", help="Keep nothing of a file in which any recording is refused.")
     ] = False,
-    url: Url = _LOCAL,
+    url: Url = LOCAL,
     key: Key = None,
 ) -> None:
     """Send files to the service, one after the other; exit status 2 where anything was refused."""
@@ -35,7 +35,7 @@ def import_files(
     from rich.progress import Progress
 
     refused = 0
-    with _client(url, key) as client, Progress(console=Console(stderr=True)) as progress:
+    with connect(url, key) as client, Progress(console=Console(stderr=True)) as progress:
         task = progress.add_task("importing", total=len(files))
         for file in files:
             lines = _sent(client, file, skin, rig, all_or_nothing)
@@ -50,7 +50,7 @@ def import_files(
 def export_skin(
     skin: Annotated[str, typer.Argument(help="The skin.")],
     file: Annotated[Path, typer.Argument(help="The HDF5 file to write.")],
-    url: Url = _LOCAL,
+    url: Url = LOCAL,
     key: Key = None,
 ) -> None:
     """Write all that the service keeps of a skin into one HDF5 file, for `underskin import` elsewhere."""
@@ -58,13 +58,14 @@ def export_skin(
     from rich.progress import DownloadColumn, Progress, TextColumn
 
     columns = (TextColumn("exporting"), DownloadColumn())
-    with _client(url, key) as client, Progress(*columns, console=Console(stderr=True)) as progress:
+    with connect(url, key) as client, Progress(*columns, console=Console(stderr=True)) as progress:
         task = progress.add_task("", total=None)
         client.skins.export(skin, file, lambda count: progress.advance(task, count))
     typer.echo(f"{file}: {file.stat().st_size / 1e6:.1f} MB")
 
 
-def _client(url: str, key: str | None) -> "Client":
+def connect(url: str, key: str | None) -> "Client":
+    """A client that waits long enough for what the service does with a big file."""
     from underskin.client import Client
 
     return Client(url, api_key=key, timeout=_LONGEST_WAIT_S)
