@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 # Raised whenever the fields below, or the figures that underskin.inversion and underskin.recordings put into them,
 # change: what an earlier version kept is then computed anew.
-ANSWER_VERSION = 1
+ANSWER_VERSION = 2
 
 
 class D33Value(BaseModel):

@@ -33,19 +33,11 @@ def answer(store: Database, table: SigmaTable, row: AnyRow, band_hz: Band | None
             return dict(kept)
         campaign = campaigns.load(connection, row, with_excluded=False)
         excluded = campaigns.excluded_of(connection, row.number)
-    document = {"campaign_id": row.id, "table_sha256": table.sha256}
-    left_out = [{"recording": left.recording, "reason": left.reason} for left in excluded]
-    try:
-        found = _inverted(campaign, table, band_hz)
-        document |= {**found, "left_out": left_out + found["left_out"]}
-        D33.model_validate(orjson.loads(orjson.dumps(document)))  # what is kept can be answered
-    except InvalidInput:  # of the band
-        raise
-    except Exception as error:
-        logger.exception("no d33 from a campaign", extra={"fields": {"campaign": row.id}})
-        reason = f"the figures cannot be computed ({type(error).__name__}: {error}); the server's log says more"
-        return {**document, **_none(reason), "moduli": [], "left_out": left_out}
-    if band_hz is None:
+    model = {"model": "paper", "model_id": None, "model_percent": None}
+    document = {"campaign_id": row.id, "table_sha256": table.sha256, **model}
+    left_out = [(left.recording, left.reason) for left in excluded]
+    document, computed = _computed(document, campaign, table, band_hz, left_out)
+    if band_hz is None and computed:
         _keep(store, row, document)
     return document
 
@@ -64,13 +56,12 @@ def adopted_answer(
         campaign = campaigns.load(connection, row, with_excluded=False)
         excluded = campaigns.excluded_of(connection, row.number)
     translated, beyond = serving.model.as_base_model(campaign, table)
-    found = _inverted(translated, table, band_hz)
     left_out = [(left.recording, left.reason) for left in excluded]
     left_out += [(name, "beyond the table under the adopted model") for name in beyond]
-    found["left_out"] = [{"recording": name, "reason": reason} for name, reason in left_out] + found["left_out"]
     model = {"model": "adopted", "model_id": serving.model_id, "model_percent": 100 * serving.model.unsure}
-    document = {"campaign_id": row.id, "table_sha256": table.sha256, **model, **found}
-    if band_hz is None:
+    document = {"campaign_id": row.id, "table_sha256": table.sha256, **model}
+    document, computed = _computed(document, translated, table, band_hz, left_out)
+    if band_hz is None and computed:
         try:
             with store.writing() as connection:
                 inversions.keep_adopted(connection, row, serving.model_id, table.sha256, document)
@@ -95,6 +86,31 @@ def complete(store: Database, table: SigmaTable, root: str) -> None:
     with store.reading() as connection:
         missing = inversions.missing_of_skin(connection, root, table.sha256)
     derive(store, table, [row.id for row in missing])
+
+
+def _computed(
+    document: dict[str, Any],
+    campaign: Campaign,
+    table: SigmaTable,
+    band_hz: Band | None,
+    left_out: Sequence[tuple[str, str]],
+) -> tuple[dict[str, Any], bool]:
+    """The document with the campaign's figures, and whether they could be computed; `left_out`: recordings, reasons.
+
+    Raises InvalidInput where the band is refused.
+    """
+    entries = [{"recording": recording, "reason": reason} for recording, reason in left_out]
+    try:
+        found = _inverted(campaign, table, band_hz)
+        whole = {**document, **found, "left_out": entries + found["left_out"]}
+        D33.model_validate(orjson.loads(orjson.dumps(whole)))  # what is kept can be answered
+    except InvalidInput:  # of the band
+        raise
+    except Exception as error:
+        logger.exception("no d33 from a campaign", extra={"fields": {"campaign": document["campaign_id"]}})
+        reason = f"the figures cannot be computed ({type(error).__name__}: {error}); the server's log says more"
+        return {**document, **_none(reason), "moduli": [], "left_out": entries}, False
+    return whole, True
 
 
 def _inverted(campaign: Campaign, table: SigmaTable, band_hz: Band | None) -> dict[str, Any]:

@@ -1,8 +1,9 @@
 """One column of the contact table: one material contact edge, pressed by ever smaller spheres up to the largest load.
 
 The mesh belongs to the edge, so each column has one, and every sphere starts from the one before. Its radius is chosen
-so that x = L^(1/3) falls near the wanted values; the exact ones are reached by interpolation along the column, where
-everything is smooth in x. What is kept is over its value by Hertz at the same force and sphere (PHYSICS, section 1).
+so that x = L^(1/3) falls near every other of the wanted values; they are reached by interpolation along the column,
+where a/h stays and all that changes is the strain, in which everything is smooth. What is kept is over its value by
+Hertz at the same force and sphere (PHYSICS, section 1).
 """
 
 from collections.abc import Iterator
@@ -67,7 +68,8 @@ def solve_contact_column(a: float, rho: Floats, cbrt_load: Floats, order: int) -
     Raises SolverError that names the point.
     """
     with threadpool_limits(1):  # the same bits whatever the number of cores
-        spheres = list(_follow(a, rho, np.append(cbrt_load[0] / 2, cbrt_load), order))
+        targets = np.concatenate([[cbrt_load[0] / 2], cbrt_load[:-1:2], [cbrt_load[-1]]])
+        spheres = list(_follow(a, rho, targets, order))
     x = np.array([sphere.cbrt_load for sphere in spheres])
     values = np.array(
         [np.append(sphere.radius * x_, sphere.over_hertz()) for sphere, x_ in zip(spheres, x, strict=True)]

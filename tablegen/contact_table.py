@@ -53,10 +53,10 @@ SOURCES = (
 _LEFT_OUT_GAIN = 4.0
 _RATIOS = ("contact_radius", "indentation", "stiffness")
 
-DEFAULT_EDGES = np.linspace(np.sqrt(0.013), np.sqrt(2.05), 26) ** 2  # a/h before pressing: R/h 0.5 to 8 at every x
+DEFAULT_EDGES = np.linspace(np.sqrt(0.009), np.sqrt(2.05), 27) ** 2  # a/h before pressing: R/h 0.5 to 8 at every x
 DEFAULT_AXES = (
     0.5 * 2 ** np.linspace(0, 4, 17),
-    np.cbrt(0.1) * np.linspace(0, 1, 13),
+    np.cbrt(0.1) * np.linspace(0, 1, 19),
     3.0 * np.linspace(0, 1, 33),
 )
 

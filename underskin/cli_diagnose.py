@@ -1,32 +1,37 @@
 """The commands `diagnose` and `plan`: what recordings and model disagree about, and which recordings would settle it.
 
-`diagnose` writes one report (`report/1`) a campaign, named like its input; it uses all cores, one campaign a process,
-so that the reports do not depend on how many there are.
+`diagnose` writes one report (`report/1`) a campaign, named like its input; it uses all cores, or a Dask cluster, one
+campaign a process, so that the reports do not depend on how many there are.
 """
 
 import json
 import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from underskin.cli_store import LOCAL, Key, Url, connect
 from underskin.errors import UnderskinError
 
+if TYPE_CHECKING:
+    from underskin.client import Client
+
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-Files = Annotated[list[Path], typer.Argument(help="Campaigns (campaign/1, JSON, or any format that is read).")]
+Files = Annotated[list[Path] | None, typer.Argument(help="Campaigns (campaign/1, JSON, or any format that is read).")]
 Workers = Annotated[int, typer.Option(min=0, help="Processes; 0 is one for each core.")]
 
 
 @dataclass(frozen=True)
 class _Outcome:
-    """What became of one file: its verdict, or why it could not be read."""
+    """What became of one campaign: its verdict, or why there is no report."""
 
-    file: Path
+    source: str
     problem: str = ""
     verdict: str = ""
 
@@ -38,62 +43,161 @@ def add_commands(app: typer.Typer) -> None:
 
 
 def diagnose(
-    files: Files,
     output_dir: Annotated[Path, typer.Option(help="Folder for the reports; made where it does not exist.")],
+    files: Files = None,
+    html: Annotated[bool, typer.Option("--html", help="Also write each report as a page with figures.")] = False,
     workers: Workers = 0,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Address of a Dask cluster, whose workers must find files and folder where they are here."),
+    ] = None,
+    campaign: Annotated[
+        list[str] | None, typer.Option(help="Id of a campaign that the service keeps and diagnoses; repeatable.")
+    ] = None,
+    url: Url = LOCAL,
+    key: Key = None,
 ) -> None:
     """Where recordings and model disagree, and what physics the model left out: one report a campaign."""
     from rich.console import Console
     from rich.progress import Progress
 
+    files, campaign = files or [], campaign or []
+    _refuse_what_would_be_overwritten([*(file.stem for file in files), *campaign])
     output_dir.mkdir(parents=True, exist_ok=True)
-    unreadable = False
+    failed = False
     console = Console(stderr=True)
     with Progress(console=console) as progress:
-        bar = progress.add_task("diagnosing", total=len(files))
-        for outcome in _each(files, output_dir, workers or os.cpu_count() or 1):
-            progress.advance(bar)
-            unreadable |= bool(outcome.problem)
-            line = f"underskin: {outcome.problem}" if outcome.problem else f"{outcome.file}: {outcome.verdict}"
-            console.print(line, markup=False, highlight=False, soft_wrap=True)
-    if unreadable:
+        bar = progress.add_task("diagnosing", total=len(files) + len(campaign))
+        for outcomes in (
+            _of_files(files, output_dir, html, workers or os.cpu_count() or 1, scheduler),
+            _of_store(campaign, output_dir, html, url, key),
+        ):
+            for outcome in outcomes:
+                progress.advance(bar)
+                failed |= bool(outcome.problem)
+                line = f"underskin: {outcome.problem}" if outcome.problem else f"{outcome.source}: {outcome.verdict}"
+                console.print(line, markup=False, highlight=False, soft_wrap=True)
+    if failed:
         raise typer.Exit(2)
 
 
-def _each(files: Sequence[Path], output_dir: Path, workers: int) -> Iterator[_Outcome]:
-    if len(files) == 1 or workers == 1:
+def _refuse_what_would_be_overwritten(names: Sequence[str]) -> None:
+    if not names:
+        raise typer.BadParameter("give files or --campaign", param_hint="FILES")
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise typer.BadParameter(f"{twice[0]}: two reports would have this name", param_hint="FILES")
+
+
+def _of_files(
+    files: Sequence[Path], output_dir: Path, html: bool, workers: int, scheduler: str | None
+) -> Iterator[_Outcome]:
+    if scheduler is None and (len(files) <= 1 or workers == 1):
         for file in files:
-            yield _one(file, output_dir)
+            yield _one(file, output_dir, html)
         return
-    # A fresh interpreter a process (spawn), with one BLAS thread: the same numbers whatever the number of cores.
-    for name in _THREADS:
-        os.environ[name] = "1"
-    with ProcessPoolExecutor(min(workers, len(files)), mp_context=get_context("spawn")) as pool:
-        pending: list[Future[_Outcome]] = [pool.submit(_one, file, output_dir) for file in files]
+    with _executor(min(workers, len(files)), scheduler) as pool:
+        # Absolute, since a cluster's workers have a working folder of their own
+        folder = output_dir.resolve()
+        pending: dict[Future[_Outcome], Path] = {
+            pool.submit(_one, file if scheduler is None else file.resolve(), folder, html): file for file in files
+        }
         for done in as_completed(pending):
-            yield done.result()
+            try:
+                yield done.result()
+            except Exception as error:  # a worker that died must not take the other campaigns with it
+                yield _Outcome(str(pending[done]), f"{pending[done]}: {type(error).__name__}: {error}")
 
 
-def _one(file: Path, output_dir: Path) -> _Outcome:
+@contextmanager
+def _executor(workers: int, scheduler: str | None) -> Iterator[Executor]:
+    """Processes on this machine, or a Dask cluster through the same interface."""
+    if scheduler is None:
+        # A fresh interpreter a process (spawn), with one BLAS thread: the same numbers whatever the number of cores.
+        for name in _THREADS:
+            os.environ[name] = "1"
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+            yield pool
+        return
+    try:
+        from distributed import Client as Cluster
+    except ImportError as error:
+        raise UnderskinError("--scheduler needs Dask: pip install 'underskin[cluster]'") from error
+
+    try:
+        cluster = Cluster(scheduler, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise UnderskinError(f"no Dask scheduler answers at {scheduler}: {error}") from error
+    with cluster, cluster.get_executor(pure=False) as pool:
+        yield pool
+
+
+def _one(file: Path, output_dir: Path, html: bool) -> _Outcome:
     """Read, diagnose and write one campaign."""
-    from underskin.diagnosis.diagnose import diagnosis_report
+    from underskin.diagnosis.diagnose import diagnose as work_out
+    from underskin.diagnosis.diagnose import with_refused
+    from underskin.diagnosis.report import report
     from underskin.recordings import read_file
     from underskin.surrogate import load_table
 
     try:
         reading = read_file(file, file.name)
     except UnderskinError as error:
-        return _Outcome(file, f"{file}: {' '.join(str(error).split())}")
-    document = diagnosis_report(reading.campaign, load_table(), refused=reading.problems)
+        return _Outcome(str(file), f"{file}: {' '.join(str(error).split())}")
+    found = with_refused(work_out(reading.campaign, load_table()), reading.problems)
+    document = report(found)
     write_report(document, output_dir / f"{file.stem}.json")
-    return _Outcome(file, verdict=str(document["verdict"]))
+    if html:
+        from underskin.diagnosis.figures import figures
+        from underskin.diagnosis.page import page
+
+        _write(page(document, figures(found, document)), output_dir / f"{file.stem}.html")
+    return _Outcome(str(file), verdict=str(document["verdict"]))
+
+
+def _of_store(campaigns: Sequence[str], output_dir: Path, html: bool, url: str, key: str | None) -> Iterator[_Outcome]:
+    """Have campaigns diagnosed where they are kept; all are asked for before the first is awaited."""
+    if not campaigns:
+        return
+    with connect(url, key) as client:
+        asked = [(campaign, _asked(client, campaign)) for campaign in campaigns]
+        for campaign, started in asked:
+            yield started if isinstance(started, _Outcome) else _fetched(client, campaign, started, output_dir, html)
+
+
+def _asked(client: "Client", campaign: str) -> str | _Outcome:
+    """The id of the diagnosis."""
+    try:
+        return str(client.diagnoses.start(campaign)["id"])
+    except UnderskinError as error:
+        return _Outcome(campaign, f"{campaign}: {error}")
+
+
+def _fetched(client: "Client", campaign: str, diagnosis: str, output_dir: Path, html: bool) -> _Outcome:
+    """Await one diagnosis and write its report; its page has the one figure that a report alone can give."""
+    try:
+        found = client.diagnoses.wait(diagnosis)
+    except UnderskinError as error:
+        return _Outcome(campaign, f"{campaign}: {error}")
+    document = found["report"]
+    if document is None:
+        return _Outcome(campaign, f"{campaign}: {found['state']}: {found['reason'] or 'no report'}")
+    write_report(document, output_dir / f"{campaign}.json")
+    if html:
+        from underskin.diagnosis.page import page
+
+        _write(page(document), output_dir / f"{campaign}.html")
+    return _Outcome(campaign, verdict=str(document["verdict"]))
 
 
 def write_report(document: dict[str, Any], path: Path) -> None:
     """Write a report as JSON, the same bytes for the same report."""
-    text = json.dumps(document, ensure_ascii=False, indent=1, allow_nan=False)
+    _write(json.dumps(document, ensure_ascii=False, indent=1, allow_nan=False) + "\n", path)
+
+
+def _write(text: str, path: Path) -> None:
     partial = path.with_name(f".{path.name}.part")
-    partial.write_text(f"{text}\n", encoding="utf-8")
+    partial.write_text(text, encoding="utf-8")
     partial.replace(path)
 
 

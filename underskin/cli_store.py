@@ -18,7 +18,7 @@ Url = Annotated[str, typer.Option(envvar="UNDERSKIN_URL", help="Where the servic
 Key = Annotated[
     str | None, typer.Option(envvar="UNDERSKIN_API_KEY", help="API key of scope write, where keys are needed.")
 ]
-_LOCAL = "http://127.0.0.1:8000"
+LOCAL = "http://127.0.0.1:8000"
 _LONGEST_WAIT_S = 600.0
 
 
@@ -33,7 +33,7 @@ def import_files(
         bool,
         typer.Option("--all-or-nothing", help="Keep nothing of a file, or of a campaign, with a refused recording."),
     ] = False,
-    url: Url = _LOCAL,
+    url: Url = LOCAL,
     key: Key = None,
 ) -> None:
     """Send files to the service, one after the other or together; exit status 2 where anything was refused."""
@@ -46,7 +46,7 @@ def import_files(
     console = Console(stderr=True)
     # The bar may take what is written to a terminal, to stay below it, but not what goes into a pipe.
     bar = Progress(console=console, disable=not console.is_terminal, redirect_stdout=sys.stdout.isatty())
-    with _client(url, key) as client, bar:
+    with connect(url, key) as client, bar:
         for name, batch in bar.track(batches, description="importing"):
             for good, line in _sent(client, batch, terms):
                 refused += not good
@@ -58,7 +58,7 @@ def import_files(
 def export_skin(
     skin: Annotated[str, typer.Argument(help="The skin.")],
     file: Annotated[Path, typer.Argument(help="The HDF5 file to write.")],
-    url: Url = _LOCAL,
+    url: Url = LOCAL,
     key: Key = None,
 ) -> None:
     """Write all that the service keeps of a skin into one HDF5 file, for `underskin import` elsewhere."""
@@ -67,13 +67,14 @@ def export_skin(
 
     console = Console(stderr=True)
     bar = Progress(TextColumn("exporting"), DownloadColumn(), console=console, disable=not console.is_terminal)
-    with _client(url, key) as client, bar:
+    with connect(url, key) as client, bar:
         task = bar.add_task("", total=None)
         client.skins.export(skin, file, lambda count: bar.advance(task, count))
     typer.echo(f"{file}: {file.stat().st_size / 1e6:.1f} MB")
 
 
-def _client(url: str, key: str | None) -> "Client":
+def connect(url: str, key: str | None) -> "Client":
+    """A client that waits long enough for what the service does with a big file."""
     from underskin.client import Client
 
     return Client(url, api_key=key, timeout=_LONGEST_WAIT_S)

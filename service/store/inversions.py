@@ -55,6 +55,7 @@ def find_adopted(connection: Connection, campaign: AnyRow, model_id: str, table_
         adopted_inversions.c.model_id == model_id,
         adopted_inversions.c.revision == campaign.revision,
         adopted_inversions.c.table_sha256 == table_sha256,
+        adopted_inversions.c.answer_version == ANSWER_VERSION,
     )
     blob = connection.execute(query).scalar()
     return None if blob is None else decompressed(blob)
@@ -68,8 +69,9 @@ def keep_adopted(connection: Connection, campaign: AnyRow, model_id: str, table_
     if connection.execute(query).scalar() != campaign.revision:
         return
     connection.execute(delete(adopted_inversions).where(adopted_inversions.c.campaign == campaign.number))
-    row = {"revision": campaign.revision, "table_sha256": table_sha256, "document": compressed(document)}
-    connection.execute(insert(adopted_inversions), {"campaign": campaign.number, "model_id": model_id, **row})
+    basis = {"revision": campaign.revision, "table_sha256": table_sha256, "answer_version": ANSWER_VERSION}
+    row = {"campaign": campaign.number, "model_id": model_id, **basis, "document": compressed(document)}
+    connection.execute(insert(adopted_inversions), row)
 
 
 def missing_of_skin(connection: Connection, root: str, table_sha256: str) -> Sequence[AnyRow]:

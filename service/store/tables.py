@@ -149,6 +149,7 @@ adopted_inversions = Table(
     Column("model_id", String, nullable=False),
     Column("revision", Integer, nullable=False),
     Column("table_sha256", String, nullable=False),
+    Column("answer_version", Integer, nullable=False),  # service.d33_models.ANSWER_VERSION
     Column("document", LargeBinary, nullable=False),  # compressed JSON
 )
 

@@ -111,13 +111,18 @@ def diagnosis_report(
     refused: Sequence[RecordingProblem] = (),
 ) -> dict[str, Any]:
     """The report of a campaign's diagnosis (`report/1`); `refused` recordings are named among the findings."""
-    found = diagnose(campaign, table, progress)
+    found = with_refused(diagnose(campaign, table, progress), refused)
+    progress(1.0)
+    return report(found)
+
+
+def with_refused(found: Diagnosis, refused: Sequence[RecordingProblem]) -> Diagnosis:
+    """The diagnosis with recordings that were refused when they were read named first among its findings."""
     problems = [
         Finding("refused", entry.recording, entry.field, f"{entry.field} = {entry.value!r}: {entry.allowed}; left out")
         for entry in refused
     ]
-    progress(1.0)
-    return report(replace(found, findings=(*problems, *found.findings)))
+    return replace(found, findings=(*problems, *found.findings))
 
 
 def _provenance(table: SigmaTable) -> dict[str, Any]:

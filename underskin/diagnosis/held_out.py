@@ -71,8 +71,9 @@ def groups(lines: Lines) -> dict[str, NDArray[np.bool_]]:
     found: dict[str, NDArray[np.bool_]] = {}
     if lines.curves:
         # A curve's contact point is its own, so what can be left out is the part of each curve that reaches furthest.
-        highest = np.maximum.reduceat(lines.value.real, lines.first)[lines.recording]
-        return {f"force_n above {_FURTHEST:.0%}": lines.value.real > _FURTHEST * highest}
+        force = np.abs(lines.value.real)  # tension is negative
+        highest = np.maximum.reduceat(force, lines.first)[lines.recording]
+        return {f"force_n above {_FURTHEST:.0%}": force > _FURTHEST * highest}
     entries = frf_recordings(lines.campaign)
 
     def add(name: str, column: Sequence[float | str | None], last: Callable[[list[float | str]], float | str]) -> None:

@@ -58,6 +58,7 @@ def upgrade() -> None:
         sa.Column("model_id", sa.String(), nullable=False),
         sa.Column("revision", sa.Integer(), nullable=False),
         sa.Column("table_sha256", sa.String(), nullable=False),
+        sa.Column("answer_version", sa.Integer(), nullable=False),
         sa.Column("document", sa.LargeBinary(), nullable=False),
         sa.ForeignKeyConstraint(["campaign"], ["campaigns.number"]),
         sa.PrimaryKeyConstraint("campaign"),

@@ -1,0 +1,266 @@
+"""The report as one HTML file that needs nothing from outside: it opens on any computer, also without a network.
+
+Every text that comes from a campaign is escaped; the page's policy forbids whatever is not in it.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+import plotly.graph_objects as go
+import plotly.io
+from plotly.offline import get_plotlyjs
+
+from underskin.diagnosis.figures import AXES, explanations
+from underskin.mechanisms.catalogue import CATALOGUE
+
+_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+_VERDICTS = {
+    "explained": "explained",
+    "ambiguous": "several explanations remain",
+    "unexplained": "something without a name is missing",
+    "no_mismatch": "no mismatch",
+    "insufficient_data": "too little data",
+}
+_STYLE = """
+body { font: 17px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
+h1 { font-size: 1.1rem; font-weight: 600; color: #555; margin: 0; }
+h2 { margin-top: 2.5rem; border-bottom: 1px solid #ccc; font-size: 1.3rem; }
+.first { font-size: 1.5rem; line-height: 1.3; margin: .4rem 0 1rem; }
+.verdict { display: inline-block; border: 1px solid #555; border-radius: 1rem; padding: 0 .8rem; font-size: .95rem; }
+table { border-collapse: collapse; margin: .8rem 0; font-size: .95rem; }
+th, td { text-align: left; vertical-align: top; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid #e4e4e4; }
+th { font-weight: 600; }
+.note { color: #555; font-size: .95rem; }
+.wide { overflow-x: auto; }
+dt { font-weight: 600; margin-top: .6rem; } dd { margin: 0; overflow-wrap: anywhere; }
+"""
+
+Report = Mapping[str, Any]
+Figures = Mapping[str, go.Figure]
+
+
+def page(report: Report, figures: Figures | None = None) -> str:
+    """The whole page; `figures` as `underskin.diagnosis.figures` makes them: a report alone has but one."""
+    drawn: Figures = figures if figures is not None else _of_report(report)
+    first, _, rest = report["statement"].partition(". ")
+    title = escape(f"Diagnosis of {report['campaign']}")
+    verdict = f"{_VERDICTS[report['verdict']]} · probability {_percent(report['probability'])}"
+    body = [
+        f"<h1>{title}</h1>",
+        f'<p class="first">{escape(first.rstrip("."))}.</p>',
+        f'<p><span class="verdict">{escape(verdict)}</span></p>',
+        _paragraph(rest),
+        _section("Where", _where(report, drawn)),
+        _section("What", _what(report, drawn)),
+        _section("How much better", _better(report, drawn)),
+        _section("Look at these recordings", _findings(report)),
+        _section("What to measure next", _next(report)),
+        _section("Made with", _provenance(report)),
+    ]
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{title}</title>\n<style>{_STYLE}</style>\n"
+        f"{f'<script>{get_plotlyjs()}</script>' if drawn else ''}\n</head>\n<body>\n"
+        + "\n".join(part for part in body if part)
+        + "\n</body>\n</html>\n"
+    )
+
+
+def _of_report(report: Report) -> Figures:
+    return {} if report["fit"] is None else {"explanations": explanations(report)}
+
+
+def _where(report: Report, drawn: Figures) -> str:
+    location = report["location"]
+    rows = [
+        (
+            _axis(entry["axis"]),
+            "undecidable" if entry["p_value"] is None else f"{entry['p_value']:.3f}",
+            "" if entry["p_value"] is None else f"{entry['share_percent']:.1f} %",
+            entry.get("undecidable", ""),
+        )
+        for entry in location["axes"]
+    ]
+    note = "p is the probability of so strong a dependence by chance, corrected for the number of axes."
+    table = _table(("axis", "p", "share of the misfit", ""), rows) + _note(note) if rows else ""
+    return _paragraph(location["statement"]) + _figure(drawn, "where") + table
+
+
+def _what(report: Report, drawn: Figures) -> str:
+    parts = [_figure(drawn, "explanations")]
+    for entry in report["mechanisms"]:
+        name = entry["name"]
+        law = CATALOGUE[name].law if name in CATALOGUE else ""
+        source = CATALOGUE[name].source if name in CATALOGUE else ""
+        explains = entry["explains_percent"]
+        share = "" if explains is None else f"; takes away {explains:.0f} % of the misfit beyond noise"
+        parts.append(f"<h3>{escape(_words(name))}</h3>")
+        parts.append(_paragraph(f"Present with probability {_percent(entry['probability'])}{share}. {law}"))
+        parts.append(
+            _table(
+                ("parameter", "value", "95 % interval", "unit"),
+                [
+                    (_words(one["name"]), _number(one["value"]), _interval(one), _unit(one["unit"]))
+                    for one in entry["parameters"]
+                ],
+            )
+        )
+        parts.append(_note(f"Source: {source}") if source else "")
+    parts.append(_figure(drawn, "parameters"))
+    if report["d33"] is not None:
+        one = report["d33"]
+        parts.append(
+            _paragraph(f"d33 under this explanation: {_number(one['value'])} ({_interval(one)}) {one['unit']}.")
+        )
+    if report["alternatives"]:
+        rows = [
+            (" + ".join(map(_words, entry["mechanisms"])), _percent(entry["probability"]), entry["why_not"])
+            for entry in report["alternatives"]
+        ]
+        parts += ["<h3>Alternatives, and why not</h3>", _table(("explanation", "probability", "why not"), rows)]
+    if report["not_identifiable"]:
+        rows = [
+            (_words(entry["mechanism"]), _words(entry["confounded_with"]), entry["reason"])
+            for entry in report["not_identifiable"]
+        ]
+        parts += [
+            "<h3>What these recordings cannot tell</h3>",
+            _table(("mechanism", "not told from", "because"), rows),
+        ]
+    return "".join(parts)
+
+
+def _better(report: Report, drawn: Figures) -> str:
+    fit = report["fit"]
+    if fit is None:
+        return ""
+    before, after, floor = fit["before"], fit["after"], _error(fit["noise_floor_percent"])
+    rows = [
+        ("recordings held out", _error(before["heldout_rmse_percent"]), _error(after["heldout_rmse_percent"]), floor),
+        ("recordings fitted to", _error(before["rmse_percent"]), _error(after["rmse_percent"]), ""),
+    ]
+    groups = [
+        (
+            _group(entry["group"]),
+            _error(entry["before_rmse_percent"]),
+            _error(entry["after_rmse_percent"]),
+            _error(entry["noise_floor_percent"]),
+            " + ".join(map(_words, entry["chosen"])),
+        )
+        for entry in fit["groups"]
+    ]
+    heads = ("base model", "with it", "noise floor")
+    note = (
+        "Error: rms of measured less predicted over rms of predicted. Each group was left out whole, everything fitted "
+        "and chosen again without it, and then predicted; the noise floor is what noise alone would give."
+    )
+    parts = [_table(("error of", *heads), rows), _figure(drawn, "before_after")]
+    if groups:
+        parts += ["<h3>Group by group</h3>", _table(("left out", *heads, "chosen without it"), groups)]
+    return "".join([*parts, _note(note)])
+
+
+def _findings(report: Report) -> str:
+    rows = [
+        (entry["recording"] or "all", entry["field"], entry["statement"], _words(entry["code"]))
+        for entry in report["findings"]
+    ]
+    return _table(("recording", "field", "finding", "kind"), rows) if rows else ""
+
+
+def _next(report: Report) -> str:
+    planned = report["next_experiment"]
+    if not planned:
+        return ""
+    heads = list(dict.fromkeys(name for entry in planned["recordings"] for name in entry))
+    rows = [[_plain(entry.get(name)) for name in heads] for entry in planned["recordings"]]
+    chance = (
+        f"Expected probability that they decide: {_percent(planned['probability_of_deciding'])} "
+        f"(without them {_percent(planned['without_it'])}); about {planned['minutes']:g} minutes."
+    )
+    return _paragraph(planned["statement"]) + _table([_axis(name) for name in heads], rows) + _paragraph(chance)
+
+
+def _provenance(report: Report) -> str:
+    rows = []
+    for name, value in report["provenance"].items():
+        text = ", ".join(f"{key} {entry}" for key, entry in value.items()) if isinstance(value, Mapping) else value
+        rows.append(f"<dt>{escape(str(name))}</dt><dd>{escape(str(text))}</dd>")
+    return f"<dl>{''.join(rows)}</dl>"
+
+
+def _figure(drawn: Figures, name: str) -> str:
+    if name not in drawn:
+        return ""
+    text: str = plotly.io.to_html(
+        drawn[name],
+        full_html=False,
+        include_plotlyjs=False,
+        div_id=f"figure-{name}",
+        config={"displaylogo": False, "responsive": True},
+    )
+    return text
+
+
+def _section(title: str, content: str) -> str:
+    return f"<h2>{escape(title)}</h2>\n{content}" if content else ""
+
+
+def _paragraph(text: str) -> str:
+    return f"<p>{escape(text)}</p>" if text else ""
+
+
+def _note(text: str) -> str:
+    return f'<p class="note">{escape(text)}</p>'
+
+
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    head = "".join(f"<th>{escape(text)}</th>" for text in heads)
+    body = "".join(f"<tr>{''.join(f'<td>{escape(str(text))}</td>' for text in row)}</tr>" for row in rows)
+    return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _axis(name: str) -> str:
+    return AXES.get(name, _words(name))
+
+
+def _group(name: str) -> str:
+    axis, _, value = name.partition(" ")
+    return f"{_axis(axis)}: {value}"
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.4g}"
+
+
+def _error(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3g} %"
+
+
+def _interval(entry: Mapping[str, Any]) -> str:
+    return f"{_number(entry['low'])} to {_number(entry['high'])}"
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "-" else unit
+
+
+def _percent(probability: float) -> str:
+    """Reports round to three decimals, so 0 and 1 are no certainties."""
+    if 0.001 <= probability <= 0.999:
+        return f"{100 * probability:.3g} %"
+    return "under 0.1 %" if probability < 0.5 else "over 99.9 %"
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, list):
+        return ", ".join(map(_plain, value))
+    return f"{value:.4g}" if isinstance(value, float) and math.isfinite(value) else "" if value is None else str(value)
