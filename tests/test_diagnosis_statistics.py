@@ -3,6 +3,7 @@
 import os
 from dataclasses import replace
 
+import dynesty
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
@@ -196,7 +197,6 @@ def test_evidence_agrees_with_nested_sampling(
     names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable
 ) -> None:
     """Laplace's method against nested sampling of the same posterior: 0.5 in log evidence, beside its own error."""
-    dynesty = pytest.importorskip("dynesty")
     posterior = Posterior(names, values, table)
     fitter, low, high = posterior.fitter, posterior.low, posterior.high
     places, count = fitter.places, len(fitter.places)
