@@ -7,7 +7,7 @@ import time
 from importlib.metadata import version
 from pathlib import Path
 
-from bench import accuracy, batch, mechanisms, newton_step, orderings, single_requests, start, store
+from bench import accuracy, batch, diagnosis, mechanisms, newton_step, orderings, single_requests, start, store
 from bench.page import keep, markdown, write
 
 PARTS = {
@@ -18,6 +18,7 @@ PARTS = {
     "orderings": orderings.measure,
     "accuracy": accuracy.measure,
     "mechanisms": mechanisms.measure,
+    "diagnosis": diagnosis.measure,
     "store": store.measure,
 }
 _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem")

@@ -26,7 +26,9 @@ _SECTIONS = {
     "start": "Start and memory",
     "newton": "Finite elements against FElupe",
     "orderings": "What was tried for the solver",
+    "store": "Campaigns kept, listed and inverted",
     "mechanisms": "Predictions of composed mechanisms",
+    "diagnosis": "A whole diagnosis",
 }
 
 _EXPLANATIONS = {
@@ -38,6 +40,8 @@ server and Tesseract Core's runtime, each serving the same spline.""",
     "start": "From starting the process to the first answer of `/ready`; resident memory after load.",
     "newton": "One Newton step at equal unknowns, on one core.",
     "orderings": "Factors of one step's matrix, on one core.",
+    "store": "Over HTTP, server and client on one machine; 1,000,000 recordings with UNDERSKIN_SOAK=1, else 50,000.",
+    "diagnosis": "Campaigns of the virtual rig; each diagnosis in a fresh process with one BLAS thread.",
     "mechanisms": """One prediction of all lines with its derivatives with respect to all parameters and to the
 contacts' positions, under three mechanisms; processor time on one core.""",
 }

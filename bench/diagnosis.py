@@ -1,0 +1,80 @@
+"""A whole diagnosis of a campaign of 100 recordings × 60 lines: processor time on one core, and memory."""
+
+import json
+import os
+import subprocess
+import sys
+from statistics import median
+
+from bench.figures import Figure
+
+EFFECTS = {
+    "nothing missing": {},
+    "one mechanism": {"contact_resonance": {"tip_mass_g": 2, "damping": 0.04}},
+    "two mechanisms": {"amplifier_high_pass": {"corner_hz": 1.0}, "preload_dependent_d33": {"beta_per_mpa": 1.5}},
+}
+ROUNDS = 3
+_ONE = """
+import json, resource, sys, time
+from rig.experiment import parse as experiment
+from rig.recorded import campaign, record_lines
+from underskin.diagnosis.diagnose import diagnosis_report
+from underskin.recordings.campaign import parse
+from underskin.surrogate import load_table
+
+hidden = parse(campaign(record_lines(experiment(json.loads(sys.argv[1])))))
+assert len(hidden.recordings) == 100
+start = time.process_time()
+verdict = diagnosis_report(hidden, load_table())["verdict"]
+print(time.process_time() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3, verdict)
+"""
+
+
+def measure() -> list[Figure]:
+    """Seconds of processor time and peak memory of a process that diagnoses once, for each of three campaigns."""
+    figures, memory = [], []
+    for name, effects in EFFECTS.items():
+        times = []
+        for _ in range(ROUNDS):
+            seconds, peak = _diagnosed(effects)
+            times.append(seconds)
+            memory.append(peak)
+        figures.append(Figure(f"100 recordings × 60 lines, {name}", median(times), "s", 5.0, "lower"))
+    return [*figures, Figure("Peak memory of the process", max(memory), "MB", 500.0, "lower")]
+
+
+def _diagnosed(effects: dict[str, dict[str, float]]) -> tuple[float, float]:
+    run = subprocess.run(
+        [sys.executable, "-c", _ONE, json.dumps(_experiment(effects))],
+        env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    seconds, peak, _ = run.stdout.split()
+    return float(seconds), float(peak)
+
+
+def _experiment(effects: dict[str, dict[str, float]]) -> dict[str, object]:
+    """The prototype's corner: five sensors, two spheres, ten preloads."""
+    return {
+        "schema": "experiment/1",
+        "name": "bench",
+        "seed": 5,
+        "kind": "frf",
+        "skin": {
+            "thickness_mm": 2.5,
+            "youngs_modulus_mpa": 16,
+            "sensor_radius_mm": 1.5,
+            "d33_pc_per_n": 14,
+            "array": {"columns": 5, "rows": 1, "pitch_mm": 8},
+        },
+        "design": {
+            "indenters_mm": [4, 10],
+            "preloads_n": [0.3, 0.5, 0.7, 1, 1.3, 1.6, 2, 2.3, 2.6, 3],
+            "dynamic_forces_n": [0.09],
+        },
+        "lines": {"low_hz": 1, "high_hz": 1000, "count": 60},
+        "noise": {"gain": 0.02, "line": 0.01, "averages": 16},
+        "effects": effects,
+    }
