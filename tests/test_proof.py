@@ -25,7 +25,7 @@ from rig.draw import CATALOGUED, UNKNOWN, drawn
 from rig.experiment import parse as parse_experiment
 from rig.strengths import of_frf
 from underskin.diagnosis.diagnose import diagnosis_report
-from underskin.recordings.campaign import parse
+from underskin.recordings.campaign import FrfRecording, parse
 from underskin.surrogate import load_table
 
 RECORDINGS = os.environ.get("UNDERSKIN_RECORDINGS")
@@ -200,7 +200,7 @@ def test_what_was_judged_survives_being_kept(tmp_path: Path) -> None:
 
 def test_the_riddles_campaigns_say_what_the_paper_says() -> None:
     array = parse(riddle.worlds()["array"])
-    preloads = [entry.preload_n for entry in array.recordings if entry.kind == "frf"]
+    preloads = [entry.preload_n for entry in array.recordings if isinstance(entry, FrfRecording)]
     assert (preloads.count(3.0), preloads.count(1.0)) == (riddle.AT_HIGHER, riddle.AT_LOWER)
 
 
@@ -213,7 +213,7 @@ def test_what_would_settle_the_riddle_does() -> None:
 
 @pytest.mark.skipif(RECORDINGS is None, reason="UNDERSKIN_RECORDINGS names no folder of recordings")
 def test_real_recordings() -> None:
-    """The main outcomes: stiffening PDMS, creeping gel, relaxing cell, a layer beneath the sphere in one of the wells."""
+    """The main outcomes: stiffening PDMS, creeping gel, relaxing cell, a layer in one of the wells."""
     assert RECORDINGS is not None
     found = {}
     for entry in recorded():
