@@ -10,7 +10,7 @@ TEST_PACKAGES = nginx openssl octave curl postgresql
 PIP_INSTALL = $(PYTHON) -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test check tables paper mechanisms bench soak lock clean
+.PHONY: help serve test check tables paper mechanisms proof bench soak lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -42,6 +42,9 @@ paper: $(VENV)/.dev ## regenerate docs/paper.md and its figures
 
 mechanisms: $(VENV)/.dev ## regenerate docs/mechanisms.md and its figures
 	$(PYTHON) -m docs.mechanisms
+
+proof: $(VENV)/.dev ## judge the diagnosis on concealed campaigns and real recordings (hours; resumes)
+	$(VENV)/bin/underskin prove
 
 bench: $(VENV)/.dev $(VENV)-tesseract/.installed ## measure speed, as ratios against peers in the same run
 	@scripts/system-packages.sh wrk

@@ -11,7 +11,7 @@ from rig.effects import KNOWN, needed_by_law
 Ranges = dict[str, dict[str, tuple[float, float]]]
 
 # Parameters that are as often negative, and factors that are as often below 1.
-_SIGNED = {
+SIGNED = {
     "preload_dependent_d33": "beta_per_mpa",
     "bending_substrate": "amplitude",
     "hysteretic_d33": "amplitude",
@@ -19,7 +19,7 @@ _SIGNED = {
     "cable_motion": "amplitude",
     "force_drift": "n_per_root_s",
 }
-_INVERTED = {"modulus_error", "thickness_error"}
+INVERTED = {"modulus_error", "thickness_error"}
 
 
 def evenly_in_log(random: np.random.Generator, low: float, high: float) -> float:
@@ -33,9 +33,9 @@ def drawn_parameters(random: np.random.Generator, name: str, ranges: Ranges) -> 
         parameter: evenly_in_log(random, low, high) for parameter, (low, high) in ranges.get(name, {}).items()
     }
     upside_down = random.random() < 0.5
-    if name in _SIGNED and upside_down:
-        values[_SIGNED[name]] *= -1
-    if name in _INVERTED and upside_down:
+    if name in SIGNED and upside_down:
+        values[SIGNED[name]] *= -1
+    if name in INVERTED and upside_down:
         values["factor"] = 1 / values["factor"]
     if KNOWN[name].laws:
         values["law"] = str(random.choice(KNOWN[name].laws))

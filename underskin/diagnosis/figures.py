@@ -50,7 +50,7 @@ def figures(diagnosis: Diagnosis, document: Mapping[str, Any]) -> dict[str, go.F
         "before_after": before_and_after(diagnosis, thinned, before, after, shown),
         "explanations": explanations(document),
     }
-    if document["mechanisms"]:
+    if any(entry["parameters"] for entry in document["mechanisms"]):
         found["parameters"] = parameter_intervals(diagnosis.bench, shown, document)
     return found
 

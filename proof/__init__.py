@@ -1,0 +1,1 @@
+"""Judges the diagnosis on concealed campaigns, on this project's virtual rig, and on real recordings."""

@@ -1,0 +1,68 @@
+"""What is diagnosed: a campaign in a file, or one that the virtual rig draws. Both are small and go to any process."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from rig.draw import drawn, record
+from rig.recorded import campaign
+
+
+class Case(Protocol):
+    """A campaign to diagnose, by a name of its own."""
+
+    @property
+    def name(self) -> str:
+        """Its name in the results."""
+        ...
+
+    def document(self) -> dict[str, Any]:
+        """The campaign (`campaign/1`): all that the diagnosis is told."""
+        ...
+
+
+@dataclass(frozen=True)
+class FileCase:
+    """A campaign/1 file."""
+
+    path: Path
+
+    @property
+    def name(self) -> str:
+        """The file's name without its ending."""
+        return self.path.stem
+
+    def document(self) -> dict[str, Any]:
+        """What the file holds."""
+        return dict(json.loads(self.path.read_text(encoding="utf-8")))
+
+
+@dataclass(frozen=True)
+class DrawnCase:
+    """Random experiment `number` of a seed on the virtual rig; `what` it hides is drawn too where it is None."""
+
+    seed: int
+    number: int
+    what: str | None = None
+
+    @property
+    def name(self) -> str:
+        """Seed, number and what was asked for."""
+        return f"{self.seed}-{self.number:04d}-{self.what or 'any'}"
+
+    def document(self) -> dict[str, Any]:
+        """What the rig records, without its truth."""
+        return campaign(record(drawn(self.seed, self.number, self.what)))
+
+
+@dataclass(frozen=True)
+class MadeCase:
+    """A campaign/1 document that was made from recordings."""
+
+    name: str
+    content: dict[str, Any]
+
+    def document(self) -> dict[str, Any]:
+        """The document."""
+        return self.content

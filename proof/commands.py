@@ -1,0 +1,39 @@
+"""`underskin prove`: the diagnosis judged on campaigns whose answer it cannot know, and the page about it."""
+
+import os
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def prove(
+    part: Annotated[
+        list[str] | None,
+        typer.Argument(help="open, sealed, mixture, quiet, ceiling, recordings, riddle; default: all of them."),
+    ] = None,
+    count: Annotated[int | None, typer.Option(min=1, help="Campaigns of each part at most; default: all.")] = None,
+    workers: Annotated[int, typer.Option(min=0, help="Processes; 0 is one for each core.")] = 0,
+    work_dir: Annotated[Path, typer.Option(help="Where results are kept, so that a stopped run goes on.")] = Path(
+        "build/proof"
+    ),
+    docs_dir: Annotated[Path, typer.Option(help="Where proof.md and its figures are written.")] = Path("docs"),
+) -> None:
+    """Judge the diagnosis, part by part, and write docs/proof.md from every part that is kept."""
+    from proof.kept import Work
+    from proof.page import write_page
+    from proof.results import PARTS, kept_parts, work_out
+
+    for name in part or ():
+        if name not in PARTS:
+            raise typer.BadParameter(f"{name!r}: must be one of {', '.join(PARTS)}", param_hint="PART")
+    work = Work(work_dir, workers or os.cpu_count() or 1, count)
+    for name in part or PARTS:
+        work_out(name, work, partial(_tell, name))
+    for path in write_page(kept_parts(work), docs_dir):
+        typer.echo(str(path))
+
+
+def _tell(part: str, text: str) -> None:
+    typer.echo(f"{part}: {text}", err=True)

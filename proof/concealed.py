@@ -1,0 +1,50 @@
+"""Campaigns of a rig that this project has never seen, in the folder that UNDERSKIN_CAMPAIGNS names.
+
+`open` comes with its truth and is judged here. Of `sealed` reports are written for others to judge; nothing here, and
+nothing in the diagnosis, is fitted to them.
+"""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from proof.cases import FileCase
+from proof.judge import Judged, judge
+from proof.kept import Work, reports
+from underskin.cli_diagnose import write_report
+
+
+def judge_open(work: Work, campaigns: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Every open campaign beside its truth."""
+    truths = json.loads((campaigns / "open-truth.json").read_text(encoding="utf-8"))
+    cases = _cases(campaigns / "open", work)
+    judged = [
+        judge(case.name, report, truths[case.name])
+        for case, report in zip(cases, reports(work, cases, tell), strict=True)
+    ]
+    return {"judged": [asdict(entry) for entry in judged]}
+
+
+def report_sealed(work: Work, campaigns: Path, folder: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Write the report of each sealed campaign into the folder, under the campaign's file name."""
+    cases = _cases(campaigns / "sealed", work)
+    made = reports(work, cases, tell)
+    folder.mkdir(parents=True, exist_ok=True)
+    for case, report in zip(cases, made, strict=True):
+        write_report(report, folder / f"{case.name}.json")
+    return {"verdicts": [report["verdict"] for report in made]}
+
+
+def _cases(folder: Path, work: Work) -> Sequence[FileCase]:
+    return [FileCase(path) for path in sorted(folder.glob("*.json"))[: work.count]]
+
+
+def judged_of(result: Mapping[str, Any]) -> list[Judged]:
+    """What was judged, from a result that was kept."""
+    return [
+        Judged(**{**entry, "truth": tuple(entry["truth"]), "answer": tuple(entry["answer"]),
+                  "held_out": entry["held_out"] and tuple(entry["held_out"])})
+        for entry in result["judged"]
+    ]  # fmt: skip

@@ -1,0 +1,207 @@
+"""The ceiling: a diagnoser that owns the rig's equations, noise levels, parameter ranges and shares of what is hidden.
+
+Its likelihood: each recording's amplitude has its gain scatter and, to second order in the mean and first in the
+variance, its scatter of position; lines have the rig's own noise; d33 is even in its logarithm from 8 to 30 pC/N;
+E, h and the sensors' gains are what is declared. It supposes nothing, every effect of the catalogue, every one
+that is not in it, and where two effects were drawn every pair that shares one with them. Each supposition is evaluated
+on a coarse grid; the six best, and the true one from its true values, are maximised (Nelder–Mead) and integrated by
+Laplace's method. So it is told where the true answer lies and never overlooks it: no diagnosis can hope to be better.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import logsumexp
+from scipy.stats import norm, qmc
+
+from proof.cases import DrawnCase
+from proof.ideal_laws import Supposition, suppositions
+from proof.judge import UNKNOWN as UNKNOWN_ANSWER
+from rig.draw import CATALOGUED, SHARES, UNKNOWN, drawn, record
+from rig.effects import Values, of
+from rig.errors import RigError
+from rig.recorded import RecordedLines
+from rig.strengths import of_frf
+from underskin.units import Floats
+
+_D33 = np.log([8.0, 30.0])  # as the rig draws it
+_SCALES = np.linspace(_D33[0], _D33[1], 1001)
+_WIDE = np.linspace(_D33[0] - 1.0, _D33[1] + 1.0, 2501)  # of d33 times a sensor's gain
+_REFINED = 6
+_COARSE = {0: 1, 1: 12, 2: 32, 3: 64}
+_NODE = np.sqrt(3.0)  # of a Gauss–Hermite rule of three points; its outer weights are 1/6
+_PICKUP_WIDTH_HZ = 1.5
+
+
+@dataclass(frozen=True)
+class _Amplitudes:
+    """What lines say of each recording's amplitude, given the shape: estimate, its variance, and what is left of χ²."""
+
+    estimate: Floats
+    variance: Floats
+    rest: float
+
+
+class Likelihood:
+    """ln p(lines | effects, nothing else but d33 unknown), up to a constant."""
+
+    def __init__(self, recorded: RecordedLines) -> None:
+        self.recorded = recorded
+        self.noise = recorded.bench.experiment.noise
+
+    def __call__(self, effects: dict[str, Values]) -> float:
+        """The logarithm, −∞ where the rig cannot carry the effects out."""
+        try:
+            return self._log(effects)
+        except (RigError, ValueError, FloatingPointError):
+            return -np.inf
+
+    def _log(self, effects: dict[str, Values]) -> float:
+        bench = self.recorded.bench
+        experiment = replace(bench.experiment, effects=effects, skin=replace(bench.experiment.skin, d33_pc_per_n=1.0))
+        nowhere = np.zeros_like(bench.missed_mm)
+        plain = replace(bench, experiment=experiment, missed_mm=nowhere, sensor_gains=np.ones_like(bench.sensor_gains))
+        mean, variance = plain.level, np.zeros(len(nowhere))
+        shape = plain.lines(self.recorded.frequency_hz) / mean[:, None]
+        if self.noise.position_mm:
+            for step in _NODE * self.noise.position_mm * np.eye(2):
+                up, down = (replace(plain, missed_mm=nowhere + sign * step).level for sign in (1, -1))
+                mean = mean + (up + down - 2 * plain.level) / 6
+                variance = variance + ((up - down) / (2 * _NODE)) ** 2 + ((up + down - 2 * plain.level) ** 2) / 18
+        scatter = variance + self.noise.gain**2 * (mean**2 + variance)
+        found = self._amplitudes(shape, effects)
+        spread = of(effects, "sensor_spread", "sd")
+        if not spread:
+            return found.rest + float(
+                logsumexp(self._at(_SCALES, mean, scatter, found).sum(axis=0)) - np.log(len(_SCALES))
+            )
+        sensors, index = np.unique(bench.plan.sensor, return_inverse=True)
+        each = np.zeros((len(sensors), len(_WIDE)))
+        np.add.at(each, index, self._at(_WIDE, mean, scatter, found))
+        top = each.max(axis=1, keepdims=True)
+        coarse = _SCALES[::10]
+        weight = norm.pdf(_WIDE, coarse[:, None], spread) * (_WIDE[1] - _WIDE[0])
+        whole = np.log(np.maximum(np.exp(each - top) @ weight.T, 1e-300)) + top
+        return found.rest + float(logsumexp(whole.sum(axis=0)) - np.log(len(coarse)))
+
+    def _at(self, scales: Floats, mean: Floats, scatter: Floats, found: _Amplitudes) -> Floats:
+        """ln p of each recording at each ln d33."""
+        d33 = np.exp(scales)
+        variance = scatter[:, None] * d33**2 + found.variance[:, None]
+        return -0.5 * (np.log(variance) + (found.estimate[:, None] - mean[:, None] * d33) ** 2 / variance)
+
+    def _amplitudes(self, shape: np.ndarray, effects: dict[str, Values]) -> _Amplitudes:
+        y, weight = self.recorded.measured, 1 / self.recorded.line_variance
+        pairs = [(shape, shape), (shape, y), (y, y)]
+        ss, sy, yy = ((weight * a.conj() * b).sum(axis=1) for a, b in pairs)
+        lost = 0.0
+        if "mains_pickup" in effects:
+            frequency, mains = self.recorded.frequency_hz, of(effects, "mains_pickup", "mains_hz")
+            p = sum(k / (1 + ((frequency - n * mains) / _PICKUP_WIDTH_HZ) ** 2) for n, k in ((1, 1.0), (3, 1 / 3)))
+            half = 0.5 * (of(effects, "mains_pickup", "charge_pc") / self.recorded.bench.plan.dynamic_n) ** 2
+            pp, ps, py = (weight * p * p).sum(axis=1), (weight * p * shape).sum(axis=1), (weight * p * y).sum(axis=1)
+            inner = pp + 1 / half
+            ss, sy, yy = ss - np.abs(ps) ** 2 / inner, sy - ps.conj() * py / inner, yy - np.abs(py) ** 2 / inner
+            lost = float(np.log1p(half * pp).sum())
+        rest = -0.5 * float((yy.real - sy.real**2 / ss.real + np.log(ss.real)).sum()) - lost
+        return _Amplitudes(sy.real / ss.real, 1 / ss.real, rest)
+
+
+def diagnosed(case: DrawnCase) -> dict[str, Any]:
+    """The ideal diagnoser's answer on a drawn campaign and its probability."""
+    description = drawn(case.seed, case.number, case.what)
+    recorded = record(description)
+    truth: dict[str, Values] = {name: dict(values) for name, values in recorded.bench.on.items()}
+    likelihood = Likelihood(recorded)
+    sets = _sets(tuple(truth))
+    ranges = of_frf(description)
+    coarse = {}
+    for names in sets:
+        for supposed in suppositions(names, ranges):
+            coarse[id(supposed)] = (supposed, *_best_of(supposed, likelihood))
+    ranked = sorted(coarse.values(), key=lambda entry: -entry[2])[:_REFINED]
+    true = [(entry, place) for entry, *_ in coarse.values() if (place := entry.place_of(truth)) is not None]
+    evidence: dict[tuple[str, ...], list[float]] = {}
+    for supposed, place, _ in ranked:
+        evidence.setdefault(supposed.names, []).append(_evidence(supposed, likelihood, place))
+    for supposed, place in true:
+        evidence.setdefault(supposed.names, []).append(_evidence(supposed, likelihood, place))
+    weight: dict[tuple[str, ...], list[float]] = {}
+    for names, found in evidence.items():
+        answer = (UNKNOWN_ANSWER,) if set(names) & set(UNKNOWN) else names
+        variants = len(suppositions(names, ranges))
+        weight.setdefault(answer, []).append(max(found) - np.log(variants) + sets[names])
+    total = {answer: float(logsumexp(values)) for answer, values in weight.items()}
+    leader = max(total, key=lambda answer: total[answer])
+    return {
+        "answer": list(leader),
+        "probability": float(np.exp(total[leader] - logsumexp(list(total.values())))),
+    }
+
+
+def _sets(truth: tuple[str, ...]) -> dict[tuple[str, ...], float]:
+    """The sets that are supposed, sorted, with the logarithm of their priors: the shares that the rig draws."""
+    singles, pairs = len(CATALOGUED), len(CATALOGUED) * (len(CATALOGUED) - 1) / 2
+    sets: dict[tuple[str, ...], float] = {(): np.log(SHARES["none"])}
+    sets |= {(name,): np.log(SHARES["single"] / singles) for name in CATALOGUED}
+    sets |= {(name,): np.log(SHARES["unknown"] / len(UNKNOWN)) for name in UNKNOWN}
+    if len(truth) == 2:
+        for name in truth:
+            for other in CATALOGUED:
+                if other != name:
+                    first, second = sorted((name, other))
+                    sets[first, second] = np.log(SHARES["pair"] / pairs)
+    return sets
+
+
+def _best_of(supposed: Supposition, likelihood: Likelihood) -> tuple[Floats, float]:
+    """The best of evenly spread places (Halton), and ln p there."""
+    size = len(supposed.coordinates)
+    if not size:
+        return np.zeros(0), likelihood(supposed.effects(np.zeros(0)))
+    places = qmc.Halton(size, scramble=False).random(_COARSE.get(size, 64) + 1)[1:]
+    values = [likelihood(supposed.effects(place)) for place in places]
+    best = int(np.argmax(values))
+    return places[best], values[best]
+
+
+def _evidence(supposed: Supposition, likelihood: Likelihood, start: Floats) -> float:
+    """ln ∫ p over the unit cube, by Laplace's method from a start; no wider than the cube."""
+    size = len(supposed.coordinates)
+
+    def loss(place: Floats) -> float:
+        return -likelihood(supposed.effects(place)) if np.all((place >= 0) & (place <= 1)) else np.inf
+
+    start = np.clip(start, 0.0, 1.0)
+    if not size or not np.isfinite(loss(start)):
+        return -loss(start)
+    simplex = np.vstack(
+        [start, *(start + np.where(start[k] > 0.5, -0.04, 0.04) * np.eye(size)[k] for k in range(size))]
+    )
+    found = minimize(
+        loss, start, method="Nelder-Mead",
+        options={"initial_simplex": simplex, "maxfev": 45 * size, "xatol": 1e-4, "fatol": 0.05},
+    )  # fmt: skip
+    best, least = np.asarray(found.x), float(found.fun)
+    steps = np.array([_step(loss, best, least, axis) for axis in np.eye(size)])
+    inward = np.where(best > 0.5, -1.0, 1.0) * steps
+    hessian = np.empty((size, size))
+    single = np.array([loss(best + inward[k] * np.eye(size)[k]) - least for k in range(size)])
+    for i in range(size):
+        hessian[i, i] = 2 * single[i] / inward[i] ** 2
+        for j in range(i):
+            both = loss(best + inward[i] * np.eye(size)[i] + inward[j] * np.eye(size)[j]) - least
+            hessian[i, j] = hessian[j, i] = (both - single[i] - single[j]) / (inward[i] * inward[j])
+    values = np.maximum(np.linalg.eigvalsh(hessian), 2 * np.pi)
+    return -least + 0.5 * float((np.log(2 * np.pi) - np.log(values)).sum())
+
+
+def _step(loss: Any, best: Floats, least: float, axis: Floats) -> float:
+    """How far the loss takes to grow by a half, into the cube."""
+    sign = -1.0 if float(best @ axis) > 0.5 else 1.0
+    step = 1e-4
+    while step < 0.4 and loss(best + sign * step * axis) - least < 0.5:
+        step *= 1.6
+    return step

@@ -1,0 +1,104 @@
+"""What the ideal diagnoser may suppose: each effect by the rig's own law, within the range it draws from."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from rig.effects import KNOWN, Values, needed_by_law
+from rig.strengths import INVERTED, SIGNED, Ranges
+from underskin.units import Floats
+
+_MAINS_HZ = (50.0, 60.0)
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A parameter, even in its logarithm between two values; `sign` −1 turns its sign, of a factor its logarithm's."""
+
+    effect: str
+    parameter: str
+    low: float
+    high: float
+    sign: int = 1
+
+    def value(self, place: float) -> float:
+        """The parameter's value at a place from 0 to 1."""
+        if self.parameter == "angle":
+            return 2 * math.pi * place
+        size = math.exp(math.log(self.low) + place * math.log(self.high / self.low))
+        if self.effect in INVERTED:
+            return size**self.sign
+        return self.sign * size
+
+    def place(self, value: float) -> float:
+        """The place of a value, outside 0 to 1 or nan where this coordinate does not reach it."""
+        if self.parameter == "angle":
+            return value / (2 * math.pi) % 1
+        size = value**self.sign if self.effect in INVERTED else self.sign * value
+        return math.log(size / self.low) / math.log(self.high / self.low) if size > 0 else math.nan
+
+
+@dataclass(frozen=True)
+class Supposition:
+    """Effects with their laws fixed and their parameters free: `coordinates` run from 0 to 1."""
+
+    fixed: Mapping[str, Values]
+    coordinates: tuple[Coordinate, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effects' names, sorted."""
+        return tuple(sorted(self.fixed))
+
+    def effects(self, place: Floats) -> dict[str, Values]:
+        """The effects at a place."""
+        found: dict[str, Values] = {name: dict(values) for name, values in self.fixed.items()}
+        for coordinate, at in zip(self.coordinates, place, strict=True):
+            found[coordinate.effect][coordinate.parameter] = coordinate.value(float(at))
+        if "misalignment" in found:
+            size, angle = (float(found["misalignment"].pop(name)) for name in ("size", "angle"))
+            found["misalignment"] = {"x_mm": size * math.cos(angle), "y_mm": size * math.sin(angle)}
+        return found
+
+    def place_of(self, effects: Mapping[str, Values]) -> Floats | None:
+        """Where these effects are, None where this supposition does not hold them."""
+        if set(effects) != set(self.fixed):
+            return None
+        if any(effects[name].get(key) != value for name, part in self.fixed.items() for key, value in part.items()):
+            return None
+        known = {name: dict(values) for name, values in effects.items()}
+        if "misalignment" in known:
+            x, y = (float(known["misalignment"][name]) for name in ("x_mm", "y_mm"))
+            known["misalignment"] = {"size": math.hypot(x, y), "angle": math.atan2(y, x)}
+        place = np.array([entry.place(float(known[entry.effect][entry.parameter])) for entry in self.coordinates])
+        return place if np.all((place > -0.01) & (place < 1.01)) else None
+
+
+def suppositions(names: Sequence[str], ranges: Ranges) -> list[Supposition]:
+    """All laws and signs of a set of effects."""
+    found = []
+    for parts in product(*(list(_alone(name, ranges.get(name, {}))) for name in names)):
+        fixed = {name: values for name, (values, _) in zip(names, parts, strict=True)}
+        found.append(Supposition(fixed, tuple(entry for _, coordinates in parts for entry in coordinates)))
+    return found
+
+
+def _alone(name: str, ranges: Mapping[str, tuple[float, float]]) -> Iterator[tuple[Values, tuple[Coordinate, ...]]]:
+    effect = KNOWN[name]
+    for law in effect.laws or (None,):
+        values: Values = {} if law is None else {"law": law}
+        unused = set(effect.optional) - set(needed_by_law(name, values))
+        free = {parameter: ends for parameter, ends in ranges.items() if parameter not in unused}
+        if name == "misalignment":
+            free = {"size": free["x_mm"], "angle": (0.0, 2 * math.pi)}
+        for sign in (1, -1) if name in SIGNED or name in INVERTED else (1,):
+            turned = SIGNED.get(name, "factor")
+            coordinates = tuple(
+                Coordinate(name, parameter, *ends, sign if parameter == turned else 1)
+                for parameter, ends in free.items()
+            )
+            for mains in _MAINS_HZ if name == "mains_pickup" else (None,):
+                yield (values if mains is None else {**values, "mains_hz": mains}), coordinates

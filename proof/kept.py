@@ -1,0 +1,104 @@
+"""Work that is kept: a result a file, found again by what went in and by the sources that made it.
+
+A run that is stopped goes on where it was; a diagnosis that has changed since is worked out again.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, TypeVar
+
+import proof
+import rig
+import underskin
+from proof.cases import Case
+
+Item = TypeVar("Item")
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Work:
+    """Where results are kept, on how many processes, and how many campaigns of each kind at most (None: all)."""
+
+    folder: Path
+    workers: int = 1
+    count: int | None = None
+
+
+def sources(*packages: str) -> str:
+    """A digest of the Python sources of packages of this project, or of single files under them."""
+    roots = {module.__name__: Path(str(module.__file__)).parent for module in (underskin, rig, proof)}
+    digest = hashlib.sha256()
+    for package in packages:
+        name, _, file = package.partition("/")
+        for path in sorted(roots[name].rglob(file or "*.py")):
+            digest.update(path.relative_to(roots[name]).as_posix().encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def digest_of(document: Any) -> str:
+    """A digest of plain JSON values."""
+    return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()[:24]
+
+
+def kept(folder: Path, key: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """The result of that key, made where it is not there yet."""
+    path = folder / f"{key}.json"
+    if path.exists():
+        return dict(json.loads(path.read_text(encoding="utf-8")))
+    made = make()
+    folder.mkdir(parents=True, exist_ok=True)
+    unfinished = folder / f".{key}.{os.getpid()}"
+    unfinished.write_text(json.dumps(made, ensure_ascii=False), encoding="utf-8")
+    unfinished.replace(path)
+    return made
+
+
+def of_each(
+    work: Work, items: Sequence[Item], make: Callable[[Item], dict[str, Any]], tell: Callable[[str], None]
+) -> list[dict[str, Any]]:
+    """`make` of each item, in order, on all of the work's processes; `tell` hears how far it is."""
+    if work.workers == 1 or len(items) < 2:
+        results = []
+        for number, item in enumerate(items, 1):
+            results.append(make(item))
+            tell(f"{number} of {len(items)}")
+        return results
+    # A fresh interpreter a process, with one BLAS thread: the same numbers whatever the number of cores.
+    for name in _THREADS:
+        os.environ[name] = "1"
+    with ProcessPoolExecutor(min(work.workers, len(items)), mp_context=get_context("spawn")) as pool:
+        pending: list[Future[dict[str, Any]]] = [pool.submit(make, item) for item in items]
+        for number, _ in enumerate(as_completed(pending), 1):
+            tell(f"{number} of {len(items)}")
+        return [future.result() for future in pending]
+
+
+def reports(work: Work, cases: Sequence[Case], tell: Callable[[str], None]) -> list[dict[str, Any]]:
+    """The report (`report/1`) of each case."""
+    from underskin.surrogate import load_table
+
+    version = f"{sources('underskin')} {load_table().sha256}"
+    return of_each(work, cases, partial(_report, work.folder / "reports", version), tell)
+
+
+def _report(folder: Path, version: str, case: Case) -> dict[str, Any]:
+    document = case.document()
+    return kept(folder, digest_of([document, version]), partial(_diagnosed, document))
+
+
+def _diagnosed(document: dict[str, Any]) -> dict[str, Any]:
+    from underskin.diagnosis.diagnose import diagnosis_report
+    from underskin.recordings.campaign import from_dict
+    from underskin.surrogate import load_table
+
+    campaign, refused = from_dict(document)
+    return diagnosis_report(campaign, load_table(), refused=refused)

@@ -1,0 +1,45 @@
+"""Campaigns of this project's virtual rig, which shares no code with the diagnosis: a mixture, and quiet ones.
+
+The mixture hides nothing, one effect, two, or physics that no catalogue has, from subtle to strong; the quiet ones hide
+nothing at all. Both are fixed by the seed.
+"""
+
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import partial
+from typing import Any
+
+from proof.cases import DrawnCase
+from proof.judge import judge
+from proof.kept import Work, digest_of, kept, of_each, reports, sources
+from rig.draw import drawn, record
+from rig.truth import truth_of_lines
+
+SEED = 18459
+MIXTURE, QUIET = 300, 500
+
+
+def judge_mixture(work: Work, tell: Callable[[str], None]) -> dict[str, Any]:
+    """The mixture's campaigns beside their truth."""
+    return _judge(work, [DrawnCase(SEED, number) for number in range(work.count or MIXTURE)], tell)
+
+
+def judge_quiet(work: Work, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Campaigns with nothing missing; what they need besides is drawn anew, so none is one of the mixture's."""
+    return _judge(work, [DrawnCase(SEED + 1, number, "none") for number in range(work.count or QUIET)], tell)
+
+
+def _judge(work: Work, cases: list[DrawnCase], tell: Callable[[str], None]) -> dict[str, Any]:
+    truths = of_each(work, cases, partial(truth, work, sources("rig")), tell)
+    made = reports(work, cases, tell)
+    return {
+        "judged": [
+            asdict(judge(case.name, report, known)) for case, report, known in zip(cases, made, truths, strict=True)
+        ]
+    }
+
+
+def truth(work: Work, version: str, case: DrawnCase) -> dict[str, Any]:
+    """What the rig knows of a drawn campaign."""
+    described = drawn(case.seed, case.number, case.what)
+    return kept(work.folder / "truths", digest_of([described, version]), lambda: truth_of_lines(record(described)))

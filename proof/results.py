@@ -1,0 +1,103 @@
+"""The parts of the proof: each is worked out by itself and kept as one document, from which the page is written."""
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from proof import concealed, own_rig, real, riddle
+from proof.cases import DrawnCase, MadeCase
+from proof.kept import Work, kept, of_each, reports, sources
+from underskin.errors import InvalidInput
+
+Tell = Callable[[str], None]
+Part = Callable[[Work, Tell], dict[str, Any]]
+SEALED = Path(__file__).parent / "sealed"
+
+
+def folder(setting: str) -> Path:
+    """The folder that an environment variable names; raises InvalidInput where it does not."""
+    if setting not in os.environ:
+        raise InvalidInput(setting, None, "must name the folder that these data lie in")
+    return Path(os.environ[setting])
+
+
+def _open(work: Work, tell: Tell) -> dict[str, Any]:
+    return concealed.judge_open(work, folder("UNDERSKIN_CAMPAIGNS"), tell)
+
+
+def _sealed(work: Work, tell: Tell) -> dict[str, Any]:
+    return concealed.report_sealed(work, folder("UNDERSKIN_CAMPAIGNS"), SEALED, tell)
+
+
+def _recordings(work: Work, tell: Tell) -> dict[str, Any]:
+    made = list(real.recorded())[: work.count]
+    place = folder("UNDERSKIN_RECORDINGS")
+    found = reports(work, [MadeCase(entry.name, entry.make(place)) for entry in made], tell)
+    return {
+        "campaigns": [
+            {"name": entry.name, "told": entry.told, "report": report}
+            for entry, report in zip(made, found, strict=True)
+        ]
+    }
+
+
+def _riddle(work: Work, tell: Tell) -> dict[str, Any]:
+    cases = [MadeCase(name, document) for name, document in riddle.worlds().items()]
+    return {
+        "campaigns": [
+            {"name": case.name, "report": report}
+            for case, report in zip(cases, reports(work, cases, tell), strict=True)
+        ]
+    }
+
+
+def _ceiling(work: Work, tell: Tell) -> dict[str, Any]:
+    cases = [DrawnCase(own_rig.SEED, number) for number in range(work.count or own_rig.MIXTURE)]
+    version = sources("rig", "proof/ideal*.py")
+    answers = of_each(work, cases, _Ideal(work.folder / "ceiling", version), tell)
+    return {"answers": {case.name: answer for case, answer in zip(cases, answers, strict=True)}}
+
+
+class _Ideal:
+    """The ideal diagnoser on one case, kept; goes to other processes."""
+
+    def __init__(self, folder: Path, version: str) -> None:
+        self.folder, self.version = folder, version
+
+    def __call__(self, case: DrawnCase) -> dict[str, Any]:
+        from proof.ideal import diagnosed
+
+        return kept(self.folder, f"{case.name}-{self.version}", lambda: diagnosed(case))
+
+
+PARTS: dict[str, Part] = {
+    "open": _open,
+    "sealed": _sealed,
+    "mixture": own_rig.judge_mixture,
+    "quiet": own_rig.judge_quiet,
+    "ceiling": _ceiling,
+    "recordings": _recordings,
+    "riddle": _riddle,
+}
+
+
+def work_out(name: str, work: Work, tell: Tell) -> None:
+    """Work one part out and keep it."""
+    result = {"sources": sources("underskin"), **PARTS[name](work, tell)}
+    work.folder.mkdir(parents=True, exist_ok=True)
+    unfinished = work.folder / f".{name}.json.part"
+    unfinished.write_text(json.dumps(result, ensure_ascii=False), encoding="utf-8")
+    unfinished.replace(_path(name, work))
+
+
+def kept_parts(work: Work) -> dict[str, dict[str, Any]]:
+    """Every part that has been worked out."""
+    return {
+        name: json.loads(_path(name, work).read_text(encoding="utf-8")) for name in PARTS if _path(name, work).exists()
+    }
+
+
+def _path(name: str, work: Work) -> Path:
+    return work.folder / f"{name}.json"

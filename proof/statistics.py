@@ -1,0 +1,92 @@
+"""Shares with their intervals, and how well probabilities are calibrated."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from underskin.units import Floats
+
+_95 = float(norm.ppf(0.975))
+BINS = 10
+
+
+@dataclass(frozen=True)
+class Share:
+    """`right` of `count`, with Wilson's 95 % interval; all three are None-like (nan) where count is 0."""
+
+    right: int
+    count: int
+
+    @property
+    def value(self) -> float:
+        """The share."""
+        return self.right / self.count if self.count else float("nan")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson's score interval, 95 %: p̃ ± z √(p(1−p)/n + z²/4n²)/(1 + z²/n), p̃ = (p + z²/2n)/(1 + z²/n)."""
+        if not self.count:
+            return float("nan"), float("nan")
+        squared = _95**2 / self.count
+        middle = (self.value + squared / 2) / (1 + squared)
+        reach = _95 * np.sqrt(self.value * (1 - self.value) / self.count + squared / (4 * self.count)) / (1 + squared)
+        return float(max(middle - reach, 0.0)), float(min(middle + reach, 1.0))
+
+
+def share(right: Sequence[bool]) -> Share:
+    """The share of what is true."""
+    return Share(sum(right), len(right))
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Stated probabilities against how often they were right, in ten equal bins; empty bins are left out.
+
+    `error` is Σ (n_bin/n) |right − stated|; a perfectly calibrated tool that states the same probabilities has an error
+    below `by_chance` in 95 % of cases (both ends of its 95 % range are in `chance_range`).
+    """
+
+    count: tuple[int, ...]
+    stated: tuple[float, ...]
+    right: tuple[float, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    error: float
+    chance_range: tuple[float, float]
+
+
+def calibration(probabilities: Sequence[float], right: Sequence[bool], draws: int = 4000) -> Calibration:
+    """How well stated probabilities match; the range by chance is simulated with a fixed seed."""
+    stated, hit = np.array(probabilities, dtype=float), np.array(right, dtype=float)
+    place = np.minimum((stated * BINS).astype(int), BINS - 1)
+    used = np.unique(place)
+    members = [place == number for number in used]
+    chance = np.random.default_rng(1).random((draws, len(stated))) < stated
+    errors = [_error(members, stated, row) for row in chance.astype(float)]
+    shares = [Share(int(hit[member].sum()), int(member.sum())) for member in members]
+    low, high = np.quantile(errors, [0.025, 0.975])
+    return Calibration(
+        count=tuple(entry.count for entry in shares),
+        stated=tuple(float(stated[member].mean()) for member in members),
+        right=tuple(entry.value for entry in shares),
+        low=tuple(entry.interval[0] for entry in shares),
+        high=tuple(entry.interval[1] for entry in shares),
+        error=_error(members, stated, hit),
+        chance_range=(float(low), float(high)),
+    )
+
+
+def _error(members: Sequence[np.ndarray], stated: Floats, hit: Floats) -> float:
+    return float(sum(abs((hit[member] - stated[member]).sum()) for member in members) / len(stated))
+
+
+def bootstrap(
+    values: Sequence[float], statistic: Callable[[Floats], Floats], draws: int = 2000
+) -> tuple[float, float, float]:
+    """A statistic over the last axis of the values and its 95 % bootstrap interval, with a fixed seed."""
+    sample = np.array(values, dtype=float)
+    again = np.random.default_rng(2).choice(sample, (draws, len(sample)))
+    low, high = np.quantile(statistic(again), [0.025, 0.975])
+    return float(statistic(sample[None])[0]), float(low), float(high)

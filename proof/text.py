@@ -1,0 +1,198 @@
+"""docs/proof.md as text: every number in it is computed from the parts that were worked out."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from proof import own_rig
+from proof.concealed import judged_of
+from proof.judge import QUIET, Judged, shown
+from proof.markdown import table
+from proof.statistics import Share, bootstrap, calibration, share
+from proof.text_real import recordings, riddle
+from underskin.units import Floats
+
+Result = Mapping[str, Any]
+
+_HEAD = """\
+# Proof: the diagnosis judged on what it cannot know
+
+Everything on this page, figures and numbers, is written by `make proof` (`underskin prove`, `proof/`). The full run
+takes hours on two cores; it keeps what it has worked out and goes on from there. Shares have Wilson's 95 % interval
+in brackets. The diagnosis is called as `underskin diagnose` calls it: it gets the campaign and nothing else.
+
+An answer is *right* if the set of mechanisms that leads is exactly the set that was hidden: for nothing by the
+verdict `no_mismatch`, for physics outside the catalogue by the verdict `unexplained`. A leading set counts under
+`ambiguous` too. Something hidden is *visible* if the truth gains more than 20 in χ² over the base model, a pair if
+each of its members does so beside the other.
+"""
+
+
+def document(parts: Mapping[str, Result]) -> str:
+    """The page of all parts that were worked out."""
+    sections = {
+        "open": _concealed,
+        "sealed": _sealed,
+        "mixture": lambda result: _mixture(result, parts.get("ceiling")),
+        "quiet": _quiet,
+        "recordings": recordings,
+        "riddle": riddle,
+    }
+    written = [section(parts[name]) for name, section in sections.items() if name in parts]
+    state = table(
+        ["part", "sources of the diagnosis"], [[name, f"`{part['sources']}`"] for name, part in parts.items()]
+    )
+    tail = "## What was run\n\nA digest of the library's sources stands for each part.\n\n"
+    return "\n".join([_HEAD, *written, tail + state])
+
+
+def _percent(found: Share) -> str:
+    if not found.count:
+        return "none there"
+    low, high = found.interval
+    return f"{found.right} of {found.count}: {100 * found.value:.0f} % [{100 * low:.0f}–{100 * high:.0f}]"
+
+
+def _right(judged: Sequence[Judged]) -> str:
+    return _percent(share([entry.right for entry in judged]))
+
+
+def _misses(judged: Sequence[Judged]) -> str:
+    rows = [
+        [entry.name, shown(entry.truth), shown(entry.answer), entry.verdict, f"{entry.probability:.2f}",
+         "yes" if entry.visible else "no", f"{entry.size:.1f}"]
+        for entry in judged if not entry.right
+    ]  # fmt: skip
+    if not rows:
+        return "No misses.\n"
+    header = ["campaign", "hidden", "named", "verdict", "probability", "visible", "size, units of noise"]
+    return table(header, rows)
+
+
+def _concealed(result: Result) -> str:
+    judged = judged_of(result)
+    visible = [entry for entry in judged if entry.visible]
+    return f"""\
+## Campaigns of a rig that this project has never seen
+
+Of {len(judged)} open campaigns {len(visible)} are identifiable. Right among these: {_right(visible)}; among all:
+{_right(judged)}.
+
+{_misses(judged)}"""
+
+
+def _sealed(result: Result) -> str:
+    counts = Counter[str](result["verdicts"])
+    said = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
+    return f"""\
+Of the sealed campaigns, whose truth is not known here, {len(result["verdicts"])} reports lie in `proof/sealed/`, for
+others to judge. Their verdicts: {said}. Nothing was fitted to them.
+"""
+
+
+def _mixture(result: Result, ceiling: Result | None) -> str:
+    judged = judged_of(result)
+    seen = [entry for entry in judged if entry.visible]
+    parts = {kind: [entry for entry in seen if entry.kind == kind] for kind in ("none", "single", "pair", "unknown")}
+    rows = [[kind, str(sum(entry.kind == kind for entry in judged)), _right(found), _ideal(found, ceiling)]
+            for kind, found in parts.items()]  # fmt: skip
+    rows.append(["all visible", str(len(judged)), _right(seen), _ideal(seen, ceiling)])
+    return f"""\
+## Campaigns of our own rig
+
+{len(judged)} of {own_rig.MIXTURE} campaigns (seed {own_rig.SEED}), drawn evenly from subtle to strong; the rig
+shares no code with the diagnosis, and its laws are not the catalogue's.
+
+{table(["hidden", "drawn", "right, of the visible", "ideal diagnoser, of those it was run on"], rows)}
+{_CEILING if ceiling else ""}
+What was named where the answer is not right, of the visible:
+
+{_confused(seen)}
+![What was hidden against what was named](figures/proof-confusion.svg)
+
+{_probabilities(judged, seen)}
+![Calibration, and accuracy against the effect's size](figures/proof-calibration.svg)
+
+{_held_out(seen)}
+### Every miss
+
+{_misses(judged)}"""
+
+
+_CEILING = """\
+The ideal diagnoser owns the rig's equations (those outside the catalogue included), its noise levels, the ranges
+and shares that it draws from, and knows E, h and the sensors' gains exactly. It takes the most probable of nothing,
+every single effect and, where two are hidden, every pair that shares one with them, by Laplace evidence; the true
+set is maximised from its true values, so it never overlooks it. Its likelihood treats the scatter of position to
+second order.
+"""
+
+
+def _ideal(judged: Sequence[Judged], ceiling: Result | None) -> str:
+    answers = ceiling["answers"] if ceiling else {}
+    right = [tuple(answers[entry.name]["answer"]) == entry.truth for entry in judged if entry.name in answers]
+    return _percent(share(right)) if right else "not run"
+
+
+def _confused(judged: Sequence[Judged]) -> str:
+    header = ["hidden", "count", "right", "part of it", "other mechanisms", "unexplained", "nothing"]
+    rows = []
+    for kind in ("none", "single", "pair", "unknown"):
+        entries = [entry for entry in judged if entry.kind == kind]
+        counts = Counter(_outcome(entry) for entry in entries)
+        rows.append([kind, str(len(entries)), *(str(counts[name]) for name in header[2:])])
+    return table(header, rows)
+
+
+def _outcome(entry: Judged) -> str:
+    if entry.right:
+        return "right"
+    if entry.verdict in QUIET:
+        return "nothing"
+    if entry.verdict == "unexplained":
+        return "unexplained"
+    return "part of it" if set(entry.truth) & set(entry.answer) else "other mechanisms"
+
+
+def _probabilities(judged: Sequence[Judged], seen: Sequence[Judged]) -> str:
+    rows = []
+    for name, entries in (("visible", seen), ("all", judged)):
+        found = calibration([entry.probability for entry in entries], [entry.right for entry in entries])
+        low, high = found.chance_range
+        inside = "inside" if found.error <= high else "outside"
+        rows.append([name, str(len(entries)), f"{found.error:.3f}", f"{low:.3f}–{high:.3f}", inside])
+    header = ["campaigns", "count", "expected calibration error", "95 % range of a perfectly calibrated tool", "is"]
+    return f"""\
+Stated probability of the answer against how often it was right, in ten equal bins. Some error is there by chance:
+the range is that of 4000 simulated tools that state the same probabilities and are right exactly so often.
+
+{table(header, rows)}"""
+
+
+def _held_out(judged: Sequence[Judged]) -> str:
+    ratios = [entry.held_out[0] / entry.held_out[1] for entry in judged if entry.held_out]
+    if not ratios:
+        return ""
+
+    def median(values: Floats) -> Floats:
+        return np.median(values, axis=-1)
+
+    value, low, high = bootstrap(ratios, median)
+    return (
+        f"Error on held-out groups after the fit, over the noise floor: median {value:.2f} [{low:.2f}–{high:.2f}] over "
+        f"{len(ratios)} campaigns (bootstrap).\n"
+    )
+
+
+def _quiet(result: Result) -> str:
+    judged = judged_of(result)
+    alarms = [entry for entry in judged if entry.verdict not in QUIET]
+    return f"""\
+### False alarms
+
+{len(judged)} of {own_rig.QUIET} campaigns with nothing missing (seed {own_rig.SEED + 1}): a verdict other than
+`no_mismatch` or `insufficient_data` in {_percent(Share(len(alarms), len(judged)))}.
+
+{_misses(alarms) if alarms else ""}"""

@@ -1,0 +1,34 @@
+"""`underskin diagnose --campaign`: reports of campaigns that a service keeps."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from tests.store.diagnosed import report, resonant, sent
+from tests.store.server import Place, running
+from underskin.cli import app
+
+
+def test_reports_of_kept_campaigns_are_those_of_the_service(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    reports = tmp_path / "reports"
+    with running(Place(folder), UNDERSKIN_DIAGNOSIS_WORKERS="1") as server:
+        kept = sent(server, resonant("array"))
+        given = ["--campaign", kept, "--campaign", "nowhere", "--url", str(server.http.base_url)]
+        result = CliRunner().invoke(app, ["diagnose", *given, "--output-dir", str(reports), "--html"])
+    assert result.exit_code == 2
+    assert f"{kept}: explained" in result.stderr
+    assert "nowhere: 404" in result.stderr
+    assert json.loads((reports / f"{kept}.json").read_text(encoding="utf-8")) == report()
+    assert "contact_resonance" in (reports / f"{kept}.html").read_text(encoding="utf-8")
+    assert len(list(reports.iterdir())) == 2
+
+
+@pytest.mark.parametrize("given", [[], ["a/palm.json", "b/palm.json"]])
+def test_what_to_diagnose_must_be_given_once(given: list[str], tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["diagnose", *given, "--output-dir", str(tmp_path / "reports")])
+    assert result.exit_code == 2
+    assert not (tmp_path / "reports").exists()
