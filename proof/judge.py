@@ -20,6 +20,7 @@ class Judged:
     name: str
     truth: tuple[str, ...]  # sorted; empty where nothing is missing
     answer: tuple[str, ...]
+    left_open: bool  # not right, but `ambiguous` with the truth among the rivals
     verdict: str
     probability: float
     visible: bool  # whether all that is missing shows in the recordings at all
@@ -43,12 +44,15 @@ class Judged:
 def judge(name: str, report: Mapping[str, Any], truth: Mapping[str, Any]) -> Judged:
     """The report of one campaign judged by its truth (`truth/1`, or an entry of open-truth.json)."""
     visible = bool(truth["identifiable"])
+    truth_set = tuple(sorted(truth["effects"]))
+    rivals = [tuple(sorted(entry["mechanisms"])) for entry in report["alternatives"]]
     fit = report["fit"]
     left = fit["after"]["heldout_rmse_percent"] if fit else None
     return Judged(
         name=name,
-        truth=tuple(sorted(truth["effects"])),
+        truth=truth_set,
         answer=answer(report),
+        left_open=report["verdict"] == "ambiguous" and truth_set in rivals and truth_set != answer(report),
         verdict=report["verdict"],
         probability=float(report["probability"]),
         visible=bool(truth.get("every_effect_identifiable", visible)) and visible,

@@ -107,7 +107,8 @@ shares no code with the diagnosis, and its laws are not the catalogue's.
 
 {table(["hidden", "drawn", "right, of the visible", "ideal diagnoser, of those it was run on"], rows)}
 {_CEILING if ceiling else ""}
-What was named where the answer is not right, of the visible:
+What was named where the answer is not right, of the visible. *Left open* is the verdict `ambiguous` with the truth
+among the rivals: for near-twins (a moving edge and a finite amplitude at one amplitude) there is no better answer.
 
 {_confused(seen)}
 ![What was hidden against what was named](figures/proof-confusion.svg)
@@ -137,7 +138,7 @@ def _ideal(judged: Sequence[Judged], ceiling: Result | None) -> str:
 
 
 def _confused(judged: Sequence[Judged]) -> str:
-    header = ["hidden", "count", "right", "part of it", "other mechanisms", "unexplained", "nothing"]
+    header = ["hidden", "count", "right", "left open", "part of it", "other mechanisms", "unexplained", "nothing"]
     rows = []
     for kind in ("none", "single", "pair", "unknown"):
         entries = [entry for entry in judged if entry.kind == kind]
@@ -149,6 +150,8 @@ def _confused(judged: Sequence[Judged]) -> str:
 def _outcome(entry: Judged) -> str:
     if entry.right:
         return "right"
+    if entry.left_open:
+        return "left open"
     if entry.verdict in QUIET:
         return "nothing"
     if entry.verdict == "unexplained":

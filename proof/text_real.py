@@ -42,10 +42,7 @@ def recordings(result: Result) -> str:
     told = table(
         ["campaign", "what the diagnosis was told"], [[entry["name"], entry["told"]] for entry in result["campaigns"]]
     )
-    where = "\n".join(
-        f"- **{entry['name']}**: {entry['report']['statement']} {entry['report']['location']['statement']}"
-        for entry in result["campaigns"]
-    )
+    where = "\n".join(f"- **{entry['name']}**: {_said(entry['report'])}" for entry in result["campaigns"])
     header = ["campaign", "verdict", "named", "rivals", "held-out error before → after (noise floor), %"]
     return f"""\
 ## Real recordings
@@ -63,6 +60,13 @@ What each report says, in its own words:
 
 {where}
 """
+
+
+def _said(report: Result) -> str:
+    """A report's statement without the laws, and where it locates the misfit."""
+    sentences = report["statement"].split(". ")
+    kept = sentences if report["verdict"] == "unexplained" else sentences[:1]
+    return f"{'. '.join(kept).rstrip('.')}. {report['location']['statement']}"
 
 
 def _findings(result: Result) -> str:
@@ -121,8 +125,18 @@ On the array every recording at 1 N is a late one and every recording at 3 N an 
 preload, in age and, in part, in sensors, so the numbers alone cannot tell a d33 that grows with preload from one
 that falls with age: any weight between the two comes from the mechanisms' priors, not from the recordings. That
 something is missing from the base model on the array is not in doubt. Axes that the report calls undecidable there:
-{", ".join(undecidable) or "none"}. Next experiment in that report: {planned}.
+{", ".join(undecidable) or "none"}. Next experiment in that report: {planned}. {_too_sure(array)}
 
 What settles it: press the twelve sensors of the latest runs at 1 N *and* 3 N on the same day. The last two rows are
 that experiment in both worlds, diagnosed together with the array's recordings.
 """
+
+
+def _too_sure(array: Result) -> str:
+    """Whether the report on the array leaves the question open, as it should."""
+    pairs = [{entry["mechanism"], entry["confounded_with"]} for entry in array["not_identifiable"]]
+    listed = "lists" if {"preload_dependent_d33", "ageing"} in pairs else "does not list"
+    tied = f"It {listed} the two as confounded."
+    if array["verdict"] != "explained":
+        return tied
+    return f"{tied} Its probability of {array['probability']:.2f} is more than such recordings can carry."

@@ -36,6 +36,7 @@ def report(verdict: str, *names: str, probability: float = 0.9) -> dict[str, Any
         "verdict": verdict,
         "probability": probability,
         "mechanisms": [{"name": name} for name in names],
+        "alternatives": [{"mechanisms": ["twin"]}],
         "fit": {"after": {"heldout_rmse_percent": 2.0}, "noise_floor_percent": 1.0},
     }
 
@@ -69,6 +70,14 @@ def test_a_pair_is_visible_only_if_each_of_its_members_is() -> None:
     }
     found = judge("c", report("explained", "a"), truth)
     assert (found.kind, found.visible, found.one_visible) == ("pair", False, True)
+
+
+def test_a_twin_is_left_open_only_under_ambiguous() -> None:
+    truth = {"effects": ["twin"], "identifiable": True, "chi2_gain_of_truth": 90.0}
+    for verdict in ("ambiguous", "explained"):
+        found = judge("c", report(verdict, "a"), truth)
+        assert not found.right
+        assert found.left_open is (verdict == "ambiguous")
 
 
 def test_wilson_interval_against_its_known_values() -> None:
@@ -190,7 +199,7 @@ def test_an_unknown_part_is_named() -> None:
 def test_what_was_judged_survives_being_kept(tmp_path: Path) -> None:
     from proof.concealed import judged_of
 
-    entry = Judged("c", ("a",), (), "no_mismatch", 0.5, True, True, 3.0, (1.0, 2.0))
+    entry = Judged("c", ("a",), (), False, "no_mismatch", 0.5, True, True, 3.0, (1.0, 2.0))
     text = json.dumps({"judged": [asdict(entry)]})
     assert judged_of(json.loads(text)) == [entry]
     path = tmp_path / "x.json"

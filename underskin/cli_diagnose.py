@@ -62,7 +62,7 @@ def diagnose(
     from rich.progress import Progress
 
     files, campaign = files or [], campaign or []
-    _refuse_what_would_be_overwritten([*(file.stem for file in files), *campaign])
+    _refuse_overwriting(files, campaign, output_dir)
     output_dir.mkdir(parents=True, exist_ok=True)
     failed = False
     console = Console(stderr=True)
@@ -81,12 +81,17 @@ def diagnose(
         raise typer.Exit(2)
 
 
-def _refuse_what_would_be_overwritten(names: Sequence[str]) -> None:
+def _refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_dir: Path) -> None:
+    """Reports are named like their campaigns: two of one name, or a campaign in the folder, would be lost."""
+    names = [*(file.stem for file in files), *campaigns]
     if not names:
         raise typer.BadParameter("give files or --campaign", param_hint="FILES")
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise typer.BadParameter(f"{twice[0]}: two reports would have this name", param_hint="FILES")
+    lost = [file for file in files if (output_dir / f"{file.stem}.json").resolve() == file.resolve()]
+    if lost:
+        raise typer.BadParameter(f"the report would overwrite {lost[0]}", param_hint="--output-dir")
 
 
 def _of_files(

@@ -32,3 +32,12 @@ def test_what_to_diagnose_must_be_given_once(given: list[str], tmp_path: Path) -
     result = CliRunner().invoke(app, ["diagnose", *given, "--output-dir", str(tmp_path / "reports")])
     assert result.exit_code == 2
     assert not (tmp_path / "reports").exists()
+
+
+def test_a_report_never_overwrites_its_campaign(tmp_path: Path) -> None:
+    file = tmp_path / "palm.json"
+    file.write_text("{}", encoding="utf-8")
+    result = CliRunner().invoke(app, ["diagnose", str(file), "--output-dir", str(tmp_path)])
+    assert result.exit_code == 2
+    assert "overwrite" in result.stderr
+    assert file.read_text(encoding="utf-8") == "{}"

@@ -126,7 +126,7 @@ def before_and_after(
 ) -> go.Figure:
     """Measured against predicted, by the base model and by what is stated, each with the band that noise allows."""
     named = " + ".join(shown.names).replace("_", " ") or "nothing added"
-    figure = make_subplots(1, 2, subplot_titles=("before: base model", f"after: {named}"), horizontal_spacing=0.1)
+    figure = make_subplots(1, 2, subplot_titles=("before: base model", f"after: {named}"), shared_yaxes=True)
     _, name = _part(diagnosis, before.measured)
     ids = [escape(entry.id) for entry in thinned.lines.campaign.recordings]
     for place, (points, colour, marker) in enumerate(((before, _ORANGE, "square"), (after, _BLUE, "circle")), start=1):

@@ -51,7 +51,7 @@ def page(report: Report, figures: Figures | None = None) -> str:
         f"<h1>{title}</h1>",
         f'<p class="first">{escape(first.rstrip("."))}.</p>',
         f'<p><span class="verdict">{escape(verdict)}</span></p>',
-        _paragraph(rest),
+        _paragraph("" if report["verdict"] == "explained" else rest),  # the laws, which stand under What
         _section("Where", _where(report, drawn)),
         _section("What", _what(report, drawn)),
         _section("How much better", _better(report, drawn)),

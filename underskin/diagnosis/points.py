@@ -17,7 +17,8 @@ from underskin.diagnosis.residuals import whole_prediction
 from underskin.mechanisms.differentiated import Array
 from underskin.units import Complexes, Floats
 
-_MOST_POINTS = 3000
+_MOST_POINTS = 600
+_LEAST_BINS = 8  # of the lines, so that a shape over them can be seen in campaigns of any size
 _MOST_LEVELS = 24  # of an axis
 _SMALLEST = 0.05  # of the largest response: smaller ones are no scale for a residual
 
@@ -60,7 +61,7 @@ class Thinned:
         along = any(axis in diagnosis.region for axis in lines.row_axes)
         by_line = lines.curves or along or any(needs_lines(name) for name in shown.names)
         distinct, line = np.unique(np.round(lines.frequency, 6), return_inverse=True)
-        bins = min(len(distinct), max(_MOST_POINTS // lines.recordings, 1)) if by_line else 1
+        bins = min(len(distinct), max(_MOST_POINTS // lines.recordings, _LEAST_BINS)) if by_line else 1
         key = lines.recording * bins + line.reshape(-1) * bins // len(distinct)
         self.by_line = by_line
         self._used, self._point = np.unique(key, return_inverse=True)
