@@ -5,7 +5,7 @@ PORT   ?= 8000
 TESTS  ?= tests
 
 # From Debian: the proxy with TLS, its certificate, and what runs the examples.
-TEST_PACKAGES = nginx openssl octave curl postgresql
+TEST_PACKAGES = nginx openssl octave curl postgresql chromium
 
 PIP_INSTALL = $(PYTHON) -m pip install --quiet --disable-pip-version-check
 

@@ -12,9 +12,10 @@ from service.store.engine import Database
 from service.store.tables import AnyRow
 from underskin import InvalidInput
 from underskin.surrogate import SigmaTable
-from underskin.trend import SIGNIFICANT, Trend, holm, trend
+from underskin.trend import FEWEST, SIGNIFICANT, Trend, holm, trend
 
 _YEAR_S = 365.25 * 86400
+_LEAST_SPAN_S = 86400.0
 
 
 def history(connection: Connection, root: str, table_sha256: str) -> models.History:
@@ -59,7 +60,7 @@ def _history(
         skin_id=root,
         joined=[joined(row) for row in skins.joined_to(connection, root)],
         sensors=[
-            models.SensorHistory(sensor=name, points=by_sensor[name], trend=found)
+            models.SensorHistory(sensor=name, points=by_sensor[name], trend=found, no_trend=_no_trend(by_sensor[name]))
             for name, found in zip(names, _trends([by_sensor[name] for name in names]), strict=True)
         ],
         left_out_campaigns=campaigns_out,
@@ -90,9 +91,27 @@ def _trends(sensors: Sequence[Sequence[models.Point]]) -> list[models.TrendAnswe
     return [None if line is None else _answer(line, next(adjusted)) for line in found]
 
 
+def _no_trend(points: Sequence[models.Point]) -> str | None:
+    """Why these points, by time, have no trend."""
+    arrived = sum(point.time_is == "received" for point in points)
+    if len(points) < FEWEST:
+        return f"a trend needs {FEWEST} campaigns, and there {'is' if len(points) == 1 else 'are'} {len(points)}"
+    if arrived:
+        return f"{arrived} of {len(points)} points are timed by arrival: their recordings have no recorded_at"
+    if _seconds(points[-1]) - _seconds(points[0]) < _LEAST_SPAN_S:
+        return "the points span less than a day"
+    return None
+
+
+def _seconds(point: models.Point) -> float:
+    return datetime.fromisoformat(point.time).timestamp()
+
+
 def _line(points: Sequence[models.Point]) -> Trend | None:
+    if _no_trend(points) is not None:
+        return None
     return trend(
-        [datetime.fromisoformat(point.time).timestamp() / _YEAR_S for point in points],
+        [_seconds(point) / _YEAR_S for point in points],
         [point.d33_pc_per_n for point in points],
         [point.d33_uncertainty_pc_per_n for point in points],
     )

@@ -76,7 +76,10 @@ class SensorHistory(BaseModel):
 
     sensor: str = Field(description="Its id.")
     points: list[Point] = Field(description="By time.")
-    trend: TrendAnswer | None = Field(description="Null for fewer than three points, or points of one time.")
+    trend: TrendAnswer | None = Field(description="Null where `no_trend` says why.")
+    no_trend: str | None = Field(
+        description="Why there is none: fewer than three points, one timed by its arrival, or less than a day in all."
+    )
 
 
 class LeftOutCampaign(BaseModel):

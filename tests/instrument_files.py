@@ -41,16 +41,22 @@ def hdf5(campaign_document: dict[str, Any]) -> bytes:
     return buffer.getvalue()
 
 
-def tdms(segments: int) -> bytes:
+def tdms(segments: int, **stamps: dict[str, Any]) -> bytes:
+    """The file; `stamps` are properties more, of `root`, `group` and `channel`."""
     buffer = io.BytesIO()
-    properties = {"wf_increment": 0.001, "wf_start_offset": 0.0}
+    properties = {"wf_increment": 0.001, "wf_start_offset": 0.0, **stamps.get("channel", {})}
     for start in range(segments):
         part = slice(start * len(FORCE) // segments, (start + 1) * len(FORCE) // segments)
         with TdmsWriter(buffer) as writer:
             force = ChannelObject("run", "force", FORCE[part] * 1000, {**properties, "unit_string": "mN"})
             amplifier = ChannelObject("run", "amplifier", -CHARGE[part] * 0.01, properties)
             writer.write_segment(
-                [RootObject({"operator": "me"}), GroupObject("run", {"preload": 1.0}), force, amplifier]
+                [
+                    RootObject({"operator": "me", **stamps.get("root", {})}),
+                    GroupObject("run", {"preload": 1.0, **stamps.get("group", {})}),
+                    force,
+                    amplifier,
+                ]
             )
     return buffer.getvalue()
 

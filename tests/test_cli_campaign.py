@@ -114,7 +114,13 @@ def test_a_campaign_that_tells_nothing_says_why(palm: Campaign, tmp_path: Path) 
     (tmp_path / "hard.json").write_text(json.dumps(document))
     answer = run("d33", str(tmp_path / "hard.json"))
     assert answer.returncode == 2
-    assert "no d33: recordings = 'palm': must hold one within the table's domain" in answer.stdout
+    assert "no d33: none of the 36 recordings can be used: recording r0: F = 500 N" in answer.stdout
+    for recording in document["recordings"]:
+        recording["preload_n"] = -1
+    (tmp_path / "refused.json").write_text(json.dumps(document))
+    refused = run("d33", str(tmp_path / "refused.json")).stdout.splitlines()
+    assert refused[1] == f"no d33: none of the {len(document['recordings'])} recordings can be used"
+    assert refused[2].startswith("left out: recording r0: preload_n = -1")
 
 
 def test_instrument_files_need_a_rig_and_tell_the_modulus(tmp_path: Path) -> None:

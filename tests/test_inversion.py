@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,8 +10,9 @@ import numpy as np
 import pytest
 
 from tests.simulated_campaign import LARGEST_SCATTER_MM, Rig, simulate
+from underskin import hertz
 from underskin.errors import InvalidInput
-from underskin.inversion import Inversion, invert
+from underskin.inversion import Inversion, NoD33, invert
 from underskin.mixed_model import Estimate
 from underskin.recordings.campaign import Campaign, FrfRecording, parse
 from underskin.surrogate import SigmaTable, load_table
@@ -152,8 +154,64 @@ def test_a_contact_outside_the_table_is_left_out_and_said_so(table: SigmaTable) 
     assert 0 < outside.sum() < len(outside)
     assert len(found.left_out) == outside.sum()
     assert np.isnan(found.recordings.d33[outside]).all()
-    with pytest.raises(InvalidInput, match="domain"):
-        invert(replace(campaign, skin=replace(campaign.skin, poisson_ratio=0.4)), table)
+    assert all(re.search(r"L = (\S+) exceeds 0.1: at most 1.44 N with this sphere$", line) for line in found.left_out)
+
+
+def refusal(campaign: Campaign, table: SigmaTable) -> str:
+    with pytest.raises(NoD33) as refused:
+        invert(campaign, table)
+    assert (refused.value.field, refused.value.value) == ("recordings", campaign.name)
+    return str(refused.value)
+
+
+def test_a_campaign_of_which_nothing_can_be_used_says_what_exceeds_what(table: SigmaTable) -> None:
+    rig = Rig(d33=np.array([14.0]), indenters_mm=(4.0,), modulus_mpa=16.0, thickness_mm=2.5, preloads_n=(1.0, 2.0))
+    campaign = simulate(table, rig, np.random.default_rng(7))
+    hard = moved(moved(campaign, 0, preload_n=1000.0), 1, preload_n=50.0)
+    said = refusal(hard, table)
+    assert said.startswith(
+        "none of the 2 recordings can be used: recording r0: F = 1000 N, R = 4 mm, E = 16 MPa, L = 3.9"
+    )
+    assert "L = 3.91 exceeds 0.1: at most 25.6 N with this sphere; is preload_n in mN?; recording r1: F = 50 N" in said
+    assert said.endswith("L = 0.195 exceeds 0.1: at most 25.6 N with this sphere")
+    compressible = replace(campaign, skin=replace(campaign.skin, poisson_ratio=0.4))
+    assert refusal(compressible, table).endswith(
+        "Poisson's ratio = 0.4: the table is of incompressible elastomer, 0.5; and 1 more"
+    )
+    thin = replace(campaign, skin=replace(campaign.skin, thickness_mm=0.05, sensor_radius_mm=0.1))
+    limit = re.search(r"a/h = \S+ exceeds 3: at most (\S+) N", refusal(thin, table))
+    assert limit is not None
+    assert hertz.contact_radius(float(limit[1]), 4e-3, 16e6) == pytest.approx(3 * 0.05e-3, rel=0.01)
+    wide = replace(campaign, skin=replace(campaign.skin, thickness_mm=1.0, sensor_radius_mm=4.0))
+    assert "rT/h = 4 exceeds 3" in refusal(wide, table)
+
+
+def test_a_recording_without_a_line_in_the_band_is_told_apart(table: SigmaTable) -> None:
+    campaign = simulate(table, Rig(d33=np.array([14.0])), np.random.default_rng(7))
+    first = campaign.recordings[0]
+    assert isinstance(first, FrfRecording)
+    assert first.frequency_hz is not None
+    found = invert(moved(campaign, 0, frequency_hz=first.frequency_hz + 5000), table, (1.0, 100.0))
+    assert found.left_out == ("recording r0: it has no line in the band",)
+
+
+@pytest.mark.parametrize(
+    ("factor", "asks"),
+    [
+        (1000.0, "was mV/pC meant, not mV/nC"),
+        (1e-3, "was mV/nC meant, not mV/pC"),
+        (-1.0, "is the sign of charge or force"),
+    ],
+)
+def test_a_slip_that_the_whole_array_shows_is_a_finding(table: SigmaTable, factor: float, asks: str) -> None:
+    campaign = simulate(table, Rig(d33=np.full(3, 14.0)), np.random.default_rng(7))
+    assert invert(campaign, table).findings == ()
+    slipped = campaign
+    for row in range(len(campaign.recordings)):
+        slipped = scaled(slipped, row, factor)
+    (finding,) = invert(slipped, table).findings
+    assert asks in finding
+    assert f"{14 * factor:.2g}"[:3] in finding
 
 
 def moved(campaign: Campaign, row: int, **changes: object) -> Campaign:
@@ -222,7 +280,7 @@ def test_a_sensor_of_few_recordings_is_flagged_as_a_whole(table: SigmaTable) -> 
 @pytest.mark.parametrize("factor", [0.0, 1e-300, 1e200])
 def test_a_campaign_without_a_charge_that_can_be_is_refused(table: SigmaTable, factor: float) -> None:
     campaign = simulate(table, Rig(d33=np.array([14.0]), preloads_n=(1.0,)), np.random.default_rng(16))
-    with pytest.raises(InvalidInput, match=r"recordings = .*(charge|below 1 C/N)"):
+    with pytest.raises(InvalidInput, match=r"no charge in any|below 1 C/N"):
         invert(scaled(scaled(campaign, 0, factor), 1, factor), table)
 
 
@@ -295,3 +353,23 @@ def test_concealed_campaigns_with_nothing_missing(table: SigmaTable) -> None:
         assert found.campaign_d33 is not None
         assert found.campaign_d33.value * 1e12 == pytest.approx(truth[name]["d33_pc_per_n"], rel=0.03)
         assert covered(found.campaign_d33, np.array(truth[name]["d33_pc_per_n"]))
+
+
+def test_a_force_whose_mean_contradicts_the_preload_is_a_finding(table: SigmaTable) -> None:
+    random = np.random.default_rng(18)
+    campaign = simulate(table, Rig(d33=np.array([14.0]), preloads_n=(1.0,)), random)
+
+    def as_series(recording: FrfRecording, mean: float) -> FrfRecording:
+        assert recording.frf_re_pc_per_n is not None
+        shaken = 0.03 * random.normal(size=4000)
+        charge = recording.frf_re_pc_per_n[0] * shaken + 1e-3 * random.normal(size=4000)
+        return replace(
+            recording, frequency_hz=None, frf_re_pc_per_n=None, frf_im_pc_per_n=None, coherence=None,
+            sample_rate_hz=500.0, force_n=mean + shaken, charge_pc=charge,
+        )  # fmt: skip
+
+    recorded = [item for item in campaign.recordings if isinstance(item, FrfRecording)]
+    for means, accused in (((1.0, 0.0), []), ((0.05, 2.5), []), ((4.0, 0.2), ["r0", "r1"]), ((1.0, -1000.0), ["r1"])):
+        series = tuple(as_series(item, mean) for item, mean in zip(recorded, means, strict=True))
+        found = invert(replace(campaign, recordings=series), table).findings
+        assert [line.split(":")[0].split()[1] for line in found if "but preload_n is 1" in line] == accused

@@ -1,6 +1,7 @@
 """Every format on a small file written here, by the format's own writer where there is one."""
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,9 @@ from underskin.recordings import json_file, read_contents, read_file
 from underskin.recordings.campaign import parse, to_dict
 from underskin.recordings.channels import Contents
 from underskin.recordings.rig_description import RigDescription
+
+MAY, JUNE = np.datetime64("2024-05-03T10:00:00"), np.datetime64("2024-06-03T10:00:00.500000")
+UNSET = np.datetime64("1904-01-01T00:00:00")
 
 
 def the_time_series(data: bytes, name: str, rig: RigDescription, rate: float = 1000.0) -> list[str]:
@@ -138,6 +142,50 @@ def test_an_interrupted_tdms_acquisition_is_read_up_to_the_last_whole_segment(lo
     assert str(len(cut) - last) in found.warnings[0]
     with pytest.raises(FileError, match="before its first segment was whole"):
         read_contents(tdms(1)[:-1], "run.tdms")
+
+
+@pytest.mark.parametrize(
+    ("stamps", "says"),
+    [
+        ({"channel": {"wf_start_time": JUNE}, "root": {"DateTime": MAY}}, "2024-06-03T10:00:00.500000Z"),
+        ({"channel": {"wf_start_time": UNSET}, "group": {"DateTime": MAY}}, "2024-05-03T10:00:00Z"),
+        ({"group": {"DateTime": JUNE}, "root": {"DateTime": MAY}}, "2024-06-03T10:00:00.500000Z"),
+        ({"root": {"DateTime": MAY}}, "2024-05-03T10:00:00Z"),
+        ({"root": {"DateTime": UNSET}}, None),
+        ({"root": {"DateTime": "in May"}}, None),
+    ],
+)
+def test_a_tdms_file_says_when_it_was_recorded(stamps: dict[str, Any], says: str | None) -> None:
+    (recording,) = read_file(tdms(1, **stamps), "run.tdms", rig()).campaign.recordings
+    assert recording.recorded_at == says
+
+
+def test_the_rigs_time_goes_before_the_files() -> None:
+    described = rig()
+    told = replace(described, recording={**described.recording, "recorded_at": "2020-01-01"})
+    (recording,) = read_file(tdms(1, root={"DateTime": MAY}), "run.tdms", told).campaign.recordings
+    assert recording.recorded_at == "2020-01-01"
+
+
+@pytest.mark.parametrize(
+    ("of_file", "of_segment", "says"),
+    [
+        ("Date|2024/05/03\nTime|10:00:00.3725000620117\n", "", "2024-05-03T10:00:00.372500"),
+        (
+            "Date|2024/05/03\nTime|10:00:00\n",
+            "Date|2024/06/03|2024/06/03\nTime|09:00:00,5|09:00:00,5\n",
+            "2024-06-03T09:00:00.500000",
+        ),
+        ("Date|1903/12/31\nTime|18:00:00\n", "", None),
+        ("Date|in May\nTime|10:00:00\n", "", None),
+        ("Time|10 o'clock\n", "", None),
+    ],
+)
+def test_an_lvm_file_says_when_it_was_recorded(of_file: str, of_segment: str, says: str | None) -> None:
+    text = lvm().replace("X_Columns", f"{of_file}X_Columns".replace("|", "\t"))
+    text = text.replace("Channels", f"{of_segment}Channels".replace("|", "\t"))
+    first, second = read_file(text.encode(), "run.lvm", rig()).campaign.recordings
+    assert (first.recorded_at, second.recorded_at) == (says, says)
 
 
 def test_lvm() -> None:

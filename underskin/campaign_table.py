@@ -53,7 +53,10 @@ class Told:
         if isinstance(self.found, Inversion):
             notes += [f"look at: {finding}" for finding in self.found.findings]
         elif not self.moduli:
-            notes.append(f"no d33: {self.found}")
+            refused = len(self.reading.problems)
+            all_refused = refused and not self.reading.campaign.recordings
+            why = f"none of the {refused} recordings can be used" if all_refused else self.found
+            notes.append(f"no d33: {why}")
         for problem in self.reading.problems:
             said = InvalidInput(problem.field, problem.value, problem.allowed)
             notes.append(f"left out: recording {problem.recording}: {said}")

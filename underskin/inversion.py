@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin import mixed_model
+from underskin import inversion_findings, mixed_model, unusable_row
 from underskin.errors import InvalidInput
 from underskin.mixed_model import Estimate, MixedModel, Rows
 from underskin.offset import PositionedSigma, positioned_sigma
@@ -25,10 +25,19 @@ from underskin.sensor_flags import Flag, standing_out, unfit
 from underskin.skin import Indenter, Skin
 from underskin.stray_recordings import strays
 from underskin.surrogate import SigmaTable
-from underskin.units import Floats, findings, to_lab, to_si
+from underskin.units import Floats, to_lab, to_si
+from underskin.unusable_row import usable
 
-_LEAST_CHARGE, _MOST_CHARGE = 1e-24, 1.0  # FRF [C/N] that can be a measured one
+_LEAST_CHARGE = 1e-24  # FRF [C/N] that can be a measured one
+_MOST_REASONS = 3  # told where no recording can be used
 _MODULUS_UNSURE, _THICKNESS_UNSURE = 0.02, 0.01  # PHYSICS, section 8: what a declared value may be off by
+
+
+class NoD33(InvalidInput):
+    """A campaign of which no d33 can be told; as text it is the reason."""
+
+    def __str__(self) -> str:
+        return self.allowed
 
 
 @dataclass(frozen=True)
@@ -83,26 +92,30 @@ class Inversion:
 def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] | None = None) -> Inversion:
     """The d33 of a campaign's `frf` recordings, over its flat zone or the band given.
 
-    Raises InvalidInput where the campaign has no frf recording, none within the table's domain, none in the band, or
-    none with any charge.
+    Raises InvalidInput where no line lies in that band; NoD33 where the campaign has no frf recording, none within the
+    table's domain, none with a line in the flat zone, or none with any charge.
     """
     recorded = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
     if not recorded:
-        raise InvalidInput("recordings", campaign.name, "must hold at least one recording of kind frf")
+        raise NoD33("recordings", campaign.name, "there is no recording of kind frf in it")
     measured, recorded, refused = _measured(recorded)
     if not recorded:
-        raise InvalidInput("recordings", campaign.name, f"must hold one whose FRF can be estimated; {refused[0]}")
+        raise _none_usable(campaign, refused)
     frfs = stacked(measured)
     zone = flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
     contact = _Contact.of(campaign, recorded, table)
-    inside = contact.felt.inside & np.isfinite(contact.positioned.sigma) & (np.hypot(level, noise) < _MOST_CHARGE)
+    inside = usable(level, noise, contact.positioned.sigma, contact.felt)
+    reasons = unusable_row.reasons(recorded, campaign.skin, contact.felt, level, table)
+    refused += [
+        f"recording {item.id}: {reason}"
+        for item, reason, good in zip(recorded, reasons, inside, strict=True)
+        if not good
+    ]
     if not inside.any():
-        raise InvalidInput(
-            "recordings", campaign.name, "must hold one within the table's domain and the band, below 1 C/N"
-        )
+        raise _none_usable(campaign, refused)
     if np.abs(level[inside]).max() < _LEAST_CHARGE:
-        raise InvalidInput("recordings", campaign.name, "must hold one that shows charge: there is none in any")
+        raise NoD33("recordings", campaign.name, "there is no charge in any recording")
     seen = gain(contact.positioned.sigma, contact.felt.rt_over_h)
     d33, uncertainty = level / seen, noise / np.abs(seen)
     ids = tuple(dict.fromkeys(item.sensor for item in recorded))
@@ -122,18 +135,20 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
         inside=inside,
     )
     found = _estimated(ids, rows, contact, zone)
-    return replace(found, left_out=(*refused, *found.left_out), findings=_findings(recorded, measured, level))
+    looked_at = inversion_findings.in_words(recorded, measured, level, found.campaign_d33)
+    return replace(found, left_out=(*refused, *found.left_out), findings=looked_at)
 
 
-def _findings(recorded: Sequence[FrfRecording], measured: Sequence[Frf], level: Floats) -> tuple[str, ...]:
-    """In words, what is wrong with time series, and a level that looks like a slip of units."""
-    defects = [
-        f"recording {item.id}: {defect.statement}"
-        for item, frf in zip(recorded, measured, strict=True)
-        for defect in frf.found
-    ]
-    typical = to_lab("frf_pc_per_n", np.nanmedian(np.abs(level)))
-    return (*defects, *(f"FRF, median of the recordings: {one.statement}" for one in findings("frf_pc_per_n", typical)))
+def _none_usable(campaign: Campaign, refused: Sequence[str]) -> NoD33:
+    """Of a campaign whose recordings are all refused, each with the reason: the first reasons that differ."""
+    different = list({line.partition(": ")[2]: line for line in reversed(refused)}.values())[::-1]
+    more = (
+        f"; and {len(refused) - len(different[:_MOST_REASONS])} more"
+        if len(refused) > len(different[:_MOST_REASONS])
+        else ""
+    )
+    said = "; ".join(different[:_MOST_REASONS])
+    return NoD33("recordings", campaign.name, f"none of the {len(refused)} recordings can be used: {said}{more}")
 
 
 def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfRecording], list[str]]:
@@ -260,10 +275,6 @@ def _cells(rows: RecordingD33, good: NDArray[np.intp]) -> tuple[NDArray[np.intp]
 def _left_out(
     ids: tuple[str, ...], rows: RecordingD33, stray: NDArray[np.intp], misfits: dict[int, tuple[str, str]]
 ) -> tuple[str, ...]:
-    outside = [
-        f"recording {rows.ids[row]}: its contact is outside the table's domain, or it has no line in the band"
-        for row in np.flatnonzero(~rows.inside)
-    ]
     d33 = to_lab("d33_pc_per_n", rows.d33)
     off = [f"recording {rows.ids[row]}: its d33 of {d33[row]:.3g} pC/N is grossly off all others" for row in stray]
-    return (*outside, *off, *(f"sensor {ids[number]}: {reason}" for number, (_, reason) in misfits.items()))
+    return (*off, *(f"sensor {ids[number]}: {reason}" for number, (_, reason) in misfits.items()))

@@ -85,8 +85,29 @@ def test_a_sensor_that_ages_shows_and_the_others_do_not(server: Server) -> None:
         "s2": False,
     }
     aged = sensors["s1"]
+    assert aged["no_trend"] is None
     first = aged["points"][0]["d33_pc_per_n"]
     assert aged["trend"]["slope_pc_per_n_per_year"] == pytest.approx(-0.08 * first, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("times", "why"),
+    [
+        (("2017-05-03T09:00:00", "2017-06-03T09:00:00"), "needs 3 campaigns, and there are 2"),
+        (("2017-05-03T09:00:00", "2017-06-03T09:00:00", None), "1 of 3 points are timed by arrival"),
+        (("2017-05-03T09:00:00", "2017-05-03T12:00:00", "2017-05-04T08:59:00"), "less than a day"),
+    ],
+)
+def test_no_trend_is_told_from_times_that_tell_none(server: Server, times: tuple[str | None, ...], why: str) -> None:
+    for number, time in enumerate(times):
+        document = campaign(f"{number}")
+        for recording in document["recordings"]:
+            recording.pop("recorded_at", None)
+            recording |= {} if time is None else {"recorded_at": time}
+        assert server.http.post("/v1/campaigns?skin=palm", json=document).status_code == 201
+    for sensor in history(server, "palm")["sensors"]:
+        assert sensor["trend"] is None
+        assert why in sensor["no_trend"]
 
 
 def test_figures_say_what_they_leave_out(server: Server) -> None:

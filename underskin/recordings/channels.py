@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from underskin.units import Floats
 
 Values = Floats | NDArray[np.complex128]
+FIRST_YEAR = 1970  # LabVIEW writes an unset clock as the beginning of 1904
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,11 +24,13 @@ class Channel:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Channels acquired together; `sample_rate_hz` where they are evenly sampled in time."""
+    """Channels acquired together; `sample_rate_hz` where they are evenly sampled in time, `recorded_at` where the file
+    says when the acquisition began (ISO 8601)."""
 
     name: str
     channels: tuple[Channel, ...]
     sample_rate_hz: float | None = None
+    recorded_at: str | None = None
 
     def channel(self, name: str) -> Channel | None:
         """The channel of that name, or None."""

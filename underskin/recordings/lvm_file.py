@@ -5,15 +5,17 @@ many. Comments at the ends of rows are left out. Source of the format: "Specific
 (.lvm)", National Instruments.
 """
 
+import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from datetime import datetime
 from typing import BinaryIO
 
 import numpy as np
 
 from underskin.errors import FileError
 from underskin.recordings import text
-from underskin.recordings.channels import Block, Channel, Contents, with_distinct_names
+from underskin.recordings.channels import FIRST_YEAR, Block, Channel, Contents, with_distinct_names
 
 MAGIC = "LabVIEW Measurement"
 _END_OF_HEADER = "***End_of_Header***"
@@ -45,9 +47,7 @@ def read(stream: BinaryIO, file: str) -> Contents:
     warnings: list[str] = []
     reader = _Reader(file, header, separator, warnings)
     blocks = [block for segment in segments for block in reader.blocks(segment)]
-    numbered = tuple(
-        Block(str(number), block.channels, block.sample_rate_hz) for number, block in enumerate(blocks, start=1)
-    )
+    numbered = tuple(replace(block, name=str(number)) for number, block in enumerate(blocks, start=1))
     return Contents(numbered, dict(header), tuple(warnings))
 
 
@@ -87,6 +87,7 @@ class _Reader:
         self.file = file
         self.separator = separator
         self.decimal = header.get("Decimal_Separator")
+        self.began = _moment(header.get("Date", ""), header.get("Time", ""))
         self.x_columns = header.get("X_Columns", "One")
         self.warnings = warnings
 
@@ -151,8 +152,9 @@ class _Reader:
             raise FileError(self.file, f"line {segment.rows[0][0]}", reason)
         if run and length % run:
             self.warnings.append(f"the last acquisition was interrupted after {length % run} of {run} samples")
+        began = _moment(_entry(segment, "Date", 0), _entry(segment, "Time", 0)) or self.began
         return [
-            Block("", tuple(Channel(c.name, c.unit, c.values[start : start + run]) for c in channels), rate)
+            Block("", tuple(Channel(c.name, c.unit, c.values[start : start + run]) for c in channels), rate, began)
             for start in range(0, length, run or 1)
         ]
 
@@ -160,3 +162,15 @@ class _Reader:
 def _entry(segment: _Segment, name: str, channel: int) -> str:
     entries = segment.header.get(name, [])
     return entries[channel] if channel < len(entries) else ""
+
+
+def _moment(date: str, time: str) -> str | None:
+    """A header's Date (year/month/day) and Time, without a zone as it is written; None where they are none."""
+    found = re.match(r"(\d\d:\d\d:\d\d)(?:[.,](\d{1,6}))?", time)
+    if found is None:
+        return None
+    try:
+        moment = datetime.fromisoformat(f"{date.replace('/', '-')}T{found[1]}.{(found[2] or '').ljust(6, '0')}")
+    except ValueError:
+        return None
+    return moment.isoformat() if moment.year >= FIRST_YEAR else None

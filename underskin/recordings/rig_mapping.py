@@ -39,7 +39,10 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> tuple[dict[str,
         label = _label(stem, _printable(block.name) or str(number)) if len(blocks) > 1 else stem
         stated = _stated(contents, block)
         common = {name: _common(name, value, stated, file) for name, value in rig.recording.items()}
-        recordings.append({"id": label, "kind": rig.kind, **common, **_Mapped(rig, block, file, warnings).fields()})
+        began = {} if block.recorded_at is None else {"recorded_at": block.recorded_at}
+        recordings.append(
+            {"id": label, "kind": rig.kind, **began, **common, **_Mapped(rig, block, file, warnings).fields()}
+        )
     document = {"schema": SCHEMA, "name": stem, "skin": rig.skin, "recordings": recordings}
     return {**document, "units_checked": rig.units_checked}, list(dict.fromkeys(warnings))
 

@@ -51,7 +51,7 @@ def parse_apart(name: str, stream: BinaryIO, file: str, limits: Limits = _DEFAUL
     if "document" in told:
         return dict(told["document"])
     blocks = [
-        Block(block["name"], tuple(Channel(**channel) for channel in block["channels"]), block["sample_rate_hz"])
+        Block(**{**block, "channels": tuple(Channel(**channel) for channel in block["channels"])})
         for block in told["blocks"]
     ]
     return Contents(tuple(blocks), told["properties"], tuple(told["warnings"]))

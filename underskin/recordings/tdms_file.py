@@ -7,13 +7,15 @@ one without length, or shorter than it says: what comes before is read, with a w
 import io
 import struct
 from collections.abc import Mapping
+from datetime import UTC, datetime, timedelta
 from typing import Any, BinaryIO
 
 import numpy as np
 from nptdms import TdmsChannel, TdmsFile, TdmsGroup
+from nptdms.timestamp import TdmsTimestamp
 
 from underskin.errors import FileError
-from underskin.recordings.channels import Block, Channel, Contents, as_values, with_distinct_names
+from underskin.recordings.channels import FIRST_YEAR, Block, Channel, Contents, as_values, with_distinct_names
 
 MAGIC = b"TDSm"
 _LEAD_IN = 28
@@ -26,7 +28,7 @@ def read(stream: BinaryIO, file: str) -> Contents:
     stream.seek(0)
     try:
         tdms = TdmsFile.read(io.BytesIO(stream.read(whole)), raw_timestamps=True)
-        blocks = tuple(_block(group, file) for group in tdms.groups())
+        blocks = tuple(_block(group, tdms.properties, file) for group in tdms.groups())
     except (MemoryError, FileError):
         raise
     except Exception as error:  # npTDMS lets any exception of a damaged file through
@@ -62,12 +64,26 @@ def _whole_segments(stream: BinaryIO, file: str) -> tuple[int, list[str]]:
     ]
 
 
-def _block(group: TdmsGroup, file: str) -> Block:
+def _block(group: TdmsGroup, about_file: Mapping[str, Any], file: str) -> Block:
     channels = [channel for channel in group.channels() if _is_numeric(channel)]
     steps = {channel.properties.get("wf_increment") for channel in channels} - {None, 0}
     step = steps.pop() if len(steps) == 1 else None
     rate = 1 / step if isinstance(step, float) and step > 0 else None
-    return Block(group.name, with_distinct_names([_channel(channel, file) for channel in channels]), rate)
+    starts = [channel.properties.get("wf_start_time") for channel in channels]
+    moments = [_moment(given) for given in (*starts, group.properties.get("DateTime"), about_file.get("DateTime"))]
+    began = next((moment for moment in moments if moment is not None), None)
+    return Block(group.name, with_distinct_names([_channel(channel, file) for channel in channels]), rate, began)
+
+
+def _moment(given: Any) -> str | None:
+    """A time stamp, which TDMS keeps in UTC; None where it is none, or of a clock that was not set."""
+    if not isinstance(given, TdmsTimestamp):
+        return None
+    try:
+        moment = datetime(1904, 1, 1, tzinfo=UTC) + timedelta(seconds=given.seconds + given.second_fractions / 2**64)
+    except OverflowError:
+        return None
+    return moment.isoformat().replace("+00:00", "Z") if moment.year >= FIRST_YEAR else None
 
 
 def _is_numeric(channel: TdmsChannel) -> bool:
