@@ -91,6 +91,9 @@ def _rig(store: Database, uploads: Sequence[Upload], terms: Terms) -> RigDescrip
                     return parse_rig(file.read(LARGEST_BYTES + 1), upload.label or RIG)
             except FileError as error:
                 raise InvalidInput(RIG, upload.label, f"{error.place}: {error.reason}".lstrip(": ")) from None
+            except InvalidInput as error:
+                label = f"{upload.label}: " if upload.label else f"{RIG}."
+                raise InvalidInput(f"{label}{error.field}", error.value, error.allowed) from None
     if terms.skin is None:
         return None
     with store.reading() as connection:

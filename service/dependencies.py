@@ -39,7 +39,10 @@ def authorised(scopes: SecurityScopes, request: Request) -> None:
     """Refuses a key of too narrow a scope; that there is a key, where one is needed, was checked before."""
     key: Key | None = request.scope["key"]
     if key is not None and "write" in scopes.scopes and key.scope != "write":
-        raise Refusal(403, f"Key {key.name!r} has scope read; this needs a key of scope write.")
+        raise Refusal(
+            403,
+            f"Key {key.name!r} has scope read; this needs one of scope write: underskin key create NAME --scope write",
+        )
 
 
 # A body up to this size is answered on the event loop (a few ms at most); a larger one in a thread, a few at a time.

@@ -140,6 +140,9 @@ def test_instrument_files_need_a_rig_and_tell_the_modulus(tmp_path: Path) -> Non
     assert "Compression (mm)" in without.stderr
     nowhere = run("d33", str(tmp_path / "block.csv"), "--rig", str(tmp_path / "none.yaml"))
     assert (nowhere.returncode, "none.yaml: cannot be opened" in nowhere.stderr) == (2, True)
+    rig.write_text(text.replace("rig/1", "rig/9"))
+    wrong = run("d33", str(tmp_path / "block.csv"), "--rig", str(rig))
+    assert (wrong.returncode, wrong.stderr) == (2, f"underskin: {rig}: schema = 'rig/9': must be rig/1\n")
 
 
 def test_d33_and_modulus_of_one_campaign(palm: Campaign, tmp_path: Path) -> None:

@@ -151,5 +151,8 @@ def test_other_universal_files() -> None:
     frequency, density = contents.blocks[0].channels
     assert (frequency.unit, len(density.values)) == ("Hz", 3201)
     assert frequency.values == pytest.approx(np.arange(3201.0))
-    with pytest.raises(FileError, match=r"no part holds the rig's channels force, amplifier; it has .*Pressure|Mic|Hz"):
+    with pytest.raises(
+        FileError,
+        match=r"no part holds all of the rig's channels: force, amplifier is missing; it has .*Pressure|Mic|Hz",
+    ):
         read_file(spectrum, spectrum.name, rig())

@@ -111,7 +111,10 @@ def test_what_is_no_rig_description_is_refused(text: str, message: str) -> None:
             {"channel": "amplifier", "unit": "V", "sensitivity": 1, "sensitivity_unit": "A/pC"},
             "is not of the sensitivity's",
         ),
-        ({"channel": "charge", "unit": "pC"}, r"no part holds .*force, charge; it has force \[mN\], amplifier \[\?\]"),
+        (
+            {"channel": "charge", "unit": "pC"},
+            r"no part holds all .*: charge is missing; it has force \[mN\], amplifier \[\?\]",
+        ),
     ],
 )
 def test_a_channel_that_does_not_fit_is_refused(channel: dict[str, Any], message: str) -> None:

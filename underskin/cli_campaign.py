@@ -134,6 +134,8 @@ def _described(rig: Path) -> "RigDescription":
 
     try:
         return rig_description.parse(rig.read_bytes(), str(rig))
+    except InvalidInput as error:
+        raise UnderskinError(f"{rig}: {error}") from error
     except OSError as error:
         raise UnderskinError(f"{rig}: cannot be opened: {error.strerror}") from error
 

@@ -62,6 +62,8 @@ def export_skin(
     key: Key = None,
 ) -> None:
     """Write all that the service keeps of a skin into one HDF5 file, for `underskin import` elsewhere."""
+    if not file.parent.is_dir():
+        raise UnderskinError(f"{file}: the folder {file.parent} does not exist")
     from rich.console import Console
     from rich.progress import DownloadColumn, Progress, TextColumn
 
@@ -92,7 +94,7 @@ def _sent(client: "Client", files: Sequence[Path], terms: Mapping[str, Any]) -> 
     except OSError as error:
         place = f"{error.filename} " if len(files) > 1 else ""
         return [(False, f"{place}cannot be opened: {error.strerror}")]
-    return [line for result in results for line in _told(result)]
+    return [line for result in results for line in _told(client, result)]
 
 
 def _is_export(file: Path) -> bool:
@@ -108,7 +110,7 @@ def _is_export(file: Path) -> bool:
         return bool(source.attrs.get("schema") == SCHEMA)
 
 
-def _told(result: dict[str, Any]) -> list[tuple[bool, str]]:
+def _told(client: "Client", result: dict[str, Any]) -> list[tuple[bool, str]]:
     kept = [entry for entry in result["recordings"] if entry["status"] == "ok"]
     lines = [(False, f"{error['field']} = {error['value']!r}: {error['allowed']}") for error in result["errors"]]
     lines += [
@@ -119,5 +121,30 @@ def _told(result: dict[str, Any]) -> list[tuple[bool, str]]:
     lines += [(True, note) for note in result["notes"]]
     if result["status"] == "ok":
         count = f"{len(kept)} recording{'s' if len(kept) != 1 else ''}"
-        lines.insert(0, (True, f"campaign {result['id']} of skin {result['skin_id']}, {count}"))
+        figures, remarks = _figures(client, result["id"])
+        lines.insert(0, (True, f"campaign {result['id']} of skin {result['skin_id']}, {count}: {figures}"))
+        lines += [(True, remark) for remark in remarks]
     return lines
+
+
+def _figures(client: "Client", campaign_id: str) -> tuple[str, list[str]]:
+    """What a campaign tells, in short, and a line each for what looks wrong and what its figures do without."""
+    try:
+        answer = client.campaigns.d33(campaign_id)
+    except UnderskinError as error:  # the campaign is kept all the same
+        return f"no d33: {error}", []
+    moduli = [
+        f"E {one['youngs_modulus_mpa']:.4g} ± {one['youngs_modulus_uncertainty_mpa']:.2g} MPa"
+        for one in answer["moduli"]
+    ]
+    array = answer["array"]
+    if array is not None:
+        d33 = f"d33 {array['d33_pc_per_n']:.3g} ± {array['d33_uncertainty_pc_per_n']:.2g} pC/N"
+    else:
+        d33 = f"no d33: {answer['reason'] or 'every sensor stands out'}"
+    told = moduli if moduli and answer["status"] == "none" else [d33, *moduli]
+    remarks = [f"look at: {finding}" for finding in answer["findings"]]
+    for left in answer["left_out"]:
+        of = "" if left["recording"] is None else f"recording {left['recording']}: "
+        remarks.append(f"left out: {of}{left['reason']}")
+    return ", ".join(told), remarks

@@ -1,5 +1,6 @@
 """Requests to the service, and their errors as ours."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -7,17 +8,27 @@ from typing import Any
 import httpx
 import orjson
 
-from underskin.errors import ServiceError, Unreachable
+from underskin.errors import InvalidInput, ServiceError, Unreachable
 
 
 class Session:
-    """The service at `base_url`; every request raises ServiceError (refused or failed) or Unreachable (no answer)."""
+    """The service at `base_url`; every request raises ServiceError (refused or failed) or Unreachable (no answer).
+
+    Raises InvalidInput for an address or a key that cannot be one.
+    """
 
     def __init__(self, base_url: str, api_key: str | None, timeout: float) -> None:
+        if not re.match(r"https?://[^/]", base_url):
+            raise InvalidInput("url", base_url, "must begin with http:// or https:// and a host")
         headers = {"Accept": "application/json"}
         if api_key is not None:
+            if not api_key.isascii() or not api_key.isprintable():
+                raise InvalidInput("api_key", "…", "must be of ASCII letters, as `underskin key create` prints it")
             headers["Authorization"] = f"Bearer {api_key}"
-        self.http = httpx.Client(base_url=base_url, headers=headers, timeout=timeout)
+        try:
+            self.http = httpx.Client(base_url=base_url, headers=headers, timeout=timeout)
+        except httpx.InvalidURL as error:
+            raise InvalidInput("url", base_url, f"must be an address: {error}") from None
 
     def json(self, method: str, path: str, **options: Any) -> dict[str, Any]:
         """The JSON object of the answer; `options` as httpx has them."""

@@ -1,5 +1,6 @@
 """The Python client and the command line, on all that the store does."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -70,12 +71,14 @@ def test_the_commands_import_and_export(server: Server, tmp_path: Path) -> None:
     bad.write_text("{")
     there = ["--url", str(server.http.base_url)]
     done = server.place.command("import", str(good), "--skin", "palm", *there)
-    assert (done.returncode, "6 recordings" in done.stderr + done.stdout) == (0, True), done.stderr
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"6 recordings: d33 1\d\.\d ± [\d.]+ pC/N$", done.stdout.strip())
     done = server.place.command("import", str(mixed), str(bad), str(good), "--skin", "palm", *there)
     assert done.returncode == 2
     told = done.stdout + done.stderr
     assert "preload_n = -1" in told
     assert "bad.json" in told
+    assert done.stdout.count(" ± ") == 2
     assert len(server.http.get("/v1/campaigns?skin=palm").json()["campaigns"]) == 3
     file = tmp_path / "palm.h5"
     done = server.place.command("export", "palm", str(file), *there)
@@ -86,3 +89,43 @@ def test_the_commands_import_and_export(server: Server, tmp_path: Path) -> None:
         done = server.place.command("import", str(file), "--url", str(elsewhere.http.base_url))
         assert done.returncode == 0, done.stderr
         assert len(elsewhere.http.get("/v1/campaigns?skin=palm").json()["campaigns"]) == 3
+
+
+def test_import_tells_what_the_files_are_worth(server: Server, tmp_path: Path) -> None:
+    hard, odd = campaign("hard"), campaign("odd")
+    for recording in hard["recordings"]:
+        recording["preload_n"] = 500
+    for recording in odd["recordings"]:
+        recording["frf_re_pc_per_n"] = [-value for value in recording["frf_re_pc_per_n"]]
+    odd["recordings"][0]["preload_n"] = 500
+    for document in (hard, odd):
+        (tmp_path / f"{document['name']}.json").write_bytes(orjson.dumps(document))
+    files = [str(tmp_path / name) for name in ("hard.json", "odd.json")]
+    done = server.place.command("import", *files, "--url", str(server.http.base_url))
+    lines = done.stdout.splitlines()
+    assert done.returncode == 0, done.stderr
+    assert "6 recordings: no d33: none of the 6 recordings can be used: recording " in lines[0]
+    assert "6 recordings: d33 -13." in lines[1]
+    assert "look at: d33 of the array is negative" in lines[2]
+    assert "left out: recording " in lines[3]
+    assert "exceeds 0.1" in lines[3]
+
+
+def test_wrong_usage_is_one_line(server: Server, tmp_path: Path) -> None:
+    there = ["--url", str(server.http.base_url)]
+    for arguments, says in (
+        (["export", "palm", str(tmp_path / "none" / "palm.h5"), *there], "none does not exist"),
+        (
+            ["export", "palm", str(tmp_path / "palm.h5"), *there, "--key", "schlüssel"],
+            "api_key = '…': must be of ASCII",
+        ),
+        (
+            ["export", "palm", str(tmp_path / "palm.h5"), "--url", "lab:8000"],
+            "url = 'lab:8000': must begin with http://",
+        ),
+        (["export", "palm", str(tmp_path / "palm.h5"), "--url", ""], "must begin with http://"),
+        (["export", "palm", str(tmp_path / "palm.h5"), "--url", "http://a:b"], "url = 'http://a:b'"),
+    ):
+        done = server.place.command(*arguments)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+        assert says in done.stderr

@@ -27,8 +27,12 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> tuple[dict[str,
     mapped = [entry.channel for entry in rig.channels.values()]
     blocks = [block for block in contents.blocks if all(block.channel(name) for name in mapped)]
     if not blocks:
+        nearest = max(
+            contents.blocks, key=lambda block: sum(map(bool, map(block.channel, mapped))), default=Block("", ())
+        )
+        missing = ", ".join(name for name in mapped if not nearest.channel(name))
         raise FileError(
-            file, "", f"no part holds the rig's channels {', '.join(mapped)}; it has {contents.described()}"
+            file, "", f"no part holds all of the rig's channels: {missing} is missing; it has {contents.described()}"
         )
     warnings = list(contents.warnings)
     if len(blocks) < len(contents.blocks):
