@@ -58,8 +58,8 @@ class Terms:
         return answers.Request(self.sender or "", self.idempotency_key, digest)
 
 
-def accept(store: Database, uploads: Sequence[Upload], terms: Terms) -> dict[str, Any]:
-    """Keep what is good; the answer is a CampaignResult, or a BatchResult for a form or a list.
+def accept(store: Database, uploads: Sequence[Upload], terms: Terms) -> tuple[dict[str, Any], bool]:
+    """Keep what is good; the answer is a CampaignResult, or a BatchResult for a form or a list; True: it is repeated.
 
     Raises Refusal where nothing is kept.
     """
@@ -68,18 +68,18 @@ def accept(store: Database, uploads: Sequence[Upload], terms: Terms) -> dict[str
         with store.reading() as connection:
             before = answers.replayed(connection, request)
         if before is not None:
-            return dict(before)
+            return dict(before), True
     rig = _rig(store, uploads, terms)
     arrived = _arrived(uploads, rig, terms)
     _require_keepable(arrived, terms)
     with store.writing() as connection:
         if request is not None and not answers.claim(connection, request):
-            return dict(answers.replayed(connection, request) or {})
+            return dict(answers.replayed(connection, request) or {}), True
         results = [_kept(connection, found, terms, rig) for found in arrived]
         answer = {"campaigns": results} if uploads[0].in_form or arrived[0].in_list else results[0]
         if request is not None:
             answers.keep(connection, request, answer)
-    return answer
+    return answer, False
 
 
 def _rig(store: Database, uploads: Sequence[Upload], terms: Terms) -> RigDescription | None:

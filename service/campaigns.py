@@ -126,9 +126,10 @@ async def post(
     sender = None if key is None else key.name
     terms = Terms(skin, corrects, reason, all_or_nothing, together, idempotency_key, sender, settings.max_body_bytes)
     async with received(request, request.app.state.uploads) as uploads, _heavy:
-        answer = await run_in_threadpool(accept, store, uploads, terms)
+        answer, repeats = await run_in_threadpool(accept, store, uploads, terms)
         await run_in_threadpool(inverting.derive, store, table, _ids(answer))
-    return Response(orjson.dumps(answer), status_code=201, media_type="application/json")
+    headers = {"Idempotency-Replayed": "true"} if repeats else {}
+    return Response(orjson.dumps(answer), status_code=201, headers=headers, media_type="application/json")
 
 
 def _ids(answer: dict[str, Any]) -> list[str]:

@@ -62,6 +62,8 @@ class Campaigns:
     ) -> list[Document]:
         """Send files as instruments write them; one entry a campaign. `rig` describes their channels.
 
+        `repeated` of an entry says whether it was kept before, under the same `idempotency_key`.
+
         `together` is the name of the one campaign that they are joined into, such as a file a press.
         """
         if not files:
@@ -73,7 +75,9 @@ class Campaigns:
             with ExitStack() as opened:
                 named = [("file", Path(file)) for file in files] + ([] if rig is None else [("rig", Path(rig))])
                 parts = [(name, (path.name, opened.enter_context(path.open("rb")))) for name, path in named]
-                return self._session.json("POST", "/v1/campaigns", **query, headers=headers, files=parts)
+                answer, told = self._session.answered("POST", "/v1/campaigns", **query, headers=headers, files=parts)
+            repeated = "Idempotency-Replayed" in told
+            return {"campaigns": [{**entry, "repeated": repeated} for entry in answer["campaigns"]]}
 
         return list(self._again(send)["campaigns"])
 

@@ -1,5 +1,6 @@
 """The commands that send campaigns to the service and fetch skins from it: import and export."""
 
+import hashlib
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -88,13 +89,24 @@ def _sent(client: "Client", files: Sequence[Path], terms: Mapping[str, Any]) -> 
         if terms["together"] is None and _is_export(files[0]):
             brought = client.skins.load(files[0])
             return [(True, f"skin {brought['skin_id']}: {brought['kept']} campaigns, {brought['present']} were there")]
-        results = client.campaigns.post_files(files, **terms)
+        results = client.campaigns.post_files(files, **terms, idempotency_key=_content_key(files, terms))
     except UnderskinError as error:
         return [(False, str(error))]
     except OSError as error:
         place = f"{error.filename} " if len(files) > 1 else ""
         return [(False, f"{place}cannot be opened: {error.strerror}")]
     return [line for result in results for line in _told(client, result)]
+
+
+def _content_key(files: Sequence[Path], terms: Mapping[str, Any]) -> str:
+    """The same for the same files, by name and content, on the same terms: what is imported twice is kept once."""
+    sent = [*files] if terms["rig"] is None else [*files, terms["rig"]]
+    digests = []
+    for file in sent:
+        with file.open("rb") as opened:
+            digests.append((file.name, hashlib.file_digest(opened, "sha256").hexdigest()))
+    told = [terms["skin"], terms["all_or_nothing"], terms["together"], terms["rig"] is None]
+    return f"content {hashlib.sha256(repr([told, digests]).encode()).hexdigest()}"
 
 
 def _is_export(file: Path) -> bool:
@@ -122,7 +134,8 @@ def _told(client: "Client", result: dict[str, Any]) -> list[tuple[bool, str]]:
     if result["status"] == "ok":
         count = f"{len(kept)} recording{'s' if len(kept) != 1 else ''}"
         figures, remarks = _figures(client, result["id"])
-        lines.insert(0, (True, f"campaign {result['id']} of skin {result['skin_id']}, {count}: {figures}"))
+        before = ", was there" if result["repeated"] else ""
+        lines.insert(0, (True, f"campaign {result['id']} of skin {result['skin_id']}{before}, {count}: {figures}"))
         lines += [(True, remark) for remark in remarks]
     return lines
 

@@ -32,12 +32,16 @@ class Session:
 
     def json(self, method: str, path: str, **options: Any) -> dict[str, Any]:
         """The JSON object of the answer; `options` as httpx has them."""
+        return self.answered(method, path, **options)[0]
+
+    def answered(self, method: str, path: str, **options: Any) -> tuple[dict[str, Any], httpx.Headers]:
+        """The JSON object of the answer, and its headers."""
         with self._reaching():
             response = self.http.request(method, path, **options)
         document = _document(response)
         if document is None or not response.is_success:
             raise ServiceError(response.status_code, document or _foreign(response))
-        return document
+        return document, response.headers
 
     @contextmanager
     def stream(self, method: str, path: str, **options: Any) -> Iterator[httpx.Response]:

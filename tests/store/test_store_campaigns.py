@@ -102,6 +102,7 @@ def test_a_form_is_recognised_although_its_boundary_differs(server: Server) -> N
     file = {"file": ("a.json", orjson.dumps(campaign("form")))}
     answers = [server.http.post("/v1/campaigns", files=file, headers={"Idempotency-Key": "f"}) for _ in range(2)]
     assert answers[0].json() == answers[1].json()
+    assert [answer.headers.get("Idempotency-Replayed") for answer in answers] == [None, "true"]
     assert len(listed(server)) == 1
 
 

@@ -79,7 +79,11 @@ def test_the_commands_import_and_export(server: Server, tmp_path: Path) -> None:
     assert "preload_n = -1" in told
     assert "bad.json" in told
     assert done.stdout.count(" ± ") == 2
-    assert len(server.http.get("/v1/campaigns?skin=palm").json()["campaigns"]) == 3
+    assert done.stdout.count("of skin palm, was there, 6 recordings") == 1
+    assert len(server.http.get("/v1/campaigns?skin=palm").json()["campaigns"]) == 2
+    done = server.place.command("import", str(good), *there)
+    assert "was there" not in done.stdout
+    assert done.returncode == 0
     file = tmp_path / "palm.h5"
     done = server.place.command("export", "palm", str(file), *there)
     assert done.returncode == 0, done.stderr
@@ -88,7 +92,7 @@ def test_the_commands_import_and_export(server: Server, tmp_path: Path) -> None:
     with running(other) as elsewhere:
         done = server.place.command("import", str(file), "--url", str(elsewhere.http.base_url))
         assert done.returncode == 0, done.stderr
-        assert len(elsewhere.http.get("/v1/campaigns?skin=palm").json()["campaigns"]) == 3
+        assert len(elsewhere.http.get("/v1/campaigns?skin=palm").json()["campaigns"]) == 2
 
 
 def test_import_tells_what_the_files_are_worth(server: Server, tmp_path: Path) -> None:
