@@ -62,7 +62,7 @@ def test_a_bad_rig_description_says_where(server: Server) -> None:
     bad = RIG.replace("kind: indentation", "kind: bending")
     answer = server.http.post("/v1/campaigns", files=[("rig", ("r.yaml", bad)), ("file", ("cut.csv", CSV))])
     assert answer.status_code == 422
-    assert answer.json()["errors"][0]["field"] == "kind"
+    assert answer.json()["errors"][0]["field"] == "r.yaml: kind"
 
 
 def test_limits_hold_as_the_upload_streams(place: Place) -> None:

@@ -30,14 +30,17 @@ def small_disk() -> Iterator[Path]:
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])
-def cramped(request: pytest.FixtureRequest, small_disk: Path, tmp_path: Path) -> Place:
+def cramped(request: pytest.FixtureRequest, small_disk: Path, tmp_path: Path) -> Iterator[Place]:
     """A store with little room: its data folder, or its database's tablespace."""
     if request.param == "sqlite":
-        return Place(small_disk)
+        yield Place(small_disk)
+        return
     cluster: postgres.Cluster = request.getfixturevalue("cluster")
     shutil.chown(small_disk, postgres.USER, postgres.USER)
     (tmp_path / "data").mkdir()
-    return Place(tmp_path / "data", cluster.new_database(tablespace=small_disk))
+    url = cluster.new_database(tablespace=small_disk)
+    yield Place(tmp_path / "data", url)
+    cluster.drop(url)
 
 
 def test_a_full_disk_refuses_and_keeps_what_it_acknowledged(cramped: Place) -> None:

@@ -149,8 +149,7 @@ def test_d33_shows_what_looks_wrong_and_the_elastomers_modulus(server: Server) -
     blocks = [{**block, "id": "block"}, {**block, "id": "idle", "force_n": [0.0] * 30}]
     document["recordings"] += blocks
     found = server.http.get(f"/v1/campaigns/{sent(server, document)}/d33").json()
-    (finding,) = found["findings"]
-    assert "was it given in C/N?" in finding
+    assert sum("was it given in C/N?" in finding for finding in found["findings"]) == 1
     (modulus,) = found["moduli"]
     assert (modulus["recording"], modulus["kind"]) == ("block", "compression")
     assert modulus["youngs_modulus_mpa"] == pytest.approx(16)
