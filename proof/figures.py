@@ -48,7 +48,8 @@ def _calibration(axes: Axes, judged: Sequence[Judged]) -> None:
     found = calibration([entry.probability for entry in judged], [entry.right for entry in judged])
     middle, value = np.array(found.stated), np.array(found.right)
     axes.plot([0, 1], [0, 1], "k:", linewidth=0.8)
-    axes.errorbar(middle, value, [value - np.array(found.low), np.array(found.high) - value], fmt="o", capsize=3)
+    reach = np.maximum([value - np.array(found.low), np.array(found.high) - value], 0)  # rounding aside, they are
+    axes.errorbar(middle, value, reach, fmt="o", capsize=3)
     for x, y, count in zip(middle, value, found.count, strict=True):
         axes.annotate(str(count), (x, y), textcoords="offset points", xytext=(5, -11), fontsize=7)
     axes.set(title="calibration, ten equal bins", xlabel="stated probability", ylabel="share that was right")

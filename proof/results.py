@@ -13,6 +13,7 @@ from underskin.errors import InvalidInput
 
 Tell = Callable[[str], None]
 Part = Callable[[Work, Tell], dict[str, Any]]
+_JUDGE = "proof/judge.py"
 SEALED = Path(__file__).parent / "sealed"
 
 
@@ -85,7 +86,7 @@ PARTS: dict[str, Part] = {
 
 def work_out(name: str, work: Work, tell: Tell) -> None:
     """Work one part out and keep it."""
-    result = {"sources": sources("underskin"), **PARTS[name](work, tell)}
+    result = {"sources": sources("underskin"), "judged_by": sources(_JUDGE), **PARTS[name](work, tell)}
     work.folder.mkdir(parents=True, exist_ok=True)
     unfinished = work.folder / f".{name}.json.part"
     unfinished.write_text(json.dumps(result, ensure_ascii=False), encoding="utf-8")
@@ -93,10 +94,11 @@ def work_out(name: str, work: Work, tell: Tell) -> None:
 
 
 def kept_parts(work: Work) -> dict[str, dict[str, Any]]:
-    """Every part that has been worked out."""
-    return {
+    """Every part that has been worked out and judged as it is judged now."""
+    found = {
         name: json.loads(_path(name, work).read_text(encoding="utf-8")) for name in PARTS if _path(name, work).exists()
     }
+    return {name: part for name, part in found.items() if part["judged_by"] == sources(_JUDGE)}
 
 
 def _path(name: str, work: Work) -> Path:

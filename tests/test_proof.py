@@ -2,7 +2,7 @@
 
 import json
 import os
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from proof import own_rig, riddle
+from proof import figures, own_rig, riddle
 from proof.cases import DrawnCase, FileCase
 from proof.commands import prove
 from proof.ideal import diagnosed
@@ -85,6 +85,12 @@ def test_wilson_interval_against_its_known_values() -> None:
     assert share([False] * 10).interval == pytest.approx((0.0, 0.2775), abs=1e-4)
     low, high = share([True] * 5 + [False] * 5).interval
     assert low + high == pytest.approx(1.0)
+
+
+def test_a_tool_that_is_always_right_can_be_drawn(tmp_path: Path) -> None:
+    alike = Judged("c", ("a",), ("a",), False, "explained", 0.7, True, True, 9.0, None)
+    judged = [replace(alike, probability=0.7 + 0.01 * number) for number in range(30)]
+    assert figures.calibration_and_size(judged, tmp_path / "all.svg").stat().st_size > 1000
 
 
 def test_a_calibrated_tool_lies_inside_the_range_of_chance_and_a_boaster_outside() -> None:
@@ -178,8 +184,8 @@ def test_a_small_run_writes_the_page_and_goes_on_from_what_it_kept(tmp_path: Pat
     assert first.exit_code == 0, first.output
     page = (tmp_path / "docs/proof.md").read_text(encoding="utf-8")
     assert "2 of 300 campaigns" in page
-    figures = sorted(file.name for file in (tmp_path / "docs/figures").iterdir())
-    assert figures == ["proof-calibration.svg", "proof-confusion.svg"]
+    drawings = sorted(file.name for file in (tmp_path / "docs/figures").iterdir())
+    assert drawings == ["proof-calibration.svg", "proof-confusion.svg"]
     reports = {file: file.stat().st_mtime_ns for file in (tmp_path / "work/reports").iterdir()}
     assert len(reports) == 2
     assert CliRunner().invoke(command, ["mixture", *options]).exit_code == 0
