@@ -268,3 +268,15 @@ def test_a_wide_uniform_map_reaches_the_base_whole() -> None:
     found = answer(TABLE, read_request(request))
     middle = [i for i, sensor in enumerate(sensors) if 12 < sensor["x_mm"] < 23 and 6 < sensor["y_mm"] < 12]
     assert found.columns["mean_stress_mpa"][middle] == pytest.approx(0.01, rel=0.03)
+
+
+def test_idle_maps_and_impossible_contacts(http: httpx.Client) -> None:
+    """A frame without pressure gives no charge; contacts wider than their sphere and costly maps are refused."""
+    idle = {"x_mm": [0, 1], "y_mm": [0, 1], "pressure_mpa": [[0, 0], [0, 0]]}
+    found = posted(http, {**SKIN, "pressure_map": idle})
+    assert (found["status"], found["charge_pc"]) == (["ok"] * 5, [0.0] * 5)
+    refused = http.post("/v1/stress", json=document({**PRESS, "normal_force_n": 100.0}, youngs_modulus_mpa=0.05))
+    assert (refused.status_code, "must press less" in refused.text) == (422, True)
+    coarse = {"x_mm": [0, 1e4], "y_mm": [0, 1e4], "pressure_mpa": [[1, 0], [0, 0]]}
+    refused = http.post("/v1/stress", json={**SKIN, "pressure_map": coarse})
+    assert (refused.status_code, "points" in refused.text) == (422, True)

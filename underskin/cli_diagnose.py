@@ -147,9 +147,9 @@ def _one(file: Path, output_dir: Path, html: bool) -> _Outcome:
 
     try:
         reading = read_file(file, file.name)
+        found = with_refused(work_out(reading.campaign, load_table()), reading.problems)
     except UnderskinError as error:
         return _Outcome(str(file), f"{file}: {' '.join(str(error).split())}")
-    found = with_refused(work_out(reading.campaign, load_table()), reading.problems)
     document = report(found)
     write_report(document, output_dir / f"{file.stem}.json")
     if html:

@@ -75,7 +75,8 @@ class Influence:
         near = np.array([near for _, near in found]).reshape(len(sensors), len(places))
         inside_error = near @ (normal * self.normal_error + tangential * self.tangential_error)
         beyond_error = ~near @ (normal * self.normal_beyond + tangential * self.tangential_beyond)
-        return SensorStress(-scale * stress, scale * (inside_error + beyond_error), np.asarray(near.any(axis=1)))
+        within = near.any(axis=1) | (len(places) == 0)  # no load at all is known to do nothing
+        return SensorStress(-scale * stress, scale * (inside_error + beyond_error), np.asarray(within))
 
     def _on_one(self, sensor: Floats, places: Floats, forces: Floats) -> tuple[float, NDArray[np.bool_]]:
         """Σ F3 γ_n − F_outward γ_t over the forces within reach, and which ones these are."""

@@ -72,6 +72,12 @@ def pressure_map_load(x: Floats, y: Floats, pressure: Floats, thickness: float) 
     return Load(places.reshape(-1, 2), forces)
 
 
+def map_points(x: Floats, y: Floats, pressure: Floats, thickness: float) -> int:
+    """How many point forces `pressure_map_load` makes of a map."""
+    width, height = (_rule_of((axis[1] - axis[0]) / thickness) for axis in (x, y))
+    return int(np.count_nonzero(pressure)) * width[0] * width[1] * height[0] * height[1]
+
+
 def together(loads: Sequence[Load]) -> Load:
     """Several loads as one."""
     return Load(np.concatenate([load.places for load in loads]), np.concatenate([load.forces for load in loads]))
@@ -87,10 +93,15 @@ def array_stress(influence: Influence, thickness: float, sensors: Floats, load: 
     return influence.stress(thickness, sensors, load.places, load.forces)
 
 
+def _rule_of(size: float) -> tuple[int, int]:
+    """Points in each part of a cell of `size` thicknesses, and how many parts."""
+    points = 1 if size <= _FINE_CELL else 2 if size <= _MIDDLING_CELL else 3
+    return points, max(1, int(np.ceil(size / _SUBCELL)))
+
+
 def _cell_rule(size: float) -> tuple[Floats, Floats]:
     """Places in a cell, −1/2 to 1/2, and their shares, for a cell of `size` thicknesses."""
-    points = 1 if size <= _FINE_CELL else 2 if size <= _MIDDLING_CELL else 3
-    parts = max(1, int(np.ceil(size / _SUBCELL)))
+    points, parts = _rule_of(size)
     node, weight = np.polynomial.legendre.leggauss(points)
     start = (np.arange(parts) - parts / 2) / parts
     places = (start[:, None] + (1 + node) / 2 / parts).ravel()

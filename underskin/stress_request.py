@@ -20,11 +20,12 @@ from underskin.layer import slip
 from underskin.recordings import fields as field
 from underskin.recordings.campaign import Sensors
 from underskin.recordings.fields import shown
-from underskin.stress import Contact, Load, array_stress, charge, contact_load, pressure_map_load, together
+from underskin.stress import Contact, Load, array_stress, charge, contact_load, map_points, pressure_map_load, together
 from underskin.units import Floats, checked, to_lab, to_si
 
 MOST_CONTACTS = 1000
 MOST_PAIRS = 50_000_000  # of a sensor and a point force: about ten seconds
+_WIDEST = 12.0  # thicknesses; no sensor is influenced from further away
 _EVEN = 1e-6  # of a cell, how evenly the map's places must be spaced
 
 
@@ -141,9 +142,7 @@ def answer(table: InfluenceTable, request: StressRequest) -> StressAnswer:
     )
     sensors = to_si("x_mm", [[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
     load = _contacts_load(request, thickness) if request.contacts else _map_load(request, thickness)
-    if len(sensors) * len(load.places) > MOST_PAIRS:
-        allowed = f"sensors times points of the load must be at most {MOST_PAIRS}: send fewer, or coarser, at a time"
-        raise InvalidInput("sensors", f"{len(sensors)} sensors, {len(load.places)} points", allowed)
+    _refuse_many(request, len(load.places))
     glue = np.inf if request.glue_stiffness is None else request.glue_stiffness
     influence = table.at(radius / thickness, request.poisson_ratio, slip(glue))
     unknown = np.full(len(sensors), np.nan)
@@ -177,6 +176,7 @@ def _contacts_load(request: StressRequest, thickness: float) -> Load:
     places = np.array([[contact.x, contact.y] for contact in contacts])
     _refuse_beside_skin(request, "contacts", places)
     radii = np.array([contact.radius(modulus, request.poisson_ratio) for contact in contacts])
+    _refuse_wide(request, radii, thickness)
     _refuse_overlap(places, radii)
     return together([contact_load(contact, a, thickness) for contact, a in zip(contacts, radii, strict=True)])
 
@@ -187,7 +187,27 @@ def _map_load(request: StressRequest, thickness: float) -> Load:
     x, y = to_si("x_mm", found.x_mm), to_si("x_mm", found.y_mm)
     row, column = np.nonzero(found.pressure_mpa)
     _refuse_beside_skin(request, "pressure_map", np.stack([x[column], y[row]], axis=-1))
-    return pressure_map_load(x, y, to_si("pressure_mpa", found.pressure_mpa), thickness)
+    pressure = to_si("pressure_mpa", found.pressure_mpa)
+    _refuse_many(request, map_points(x, y, pressure, thickness))
+    return pressure_map_load(x, y, pressure, thickness)
+
+
+def _refuse_many(request: StressRequest, points: int) -> None:
+    if len(request.sensors) * points > MOST_PAIRS:
+        allowed = f"sensors times points of the load must be at most {MOST_PAIRS}: send fewer, or coarser, at a time"
+        raise InvalidInput("sensors", f"{len(request.sensors)} sensors, {points} points", allowed)
+
+
+def _refuse_wide(request: StressRequest, radii: Floats, thickness: float) -> None:
+    """Refuse contacts that Hertz cannot mean: wider than their sphere, or than the skin's influence reaches."""
+    for index, (contact, a) in enumerate(zip(request.contacts, radii, strict=True)):
+        widest = min(float(to_si("x_mm", contact.indenter_radius_mm)), _WIDEST * thickness)
+        if a >= widest:
+            allowed = (
+                f"must press less: the contact's radius by Hertz, {to_lab('x_mm', a):.3g} mm, must be below the "
+                f"sphere's and {_WIDEST:g} thicknesses, {to_lab('x_mm', widest):.3g} mm; is the modulus in MPa?"
+            )
+            raise InvalidInput("contacts", contact.normal_force_n, allowed, index)
 
 
 def _refuse_beside_skin(request: StressRequest, name: str, places: Floats) -> None:

@@ -17,6 +17,7 @@ from underskin.units import Floats
 _NEAR = 4.0  # standard deviations from a bound within which it counts
 _POLISHING, _POLISHED = 4, 0.05  # steps at most, and the gain in log posterior below which it stops
 _LEAST_COVARIANCE_CURVATURE = 0.3  # of logarithms of noise levels: their priors are not wider
+_TRUSTED = 30.0  # gain in log posterior that polishing may leave
 _FLAT = 1e-3  # least standard deviations of the quadratic within a parameter's bounds: keeps H invertible
 
 
@@ -44,7 +45,11 @@ def laplace(fitter: Fitter, at: Evaluated) -> Evidence:
         at = polished
     covariance: Floats = np.linalg.inv(information).astype(np.float64)
     fit = at.point.fit[places]
-    # Towards a bound the gradient stays; elsewhere what polishing left of it is not to be trusted far.
+    # Towards a bound the gradient stays; elsewhere, where polishing left much of it, the fit hangs at a kink, and what
+    # a smooth cost would still gain there is not to be had.
+    free = ~(((fit <= low) & (gradient > 0)) | ((fit >= high) & (gradient < 0)))
+    if 0.5 * gradient[free] @ np.linalg.solve(information[np.ix_(free, free)], gradient[free]) > _TRUSTED:
+        gradient = np.where(free, 0.0, gradient)
     gain = 0.5 * gradient @ covariance @ gradient
     shift = -covariance @ gradient
     mean_part = -at.cost + gain + 0.5 * len(fit) * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(information)[1]

@@ -56,7 +56,7 @@ def _is_universal(head: bytes) -> bool:
 
 def _text_format(head: bytes, file: str) -> str:
     try:
-        start = text.decode(head[: len(head) // 2 * 2], file).lstrip()
+        start = text.decode(head[: len(head) // 2 * 2 or 1], file).lstrip()
     except FileError as error:
         known = "campaign JSON and HDF5, CSV, TDMS, LVM, UFF58 and MATLAB files"
         raise FileError(file, error.place, f"is of no format that is read here: {known}") from None
