@@ -263,6 +263,9 @@ def test_bad_requests_are_named() -> None:
     with pytest.raises(InvalidInput, match="several kinds"):
         compose([], both, table())
     assert compose([], both, table(), "compression").sensor is None
+    for kind in ("indentation", "compression"):
+        with pytest.raises(InvalidInput, match=f"kind = '{kind}': must be that of at least one"):
+            compose([], CAMPAIGNS["frf"], table(), kind)
     with pytest.raises(InvalidInput, match="must be one of"):
         model_of(["gravity"], "frf")
     with pytest.raises(InvalidInput, match="named once"):

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.errors import InvalidInput
 from underskin.mechanisms.catalogue import CATALOGUE
 from underskin.mechanisms.composition import Prediction, check_supported, chosen, kind_of
 from underskin.mechanisms.compression_model import CompressionModel
@@ -47,9 +48,11 @@ def compose(names: Sequence[str], campaign: Campaign, table: SigmaTable, kind: K
     """The model of these mechanisms, by name, in any order, for the campaign's recordings of one kind.
 
     `kind` must be given where the campaign has several. Raises Unsupported(mechanism, reason) where the campaign
-    cannot support one, InvalidInput for an unknown name.
+    cannot support one, InvalidInput for an unknown name, or a kind of which the campaign has no recording.
     """
     kind = kind or kind_of(campaign)
+    if all(recording.kind != kind for recording in campaign.recordings):
+        raise InvalidInput("kind", kind, "must be that of at least one of the campaign's recordings")
     mechanisms = chosen(names, CATALOGUE)
     check_supported(mechanisms, campaign, kind)
     if kind == "frf":
