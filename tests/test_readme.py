@@ -14,6 +14,7 @@ from tests.conftest import running
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+PYTHON = ".venv/bin/python"
 ADDRESS = "http://127.0.0.1:8000"
 
 
@@ -67,6 +68,7 @@ def newcomer(folder: Path) -> Iterator[Run]:
 
         def run(command: list[str]) -> "subprocess.CompletedProcess[str]":
             live = [part.replace(ADDRESS, server.url).replace("/tmp/", f"{folder}/") for part in command]
+            live = [part.replace(PYTHON, sys.executable) for part in live]  # the last: it may lie in /tmp itself
             return subprocess.run(live, cwd=ROOT, env=environment, capture_output=True, text=True)
 
         yield run
@@ -74,7 +76,7 @@ def newcomer(folder: Path) -> Iterator[Run]:
 
 @pytest.mark.parametrize(("command", "shown"), sessions())
 def test_command_prints_what_the_readme_shows(command: str, shown: str, newcomer: Run, folder: Path) -> None:
-    answer = newcomer(["bash", "-euo", "pipefail", "-c", command.replace(".venv/bin/python", sys.executable)])
+    answer = newcomer(["bash", "-euo", "pipefail", "-c", command])
     assert answer.returncode == 0, answer.stderr
     printed = re.sub(r"\s", "", answer.stdout.replace(f"{folder}/", "/tmp/"))
     assert re.fullmatch(pattern(shown), printed), f"{command}\nprints\n{answer.stdout}"
@@ -84,7 +86,7 @@ def test_command_prints_what_the_readme_shows(command: str, shown: str, newcomer
 def test_python_block_runs_and_prints_what_its_comment_says(block: str, newcomer: Run) -> None:
     """After the commands, which send what the second block asks for."""
     (shown,) = re.findall(r"# prints (.*)", block)
-    answer = newcomer([sys.executable, "-c", block])
+    answer = newcomer([PYTHON, "-c", block])
     assert answer.returncode == 0, answer.stderr
     assert re.fullmatch(pattern(shown), re.sub(r"\s", "", answer.stdout)), answer.stdout
 
