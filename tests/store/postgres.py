@@ -46,11 +46,16 @@ class Cluster:
         self._count = 0
 
     def new_database(self, tablespace: Path | None = None) -> str:
+        """An empty database, its tables in `tablespace`.
+
+        PostgreSQL's own catalogue stays outside: a backend that finds no room for its cache of it refuses to connect.
+        """
         self._count += 1
         name = f"test{self._count}"
+        self.run_sql("postgres", f"CREATE DATABASE {name}")
         if tablespace is not None:
             self.run_sql("postgres", f"CREATE TABLESPACE {name} LOCATION '{tablespace}'")
-        self.run_sql("postgres", f"CREATE DATABASE {name}" + (f" TABLESPACE {name}" if tablespace else ""))
+            self.run_sql("postgres", f"ALTER DATABASE {name} SET default_tablespace = {name}")
         return f"{self._base}/{name}"
 
     def drop(self, url: str) -> None:
