@@ -9,6 +9,7 @@ COPY underskin /app/underskin
 COPY service /app/service
 COPY tablegen /app/tablegen
 COPY rig /app/rig
+COPY proof /app/proof
 COPY tables /app/tables
 RUN /opt/venv/bin/pip install --quiet --no-deps --no-build-isolation -e /app
 # The root is read-only later, so byte code is written now; the packages' own test suites and pip are not needed any more.
@@ -17,6 +18,8 @@ RUN python3 -m compileall -q /app && \
     /opt/venv/bin/pip uninstall --quiet --yes hatchling editables pip
 
 FROM python:3.11-slim-bookworm
+# pg_dump and psql, for backups of a store on PostgreSQL.
+RUN apt-get update -q && apt-get install -qy --no-install-recommends postgresql-client && rm -rf /var/lib/apt/lists/*
 RUN useradd --uid 10001 --user-group --no-create-home --shell /usr/sbin/nologin underskin && \
     install -d -o underskin -g underskin -m 750 /data
 COPY --from=builder /opt/venv /opt/venv
