@@ -5,7 +5,7 @@ The pressure is given by φ on 0 ≤ t ≤ 1 (t in units of the contact radius a
 Its deflection inside the contact, with α = a/h and s = r/a, must be δ − a² s²/(2R):
     ∫₀^s φ(t)/√(s² − t²) dt − α ∫₀^∞ (1 − K(k)) [∫₀¹ φ(t) cos(k α t) dt] J0(k α s) dk = δ − a² s²/(2R).
 Two solutions, for 1 and for s², give every sphere: without adhesion φ(1) = 0, with work of adhesion w
-φ(1) = −√(2 a w E'/π) (Johnson, Kendall and Roberts 1971). Source of the basis: Sneddon 1965; PHYSICS, section 5.
+φ(1) = −√(2 a w E'/π) (Johnson, Kendall and Roberts 1971). Source of the basis: Sneddon 1965.
 """
 
 from dataclasses import dataclass

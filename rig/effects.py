@@ -1,6 +1,6 @@
 """What may be switched on: every effect's law as the rig has it, its parameters and the kinds it acts on.
 
-The first part has the names of the project's catalogue (PHYSICS, section 8), the second is physics that is not in it.
+The first part has the names of the project's catalogue (docs/mechanisms.md), the second is physics that is not in it.
 The laws are the rig's own: physical, not always in the catalogue's parametrisation. Units stand in the names.
 """
 

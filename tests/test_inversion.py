@@ -30,7 +30,7 @@ def table() -> SigmaTable:
 
 
 def drawn(random: np.random.Generator) -> tuple[Rig, float]:
-    """A rig as PHYSICS describes them, and the array's d33 [pC/N] (one sensor: its own)."""
+    """A rig like the paper's, and the array's d33 [pC/N] (one sensor: its own)."""
     count = int(random.choice([1, 2, 4, 9, 16]))
     spread = float(random.choice([0.0, 0.0, 0.0, 0.01, random.uniform(0.05, 0.15)]))
     array = float(random.uniform(8, 30))

@@ -40,7 +40,7 @@ def test_influence_of_a_point_force_equals_the_oracle() -> None:
 
 @NEEDS_ORACLE
 def test_the_moving_edge_increment_is_a_flat_punch() -> None:
-    """σ + (a/3) ∂σ/∂a equals the stress under the flat punch's pressure (PHYSICS, section 6)."""
+    """σ + (a/3) ∂σ/∂a equals the stress under the flat punch's pressure (Johnson 1985, section 3.4)."""
     rho, a, offset, value = linear_layer_values("sigma_edge")
     punch = normal_stress(linear_layer.transmission, punch_transform, a, rho, offset)
     assert punch == pytest.approx(value, abs=3e-8)

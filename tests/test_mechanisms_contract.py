@@ -1,5 +1,6 @@
 """Every mechanism keeps the contract: documented, proper priors, known units, limits, derivatives, honest refusals."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -28,7 +29,7 @@ CAMPAIGNS: dict[Kind, Campaign] = {
     "indentation": indentation_campaign(),
     "compression": compression_campaign(),
 }
-NAMES = (  # PHYSICS, section 8, in order of composition
+NAMES = (  # in order of composition
     "modulus_error",
     "thickness_error",
     "compressible_layer",
@@ -85,7 +86,8 @@ def test_the_catalogue_holds_the_fixed_names_in_order_of_composition() -> None:
 
 
 @pytest.mark.parametrize("mechanism", CATALOGUE.values(), ids=lambda mechanism: mechanism.name)
-def test_it_says_law_assumptions_and_source(mechanism: Mechanism) -> None:
+def test_it_says_what_happens_plainly_then_law_assumptions_and_source(mechanism: Mechanism) -> None:
+    assert re.fullmatch(r"[A-Z][A-Za-z0-9', -]{60,230}\.", mechanism.plain), "one sentence, no formula"
     assert min(map(len, (mechanism.law, mechanism.assumptions))) > 20
     assert len(mechanism.source) > 10
     assert mechanism.axes

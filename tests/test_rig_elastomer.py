@@ -99,7 +99,7 @@ def test_an_adhesive_contact_tears_at_the_force_of_johnson_kendall_and_roberts()
 
 
 def test_the_base_below_a_thin_layer_stiffens_it_as_the_exact_contact_says() -> None:
-    """PHYSICS, section 5: at a/h = 0.3 the force is 1.0197 times Hertz's at that a, δR/a² = 0.7945."""
+    """By the integral equation, at a/h = 0.3 the force is 1.0197 times Hertz's at that a, δR/a² = 0.7945."""
     h, radius = 2.0, 5.0
     description = described("indentation", {"layered_contact": {}}, indenters_mm=[radius], samples=2000)
     description["skin"]["thickness_mm"] = h

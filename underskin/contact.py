@@ -2,7 +2,7 @@
 
 The exact solution behind the curves that serve many contacts at once (contact_curves); lengths in m, forces in N.
 With E' = E/(1 − ν²), α = a/h and U = √(w/(E' h³)) R, the sphere without adhesion and a flat punch whose φ at the edge
-is −√(2awE'/π) add up (PHYSICS, section 5; Johnson, Kendall and Roberts 1971; Dimitriadis et al. 2002):
+is −√(2awE'/π) add up (Johnson, Kendall and Roberts 1971; Dimitriadis et al. 2002):
 
     F = E'h³/R [(4/3) α³ A − U √(8π α³) G],   δ = h²/R [α² B − U √(2πα) V],   k = 2E'a S
 

@@ -1,6 +1,6 @@
 """The frictionless contact of a rigid axisymmetric indenter with the layer: the integral equation, by Legendre modes.
 
-Lengths in units of the thickness, α = a/h (PHYSICS, section 5; Lebedev and Ufliand 1958):
+Lengths in units of the thickness, α = a/h (Lebedev and Ufliand 1958):
 
     (π/2) φ(x) − ∫₀^α φ(t) N(x, t) dt = f(x),   N(x, t) = ∫₀^∞ (1 − K(k)) cos kx cos kt dk,
     p̂(k) = ∫₀^α φ(t) cos kt dt

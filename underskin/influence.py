@@ -1,7 +1,7 @@
 """γ_n and γ_t from the finite-element table, and the mean stress on sensors under any field of surface forces.
 
 For a point force on the surface of the linear layer at the distance r̂ and the azimuth β from a sensor's centre
-(PHYSICS, section 4; stress tension-positive, F3 > 0 presses into the skin, F1 and F2 act on it along +x and +y):
+(Betti's theorem; stress tension-positive, F3 > 0 presses into the skin, F1 and F2 act on it along +x and +y):
     T̄ = −(3/2πh²) [F3 γ_n(r̂/h) − (F1 cos β + F2 sin β) γ_t(r̂/h)]
 The layer is linear, so the stress under many forces is the sum over them.
 """

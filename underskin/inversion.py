@@ -1,5 +1,5 @@
 """d33 of an array from a campaign's FRF recordings: per recording, per sensor × indenter × preload, per sensor, and
-for the campaign (Seminara 2018, section 3.2; PHYSICS, sections 1 and 8).
+for the campaign (Seminara 2018, section 3.2 and equation 15).
 
 Each recording's Re FRF is averaged over the flat zone and divided by (3/2) ρ² σ, σ at the commanded offset; the mixed
 model then says how far the recordings scatter, and so how well each d33 is known. Intervals hold for the skin as
@@ -30,7 +30,7 @@ from underskin.unusable_row import usable
 
 _LEAST_CHARGE = 1e-24  # FRF [C/N] that can be a measured one
 _MOST_REASONS = 3  # told where no recording can be used
-_MODULUS_UNSURE, _THICKNESS_UNSURE = 0.02, 0.01  # PHYSICS, section 8: what a declared value may be off by
+_MODULUS_UNSURE, _THICKNESS_UNSURE = 0.02, 0.01  # what a declared value may be off by
 
 
 class NoD33(InvalidInput):

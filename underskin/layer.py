@@ -3,7 +3,7 @@
 The glue line yields in shear: τ = κ (G/h) u_r at the base; κ = ∞ is bonded, κ = 0 frictionless. It is given here by
 its `slip` = 1/(1 + κ), 0 to 1, in which everything below is a ratio of linear functions, so that both ends are reached.
 
-Derivation (PHYSICS, sections 3 to 5; Sneddon, Fourier Transforms (1951), ch. 10): the transforms u, w of the
+Derivation (Sneddon, Fourier Transforms (1951), ch. 10): the transforms u, w of the
 displacements and S, T of σ_zz, τ_rz obey x' = A x in ζ = k z with (A² − 1)² = 0, so that exp(A ζ) has a closed form,
 and the 4×4 system of two conditions at the base (w = 0, u = (k/κ) T) and two at the surface reduces by hand.
 With C = cosh k, H = sinh k, p = (1 − 2ν)/(2 − 2ν), which is 0 when incompressible, and g = 2k (1 − p)/κ:
@@ -106,7 +106,7 @@ class Layer:
 
 
 def gamma_n(layer: Layer, offset: ArrayLike, rho: ArrayLike) -> Floats:
-    """γ_n(r̂/h, ρ) of a normal point force (PHYSICS, section 4); arrays broadcast."""
+    """γ_n(r̂/h, ρ) of a normal point force; arrays broadcast."""
     return normal_stress(lambda k: layer.transmission(k).value, np.ones_like, 0.0, rho, offset)
 
 

@@ -10,7 +10,7 @@ The interval is that of the mixture: at few sensors or recordings it has the wid
 A large spread of few sensors is what it knows least: of intervals said to hold 95 %, with sensors that differ by 10 %
 (relative standard deviation) 90 % hold the d33 of the population with 4 of them, and 87 % with 2.
 
-Priors: g log-normal, PHYSICS' 1–5 %; t zero, or half-Cauchy (Gelman 2006); p zero in most rigs, or 0.05–0.3 mm.
+Priors: g log-normal, 1–5 %; t zero, or half-Cauchy (Gelman 2006); p zero in most rigs, or 0.05–0.3 mm.
 """
 
 from dataclasses import dataclass

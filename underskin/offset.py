@@ -1,6 +1,6 @@
 """σ beside the sensor's centre, and what a scatter of the sphere's position does to it.
 
-An offset sensor averages the table's bottom profile T3(r; a/h, L) over its disc (PHYSICS, section 2):
+An offset sensor averages the table's bottom profile T3(r; a/h, L) over its disc:
     σ(e) = (1/πρ²) ∫_disc profile(|e + s|) d²s, lengths in units of h.
 """
 

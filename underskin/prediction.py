@@ -1,7 +1,7 @@
 """The skin pressed by a sphere: contact radius, a/h, L, σ, stress on the sensor and FRF; and d33 from a measured FRF.
 
 Columns in SI that broadcast. `model` "paper" is the base model: Hertz radius on a half space, the contact edge still,
-σ of the bonded finite-strain layer from the table (PHYSICS, sections 1, 2 and 6).
+σ of the bonded finite-strain layer from the table (Seminara 2018, equations 7 to 16).
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """σ(a/h, rT/h, L) from the finite-element table: values, derivatives, error and domain.
 
 A cubic spline in a/h, rT/h and L^(1/3) passes through the table's nodes; σ is smooth in L^(1/3), which is
-proportional to the strain (PHYSICS, section 2). Rows outside the domain are NaN, never extrapolated.
+proportional to the strain (a/R, Seminara 2018, equation 16). Rows outside the domain are NaN, never extrapolated.
 """
 
 import math

@@ -78,6 +78,7 @@ def _section(mechanism: Mechanism) -> str:
     where = f"**Recordings:** {', '.join(mechanism.kinds)}. **Shows on:** {', '.join(mechanism.axes)}."
     lines = [
         f"## {mechanism.name}\n",
+        f"{mechanism.plain}\n",
         f"**Law.** {mechanism.law}\n",
         f"**Assumptions.** {mechanism.assumptions}\n",
         f"**Source.** {mechanism.source}\n",

@@ -1,4 +1,4 @@
-"""How probable the recordings are under a model, with the noise of PHYSICS, section 8, marginalised exactly.
+"""How probable the recordings are under a model, with all of its noise marginalised exactly.
 
 Recording i of sensor s, rows j:  y_ij = m_ij (1 + g_i) e^(b_s) + ∂m_ij·δ_i + pickup_ij z_i + n_ij, with
     n ~ N(0, κ² d_ij²) in real and imaginary part, g ~ N(0, s²), δ ~ N(0, p² I), z complex normal, b ~ N(0, τ²).

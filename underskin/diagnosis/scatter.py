@@ -1,6 +1,6 @@
 """What every hypothesis assumes of the noise beside the lines' own, with the same priors.
 
-- gain scatter of a recording, sd of its logarithm: equal density of the logarithm from 1 to 5 % (PHYSICS, section 8),
+- gain scatter of a recording, sd of its logarithm: equal density of the logarithm from 1 to 5 %,
   falling off outside, more slowly downwards: a careful rig is better than 1 %;
 - positioning scatter, in x and y: none in most rigs (0.7), else equal density of the logarithm from 0.05 to 0.3 mm;
 - line noise: its level as estimated from the lines' roughness, times a factor near 1.

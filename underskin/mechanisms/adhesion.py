@@ -1,7 +1,8 @@
-"""The skin sticks to the sphere.
+"""The skin sticks to the sphere, so the contact is wider than the force alone would make it, most of all at low force,
+under large spheres and on soft skins.
 
 Law: Johnson, Kendall and Roberts: on the half space a³ = (3R/4E') [F + 3πwR + √(6πwRF + (3πwR)²)], pressure = Hertz'
-less a flat punch's; on the layer φ(a) = −√(2awE'/π) in PHYSICS, section 5.
+less a flat punch's; on the layer φ(a) = −√(2awE'/π) in the integral equation of layered_contact.
 
 Assumptions: short-ranged adhesion (soft, large contacts: Tabor's number far above 1), equilibrium on the loading branch
 under a given force. FRF = Q(F)/F with the static pressure. An indentation sticks from the first touch to

@@ -1,11 +1,13 @@
-"""The sensor's response falls with the number of load cycles.
+"""The sensors lose strength as the skin is pressed again and again, so recordings after many load cycles are lower than
+those after few.
 
 Law: 1 − r [1 − (1 + N/n0)^(−p)]/(p ln 10): for p → 0 it is 1 − r log10(1 + N/n0), for large p the saturating
 1 − D (1 − e^(−N/n)), with D = r/(p ln 10) and n = n0/p.
 
 Assumptions: all sensors age alike, by the campaign's own count of cycles.
 
-Source: PHYSICS, section 8 (both laws); one family holds them, so that a fit is well posed.
+Source: Jaffe, Cook & Jaffe, Piezoelectric Ceramics (1971), for a loss by the decade; one family holds it and the
+saturating law, so that a fit is well posed.
 """
 
 import numpy as np

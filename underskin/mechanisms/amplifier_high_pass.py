@@ -1,4 +1,5 @@
-"""The charge amplifier forgets a constant charge.
+"""The charge amplifier cannot hold a charge for long, so at the lowest frequencies the response drops and runs ahead of
+the force, alike in all recordings.
 
 Law: FRF · iωτ/(1 + iωτ), τ = 1/(2π corner).
 

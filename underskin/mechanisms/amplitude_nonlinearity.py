@@ -1,4 +1,5 @@
-"""The oscillation is not small against the preload: the charge's first harmonic is not its tangent.
+"""The dynamic force is not small beside the preload, so the contact grows and shrinks markedly within a cycle and
+charge over force depends on how hard the shaker drives.
 
 Law: σ → (1 − m) σ + m · (first harmonic of (F + Fd sin ωt) σ(F + Fd sin ωt))/Fd, with the edge moving and every other
 mechanism inside; tends to moving_contact_edge as Fd/F → 0.
@@ -6,7 +7,8 @@ mechanism inside; tends to moving_contact_edge as Fd/F → 0.
 Assumptions: quasi-static over the cycle; the sphere never leaves the skin (Fd < F); m, the edge's mobility, is the same
 for all recordings.
 
-Source: PHYSICS, sections 6 and 8. The harmonic is (2/π) ∫₋₁¹ Q(F + Fd s) s/√(1 − s²) ds, by Gauss–Chebyshev quadrature.
+Source: Gelb & Vander Velde, Multiple-Input Describing Functions (1968), for the first harmonic of a nonlinear answer.
+It is (2/π) ∫₋₁¹ Q(F + Fd s) s/√(1 − s²) ds, by Gauss–Chebyshev quadrature.
 """
 
 import numpy as np

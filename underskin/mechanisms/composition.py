@@ -14,7 +14,7 @@ from underskin.mechanisms.mechanism import Kind, Mechanism, Parameter, Unsupport
 from underskin.recordings.campaign import Campaign
 from underskin.units import Floats
 
-SENSOR_SPREAD = 0.01  # sd of the logarithms of the sensors' gains, without `sensor_spread` (PHYSICS, section 8)
+SENSOR_SPREAD = 0.01  # sd of the logarithms of the sensors' gains, without `sensor_spread`
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,12 @@
-"""The layer's Poisson ratio is below 0.5.
+"""The skin's material can be squeezed together a little in volume, so it passes the pressure on in another shape, which
+shows beside the sensors and with centred presses looks like another d33.
 
-Law: ν < 0.5 in Hertz' E' = E/(1 − ν²), in the layer's transmission M and in its compliance K (PHYSICS, sections 3, 5).
+Law: ν < 0.5 in Hertz' E' = E/(1 − ν²), in the layer's transmission M and in its compliance K.
 
 Assumptions: isotropic linear elasticity; what finite strain adds is the incompressible table's, entered with
 L (0.75/(1 − ν²))², which keeps q0/E. For a centred contact nearly a pure gain, not to be told from d33.
 
-Source: PHYSICS, sections 2 and 3; Sneddon, Fourier Transforms (1951), chapter 10.
+Source: Sneddon, Fourier Transforms (1951), chapter 10; the closed forms of M and K stand in underskin/layer.py.
 """
 
 from underskin.mechanisms.contact_state import Contacts

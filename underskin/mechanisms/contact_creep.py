@@ -1,4 +1,5 @@
-"""The layer relaxes while the preload is held, and the contact grows.
+"""The skin slowly gives way under the preload, so the contact grows and the response changes with the time for which
+the preload has been held.
 
 Law: E(t) = E (1 − g (1 − e^(−t/τ))), with t the time held; a³ ∝ 1/E(t), L ∝ 1/E(t).
 
@@ -8,7 +9,7 @@ through the contact radius alone, since transmission through a linear layer unde
 Curves: F(t) = u − g ∫ (1 − e^(−(t−s)/τ)) du(s) of the elastic force u(t), exact for a linear material while the contact
 grows; where it shrinks Ting's theory would take the same history up to the moment of equal contact.
 
-Source: Lee & Radok, J. Appl. Mech. 27 (1960) 438; Ting, J. Appl. Mech. 33 (1966) 845; PHYSICS, sections 7 and 8.
+Source: Lee & Radok, J. Appl. Mech. 27 (1960) 438; Ting, J. Appl. Mech. 33 (1966) 845.
 """
 
 from underskin.mechanisms.contact_state import Contacts

@@ -1,4 +1,5 @@
-"""The tip between force cell and skin swings on the contact's spring.
+"""The tip between force cell and skin bounces on the contact as a mass on a spring, so the response swells towards a
+resonance and falls beyond it, at a frequency that moves with preload and sphere.
 
 Law: FRF/(1 − (ω/ω0)² + 2iζω/ω0), ω0² = k/m, k = dF/dδ = 2E'a S(a/h) of the layer at the contact radius in force: the
 resonance moves with preload and indenter as the contact does.
@@ -6,7 +7,8 @@ resonance moves with preload and indenter as the contact does.
 Assumptions: one mass, one damping ratio; damping acts on the tip and is not sensed (a dashpot inside the contact would
 add a numerator 1 + 2iζω/ω0); the edge is held over a cycle; the layer itself has no inertia.
 
-Source: PHYSICS, sections 5 and 8; Johnson, Contact Mechanics (1985), section 5.8 (layers).
+Source: Rabe, Janser & Arnold, Rev. Sci. Instrum. 67 (1996) 3281 (contact resonances); Lebedev & Ufliand, J. Appl. Math.
+Mech. 22 (1958) 442, for the layer's S.
 """
 
 import numpy as np

@@ -1,4 +1,5 @@
-"""A sensor shows part of its neighbours' charge.
+"""Part of the charge of the neighbouring sensors gets into a sensor's own channel, so a press that they feel as well
+reads too high.
 
 Law: charge of a sensor = its own + fraction · Σ own charge of each sensor within 1.2 pitch, pitch being the smallest
 distance between two sensors.
@@ -6,7 +7,7 @@ distance between two sensors.
 Assumptions: the same fraction for all pairs; a neighbour's own charge follows from the same contact at its own offset,
 with the same d33 law (its own gain is taken as 1).
 
-Source: PHYSICS, section 8; capacitive coupling between the leads of an array.
+Source: Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling between leads).
 """
 
 import numpy as np

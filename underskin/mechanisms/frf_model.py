@@ -1,7 +1,7 @@
 """The FRF of a campaign's recordings under a set of mechanisms.
 
 Base model: Hertz' radius on a half space, the contact edge still, σ of the bonded finite-strain layer averaged over the
-sensor's disc at its offset; FRF = d33 · (3/2) ρ² σ (PHYSICS, sections 1, 2 and 6). The stages, in this order:
+sensor's disc at its offset; FRF = d33 · (3/2) ρ² σ (Seminara 2018, equations 7 to 16). The stages, in this order:
 
 declared values → material → contact radius and pressure → position → σ → increment with the load → d33 of each
 sensor under its own stress → neighbours' charge → ageing → dynamics of tip, sensor and electronics, line by line.

@@ -1,4 +1,5 @@
-"""The stage gives under the load.
+"""The stage gives way under the force, so the displacement read off it is larger than the indentation and the sample
+looks too soft, most of all at high force.
 
 Law: measured displacement = indentation + F/k.
 

@@ -1,11 +1,13 @@
-"""The glue line between layer and substrate yields in shear.
+"""The glue under the skin gives way sideways, so the pressure reaches the sensors in another shape, which shows beside
+them and with centred presses looks much like another d33.
 
 Law: τ = κ (G/h) u_r at the base, in place of u_r = 0; it changes the layer's transmission M and its compliance K.
 
-Assumptions: a linear glue line of one stiffness everywhere; κ = ∞ is bonded, κ = 0 frictionless. Needs the linear
-layer of PHYSICS, section 3; what finite strain adds is taken from the bonded table.
+Assumptions: a linear glue line of one stiffness everywhere; κ = ∞ is bonded, κ = 0 frictionless. The layer is the
+linear one; what finite strain adds is taken from the bonded table.
 
-Source: PHYSICS, sections 3 and 8; Goodman, Taylor & Brekke, J. Soil Mech. Found. Div. 94 (1968) 637 (joint stiffness).
+Source: Goodman, Taylor & Brekke, J. Soil Mech. Found. Div. 94 (1968) 637 (joint stiffness); Sneddon, Fourier Transforms
+(1951), chapter 10, for the layer: the closed forms of M and K stand in underskin/layer.py.
 """
 
 from underskin.mechanisms.contact_state import Contacts

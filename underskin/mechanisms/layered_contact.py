@@ -1,7 +1,10 @@
-"""The sphere presses a layer of finite thickness, not a half space.
+"""The hard base under the thin skin holds against the sphere, so the skin feels stiffer and the contact stays smaller
+than on a deep block of the same material, the more so the wider it is.
 
-Law: contact radius and pressure from the integral equation of a rigid sphere on the layer (PHYSICS, section 5), with
-the layer's own ν and glue line; with adhesion where that mechanism is present too.
+Law: contact radius and pressure from the integral equation of a rigid sphere on the layer, (π/2) φ(x) − ∫₀^a φ(t)
+N(x,t) dt = (E'/2)(δ − x²/R), N = ∫₀^∞ (1 − K(ξh)) cos ξx cos ξt dξ, F = 2π ∫₀^a φ dt, φ(a) = 0; K is the surface
+deflection of the layer over the half space's, with its own ν and glue line; with adhesion where that mechanism is
+present too.
 
 Assumptions: linear, frictionless contact; what finite strain adds is the table's at this a and L.
 

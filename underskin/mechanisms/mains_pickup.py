@@ -1,4 +1,5 @@
-"""The mains' field puts charge on the leads.
+"""The mains put charge on the sensors' leads, so lines at the mains' frequency and its multiples are off, the more the
+weaker the dynamic force.
 
 Law: a charge q at the mains' frequency and q/n at its n-th harmonic, each a line of width 1.5 Hz (the analysis
 window's), whatever the dynamic force: an FRF error of q/Fd, complex, its phase independent in each recording. It enters
@@ -7,7 +8,7 @@ the covariance as pickup · pickupᵀ within a recording.
 Assumptions: q is the standard deviation of each component over recordings; 50 or 60 Hz, whichever stands out in the
 campaign's lines; harmonics up to the fifth.
 
-Source: PHYSICS, section 8.
+Source: Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling to leads).
 """
 
 import numpy as np

@@ -1,7 +1,8 @@
 """What a mechanism is: a law that the base model leaves out, its parameters, and where in the model it acts.
 
-A mechanism is one file: its docstring states the law, the assumptions and the source; its class says what it asks of
-a campaign and overrides the hooks of the stages at which it acts. Values inside are SI, parameters are in their units.
+A mechanism is one file: its docstring states what happens in one plain sentence, then the law, the assumptions and the
+source; its class says what it asks of a campaign and overrides the hooks of the stages at which it acts. Values inside
+are SI, parameters are in their units.
 """
 
 from __future__ import annotations
@@ -134,6 +135,11 @@ class Mechanism:
     largest_stretch: ClassVar[float] = 1.0
 
     @property
+    def plain(self) -> str:
+        """What happens and how it shows, in one sentence without a formula."""
+        return " ".join(self._documentation.split("\n\n")[0].split())
+
+    @property
     def law(self) -> str:
         """The equation, in words and symbols."""
         return self._section("Law")
@@ -148,9 +154,12 @@ class Mechanism:
         """Where the law comes from."""
         return self._section("Source")
 
+    @property
+    def _documentation(self) -> str:
+        return getattr(getmodule(type(self)), "__doc__", None) or ""
+
     def _section(self, title: str) -> str:
-        text = getattr(getmodule(type(self)), "__doc__", None) or ""
-        found = re.search(rf"^{title}: (.*?)(?=\n\n|\Z)", text, re.MULTILINE | re.DOTALL)
+        found = re.search(rf"^{title}: (.*?)(?=\n\n|\Z)", self._documentation, re.MULTILINE | re.DOTALL)
         if found is None:
             raise InvalidInput("docstring", type(self).__module__, f"must have a paragraph '{title}: …'")
         return " ".join(found.group(1).split())

@@ -1,11 +1,12 @@
-"""The indenter's axis is not where the stage says.
+"""The sphere does not come down where the stage says but always a little to the same side, so each sensor shows what a
+press at that other place gives.
 
 Law: true position = commanded + a constant offset, for all recordings.
 
 Assumptions: stage and array are shifted against each other, not turned or stretched. Where every press is commanded at
 a sensor's centre the direction cannot be told, and the offset's length alone is a parameter.
 
-Source: PHYSICS, sections 3 and 8: the offset enters as J0(k e/h).
+Source: Sneddon, Fourier Transforms (1951), chapter 10: in the layer's Hankel integral the offset enters as J0(k e/h).
 """
 
 import numpy as np

@@ -1,10 +1,12 @@
-"""The declared Young's modulus is wrong: a parameter, not physics.
+"""The Young's modulus that was declared is not the skin's, a wrong number rather than missing physics, so every contact
+is wider or narrower than computed, which shows the more the wider it is.
 
 Law: E = declared E · factor; it acts through a³ ∝ 1/E and L ∝ 1/E, and on an indentation's or compression's force.
 
 Assumptions: one factor for the whole skin, in all recordings.
 
-Source: PHYSICS, section 8; under force control σ of a linear layer depends on E through the contact radius alone.
+Source: Seminara 2018, equations 7 to 10 and 16: E enters through a and L; under force control a linear layer transmits
+a given pressure alike whatever its modulus.
 """
 
 from underskin.mechanisms.contact_state import Contacts

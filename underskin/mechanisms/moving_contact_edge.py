@@ -1,12 +1,13 @@
-"""The edge of the contact moves with the oscillating force, as far as nothing pins it.
+"""The edge of the contact moves with the dynamic force, so the oscillating part of the pressure sits towards the rim,
+and a wide contact gives less charge than the steady pressure's shape says.
 
 Law: σ → (1 − m) σ + m d(Fσ)/dF at fixed R, with every other mechanism inside the derivative; for the linear Hertz case
 d(Fσ)/dF = σ + (a/3) ∂σ/∂a, the flat punch's σ. FRF = charge over oscillating force.
 
 Assumptions: m, the mobile fraction, is the same for all recordings; oscillations small against the preload.
 
-Source: PHYSICS, section 6; Johnson, Contact Mechanics (1985), section 3.4 (an increment of Hertz' pressure is the flat
-punch's).
+Source: Johnson, Contact Mechanics (1985), section 3.4 (an increment of Hertz' pressure is the flat punch's); Seminara
+2018, equations 12 to 16, holds the edge still.
 """
 
 import numpy as np

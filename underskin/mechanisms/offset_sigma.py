@@ -1,8 +1,8 @@
 """σ of many contacts on one skin at any offset, with derivatives, fast enough for a fit.
 
-The table's bottom profile, averaged over the sensor's disc at its offset (PHYSICS, section 2), is tabulated once as a
+The table's bottom profile, averaged over the sensor's disc at its offset, is tabulated once as a
 cubic spline in a/h, L^(1/3), log(rT/h) and e/h; a contact then is a curve over e/h. To it may be added what a linear
-layer of another transmission or a pressure of another shape puts there, by the Hankel integral (PHYSICS, section 3):
+layer of another transmission or a pressure of another shape puts there, by its Hankel integral (underskin/hankel.py):
 
     σ = linear(p̂, M; a, e) + [table(a, L, e) − table(a, 0, e)].
 

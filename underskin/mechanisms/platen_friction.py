@@ -1,4 +1,5 @@
-"""A compressed cylinder sticks to its platens and looks stiffer.
+"""The plates hold the ends of the compressed cylinder, so that it cannot widen freely and looks too stiff, the more so
+the flatter it is.
 
 Law: nominal stress · (1 + 2 f S²), S = D/4H of the sample as it is now (D ∝ λ^(−1/2), H ∝ λ), f from 0 (slips) to 1
 (sticks fully).

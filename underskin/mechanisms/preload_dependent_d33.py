@@ -1,11 +1,12 @@
-"""d33 changes with the static stress that the preload puts on the sensor.
+"""The preload squeezes the sensor itself and changes how strongly it answers, so d33 comes out different at each
+preload and under each sphere.
 
 Law: d33 = d0 (1 + β T0/(1 + |T0|/Ts)), T0 = 3Fσ/(2πh²) > 0 in compression; linear as Ts → ∞, saturating at 1 + β Ts.
 
 Assumptions: d33(T0) is the tangent coefficient, felt by the small oscillation; T0 is the mean over the sensor, of the
 static σ at its own offset. The same law for all sensors.
 
-Source: PHYSICS, section 8; Seminara 2018, section 3.2 (22 pC/N at 3 N against 14 pC/N at 1 N on the array).
+Source: Seminara 2018, section 3.2 (22 pC/N at 3 N against 14 pC/N at 1 N on the array).
 """
 
 import numpy as np

@@ -1,8 +1,9 @@
 """The stage that turns loads into contacts: radius, and the pressure's shape as a mixture of a sphere's and a punch's.
 
-Four cases (PHYSICS, section 5; Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301): half space or layer, with
-or without adhesion. On the half space with adhesion a³ = 3 R F1/(4E'), F1 = F + 3πwR + √(6πwRF + (3πwR)²), and the
-pressure is Hertz' under F1 less a flat punch's under F1 − F; on the layer both parts are those of contact_curves.
+Four cases (Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301; Lebedev & Ufliand, J. Appl. Math. Mech. 22
+(1958) 442): half space or layer, with or without adhesion. On the half space with adhesion a³ = 3 R F1/(4E'),
+F1 = F + 3πwR + √(6πwRF + (3πwR)²), and the pressure is Hertz' under F1 less a flat punch's under F1 − F; on the
+layer both parts are those of contact_curves.
 """
 
 from dataclasses import dataclass

@@ -1,11 +1,11 @@
-"""The sensor itself relaxes: its d33 falls with frequency and lags.
+"""The sensor's material follows a change only with delay, so the response falls with rising frequency and the charge
+lags behind the force.
 
 Law: (iω/ω_ref)^(−n) · (1 + s/(1 + iω/ω_s)), n ≥ 0, s ≥ 0, ω_ref = 2π · 30 Hz: a power law, a step, or both.
 
 Assumptions: linear, the same for all sensors and preloads; causal, so that real and imaginary part belong together.
 
-Source: PHYSICS, section 8; Jonscher, Dielectric Relaxation in Solids (1983), chapters 3 and 5 (Debye's step, universal
-power law).
+Source: Jonscher, Dielectric Relaxation in Solids (1983), chapters 3 and 5 (Debye's step, universal power law).
 """
 
 import numpy as np

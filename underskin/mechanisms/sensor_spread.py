@@ -1,11 +1,12 @@
-"""Each sensor has its own d33.
+"""The sensors are not alike, so the same press gives each of them a charge that is off by a factor of its own, in all
+of its recordings.
 
 Law: d33 of sensor j = d33 · e^(g_j), g_j normal with the standard deviation `spread`.
 
 Assumptions: the gains are the sensors' own, constant over the campaign; they are marginalised by whoever fits, as a
 random effect along the model's response that a sensor's recordings share. Without this mechanism the spread is 1 %.
 
-Source: PHYSICS, section 8.
+Source: Seminara 2018, section 3.2 (d33 over the sensors of an array); a gain is positive, so its logarithm is normal.
 """
 
 from underskin.mechanisms.composition import SENSOR_SPREAD

@@ -1,4 +1,5 @@
-"""The elastomer stiffens with strain.
+"""The elastomer gets stiffer the more it is deformed, so at high preloads and under small spheres the contact grows
+less, and the force rises more, than a constant modulus would have it.
 
 Law: FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved together.
 Curves: Yeoh's law, nominal stress (E/3)(λ⁻² − λ)(1 + 2 c2 I + 3 c3 I²), I = λ² + 2/λ − 3, λ = 1 − strain; under a

@@ -1,10 +1,11 @@
-"""The declared thickness is wrong: a parameter, not physics.
+"""The thickness that was declared is not the skin's, a wrong number rather than missing physics, so the pressure
+spreads out more or less on its way to the sensors than computed, in every recording.
 
 Law: h = declared h · factor; it acts through a/h, rT/h and e/h: everything.
 
 Assumptions: one factor for the whole skin, in all recordings.
 
-Source: PHYSICS, sections 1 and 8.
+Source: Seminara 2018, equations 15 and 16: h is the unit of every length.
 """
 
 from underskin.mechanisms.contact_state import Contacts

@@ -1,4 +1,5 @@
-"""A delay between the force's and the charge's channel.
+"""Charge and force are not sampled at the same instant, so the phase goes off in proportion to frequency while the size
+of the response stays.
 
 Law: FRF · exp(−iωt0), t0 the delay.
 
