@@ -218,9 +218,30 @@ def test_contacts_beyond_the_table_are_marked_and_continued() -> None:
     assert np.isfinite(answer.value).all()
 
 
-def test_contacts_beside_the_profile_are_marked() -> None:
-    far = frf_recording(position_mm=(19.0, 0.0))
-    assert not compose([], campaign([far]), table()).valid.any()
+def test_contacts_beside_the_profile_are_marked_and_feel_nothing() -> None:
+    beside = campaign([frf_recording(position_mm=(19.0, 0.0)), frf_recording(id="far", position_mm=(25.0, 0.0))])
+    model = compose([], beside, table())
+    assert not model.valid.any()
+    answer = model.predict(fit_of(model))
+    assert not answer.inside.any()
+    assert (answer.value.reshape(2, -1)[1] == 0).all()
+    assert answer.position_slopes is not None
+    assert (answer.position_slopes.reshape(2, 2, -1)[:, 1] == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("misalignment", {"offset_x": 1.9, "offset_y": 0.0}), ("thickness_error", {"thickness_factor": 0.7})],
+)
+def test_what_a_fit_moves_beside_the_profile_is_marked_there(name: str, values: dict[str, float]) -> None:
+    near, far = frf_recording(position_mm=(1.0, 0.0)), frf_recording(id="far", position_mm=(18.3, 0.0))
+    model = compose([name], campaign([near, far]), table())
+    assert model.valid.all()
+    assert model.predict(fit_of(model)).inside.all()
+    answer = model.predict(fit_of(model, **values))
+    assert answer.inside.reshape(2, -1).all(axis=1).tolist() == [True, False]
+    assert (answer.value.reshape(2, -1)[1] == 0).all()
+    assert (answer.value.reshape(2, -1)[0] != 0).all()
 
 
 REFUSALS: list[tuple[str, Campaign, str]] = [

@@ -34,9 +34,10 @@ platen_friction) → relaxation in time (contact_creep).
 
 Where a mechanism leaves the table's ground (ν < 0.5, a yielding glue line, a pressure that is not Hertz') σ is the
 exact linear layer's plus what finite strain adds in the table at the mechanism's own a and L. Contacts beyond the
-table are continued along its tangent and marked: `valid` says which rows are inside as declared, `inside` which are at
-the parameters at hand. Every parameter's fit coordinate is its value, or its logarithm, and all derivatives are exact.
-Beside its own parameters every model of FRFs has the nuisances
+table are continued along its tangent, sensors further than 8 thicknesses from the contact feel nothing, and both are
+marked: `valid` says which rows are inside as declared, `inside` which are at the parameters at hand. Every
+parameter's fit coordinate is its value, or its logarithm, and all derivatives are exact. Beside its own parameters
+every model of FRFs has the nuisances
 
 """
 

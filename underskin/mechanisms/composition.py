@@ -26,7 +26,9 @@ class Prediction:
     position_slopes: Array | None  # (2, rows) ∂value/∂x, ∂value/∂y of the contact's place [1/m] (frf)
     pickup: Floats | None  # (rows,) sd of mains pick-up along a recording's common random complex amplitude [C/N]
     pickup_slopes: Floats | None  # (parameters, rows)
-    inside: NDArray[np.bool_]  # (rows,) False where the contact lies beyond the tables, which were continued there
+    # (rows,) False where the contact lies beyond the tables, which are continued there, or the sensor's disc beyond the
+    # stress profile, behind whose end the value is 0
+    inside: NDArray[np.bool_]
 
 
 class Composition:

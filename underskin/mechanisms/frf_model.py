@@ -111,7 +111,10 @@ class FrfModel:
     def _sigma_at_points(
         self, contacts: Contacts, own: dict[str, Values], position: Sequence[Differentiated]
     ) -> tuple[list[Differentiated], NDArray[np.bool_]]:
-        """σ of each point at each force node, and which points are inside the table at all of them."""
+        """σ of each point at each force node, and which points are inside the table at all of them.
+
+        Inside means also that the sensor's disc lies within the stress profile, beyond whose end σ is 0.
+        """
         design = self.design
         rho = self._sensor_radius / contacts.thickness
         layer = self._layer_curves(contacts) if contacts.layered or self._needs_stiffness else None
@@ -122,7 +125,7 @@ class FrfModel:
         offset = self._offset(own, position) / contacts.thickness
         place = self._sigma.place(offset.value)
         sigma = []
-        inside = np.ones(len(design.point_contact), dtype=bool)
+        inside = place.inside & (offset.value + rho.value <= PROFILE_END)
         for node in range(len(self._force)):
             contact = design.point_contact + node * len(design.force)
             (value, *partial), by_offset = self._sigma.at(curves.coefficients, contact, place)

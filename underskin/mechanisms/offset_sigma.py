@@ -49,6 +49,7 @@ class Place:
     functions: NDArray[np.intp]
     values: Floats
     slopes: Floats
+    inside: NDArray[np.bool_]  # (points,) False beyond the profile's end, where all four are 0
 
 
 class OffsetSigma:
@@ -120,9 +121,11 @@ class OffsetSigma:
         return Curves(np.ascontiguousarray(contracted.transpose(1, 0, 2)), inside)
 
     def place(self, offset: Floats) -> Place:
-        """Where offsets e/h (points,) lie among the curves' coefficients; at the grid's end where they are beyond."""
-        first, value, slope = self.bases[3].weights(np.minimum(offset, self.bases[3].nodes[-1]))
-        return Place(first[:, None] + np.arange(4), value, slope)
+        """Where offsets e/h (points,) lie among the curves' coefficients."""
+        end = min(float(self.bases[3].nodes[-1]), PROFILE_END)
+        inside = offset <= end
+        first, value, slope = self.bases[3].weights(np.minimum(offset, end))
+        return Place(first[:, None] + np.arange(4), value * inside[:, None], slope * inside[:, None], inside)
 
     def at(self, coefficients: Floats, contact: NDArray[np.intp], place: Place) -> tuple[Floats, Floats]:
         """The quantities (quantities, points) of each point's contact at its place, and ∂σ/∂(e/h) (points,)."""
