@@ -192,7 +192,7 @@ def test_order_of_names_does_not_matter_and_parameters_follow_the_order_of_compo
     assert forward.names == ("moving_contact_edge", "ageing")
     assert [parameter.name for parameter in forward.parameters] == [
         "mobile_fraction",
-        "loss_per_decade",
+        "loss",
         "onset",
         "saturation",
         "d33",

@@ -264,12 +264,21 @@ def test_d33_changes_with_the_stress_on_the_sensor_and_saturates() -> None:
 def test_ageing_holds_both_laws(cycles: int) -> None:
     recordings = [frf_recording(load_cycles=cycles), frf_recording(id="other", load_cycles=7)]
     base = predicted([], campaign(recordings))[0]
-    aged = predicted(["ageing"], campaign(recordings), loss_per_decade=0.1, onset=100.0, saturation=0.0)[0]
+    aged = predicted(["ageing"], campaign(recordings), loss=0.1, onset=100.0, saturation=0.0)[0]
     assert (aged / base).real == pytest.approx(1 - 0.1 * np.log10(1 + cycles / 100))
-    p, lost, scale = 1e4, 0.2, 500.0
-    values = {"loss_per_decade": lost * p * np.log(10), "onset": scale * p, "saturation": p}
-    aged = predicted(["ageing"], campaign(recordings), **values)[0]
-    assert (aged / base).real == pytest.approx(1 - lost * (1 - np.exp(-cycles / scale)), rel=1e-3)
+    aged = predicted(["ageing"], campaign(recordings), loss=0.2, onset=500.0, saturation=0.9999)[0]
+    assert (aged / base).real == pytest.approx(1 - 0.2 * (1 - np.exp(-cycles / 500)), rel=1e-3)
+
+
+def test_an_aged_response_dies_out_and_never_changes_its_sign() -> None:
+    recordings = [frf_recording(id=f"r{n}", load_cycles=10**n) for n in range(10)]
+    base = predicted([], campaign(recordings))
+    for saturation in (0.0, 0.5, 0.95):
+        for onset in (1.0, 1000.0, 1e6):
+            aged = predicted(["ageing"], campaign(recordings), loss=0.95, onset=onset, saturation=saturation)
+            left = (aged / base).real.reshape(len(recordings), -1)[:, 0]
+            assert (left > 0).all()
+            assert (np.diff(left) < 1e-12).all()
 
 
 def test_crosstalk_adds_what_the_neighbours_feel() -> None:

@@ -35,7 +35,7 @@ SHOWN: dict[str, dict[str, float]] = {
     "preload_dependent_d33": {"stress_coefficient": 2.0, "saturation_stress": 1.0},
     "sensor_spread": {"spread": 0.12},
     "crosstalk": {"fraction": 0.1},
-    "ageing": {"loss_per_decade": 0.15, "onset": 1000.0, "saturation": 0.0},
+    "ageing": {"loss": 0.15, "onset": 1000.0, "saturation": 0.0},
     "contact_resonance": {"tip_mass": 2.0, "damping_ratio": 0.05},
     "sensor_relaxation": {"exponent": 0.03, "step": 0.1, "step_frequency": 20.0},
     "amplifier_high_pass": {"corner": 1.0},

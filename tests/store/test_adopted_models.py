@@ -89,7 +89,7 @@ def test_what_the_model_needs_is_asked_for(server: Server, client: Client) -> No
     mechanisms = {"contact_creep": (0.3, 40.0), "ageing": (0.1, 1000.0, 0.0), "crosstalk": (0.1,)}
     names = {
         "contact_creep": ("relaxed_fraction", "relaxation_time"),
-        "ageing": ("loss_per_decade", "onset", "saturation"),
+        "ageing": ("loss", "onset", "saturation"),
         "crosstalk": ("fraction",),
     }
     _, diagnosis_id = diagnosed(server, resonant("array"), made(mechanisms, names))

@@ -1,8 +1,9 @@
 """The sensors lose strength as the skin is pressed again and again, so recordings after many load cycles are lower than
 those after few.
 
-Law: 1 − r [1 − (1 + N/n0)^(−p)]/(p ln 10): for p → 0 it is 1 − r log10(1 + N/n0), for large p the saturating
-1 − D (1 − e^(−N/n)), with D = r/(p ln 10) and n = n0/p.
+Law: FRF · f(1 − loss · g), g = [1 − (1 + N/(n (1 + p)))^(−p)]/(1 − 10^(−p)), p = s/(1 − s), n the onset, s the
+saturation. At s = 0 it is 1 − loss · log10(1 + N/n), a loss by the decade; for s → 1 it is 1 − loss · (1 − e^(−N/n)), a
+loss that ends. f(x) = x down to 0.05, below it 0.05 e^(20x − 1): a response dies out, it does not change its sign.
 
 Assumptions: all sensors age alike, by the campaign's own count of cycles.
 
@@ -12,12 +13,13 @@ saturating law, so that a fit is well posed.
 
 import numpy as np
 
-from underskin.mechanisms.differentiated import Array, Differentiated, chain, log
+from underskin.mechanisms.differentiated import Differentiated, chain, log
 from underskin.mechanisms.frf_design import FrfDesign, frf_recordings
-from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Uniform, Values
 from underskin.recordings.campaign import Campaign
 
-_SMALL = 1e-3
+_SMALL = 1e-3  # below it (1 − e^(−x))/x is taken from its series
+_LEAST = 0.05  # what is left of a response before its fall slows down
 
 
 class Ageing(Mechanism):
@@ -28,17 +30,17 @@ class Ageing(Mechanism):
     needs = "load_cycles of every recording, not all the same"
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """Loss a decade, the cycles at which it sets in, and the shape."""
+        """The loss, by the decade or in the end, the cycles at which it sets in, and the shape."""
         return (
             Parameter(
-                name="loss_per_decade",
+                name="loss",
                 unit="-",
                 low=0.0,
-                high=1.5,
+                high=0.95,
                 prior=Normal(0.0, 0.3),
                 scale="linear",
                 limit=0.0,
-                reason="poled polymers lose some to tens of percent a decade",
+                reason="poled polymers lose some to tens of percent, a decade or in the end",
             ),
             Parameter(
                 name="onset",
@@ -54,11 +56,11 @@ class Ageing(Mechanism):
                 name="saturation",
                 unit="-",
                 low=0.0,
-                high=5.0,
-                prior=Normal(0.0, 1.0),
+                high=0.95,
+                prior=Uniform(),
                 scale="linear",
                 limit=None,
-                reason="0: a loss that goes on logarithmically; above 1: a loss that ends",
+                reason="from a loss that goes on by the decade to one that ends: nothing is known beforehand",
             ),
         )
 
@@ -72,21 +74,25 @@ class Ageing(Mechanism):
 
     def on_recordings(self, design: FrfDesign, values: Values) -> Differentiated:
         """The factor on each recording."""
-        decades = log(1.0 + design.load_cycles / values["onset"])
-        saturation = values["saturation"]
-        fall, slope = _saturating(saturation.value * decades.value)
+        left = 1.0 - values["saturation"]
+        power = values["saturation"] / left
+        age = log(1.0 + left * (design.load_cycles / values["onset"]))
         # (1 − e^(−p x))/p = x · fall(p x)
-        lost = chain(
-            decades.value * fall,
-            (fall + decades.value * slope * saturation.value, decades),
-            (decades.value**2 * slope, saturation),
-        )
-        return 1.0 - values["loss_per_decade"] * lost / np.log(10.0)
+        lost = age * _fall(power * age) / (np.log(10.0) * _fall(np.log(10.0) * power))
+        return _alive(1.0 - values["loss"] * lost)
 
 
-def _saturating(x: Array) -> tuple[Array, Array]:
-    """(1 − e^(−x))/x and its derivative."""
-    safe = np.where(x < _SMALL, 1.0, x)
+def _fall(x: Differentiated) -> Differentiated:
+    """(1 − e^(−x))/x."""
+    safe = np.where(x.value < _SMALL, 1.0, x.value)
     value = -np.expm1(-safe) / safe
     slope = (np.exp(-safe) - value) / safe
-    return np.where(x < _SMALL, 1 - x / 2 + x**2 / 6, value), np.where(x < _SMALL, -0.5 + x / 3 - x**2 / 8, slope)
+    near = 1 - x.value / 2 + x.value**2 / 6, -0.5 + x.value / 3 - x.value**2 / 8
+    return chain(np.where(x.value < _SMALL, near[0], value), (np.where(x.value < _SMALL, near[1], slope), x))
+
+
+def _alive(factor: Differentiated) -> Differentiated:
+    """The factor, or below _LEAST what falls on to 0 from there, as steeply at first."""
+    dying = _LEAST * np.exp(np.minimum(factor.value / _LEAST - 1, 0.0))
+    alive = factor.value > _LEAST
+    return chain(np.where(alive, factor.value, dying), (np.where(alive, 1.0, dying / _LEAST), factor))
