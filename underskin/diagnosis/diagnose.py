@@ -13,7 +13,8 @@ from underskin.diagnosis import held_out
 from underskin.diagnosis.confounding import confounding
 from underskin.diagnosis.curves import curve_lines
 from underskin.diagnosis.explanation import Workbench
-from underskin.diagnosis.findings import Finding, inspect
+from underskin.diagnosis.finding import Finding
+from underskin.diagnosis.findings import inspect
 from underskin.diagnosis.lines import lines
 from underskin.diagnosis.locate import SEED, in_region, locate, region
 from underskin.diagnosis.plan import Limits, plan
@@ -26,7 +27,6 @@ from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProbl
 from underskin.surrogate import SigmaTable
 
 _CURVES: tuple[Kind, ...] = ("indentation", "compression")
-_LEAST_RECORDINGS = 2
 _GAIN = 0.022  # the scatter that is expected of recordings before any explanation
 
 Progress = Callable[[float], None]
@@ -46,15 +46,11 @@ def diagnose(
         if rows.recordings and not any(isinstance(entry, FrfRecording) for entry in campaign.recordings):
             return _work_out(campaign.name, Workbench(rows, table), [], provenance, progress, limits)
     frf = tuple(entry for entry in campaign.recordings if isinstance(entry, FrfRecording))
-    usable, found = inspect(replace(campaign, recordings=frf), table) if frf else (campaign, [])
-    kept = [entry for entry in usable.recordings if isinstance(entry, FrfRecording)]
-    if len(kept) < _LEAST_RECORDINGS:
-        lacking = (
-            f"{len(kept)} usable recording(s); at least {_LEAST_RECORDINGS} at different preloads or spheres are needed"
-        )
-        return Diagnosis(campaign.name, found, provenance, lacking=lacking)
-    bench = Workbench(lines(usable), table)
-    return _work_out(campaign.name, bench, found, provenance, progress, limits)
+    inspected = inspect(replace(campaign, recordings=frf), table)
+    if inspected.lacking:
+        return Diagnosis(campaign.name, inspected.found, provenance, lacking=inspected.lacking)
+    bench = Workbench(lines(inspected.campaign), table)
+    return _work_out(campaign.name, bench, inspected.found, provenance, progress, limits)
 
 
 def _work_out(

@@ -1,74 +1,126 @@
 """What is wrong with a campaign's recordings themselves, by name, before any physics is blamed for it.
 
-Recordings that cannot belong with the others (copies, reversed signs, units off by 1000, no finite line) are reported,
-and left out of the diagnosis, or put right where that is plain (a sensor whose sign is reversed).
+Recordings that cannot belong with the others (copies, reversed signs, units off by 1000, silence, no finite line) are
+reported, and left out of the diagnosis, or put right where that is plain (a sensor whose sign is reversed).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.distance import pdist
 
-from underskin.mechanisms.differentiated import Array
+from underskin.diagnosis.against_model import against_model
+from underskin.diagnosis.axes import recording_axes
+from underskin.diagnosis.finding import Finding
+from underskin.diagnosis.slips import faint_oscillation, lone_slips, shared_slips
 from underskin.mechanisms.frf_design import frf_recordings
-from underskin.mechanisms.model import compose
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf_estimation import lines_of
 from underskin.surrogate import SigmaTable
-from underskin.units import Floats
+from underskin.units import Complexes
 
-_SLIPS = {1e3: "1000 × too large: pC taken for nC, or N for mN?", 1e-3: "1000 × too small: nC taken for pC?"}
-_SLIP_WIDTH = np.log(12.0)
-_LIKELY_D33 = (0.3, 3000.0)  # pC/N
-_LEAST_RESPONSE = 0.2  # of the campaign's largest prediction: below it, near a crossing of zero, a sign says nothing
+LEAST_RECORDINGS = 2
+_SAME = 1e-4  # relative difference of copies: files round numbers to some digits
 _AXES = ("preload_n", "indenter_radius_mm", "dynamic_force_n")
 
 
 @dataclass(frozen=True)
-class Finding:
-    """`recording` and `field` name the place (recording empty: the whole campaign)."""
+class Inspected:
+    """The recordings that can be used, what was found, and what is lacking where nothing can be told from them."""
 
-    code: str
-    recording: str
-    field: str
-    statement: str
+    campaign: Campaign
+    found: Sequence[Finding]
+    lacking: str = ""
 
 
-def inspect(campaign: Campaign, table: SigmaTable) -> tuple[Campaign, list[Finding]]:
+def inspect(campaign: Campaign, table: SigmaTable) -> Inspected:
     """The campaign without what cannot be used, reversed sensors put right, and what was found."""
     found: list[Finding] = []
-    entries: list[FrfRecording] = []
-    for entry in frf_recordings(campaign):
+    recorded = frf_recordings(campaign) if campaign.recordings else ()
+    entries = _without_copies(_with_lines(recorded, found), found)
+    off = lone_slips(entries, found)
+    entries = [entry for entry, wrong in zip(entries, off, strict=True) if not wrong]
+    if not entries:
+        return _inspected(campaign, entries, found)
+    shared = [*shared_slips(campaign, entries), *_impossible(campaign)]
+    found += shared
+    if shared:
+        what = " and ".join(dict.fromkeys(entry.field for entry in shared))
+        return _inspected(campaign, [], found, f"{what} cannot be right as declared (see findings)")
+    found += [*_constant_axes(entries), *faint_oscillation(entries)]
+    usable, lacking = against_model(campaign, entries, table, found)
+    return _inspected(campaign, usable, found, lacking)
+
+
+def _inspected(
+    campaign: Campaign, entries: Sequence[FrfRecording], found: Sequence[Finding], lacking: str = ""
+) -> Inspected:
+    usable = replace(campaign, recordings=tuple(entries))
+    if not lacking and len(entries) < LEAST_RECORDINGS:
+        lacking = (
+            f"{len(entries)} usable recording(s); at least {LEAST_RECORDINGS} are needed, better at different preloads "
+            "or spheres"
+        )
+    elif not lacking and not recording_axes(usable) and max(len(lines_of(entry).values) for entry in entries) < 2:
+        lacking = "all recordings were made alike, at one frequency; different preloads, spheres or places are needed"
+    return Inspected(usable, found, lacking)
+
+
+def _with_lines(entries: Sequence[FrfRecording], found: list[Finding]) -> list[FrfRecording]:
+    """Those with a line that is finite and not 0."""
+    kept = []
+    for entry in entries:
         values = lines_of(entry).values
-        if not np.isfinite(values).any():
+        finite = np.isfinite(values)
+        if not finite.any():
             found.append(Finding("no_finite_line", entry.id, "frf_re_pc_per_n", "no line is finite: left out"))
-        elif not np.isfinite(values).all():
-            count = int((~np.isfinite(values)).sum())
-            found.append(Finding("lines_not_finite", entry.id, "frf_re_pc_per_n", f"{count} lines left out"))
-            entries.append(entry)
-        elif not np.abs(values).any():
+        elif not np.abs(values[finite]).any():
             found.append(Finding("no_response", entry.id, "frf_re_pc_per_n", "every line is 0: left out"))
         else:
-            entries.append(entry)
-    entries = _without_copies(entries, found)
-    found += _constant_axes(entries)
-    if not entries:
-        return replace(campaign, recordings=()), found
-    usable = replace(campaign, recordings=tuple(entries))
-    return _against_model(usable, table, found)
+            if not finite.all():
+                text = f"{int((~finite).sum())} lines left out"
+                found.append(Finding("lines_not_finite", entry.id, "frf_re_pc_per_n", text))
+            kept.append(entry)
+    return kept
 
 
 def _without_copies(entries: list[FrfRecording], found: list[Finding]) -> list[FrfRecording]:
-    seen: dict[bytes, str] = {}
-    kept = []
-    for entry in entries:
-        key = np.nan_to_num(lines_of(entry).values).tobytes()
-        if key in seen:
-            text = f"the same numbers as recording {seen[key]!r}: left out"
-            found.append(Finding("duplicated_recording", entry.id, "frf_re_pc_per_n", text))
-            continue
-        seen[key] = entry.id
-        kept.append(entry)
-    return kept
+    """Each once: copies have the same lines but for rounding. Only recordings of nearly the same mean are compared."""
+    lines = [np.nan_to_num(lines_of(entry).values) for entry in entries]
+    size = np.array([float(np.abs(own).mean()) for own in lines])
+    original = np.arange(len(entries))
+    order = np.argsort(size, kind="stable")
+    for place, number in enumerate(order):
+        for earlier in order[:place][::-1]:
+            if size[number] - size[earlier] > _SAME * size[number]:
+                break
+            if _alike(lines[number], lines[earlier]):
+                original[max(number, earlier)] = min(original[number], original[earlier])
+    for number, first in enumerate(original):
+        if first != number:
+            text = f"the same numbers as recording {entries[first].id!r}: left out"
+            found.append(Finding("duplicated_recording", entries[number].id, "frf_re_pc_per_n", text))
+    return [entry for number, entry in enumerate(entries) if original[number] == number]
+
+
+def _alike(one: Complexes, other: Complexes) -> bool:
+    return len(one) == len(other) and bool((np.abs(one - other) <= _SAME * np.abs(one)).all())
+
+
+def _impossible(campaign: Campaign) -> list[Finding]:
+    """Sensors that would overlap."""
+    skin = campaign.skin
+    places = np.array([(sensor.x_mm, sensor.y_mm) for sensor in skin.sensors])
+    if skin.sensor_radius_mm is None or len(places) < 2:
+        return []
+    pitch = float(pdist(places).min())
+    if pitch >= 2 * skin.sensor_radius_mm:
+        return []
+    text = (
+        f"sensors of {skin.sensor_radius_mm:g} mm radius cannot lie {pitch:g} mm apart: is it the diameter, or a slip?"
+    )
+    return [Finding("impossible_geometry", "", "skin.sensor_radius_mm", text)]
 
 
 def _constant_axes(entries: list[FrfRecording]) -> list[Finding]:
@@ -80,76 +132,3 @@ def _constant_axes(entries: list[FrfRecording]) -> list[Finding]:
         text = "one line a recording: nothing can be said about frequency"
         found.append(Finding("one_line", "", "frequency_hz", text))
     return found
-
-
-def _against_model(campaign: Campaign, table: SigmaTable, found: list[Finding]) -> tuple[Campaign, list[Finding]]:
-    """Signs, magnitudes and reach against the base model."""
-    model = compose((), campaign, table, "frf")
-    predicted = model.predict(np.array([parameter.start for parameter in model.parameters])).value
-    first = np.searchsorted(model.recording, np.arange(len(campaign.recordings)))
-    beyond = ~model.valid[first]
-    level = _levels(campaign)
-    shape = predicted[first].real
-    plain = np.abs(shape) > _LEAST_RESPONSE * np.abs(shape).max()
-    ratio = np.where(plain, level / np.where(shape == 0, 1.0, shape), np.nan)
-    entries = list(frf_recordings(campaign))
-    kept = np.ones(len(entries), dtype=bool)
-    for number in np.flatnonzero(beyond):
-        text = "its contact lies beyond the tables: left out"
-        found.append(Finding("out_of_domain", entries[number].id, "preload_n", text))
-        kept[number] = False
-    usual = float(np.nanmedian(np.abs(ratio))) if np.isfinite(ratio).any() else np.nan
-    slip = np.log(np.abs(ratio) / usual) if usual > 0 else np.full(len(ratio), np.nan)
-    for number in np.flatnonzero(np.isfinite(slip)):
-        for factor, guess in _SLIPS.items():
-            if len(entries) > 2 and abs(slip[number] - np.log(factor)) < _SLIP_WIDTH:
-                text = f"the response looks {guess} Left out"
-                found.append(Finding("units_off_by_1000", entries[number].id, "frf_re_pc_per_n", text))
-                kept[number] = False
-    d33 = usual * 15.0  # the prior's centre is what the prediction was made with
-    if usual > 0 and not _LIKELY_D33[0] <= d33 <= _LIKELY_D33[1]:
-        guess = _SLIPS[1e3] if d33 > _LIKELY_D33[1] else _SLIPS[1e-3]
-        text = f"charge over force would need a d33 of {d33:.3g} pC/N; it looks {guess}"
-        found.append(Finding("units_off_by_1000", "", "frf_re_pc_per_n", text))
-    signs = _signs(campaign, ratio, kept, found)
-    entries = [entry if sign > 0 else _reversed(entry) for entry, sign in zip(entries, signs, strict=True)]
-    return replace(campaign, recordings=tuple(np.array(entries, dtype=object)[kept])), found
-
-
-def _signs(campaign: Campaign, ratio: Floats, kept: Array, found: list[Finding]) -> Floats:
-    """Of each recording: −1 where its sensor's polarity is reversed, or its own alone."""
-    entries = frf_recordings(campaign)
-    negative = np.isfinite(ratio) & (ratio < 0) & kept
-    positive = np.isfinite(ratio) & (ratio > 0) & kept
-    signs = np.ones(len(entries))
-    if negative.sum() > positive.sum():
-        text = "charge is negative in compression: all signs were reversed (a negative d33, or the amplifier inverts)"
-        found.append(Finding("sign_flipped", "", "frf_re_pc_per_n", text))
-        signs[:] = -1.0
-        negative, positive = positive, negative
-    sensors = np.array([entry.sensor for entry in entries])
-    for name in dict.fromkeys(sensors.tolist()):
-        own = sensors == name
-        if (negative & own).sum() > max(1, (positive & own).sum()):
-            text = f"sensor {name!r} answers with the opposite sign of the others: reversed"
-            found.append(Finding("sign_flipped", entries[int(np.flatnonzero(own)[0])].id, "frf_re_pc_per_n", text))
-            signs[own] *= -1.0
-            negative = negative & ~own
-    if negative.sum() <= 0.2 * max(positive.sum(), 1):
-        for number in np.flatnonzero(negative):
-            text = "its sign is the opposite of the others of its sensor: reversed"
-            found.append(Finding("sign_flipped", entries[number].id, "frf_re_pc_per_n", text))
-            signs[number] *= -1.0
-    return signs
-
-
-def _levels(campaign: Campaign) -> Floats:
-    return np.array([float(np.nanmedian(lines_of(entry).values.real)) for entry in frf_recordings(campaign)])
-
-
-def _reversed(entry: FrfRecording) -> FrfRecording:
-    if entry.charge_pc is not None:
-        return replace(entry, charge_pc=-entry.charge_pc)
-    assert entry.frf_re_pc_per_n is not None
-    assert entry.frf_im_pc_per_n is not None
-    return replace(entry, frf_re_pc_per_n=-entry.frf_re_pc_per_n, frf_im_pc_per_n=-entry.frf_im_pc_per_n)

@@ -14,7 +14,7 @@ from scipy.special import ndtri
 from underskin.diagnosis import held_out
 from underskin.diagnosis.confounding import Confounding
 from underskin.diagnosis.explanation import Explanation, Workbench, own_places
-from underskin.diagnosis.findings import Finding
+from underskin.diagnosis.finding import Finding
 from underskin.diagnosis.fit import COVARIANCE_NAMES
 from underskin.diagnosis.locate import AxisResult
 from underskin.diagnosis.search import NOTHING_MISSING, Answer, Search

@@ -1,0 +1,181 @@
+"""Bad input by name: what is wrong with recordings themselves is found before physics is blamed for it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.diagnosis_campaigns import Made, campaign
+from underskin.diagnosis.diagnose import diagnosis_report
+from underskin.diagnosis.findings import inspect
+from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.surrogate import SigmaTable, load_table
+
+MADE = Made(sensors=3, repeats=2, lines=20)
+LINES = ("frf_re_pc_per_n", "frf_im_pc_per_n")
+Which = Callable[[FrfRecording], bool]
+Change = Callable[[FrfRecording], FrfRecording]
+
+
+@pytest.fixture(scope="module")
+def table() -> SigmaTable:
+    return load_table()
+
+
+@pytest.fixture(scope="module")
+def good(table: SigmaTable) -> Campaign:
+    return campaign(MADE, table)
+
+
+def noise(size: float) -> Change:
+    random = np.random.default_rng(5)
+
+    def change(entry: FrfRecording) -> FrfRecording:
+        re, im = size * random.normal(size=(2, MADE.lines))
+        return replace(entry, frf_re_pc_per_n=re, frf_im_pc_per_n=im)
+
+    return change
+
+
+def times(factor: float, *fields: str) -> Change:
+    def change(entry: FrfRecording) -> FrfRecording:
+        return replace(entry, **{name: factor * getattr(entry, name) for name in fields})
+
+    return change
+
+
+def in_metres(entry: FrfRecording) -> FrfRecording:
+    assert entry.position_mm is not None
+    x, y = entry.position_mm
+    return replace(entry, position_mm=(1e-3 * x, 1e-3 * y))
+
+
+def changed(good: Campaign, change: Change, which: Which) -> Campaign:
+    entries = [entry for entry in good.recordings if isinstance(entry, FrfRecording)]
+    return replace(good, recordings=tuple(change(entry) if which(entry) else entry for entry in entries))
+
+
+def of_all(entry: FrfRecording) -> bool:
+    return entry.id != ""
+
+
+def of_r3(entry: FrfRecording) -> bool:
+    return entry.id == "r3"
+
+
+def of_s1(entry: FrfRecording) -> bool:
+    return entry.sensor == "s1"
+
+
+def codes(found: Any) -> set[tuple[str, str, str]]:
+    return {(entry.code, entry.recording, entry.field) for entry in found if entry.code != "constant_axis"}
+
+
+ONE = [
+    (noise(1e-2), of_r3, ("no_response", "r3", "frf_re_pc_per_n"), 1),
+    (noise(1e-2), of_s1, ("no_response", "r8", "frf_re_pc_per_n"), 16),
+    (times(1000.0, "preload_n"), of_r3, ("units_off_by_1000", "r3", "preload_n"), 1),
+    (times(1e-3, "preload_n"), of_r3, ("units_off_by_1000", "r3", "preload_n"), 1),
+    (times(1000.0, "dynamic_force_n"), of_r3, ("units_off_by_1000", "r3", "dynamic_force_n"), 1),
+    (times(1000.0, "frequency_hz"), of_r3, ("units_off_by_1000", "r3", "frequency_hz"), 1),
+    (times(1e-3, "indenter_radius_mm"), of_r3, ("units_off_by_1000", "r3", "indenter_radius_mm"), 1),
+    (times(1000.0, *LINES), of_s1, ("units_off_by_1000", "r8", "frf_re_pc_per_n"), 16),
+    (times(1e-3, "dynamic_force_n"), of_all, ("units_off_by_1000", "", "dynamic_force_n"), 0),
+    (times(1e-3, *LINES), of_all, ("units_off_by_1000", "", "frf_re_pc_per_n"), 0),
+]
+
+
+@pytest.mark.parametrize(("change", "which", "finding", "left_out"), ONE)
+def test_what_is_wrong_is_named_and_left_out(
+    change: Change,
+    which: Which,
+    finding: tuple[str, str, str],
+    left_out: int,
+    good: Campaign,
+    table: SigmaTable,
+) -> None:
+    inspected = inspect(changed(good, change, which), table)
+    assert finding in codes(inspected.found)
+    assert {entry[0] for entry in codes(inspected.found)} == {finding[0]}
+    assert inspected.lacking == ""
+    assert len(inspected.campaign.recordings) == len(good.recordings) - left_out
+
+
+ALL = [
+    (noise(1e-3), "no_response", "frf_re_pc_per_n"),
+    (noise(30.0), "no_response", "frf_re_pc_per_n"),
+    (times(np.nan, *LINES), "no_finite_line", "frf_re_pc_per_n"),
+    (times(1e-3, "preload_n"), "units_off_by_1000", "preload_n"),
+    (times(1000.0, "preload_n"), "impossible_geometry", "skin.thickness_mm"),
+    (times(1000.0, "frequency_hz"), "units_off_by_1000", "frequency_hz"),
+    (times(1e-3, "frequency_hz"), "units_off_by_1000", "frequency_hz"),
+    (times(1000.0, "dynamic_force_n"), "units_off_by_1000", "dynamic_force_n"),
+    (in_metres, "units_off_by_1000", "position_mm"),
+]
+
+
+@pytest.mark.parametrize(("change", "code", "field"), ALL)
+def test_where_all_is_wrong_nothing_is_concluded(
+    change: Change, code: str, field: str, good: Campaign, table: SigmaTable
+) -> None:
+    report = diagnosis_report(changed(good, change, of_all), table)
+    assert report["verdict"] == "insufficient_data"
+    assert report["mechanisms"] == []
+    told = [entry for entry in report["findings"] if entry["code"] != "constant_axis"]
+    assert (code, field) in {(entry["code"], entry["field"]) for entry in told}
+
+
+@pytest.mark.parametrize(
+    ("sensor_radius_mm", "thickness_mm", "field"),
+    [(15.0, 2.0, "skin.sensor_radius_mm"), (1.0, 0.2, "skin.thickness_mm")],
+)
+def test_impossible_geometry_is_named(
+    sensor_radius_mm: float, thickness_mm: float, field: str, good: Campaign, table: SigmaTable
+) -> None:
+    skin = replace(good.skin, sensor_radius_mm=sensor_radius_mm, thickness_mm=thickness_mm)
+    report = diagnosis_report(replace(good, skin=skin), table)
+    assert report["verdict"] == "insufficient_data"
+    assert ("impossible_geometry", field) in {(entry["code"], entry["field"]) for entry in report["findings"]}
+
+
+def test_copies_are_found_through_rounding(good: Campaign, table: SigmaTable) -> None:
+    copies = changed(good, times(1 + 1e-6, *LINES), of_all).recordings[:4]
+    whole = replace(good, recordings=(*good.recordings, *(replace(entry, id=f"{entry.id} copy") for entry in copies)))
+    inspected = inspect(whole, table)
+    assert codes(inspected.found) == {
+        ("duplicated_recording", f"r{number} copy", "frf_re_pc_per_n") for number in range(4)
+    }
+    assert len(inspected.campaign.recordings) == len(good.recordings)
+
+
+def test_recordings_made_alike_at_one_frequency_tell_nothing(table: SigmaTable) -> None:
+    alike = campaign(Made(sensors=1, preloads_n=(1.0,), spheres_mm=(4.0,), repeats=6, lines=1), table)
+    entries = [replace(entry, load_cycles=1, dwell_s=1.0, recorded_at=None) for entry in alike.recordings]
+    report = diagnosis_report(replace(alike, recordings=tuple(entries)), table)
+    assert report["verdict"] == "insufficient_data"
+    assert "made alike" in report["statement"]
+
+
+def test_units_that_were_checked_are_believed(good: Campaign, table: SigmaTable) -> None:
+    slow = replace(changed(good, times(1e-3, "frequency_hz"), of_all), units_checked=True)
+    assert inspect(slow, table).lacking == ""
+
+
+def test_where_little_is_expected_silence_is_kept(table: SigmaTable) -> None:
+    """Far beside the sensor the response is below the noise, as the model says: such recordings count."""
+    far = campaign(Made(offsets_mm=(0.0, 5.5), lines=20, line=0.01), table)
+    random = np.random.default_rng(2)
+    entries = []
+    for entry in far.recordings:
+        assert isinstance(entry, FrfRecording)
+        assert entry.frf_re_pc_per_n is not None
+        assert entry.frf_im_pc_per_n is not None
+        re, im = 0.05 * random.normal(size=(2, 20))
+        entries.append(
+            replace(entry, frf_re_pc_per_n=entry.frf_re_pc_per_n + re, frf_im_pc_per_n=entry.frf_im_pc_per_n + im)
+        )
+    inspected = inspect(replace(far, recordings=tuple(entries)), table)
+    assert codes(inspected.found) == set()
+    assert len(inspected.campaign.recordings) == len(entries)

@@ -1,0 +1,140 @@
+"""What single recordings say against the base model before any fit: out of its reach, silent, off by 1000, reversed.
+
+All that is compared is each recording's level over what the base model predicts: its apparent d33. Recordings that are
+silent, or where little is predicted (near a crossing of zero), have none.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin import hertz
+from underskin.diagnosis.finding import Finding
+from underskin.diagnosis.silence import dead, silence
+from underskin.mechanisms.model import Model, compose
+from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.frf_estimation import lines_of
+from underskin.surrogate import SigmaTable
+from underskin.units import Floats, to_si
+
+_SLIPS = {1e3: "1000 × too large: pC taken for nC, or N for mN?", 1e-3: "1000 × too small: nC taken for pC?"}
+_SLIP_WIDTH = np.log(12.0)
+_LIKELY_D33 = (0.3, 3000.0)  # pC/N
+_LEAST_RESPONSE = 0.2  # of the campaign's largest prediction: below it, near a crossing of zero, a sign says nothing
+_D33 = 15.0  # pC/N: the prior's centre is what the prediction is made with
+
+Mask = NDArray[np.bool_]
+
+
+def against_model(
+    campaign: Campaign, entries: list[FrfRecording], table: SigmaTable, found: list[Finding]
+) -> tuple[list[FrfRecording], str]:
+    """The recordings that can be used, reversed ones put right, and what is lacking where none can."""
+    silent, variance = silence(entries)
+    if silent.all():
+        text = f"none of the {len(entries)} recordings shows a response above its noise: is the sensor connected?"
+        found.append(Finding("no_response", "", "frf_re_pc_per_n", text))
+        return [], "no recording shows a response above its own noise"
+    model = compose((), replace(campaign, recordings=tuple(entries)), table, "frf")
+    inside = _in_reach(campaign, entries, model, found)
+    ratio, expected = _apparent(entries, model, inside & ~silent)
+    kept = inside & ~dead(entries, silent & inside, variance, expected, found)
+    kept &= ~_off_by_1000(entries, ratio, found)
+    signs = _signs(entries, ratio, kept, found)
+    entries = [entry if sign > 0 else _reversed(entry) for entry, sign in zip(entries, signs, strict=True)]
+    return [entry for entry, chosen in zip(entries, kept, strict=True) if chosen], ""
+
+
+def _in_reach(campaign: Campaign, entries: list[FrfRecording], model: Model, found: list[Finding]) -> Mask:
+    """Which contacts the tables hold as declared; the others are named with what is wrong with them."""
+    inside: Mask = model.valid[np.searchsorted(model.recording, np.arange(len(entries)))]
+    skin = campaign.skin
+    assert skin.thickness_mm is not None
+    assert skin.youngs_modulus_mpa is not None
+    force = np.array([entry.preload_n for entry in entries])
+    sphere = to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in entries])
+    modulus = float(to_si("youngs_modulus_mpa", skin.youngs_modulus_mpa))
+    radius_mm = 1e3 * hertz.contact_radius(force, sphere, modulus, skin.poisson_ratio)
+    if not inside.any():
+        ratios = radius_mm / skin.thickness_mm
+        text = (
+            f"no contact lies within the tables: contact radii would be {ratios.min():.3g} to {ratios.max():.3g} of "
+            "the thickness, or the places lie far from their sensors; are preload, thickness, modulus and places right?"
+        )
+        found.append(Finding("impossible_geometry", "", "skin.thickness_mm", text))
+        return inside
+    for number in np.flatnonzero(~inside):
+        entry = entries[number]
+        text = (
+            f"its contact (radius {radius_mm[number]:.3g} mm on a layer of {skin.thickness_mm:g} mm, at its place "
+            "beside the sensor) lies beyond the tables: left out"
+        )
+        found.append(Finding("out_of_domain", entry.id, "preload_n", text))
+    return inside
+
+
+def _apparent(entries: list[FrfRecording], model: Model, usable: Mask) -> tuple[Floats, Floats]:
+    """Each recording's level over the base model's, NaN where it says nothing; and the level to be expected [C/N]."""
+    predicted = model.predict(np.array([parameter.start for parameter in model.parameters])).value
+    shape = predicted[np.searchsorted(model.recording, np.arange(len(entries)))].real
+    level = np.array([float(np.nanmedian(lines_of(entry).values.real)) for entry in entries])
+    telling = usable & (np.abs(shape) > _LEAST_RESPONSE * np.abs(shape[usable]).max(initial=0.0))
+    ratio = np.where(telling, level / np.where(shape == 0, 1.0, shape), np.nan)
+    usual = float(np.nanmedian(np.abs(ratio))) if telling.any() else 0.0
+    return ratio, np.abs(shape) * usual
+
+
+def _off_by_1000(entries: list[FrfRecording], ratio: Floats, found: list[Finding]) -> Mask:
+    """Which recordings' levels are about 1000 × off all others; and whether all of them are."""
+    off = np.zeros(len(entries), dtype=bool)
+    if not np.isfinite(ratio).any():
+        return off
+    usual = float(np.nanmedian(np.abs(ratio)))
+    slip = np.log(np.abs(ratio) / usual) if usual > 0 else np.full(len(ratio), np.nan)
+    for number in np.flatnonzero(np.isfinite(slip)):
+        for factor, guess in _SLIPS.items():
+            if len(entries) > 2 and abs(slip[number] - np.log(factor)) < _SLIP_WIDTH:
+                text = f"the response looks {guess} Left out"
+                found.append(Finding("units_off_by_1000", entries[number].id, "frf_re_pc_per_n", text))
+                off[number] = True
+    d33 = usual * _D33
+    if usual > 0 and not _LIKELY_D33[0] <= d33 <= _LIKELY_D33[1]:
+        guess = _SLIPS[1e3] if d33 > _LIKELY_D33[1] else _SLIPS[1e-3]
+        text = f"charge over force would need a d33 of {d33:.3g} pC/N; it looks {guess}"
+        found.append(Finding("units_off_by_1000", "", "frf_re_pc_per_n", text))
+    return off
+
+
+def _signs(entries: list[FrfRecording], ratio: Floats, kept: Mask, found: list[Finding]) -> Floats:
+    """Of each recording: −1 where its sensor's polarity is reversed, or its own alone."""
+    negative = np.isfinite(ratio) & (ratio < 0) & kept
+    positive = np.isfinite(ratio) & (ratio > 0) & kept
+    signs = np.ones(len(entries))
+    if negative.sum() > positive.sum():
+        text = "charge is negative in compression: all signs were reversed (a negative d33, or the amplifier inverts)"
+        found.append(Finding("sign_flipped", "", "frf_re_pc_per_n", text))
+        signs[:] = -1.0
+        negative, positive = positive, negative
+    sensors = np.array([entry.sensor for entry in entries])
+    for name in dict.fromkeys(sensors.tolist()):
+        own = sensors == name
+        if (negative & own).sum() > max(1, (positive & own).sum()):
+            text = f"sensor {name!r} answers with the opposite sign of the others: reversed"
+            found.append(Finding("sign_flipped", entries[int(np.flatnonzero(own)[0])].id, "frf_re_pc_per_n", text))
+            signs[own] *= -1.0
+            negative = negative & ~own
+    if negative.sum() <= 0.2 * max(positive.sum(), 1):
+        for number in np.flatnonzero(negative):
+            text = "its sign is the opposite of the others of its sensor: reversed"
+            found.append(Finding("sign_flipped", entries[number].id, "frf_re_pc_per_n", text))
+            signs[number] *= -1.0
+    return signs
+
+
+def _reversed(entry: FrfRecording) -> FrfRecording:
+    if entry.charge_pc is not None:
+        return replace(entry, charge_pc=-entry.charge_pc)
+    assert entry.frf_re_pc_per_n is not None
+    assert entry.frf_im_pc_per_n is not None
+    return replace(entry, frf_re_pc_per_n=-entry.frf_re_pc_per_n, frf_im_pc_per_n=-entry.frf_im_pc_per_n)
