@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.mechanism_campaigns import frf_campaign, indentation_campaign, table
+from tests.mechanism_campaigns import SKIN, frf_campaign, indentation_campaign, table
 from underskin import InvalidInput
 from underskin.adopted import AdoptedModel, adopted
 from underskin.mechanisms import CATALOGUE, compose
 from underskin.mechanisms.frf_design import frf_recordings
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.campaign import Campaign, FrfRecording
 
 D33 = 14.0
 VALUES = {
@@ -97,6 +97,45 @@ def test_a_recording_that_lacks_what_a_mechanism_needs_is_named() -> None:
     lacking = replace(campaign, recordings=(replace(first, load_cycles=None), *others))
     with pytest.raises(InvalidInput, match=r"recordings\[r0\].load_cycles.*ageing"):
         adopted(report(VALUES), campaign).as_base_model(lacking, table())
+
+
+def centred(campaign: Campaign) -> Campaign:
+    return replace(campaign, recordings=tuple(replace(one, position_mm=None) for one in frf_recordings(campaign)))
+
+
+def test_a_misalignment_found_beside_the_sensors_serves_presses_on_their_centres() -> None:
+    values: dict[str, tuple[float, ...]] = {"misalignment": (0.6, -0.8)}
+    model = adopted(report(values), recorded(values))
+    asked = centred(frf_campaign())
+    parameters = compose(["misalignment"], asked, table()).parameters
+    assert parameters[0].name == "offset"
+    found = model.response(asked, table())
+    shifted = replace(asked, recordings=tuple(_shifted(one, 0.6, -0.8) for one in frf_recordings(frf_campaign())))
+    expected = adopted(report({}), frf_campaign()).response(shifted, table())
+    np.testing.assert_allclose(found.value, expected.value, rtol=1e-6)
+
+
+def _shifted(entry: FrfRecording, x_mm: float, y_mm: float) -> FrfRecording:
+    centre = next(sensor for sensor in SKIN.sensors if sensor.id == entry.sensor)
+    return replace(entry, position_mm=(centre.x_mm + x_mm, centre.y_mm + y_mm))
+
+
+def test_a_misalignment_of_unknown_direction_serves_no_press_beside_a_centre() -> None:
+    found = report({})
+    found["mechanisms"] = [{"name": "misalignment", "parameters": [{"name": "offset", "value": 0.7}]}]
+    model = adopted(found, centred(frf_campaign()))
+    assert model.response(centred(frf_campaign()), table()).inside.all()
+    with pytest.raises(InvalidInput, match=r"position_mm.*not in which direction"):
+        model.response(frf_campaign(), table())
+
+
+def test_beside_crosstalk_a_misalignment_has_a_direction_on_centres_too() -> None:
+    found = report({})
+    found["mechanisms"] = [
+        {"name": "misalignment", "parameters": [{"name": f"offset_{axis}", "value": 0.7} for axis in "xy"]},
+        {"name": "crosstalk", "parameters": [{"name": "fraction", "value": 0.1}]},
+    ]
+    assert adopted(found, centred(frf_campaign())).response(centred(frf_campaign()), table()).inside.all()
 
 
 def test_a_skin_that_is_declared_otherwise_is_not_translated() -> None:

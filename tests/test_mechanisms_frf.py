@@ -232,6 +232,16 @@ def test_where_every_press_is_centred_misalignment_has_a_length_only() -> None:
     assert level(["misalignment"], frf_recording(), offset=0.9) == pytest.approx(moved, rel=1e-6)
 
 
+def test_neighbours_tell_in_which_direction_a_centred_press_is_misaligned() -> None:
+    names = ["misalignment", "crosstalk"]
+    for sensor, (x, y) in {"s1": (0.0, 0.0), "s2": (4.0, 0.0)}.items():
+        moved = level(["crosstalk"], frf_recording(sensor=sensor, position_mm=(x - 0.4, y + 0.7)), fraction=0.2)
+        centred = frf_recording(sensor=sensor, position_mm=(x, y))
+        assert level(names, centred, offset_x=-0.4, offset_y=0.7, fraction=0.2) == pytest.approx(moved, rel=1e-6)
+        other = level(names, centred, offset_x=0.4, offset_y=0.7, fraction=0.2)
+        assert abs(other / moved - 1) > 0.005
+
+
 def test_a_small_amplitude_is_a_moving_edge() -> None:
     recording = frf_recording(dynamic_force_n=0.01)
     small = level(["amplitude_nonlinearity"], recording, edge_mobility=0.8)

@@ -15,8 +15,8 @@ from scipy.special import ndtri
 
 from underskin.errors import InvalidInput
 from underskin.mechanisms.catalogue import CATALOGUE
-from underskin.mechanisms.composition import chosen
-from underskin.mechanisms.frf_design import frf_recordings
+from underskin.mechanisms.composition import chosen, parameters_together
+from underskin.mechanisms.frf_design import frf_recordings, offsets
 from underskin.mechanisms.frf_model import FrfModel
 from underskin.mechanisms.mechanism import Mechanism, Parameter
 from underskin.recordings.campaign import Campaign, FrfRecording, SkinDescription
@@ -97,14 +97,14 @@ class AdoptedModel:
             mechanisms = [mechanism for mechanism in mechanisms if not _acts_on_lines(mechanism)]
             campaign = _with_one_line(campaign)
         self._require_fields(campaign)
+        known = {name: value for mechanism in mechanisms for name, value in self.parameters[mechanism.name].items()}
+        if "offset" in known:
+            _require_centred(campaign)
+        elif "offset_x" in known:  # of which centred presses need the length alone
+            known["offset"] = float(np.hypot(known["offset_x"], known["offset_y"]))
         model = FrfModel(mechanisms, campaign, table)
-        own = [
-            _on_fit(parameter, self.parameters[mechanism.name][parameter.name])
-            for mechanism in mechanisms
-            for parameter in mechanism.parameters(campaign)
-        ]
-        nuisances = [parameter.to_fit(1.0) for parameter in model.parameters[len(own) :]]
-        predicted = model.predict(np.array(own + nuisances))
+        fit = [_on_fit(parameter, known.get(parameter.name, 1.0)) for parameter in model.parameters]
+        predicted = model.predict(np.array(fit))
         return Response(
             value=predicted.value.astype(np.complex128) / float(to_si("d33_pc_per_n", 1.0)),
             recording=model.recording,
@@ -149,9 +149,10 @@ def adopted(report: Mapping[str, Any], campaign: Campaign) -> AdoptedModel:
         entry["name"]: {found["name"]: float(found["value"]) for found in entry["parameters"]}
         for entry in report["mechanisms"]
     }
+    frf = [mechanism for name, mechanism in CATALOGUE.items() if name in parameters and "frf" in mechanism.kinds]
+    known = parameters_together(frf, campaign, "frf")
     for name, values in parameters.items():
-        known = name in CATALOGUE and "frf" in CATALOGUE[name].kinds
-        if not known or set(values) != {entry.name for entry in CATALOGUE[name].parameters(campaign)}:
+        if name not in known or set(values) != {entry.name for entry in known[name]}:
             allowed = "must be of mechanisms that this version knows, with the parameters that it knows"
             raise InvalidInput("diagnosis_id", name, allowed)
     d33 = report["d33"]
@@ -189,6 +190,15 @@ def pressed_campaign(
         for number, (radius, preload, x, y, *more) in enumerate(rows)
     ]
     return Campaign("rows", skin, tuple(recordings))
+
+
+def _require_centred(campaign: Campaign) -> None:
+    """Of a misalignment in an unknown direction, only presses at the sensors' centres show the same."""
+    beside = offsets(campaign).any(axis=1)
+    if beside.any():
+        entry = frf_recordings(campaign)[int(np.argmax(beside))]
+        allowed = "must be the sensor's centre: the adopted model knows how far presses miss it, not in which direction"
+        raise InvalidInput(f"recordings[{entry.id}].position_mm", entry.position_mm, allowed)
 
 
 def _needed(mechanism: str) -> str:

@@ -17,6 +17,7 @@ from underskin.diagnosis.likelihood import Curvature
 from underskin.diagnosis.lines import Lines
 from underskin.diagnosis.scatter import GAIN_PRIOR, NO_POSITION, POSITION
 from underskin.mechanisms.catalogue import CATALOGUE
+from underskin.mechanisms.composition import parameters_together
 from underskin.mechanisms.model import Model, compose
 from underskin.surrogate import SigmaTable
 
@@ -55,12 +56,11 @@ class Explanation:
 
 def own_places(names: Sequence[str], lines: Lines) -> dict[str, slice]:
     """Where in a composed model's parameters each mechanism's are."""
+    mechanisms = [mechanism for name, mechanism in CATALOGUE.items() if name in names]
     places, first = {}, 0
-    for name, mechanism in CATALOGUE.items():
-        if name in names:
-            count = len(mechanism.parameters(lines.campaign, lines.kind))
-            places[name] = slice(first, first + count)
-            first += count
+    for name, own in parameters_together(mechanisms, lines.campaign, lines.kind).items():
+        places[name] = slice(first, first + len(own))
+        first += len(own)
     return places
 
 
@@ -149,15 +149,17 @@ class Workbench:
         own = np.zeros(max((place.stop for place in places.values()), default=0))
         free: list[int] = []
         axes: list[list[float]] = []
-        new = [name for name in places if parent is None or name not in parent.names]
-        parameters = {name: CATALOGUE[name].parameters(lines.campaign, lines.kind) for name in new}
+        known = {} if parent is None else {name: parent.own(name) for name in parent.names}
+        # New too is what has other parameters beside the mechanism that was added.
+        new = [name for name, place in places.items() if len(known.get(name, ())) != place.stop - place.start]
+        parameters = {name: fitter.parameters[places[name]] for name in new}
         quantiles = _QUANTILES.get(sum(map(len, parameters.values())), (0.5,))
         for name, place in places.items():
             if name in new:
                 free += range(place.start, place.stop)
                 axes += [[entry.quantile(q) for q in quantiles] for entry in parameters[name]]
-            elif parent is not None:
-                own[place] = parent.own(name)
+            else:
+                own[place] = known.get(name, [])
         tried: dict[tuple[int, ...], Evaluated] = {}
         for index in itertools.product(*(range(len(axis)) for axis in axes)):
             own[free] = [axis[at] for axis, at in zip(axes, index, strict=True)]

@@ -14,7 +14,7 @@ from underskin.diagnosis.likelihood import Curvature, Marginal, Moments, NoiseLe
 from underskin.diagnosis.lines import Lines
 from underskin.diagnosis.scatter import GAIN_PRIOR, POSITION_PRIOR, level_prior
 from underskin.mechanisms.catalogue import CATALOGUE
-from underskin.mechanisms.composition import SENSOR_SPREAD
+from underskin.mechanisms.composition import SENSOR_SPREAD, parameters_together
 from underskin.mechanisms.mechanism import Normal, Parameter
 from underskin.mechanisms.model import Model, Prediction
 from underskin.units import Floats
@@ -72,8 +72,8 @@ class Hypothesis:
 
 def own_parameters(hypothesis: Hypothesis) -> int:
     """How many of the model's parameters are its mechanisms' own; they come first."""
-    campaign, kind = hypothesis.lines.campaign, hypothesis.lines.kind
-    return sum(len(CATALOGUE[name].parameters(campaign, kind)) for name in hypothesis.model.names)
+    mechanisms = [CATALOGUE[name] for name in hypothesis.model.names]
+    return sum(map(len, parameters_together(mechanisms, hypothesis.lines.campaign, hypothesis.lines.kind).values()))
 
 
 def _moves_covariance(entry: Parameter) -> bool:

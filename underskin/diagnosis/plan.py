@@ -57,7 +57,9 @@ def plan(bench: Workbench, search: Search, limits: Limits) -> dict[str, Any]:
     surviving = [answer for answer in search.answers if answer.explanation and answer.probability > _SURVIVES][:_RIVALS]
     if len(surviving) < 2:
         return {}
-    candidates = _candidates(bench.lines.campaign, limits)
+    candidates = _inside(bench, _candidates(bench.lines.campaign, limits))
+    if not candidates:
+        return {}
     rivals, responses, unknown = _responses(bench, surviving, candidates)
     if len(rivals) < 2:
         return {}
@@ -128,6 +130,12 @@ def _candidates(campaign: Campaign, limits: Limits) -> list[FrfRecording]:
             )
         )
     return found
+
+
+def _inside(bench: Workbench, candidates: list[FrfRecording]) -> list[FrfRecording]:
+    """Those within the tables as the skin is declared: beyond, no prediction is worth planning with."""
+    model = compose([], replace(bench.lines.campaign, recordings=tuple(candidates)), bench.table, "frf")
+    return [entry for entry, inside in zip(candidates, model.valid, strict=True) if inside]
 
 
 def _two(values: Sequence[float]) -> list[float]:

@@ -39,12 +39,12 @@ class Composition:
     ) -> None:
         """Take the parameters of each mechanism, then the nuisances."""
         self.mechanisms = tuple(mechanisms)
-        own = [mechanism.parameters(campaign, kind) for mechanism in mechanisms]
-        self.parameters = (*(parameter for group in own for parameter in group), *nuisances)
-        starts = np.cumsum([0, *(len(group) for group in own)])
+        own = parameters_together(mechanisms, campaign, kind)
+        self.parameters = (*(parameter for group in own.values() for parameter in group), *nuisances)
+        starts = np.cumsum([0, *(len(group) for group in own.values())])
         self._places = {
-            mechanism.name: {parameter.name: start + index for index, parameter in enumerate(group)}
-            for mechanism, group, start in zip(mechanisms, own, starts[:-1], strict=True)
+            name: {parameter.name: start + index for index, parameter in enumerate(group)}
+            for (name, group), start in zip(own.items(), starts[:-1], strict=True)
         }
         self._nuisances = {parameter.name: int(starts[-1]) + index for index, parameter in enumerate(nuisances)}
         self._log = np.array([parameter.scale == "log" for parameter in self.parameters])
@@ -75,6 +75,14 @@ class Composition:
             if spread is not None:
                 return float(spread.value[0]), spread.slopes[:, 0]
         return SENSOR_SPREAD, np.zeros(len(self.parameters))
+
+
+def parameters_together(
+    mechanisms: Sequence[Mechanism], campaign: Campaign, kind: Kind
+) -> dict[str, tuple[Parameter, ...]]:
+    """The parameters of each mechanism by its name, as they are where all of these act together."""
+    names = [mechanism.name for mechanism in mechanisms]
+    return {mechanism.name: mechanism.parameters_beside(names, campaign, kind) for mechanism in mechanisms}
 
 
 def kind_of(campaign: Campaign) -> Kind:

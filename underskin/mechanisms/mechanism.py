@@ -8,7 +8,7 @@ are SI, parameters are in their units.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from inspect import getmodule
 from typing import TYPE_CHECKING, ClassVar, Literal
@@ -167,6 +167,10 @@ class Mechanism:
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """Its parameters for recordings of one kind; bounds may depend on the campaign."""
         return ()
+
+    def parameters_beside(self, others: Collection[str], campaign: Campaign, kind: Kind) -> tuple[Parameter, ...]:
+        """Its parameters in a model that these other mechanisms are in too, which may show more of it."""
+        return self.parameters(campaign, kind)
 
     def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
         """What the campaign lacks to support it, in words; None where nothing is lacking."""

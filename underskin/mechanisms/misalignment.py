@@ -4,10 +4,13 @@ press at that other place gives.
 Law: true position = commanded + a constant offset, for all recordings.
 
 Assumptions: stage and array are shifted against each other, not turned or stretched. Where every press is commanded at
-a sensor's centre the direction cannot be told, and the offset's length alone is a parameter.
+a sensor's centre and no charge of its neighbours shows (crosstalk), the direction cannot be told, and the offset's
+length alone is a parameter.
 
 Source: Sneddon, Fourier Transforms (1951), chapter 10: in the layer's Hankel integral the offset enters as J0(k e/h).
 """
+
+from collections.abc import Collection
 
 import numpy as np
 
@@ -24,13 +27,17 @@ class Misalignment(Mechanism):
 
     name = "misalignment"
     axes = ("position_mm", "sensor", "preload_n", "indenter_radius_mm")
-    needs = "nothing; where every press is centred, only the length of the offset is a parameter"
+    needs = "nothing; where every press is centred and nothing tells its direction, its length alone is a parameter"
     largest_offset = 1e-3 * _LARGEST_MM * np.sqrt(2)
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The offset's two components, or its length where its direction cannot be told."""
-        centred = not offsets(campaign).any()
-        names, low = (("offset",), 0.0) if centred else (("offset_x", "offset_y"), -_LARGEST_MM)
+        return self.parameters_beside((), campaign, kind)
+
+    def parameters_beside(self, others: Collection[str], campaign: Campaign, kind: Kind) -> tuple[Parameter, ...]:
+        """The same; the charge of neighbours, which lie in known directions, tells the direction too."""
+        told = offsets(campaign).any() or "crosstalk" in others
+        names, low = (("offset_x", "offset_y"), -_LARGEST_MM) if told else (("offset",), 0.0)
         return tuple(
             Parameter(
                 name=name,
