@@ -17,6 +17,7 @@ from service import (
     metrics,
     models,
     openapi,
+    pages,
     record,
     sigma,
     skins,
@@ -68,7 +69,7 @@ def create_api(settings: Settings, table: SigmaTable, gate: Gate, store: Databas
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"])])
     for noun in (sigma, frf, d33, stress, tables, campaigns, diagnoses, exports, skins, models):
         v1.include_router(noun.router)
-    for router in (v1, umbridge.router, health.router, metrics.router, openapi.router):
+    for router in (v1, umbridge.router, health.router, metrics.router, openapi.router, pages.router):
         api.include_router(router)
     return api
 

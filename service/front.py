@@ -16,7 +16,8 @@ from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.gate import Gate
-from service.problems import Refusal, unexpected
+from service.pages.problem import problem_page
+from service.problems import Refusal, is_browsing, unexpected
 from service.record import record
 
 logger = logging.getLogger("underskin")
@@ -55,7 +56,7 @@ class Front:
         request_id = self._request_id(headers.get(b"x-request-id"))
         scope["request_id"] = request_id
         scope["key"] = None
-        exchange = _Exchange(send, request_id, scope["path"])
+        exchange = _Exchange(send, request_id, scope["path"], headers.get(b"accept", b"").decode("latin-1"))
         try:
             await self._answer(scope, headers, receive, exchange)
         except Refusal as refusal:
@@ -111,10 +112,11 @@ class Front:
 class _Exchange:
     """The answer on its way: puts the request id into it and remembers its status."""
 
-    def __init__(self, send: Send, request_id: str, path: str) -> None:
+    def __init__(self, send: Send, request_id: str, path: str, accept: str) -> None:
         self._send = send
         self._request_id = request_id
         self._path = path
+        self._accept = accept
         self.status = 0
         self.hot = False
 
@@ -132,6 +134,11 @@ class _Exchange:
 
     async def refuse(self, refusal: Refusal) -> None:
         """A problem."""
+        if is_browsing(self._path, self._accept):
+            page = problem_page(refusal, self._request_id)
+            kept = [header for header in page.raw_headers if header[0] != b"content-length"]
+            await self._whole(page.status_code, bytes(page.body), kept)
+            return
         headers = [(name.lower().encode(), value.encode()) for name, value in refusal.headers.items()]
         content_type = (b"content-type", refusal.media_type(self._path).encode())
         await self._whole(

@@ -1,12 +1,15 @@
 """Who may pass: known Host, own Origin, a key where keys are needed, a body within the limit."""
 
 from collections.abc import Mapping
+from urllib.parse import quote
 
+from service import session
 from service.keys import Key, KeyStore
-from service.problems import Refusal
+from service.problems import Refusal, is_browsing
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 OPEN = frozenset({"/health", "/ready"})
+_OPEN_PAGES = ("/login", "/static/")
 _UPLOADS = frozenset({"/v1/campaigns", "/v1/skins/import"})
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
@@ -41,7 +44,7 @@ class Gate:
         if method not in _SAFE:
             _check_origin(headers.get(b"origin"), host)
             self.check_size(_number(headers.get(b"content-length", b"")), self.takes_files(path, headers))
-        return None if path in OPEN else self._check_key(headers.get(b"authorization", b""))
+        return None if path in OPEN else self._check_key(method, path, headers)
 
     def keys_needed(self) -> bool:
         """Whether a request without a key is refused."""
@@ -64,19 +67,43 @@ class Gate:
                 limit, smaller = f"{self._max_body_bytes / 1e6:g} MB (UNDERSKIN_MAX_BODY_MB)", "fewer rows"
             raise Refusal(413, f"The body exceeds {limit}; send {smaller} a request.", title="Body too large")
 
-    def _check_key(self, authorization: bytes) -> Key | None:
+    def key_of_login(self, token: str) -> Key | None:
+        """The key that somebody typed, None where it is not known."""
+        return self._keys.find(token.strip().encode())
+
+    def _check_key(self, method: str, path: str, headers: Mapping[bytes, bytes]) -> Key | None:
         if not self.keys_needed():
             return None
-        scheme, _, token = authorization.partition(b" ")
-        key = self._keys.find(token.strip()) if scheme.lower() == b"bearer" else None
-        if key is None:
-            known = "This key is not known; it may have been revoked." if authorization else "A key is needed."
-            raise Refusal(
-                401,
-                f"{known} Send Authorization: Bearer KEY (`underskin key create` makes one).",
-                headers={"WWW-Authenticate": "Bearer"},
-            )
+        authorization = headers.get(b"authorization", b"")
+        key = self._key_of_session(method, headers) if not authorization else self._key_of(authorization)
+        if key is None and not path.startswith(_OPEN_PAGES):
+            browsing = is_browsing(path, headers.get(b"accept", b"").decode("latin-1"))
+            raise _login_first(method, path) if browsing else _key_first(authorization)
         return key
+
+    def _key_of(self, authorization: bytes) -> Key | None:
+        scheme, _, token = authorization.partition(b" ")
+        return self._keys.find(token.strip()) if scheme.lower() == b"bearer" else None
+
+    def _key_of_session(self, method: str, headers: Mapping[bytes, bytes]) -> Key | None:
+        """A browser sends its cookie by itself, so a request that changes something must say whose page it is of."""
+        if method not in _SAFE and b"origin" not in headers:
+            return None
+        return session.key_of(session.cookie_in(headers), self._keys)
+
+
+def _login_first(method: str, path: str) -> Refusal:
+    back = quote(path) if method == "GET" else "/"
+    return Refusal(303, "Log in with a key first.", headers={"Location": f"/login?next={back}"})
+
+
+def _key_first(authorization: bytes) -> Refusal:
+    known = "This key is not known; it may have been revoked." if authorization else "A key is needed."
+    return Refusal(
+        401,
+        f"{known} Send Authorization: Bearer KEY (`underskin key create` makes one).",
+        headers={"WWW-Authenticate": "Bearer"},
+    )
 
 
 def _check_origin(origin: bytes | None, host: bytes) -> None:

@@ -9,7 +9,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from service.openapi import methods
-from service.problems import Refusal, from_validation, invalid_input, unexpected
+from service.pages.problem import problem_page
+from service.problems import Refusal, from_validation, invalid_input, is_browsing, unexpected
 from service.store.answers import OtherRequest
 from service.store.engine import StorageFull
 from service.store.errors import Conflict, Missing
@@ -31,6 +32,8 @@ def install_handlers(api: FastAPI) -> None:
 async def _handle(request: Request, error: Exception) -> Response:
     refusal = _as_refusal(request, error)
     path = request.scope["path"]
+    if is_browsing(path, request.headers.get("accept", "")):
+        return problem_page(refusal, request.scope["request_id"])
     content = refusal.body(path, request.scope["request_id"])
     return Response(content, refusal.status_for(path), headers=refusal.headers, media_type=refusal.media_type(path))
 

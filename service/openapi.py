@@ -45,8 +45,11 @@ async def openapi(request: Request) -> dict[str, Any]:
 
 
 def methods(api: FastAPI, path: str) -> list[str]:
-    """All that `path` takes, as it stands in the document; the router knows those of one of its routes only."""
-    return [method.upper() for method in _document(api)["paths"][path]]
+    """All that `path` takes, as it stands in the document; the router knows those of one of its routes only.
+
+    Pages are not in the document: they are read with GET, and their forms sent with POST.
+    """
+    return [method.upper() for method in _document(api)["paths"].get(path, ("get", "post"))]
 
 
 def _document(api: FastAPI) -> dict[str, Any]:

@@ -79,6 +79,14 @@ class Refusal(Exception):
         )
 
 
+_API = ("/v1/", "/umbridge/", "/health", "/ready", "/metrics", "/openapi.json")
+
+
+def is_browsing(path: str, accept: str) -> bool:
+    """Whether somebody looks at a page, who is to be told of an error on a page."""
+    return "text/html" in accept and not path.startswith(_API)
+
+
 def _is_umbridge(path: str) -> bool:
     return path.startswith("/umbridge/")
 

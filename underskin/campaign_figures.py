@@ -52,7 +52,7 @@ def figures(campaign: Campaign, found: Inversion) -> "tuple[go.Figure, go.Figure
             to_lab("preload_n", rows.preload),
             to_lab("frf_pc_per_n", rows.frf),
             to_lab("frf_pc_per_n", rows.frf_uncertainty),
-            to_lab("frf_pc_per_n", _model(campaign, found)),
+            to_lab("frf_pc_per_n", model_frf(campaign, found)),
         ),
         response_per_sensor(found.sensor_ids, d33, low, high, limits, reasons),
     )
@@ -77,7 +77,7 @@ def page(campaign: Campaign, found: Inversion) -> str:
     )
 
 
-def _model(campaign: Campaign, found: Inversion) -> Floats:
+def model_frf(campaign: Campaign, found: Inversion) -> Floats:
     """FRF of the model [C/N] for each recording; NaN where the array has no d33."""
     rows = found.recordings
     assert campaign.skin.sensor_radius_mm is not None

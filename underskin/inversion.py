@@ -89,8 +89,10 @@ class Inversion:
     declared_percent: float  # change of d33 for E 2 % and h 1 % off, in quadrature
 
 
-def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] | None = None) -> Inversion:
-    """The d33 of a campaign's `frf` recordings, over its flat zone or the band given.
+def invert(
+    campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] | None = None, zone: FlatZone | None = None
+) -> Inversion:
+    """The d33 of a campaign's `frf` recordings, over its flat zone or the band given; `zone`: as it was found before.
 
     Raises InvalidInput where no line lies in that band; NoD33 where the campaign has no frf recording, none within the
     table's domain, none with a line in the flat zone, or none with any charge.
@@ -102,7 +104,7 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
     if not recorded:
         raise _none_usable(campaign, refused)
     frfs = stacked(measured)
-    zone = flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
+    zone = zone or flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
     contact = _Contact.of(campaign, recorded, table)
     inside = usable(level, noise, contact.positioned.sigma, contact.felt)

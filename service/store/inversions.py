@@ -76,7 +76,7 @@ def keep_adopted(connection: Connection, campaign: AnyRow, model_id: str, table_
 
 def missing_of_skin(connection: Connection, root: str, table_sha256: str) -> Sequence[AnyRow]:
     """Rows of the skin's current campaigns whose d33 is not kept as they are now."""
-    query = select(campaigns).outerjoin(inversions, _fresh(table_sha256))
+    query = select(campaigns).outerjoin(inversions, fresh(table_sha256))
     query = query.where(inversions.c.campaign.is_(None), *_current(root))
     return connection.execute(query.order_by(campaigns.c.number)).all()
 
@@ -92,14 +92,14 @@ def history(connection: Connection, root: str, table_sha256: str) -> Sequence[An
             sensor_d33.c.d33_pc_per_n,
             sensor_d33.c.d33_uncertainty_pc_per_n,
         )
-        .join(inversions, _fresh(table_sha256))
+        .join(inversions, fresh(table_sha256))
         .join(sensor_d33, sensor_d33.c.campaign == campaigns.c.number)
         .where(*_current(root))
     )
     return connection.execute(query.order_by(campaigns.c.number, sensor_d33.c.sensor)).all()
 
 
-def _fresh(table_sha256: str) -> ColumnElement[bool]:
+def fresh(table_sha256: str) -> ColumnElement[bool]:
     """Joins a campaign with what was derived from it as it is now, with this table, by this software."""
     return (
         (inversions.c.campaign == campaigns.c.number)

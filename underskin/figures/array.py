@@ -1,42 +1,53 @@
 """Figures of an array: its map, FRF against preload per indenter (Seminara 2018, figure 15), and the response of each
-sensor (figure 16). Built from columns in lab units; colours of Okabe and Ito, and Cividis, that colour-blind people
-tell apart; what a colour says, a marker or the text under the pointer says too.
+sensor (figure 16).
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
 from underskin.errors import InvalidInput
+from underskin.figures.style import COLOURS, MARKERS, label, styled
 from underskin.units import Floats
 
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-_MARKERS = ("circle", "square", "diamond", "triangle-up", "cross", "x", "star")
 _HOVER_INTERVAL = "%{text}<br>d33 %{y:.3g} pC/N<br>%{customdata[0]:.3g} to %{customdata[1]:.3g} (95 %)<extra></extra>"
-_HOVER_D33 = "%{text}<br>d33 %{customdata[0]:.3g} ± %{customdata[1]:.2g} pC/N"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a map shows of each sensor; `diverging`: its colours part at 0."""
+
+    name: str
+    unit: str
+    diverging: bool = False
+
+
+D33 = Quantity("d33", "pC/N")
 
 
 def array_map(
     sensors: Sequence[str],
     x_mm: ArrayLike,
     y_mm: ArrayLike,
-    d33_pc_per_n: ArrayLike,
-    d33_uncertainty_pc_per_n: ArrayLike,
+    values: ArrayLike,
+    uncertainties: ArrayLike,
     reasons: Sequence[str],
+    quantity: Quantity = D33,
 ) -> go.Figure:
-    """Where each sensor lies and what its d33 is; `reasons` says why a sensor stands out, empty where it does not.
+    """Where each sensor lies and what its d33, or another quantity, is; `reasons` says why a sensor stands out, empty
+    where it does not.
 
     Raises InvalidInput where a column's length differs from that of `sensors`.
     """
-    x, y, d33, uncertainty = _columns(
-        sensors, x_mm=x_mm, y_mm=y_mm, d33_pc_per_n=d33_pc_per_n, d33_uncertainty_pc_per_n=d33_uncertainty_pc_per_n
-    )
+    x, y, value, uncertainty = _columns(sensors, x_mm=x_mm, y_mm=y_mm, values=values, uncertainties=uncertainties)
     plain = np.array([not reason for reason in reasons])
     figure = go.Figure()
-    known = d33[np.isfinite(d33)]
-    limits = {"cmin": float(known.min()), "cmax": float(known.max())} if len(known) else {}
+    hover = f"%{{text}}<br>{quantity.name} %{{customdata[0]:.3g}} ± %{{customdata[1]:.2g}} {quantity.unit}"
     for name, chosen, symbol in (("sensor", plain, "circle"), ("stands out", ~plain, "x")):
         if not chosen.any():
             continue
@@ -46,22 +57,34 @@ def array_map(
             mode="markers",
             name=name,
             text=[_with_reason(sensors[row], reasons[row]) for row in np.flatnonzero(chosen).tolist()],
-            customdata=np.column_stack([d33, uncertainty])[chosen],
-            hovertemplate=f"{_HOVER_D33}<br>x %{{x:.4g}} mm, y %{{y:.4g}} mm<extra></extra>",
+            customdata=np.column_stack([value, uncertainty])[chosen],
+            hovertemplate=f"{hover}<br>x %{{x:.4g}} mm, y %{{y:.4g}} mm<extra></extra>",
             marker={
                 "symbol": symbol,
-                "size": 18,
-                "color": d33[chosen],
-                "colorscale": "Cividis",
-                "colorbar": {"title": {"text": "d33 [pC/N]"}},
+                "size": _marker_size(len(sensors)),
+                "color": value[chosen],
+                "colorbar": {"title": {"text": f"{quantity.name} [{quantity.unit}]", "side": "right"}},
                 "line": {"width": 1, "color": "#000000"},
-                **limits,
+                **_scale(value, quantity),
             },
         )
-    figure.update_layout(title="d33 over the array", legend={"orientation": "h"})
     figure.update_xaxes(title="x [mm]")
     figure.update_yaxes(title="y [mm]", scaleanchor="x", scaleratio=1)
-    return figure
+    return styled(figure, f"{quantity.name} over the array")
+
+
+def _scale(values: Floats, quantity: Quantity) -> dict[str, Any]:
+    """The colours' scale and its ends: one for all traces."""
+    known = values[np.isfinite(values)]
+    if quantity.diverging:
+        reach = float(np.abs(known).max(initial=0.0)) or 1.0
+        return {"colorscale": "PuOr_r", "cmin": -reach, "cmax": reach}
+    ends = {"cmin": float(known.min()), "cmax": float(known.max())} if len(known) else {}
+    return {"colorscale": "Cividis", **ends}
+
+
+def _marker_size(count: int) -> int:
+    return 26 if count <= 16 else 18 if count <= 100 else 10
 
 
 def frf_versus_preload(
@@ -87,14 +110,14 @@ def frf_versus_preload(
     figure = go.Figure()
     for number, size in enumerate(np.unique(radius)):
         chosen = radius == size
-        colour, marker = _COLOURS[number % len(_COLOURS)], _MARKERS[number % len(_MARKERS)]
+        colour, marker = COLOURS[number % len(COLOURS)], MARKERS[number % len(MARKERS)]
         figure.add_scatter(
             x=preload[chosen],
             y=frf[chosen],
             error_y={"type": "data", "array": uncertainty[chosen], "thickness": 1},
             mode="markers",
             name=f"{size:g} mm, measured",
-            text=[recordings[row] for row in np.flatnonzero(chosen).tolist()],
+            text=[label(recordings[row]) for row in np.flatnonzero(chosen).tolist()],
             hovertemplate=f"%{{text}}<br>sphere {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.3g}} pC/N<extra></extra>",
             marker={"color": colour, "symbol": marker, "size": 8, "opacity": 0.7},
         )
@@ -107,10 +130,9 @@ def frf_versus_preload(
             hovertemplate=f"model, sphere {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.3g}} pC/N<extra></extra>",
             line={"color": colour, "dash": ("solid", "dash", "dot")[number % 3]},
         )
-    figure.update_layout(title="FRF against preload")
     figure.update_xaxes(title="preload [N]", rangemode="tozero")
     figure.update_yaxes(title="FRF in the flat zone [pC/N]", rangemode="tozero")
-    return figure
+    return styled(figure, "FRF against preload")
 
 
 def response_per_sensor(
@@ -132,14 +154,14 @@ def response_per_sensor(
     if array_pc_per_n is not None:
         low_end, high_end = array_pc_per_n
         figure.add_hrect(
-            y0=low_end, y1=high_end, fillcolor=_COLOURS[5], opacity=0.35, line_width=0, annotation_text="array, 95 %"
+            y0=low_end, y1=high_end, fillcolor=COLOURS[5], opacity=0.35, line_width=0, annotation_text="array, 95 %"
         )
     plain = np.array([not reason for reason in reasons])
     for name, chosen, style in (("sensor", plain, 0), ("stands out", ~plain, 1)):
         if not chosen.any():
             continue
         figure.add_scatter(
-            x=[sensors[row] for row in np.flatnonzero(chosen).tolist()],
+            x=[label(sensors[row]) for row in np.flatnonzero(chosen).tolist()],
             y=d33[chosen],
             error_y={
                 "type": "data",
@@ -153,12 +175,11 @@ def response_per_sensor(
             text=[_with_reason(sensors[row], reasons[row]) for row in np.flatnonzero(chosen).tolist()],
             customdata=np.column_stack([low, high])[chosen],
             hovertemplate=_HOVER_INTERVAL,
-            marker={"color": _COLOURS[style], "symbol": _MARKERS[(0, 5)[style]], "size": 9},
+            marker={"color": COLOURS[style], "symbol": MARKERS[(0, 5)[style]], "size": 9},
         )
-    figure.update_layout(title="Response of each sensor")
-    figure.update_xaxes(title="sensor", categoryorder="array", categoryarray=list(sensors))
+    figure.update_xaxes(title="sensor", categoryorder="array", categoryarray=list(map(label, sensors)))
     figure.update_yaxes(title="d33 [pC/N]")
-    return figure
+    return styled(figure, "Response of each sensor")
 
 
 def _columns(rows: Sequence[str], **columns: ArrayLike) -> list[Floats]:
@@ -172,4 +193,4 @@ def _columns(rows: Sequence[str], **columns: ArrayLike) -> list[Floats]:
 
 
 def _with_reason(name: str, reason: str) -> str:
-    return f"{name}: {reason}" if reason else name
+    return f"{label(name)}: {escape(reason, quote=False)}" if reason else label(name)

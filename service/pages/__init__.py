@@ -1,0 +1,9 @@
+"""The pages: what a browser sees of the service, without JavaScript to build and with nothing from outside."""
+
+from fastapi import APIRouter
+
+from service.pages import assets, campaign, example, login, skin, start
+
+router = APIRouter(include_in_schema=False)
+for page in (start, skin, campaign, example, login, assets):
+    router.include_router(page.router)

@@ -1,0 +1,132 @@
+"""A campaign: its FRFs, the FRF against preload, the array's response, d33 with intervals."""
+
+from typing import Annotated, Any
+from urllib.parse import quote
+
+from fastapi import APIRouter, Query, Request, Response
+
+from service import inverting
+from service.dependencies import CampaignId, Store, Table
+from service.pages import requests
+from service.pages.campaign_figures import figures, inversion, measured, preload_columns
+from service.pages.figures import csv_answer
+from service.pages.forms import WRITE, Form, see
+from service.pages.html import page
+from service.store import campaigns, diagnoses
+from service.store.engine import Database
+from service.store.tables import AnyRow
+from underskin import InvalidInput
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.units import to_lab
+
+router = APIRouter(prefix="/campaigns/{campaign_id}")
+
+_MOST_LISTED = 60
+
+
+@router.get("")
+def campaign(
+    request: Request, campaign_id: CampaignId, store: Store, table: Table, show: Annotated[str, Query()] = ""
+) -> Response:
+    """All at a glance; `show` picks the sensor, or the recording, whose lines are drawn."""
+    with store.reading() as connection:
+        row = campaigns.find(connection, campaign_id)
+        kept = campaigns.recordings_of(connection, row.number)
+        told = diagnoses.listed(connection, diagnoses.Filters(campaign=campaign_id), None, 5)
+    answer = inverting.answer(store, table, row, None)
+    sensors = sorted({entry.sensor for entry in kept if entry.sensor is not None})
+    show = show if show in {"", *sensors, *(entry.id for entry in kept)} else ""
+    path = f"/v1/campaigns/{quote(row.id, safe='')}"
+    return page(
+        request,
+        "campaign.html",
+        row=row,
+        state=campaigns.state(row),
+        answer=answer,
+        described=row.about["skin"],
+        recordings=kept,
+        most_listed=_MOST_LISTED,
+        sensors=sensors,
+        diagnoses=told,
+        figures=figures(store, table, row, answer, show),
+        show=show,
+        same=requests.get(request, f"{path}/d33", f"client.campaigns.d33({row.id!r})"),
+    )
+
+
+@router.get("/frf.csv")
+def frf_csv(campaign_id: CampaignId, store: Store, show: Annotated[str, Query()] = "") -> Response:
+    """Every line of the recordings, or of those of `show`, as they came or were estimated."""
+    names = ("recording", "sensor", "frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n", "coherence")
+    columns: dict[str, list[Any]] = {name: [] for name in names}
+    for recording, frf in measured(_loaded(store, campaign_id)[1], show):
+        count = len(frf.values)
+        columns["recording"] += [recording.id] * count
+        columns["sensor"] += [recording.sensor] * count
+        columns["frequency_hz"] += frf.frequency.tolist()
+        columns["frf_re_pc_per_n"] += to_lab("frf_pc_per_n", frf.values.real).tolist()
+        columns["frf_im_pc_per_n"] += to_lab("frf_pc_per_n", frf.values.imag).tolist()
+        columns["coherence"] += [None] * count if frf.coherence is None else frf.coherence.tolist()
+    return csv_answer("frf", columns)
+
+
+@router.get("/preload.csv")
+def preload_csv(campaign_id: CampaignId, store: Store, table: Table) -> Response:
+    """The FRF in the flat zone of each recording, and the model's."""
+    row, whole = _loaded(store, campaign_id)
+    found = inversion(whole, inverting.answer(store, table, row, None), table)
+    return csv_answer("frf-against-preload", {} if found is None else preload_columns(whole, found))
+
+
+@router.get("/d33.csv")
+def d33_csv(campaign_id: CampaignId, store: Store, table: Table) -> Response:
+    """d33 of each sensor, and of each sensor, sphere and preload."""
+    with store.reading() as connection:
+        row = campaigns.find(connection, campaign_id)
+    answer = inverting.answer(store, table, row, None)
+    values = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
+    names = ("sensor", "indenter_radius_mm", "preload_n", "recordings", *values)
+    entries = [*answer["sensors"], *answer["cells"]]
+    return csv_answer("d33", {name: [entry.get(name) for entry in entries] for name in names})
+
+
+@router.get("/curves.csv")
+def curves_csv(campaign_id: CampaignId, store: Store) -> Response:
+    """Every sample of the indentation and compression recordings."""
+    columns: dict[str, list[Any]] = {name: [] for name in ("recording", "displacement_mm", "force_n")}
+    for recording in _loaded(store, campaign_id)[1].recordings:
+        if isinstance(recording, IndentationRecording | CompressionRecording):
+            columns["recording"] += [recording.id] * len(recording.force_n)
+            columns["displacement_mm"] += recording.displacement_mm.tolist()
+            columns["force_n"] += recording.force_n.tolist()
+    return csv_answer("curves", columns)
+
+
+@router.post("/exclude", dependencies=WRITE)
+def exclude(campaign_id: CampaignId, sent: Form, store: Store, table: Table) -> Response:
+    """Leave a recording out of all figures."""
+    with store.writing() as connection:
+        campaigns.exclude(connection, campaign_id, sent.get("recording", ""), _reason(sent))
+    inverting.derive(store, table, [campaign_id])
+    return see(f"/campaigns/{quote(campaign_id, safe='')}")
+
+
+@router.post("/withdraw", dependencies=WRITE)
+def withdraw(campaign_id: CampaignId, sent: Form, store: Store) -> Response:
+    """Leave the campaign out of all figures."""
+    with store.writing() as connection:
+        campaigns.withdraw(connection, campaign_id, _reason(sent))
+    return see(f"/campaigns/{quote(campaign_id, safe='')}")
+
+
+def _reason(sent: dict[str, str]) -> str:
+    reason = sent.get("reason", "").strip()
+    if not 0 < len(reason) <= 1000:
+        raise InvalidInput("reason", reason[:80], "must say why in 1 to 1000 characters")
+    return reason
+
+
+def _loaded(store: Database, campaign_id: str) -> tuple[AnyRow, Campaign]:
+    with store.reading() as connection:
+        row = campaigns.find(connection, campaign_id)
+        return row, campaigns.load(connection, row, with_excluded=False)

@@ -1,0 +1,136 @@
+"""The figures of a campaign's page, and their numbers."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+from service.pages.figures import Drawn, drawn
+from service.store import campaigns
+from service.store.engine import Database
+from service.store.tables import AnyRow
+from underskin import InvalidInput
+from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
+from underskin.surrogate import SigmaTable
+from underskin.units import to_lab
+
+if TYPE_CHECKING:
+    from underskin.inversion import Inversion
+    from underskin.recordings.frf_estimation import Frf
+
+_MOST_SINGLE = 48  # recordings whose lines are drawn one by one
+_MOST_CURVES = 24
+_MOST_KEPT = 64
+_kept: dict[tuple[str, int, str, str], list[Drawn]] = {}  # by campaign, revision, table and what is shown
+
+
+def figures(store: Database, table: SigmaTable, row: AnyRow, answer: Mapping[str, Any], show: str) -> list[Drawn]:
+    """All that can be drawn of a campaign as it is now; `answer`: its d33, as `/d33` has it."""
+    which = (row.id, row.revision, table.sha256, show)
+    if which not in _kept:
+        with store.reading() as connection:
+            campaign = campaigns.load(connection, row, with_excluded=False)
+        found = [*_curves(row, campaign), *_frf(row, campaign, answer, show), *_d33(row, campaign, answer, table)]
+        if len(_kept) >= _MOST_KEPT:
+            _kept.pop(next(iter(_kept)))
+        _kept[which] = found
+    return _kept[which]
+
+
+def measured(campaign: Campaign, show: str = "") -> list[tuple[FrfRecording, "Frf"]]:
+    """The FRF recordings that have an FRF, or those of them that are called `show` or of the sensor of that name."""
+    from underskin.recordings.frf_estimation import lines_of
+
+    found = []
+    for recording in campaign.recordings:
+        if isinstance(recording, FrfRecording) and show in ("", recording.sensor, recording.id):
+            try:
+                found.append((recording, lines_of(recording)))
+            except InvalidInput:
+                continue
+    return found
+
+
+def inversion(campaign: Campaign, answer: Mapping[str, Any], table: SigmaTable) -> "Inversion | None":
+    """The campaign's d33 recording by recording, over the band of its answer; None where it has none."""
+    from underskin.inversion import invert
+    from underskin.recordings.flat_zone import FlatZone
+
+    if answer["band"] is None:
+        return None
+    band = {**answer["band"], "left_out_hz": tuple(answer["band"]["left_out_hz"])}
+    return invert(campaign, table, zone=FlatZone(**band))
+
+
+def preload_columns(campaign: Campaign, found: "Inversion") -> dict[str, Sequence[Any]]:
+    """What the figure of FRF against preload shows, a row a recording."""
+    from underskin.campaign_figures import model_frf
+
+    rows = found.recordings
+    return {
+        "recording": rows.ids,
+        "sensor": [found.sensor_ids[number] for number in rows.sensor.tolist()],
+        "indenter_radius_mm": to_lab("indenter_radius_mm", rows.indenter_radius).tolist(),
+        "preload_n": rows.preload.tolist(),
+        "frf_pc_per_n": to_lab("frf_pc_per_n", rows.frf).tolist(),
+        "frf_uncertainty_pc_per_n": to_lab("frf_pc_per_n", rows.frf_uncertainty).tolist(),
+        "model_frf_pc_per_n": to_lab("frf_pc_per_n", model_frf(campaign, found)).tolist(),
+    }
+
+
+def _frf(row: AnyRow, campaign: Campaign, answer: Mapping[str, Any], show: str) -> list[Drawn]:
+    from underskin import frf_summary
+    from underskin.figures import frf_overview, frf_recordings
+
+    chosen = measured(campaign, show)
+    if not chosen:
+        return []
+    band = answer["band"]
+    zone = None if band is None else (band["low_hz"], band["high_hz"])
+    numbers = f"/campaigns/{row.id}/frf.csv?show={quote(show, safe='')}"
+    if len(chosen) <= _MOST_SINGLE:
+        lines = [frf_summary.lines_of(_title(recording, show), frf) for recording, frf in chosen]
+        return [drawn("frf", frf_recordings(lines, zone), "Magnitude, phase and coherence of each recording.", numbers)]
+    conditions = [(recording.indenter_radius_mm, recording.preload_n) for recording, _ in chosen]
+    spreads = frf_summary.spreads([frf for _, frf in chosen], conditions)
+    about = (
+        f"Magnitude, phase and coherence of {len(chosen)} recordings: for each sphere and preload the median line, "
+        "and from the lowest to the highest recording as a band."
+    )
+    return [drawn("frf", frf_overview(spreads, zone), about, numbers)]
+
+
+def _title(recording: FrfRecording, show: str) -> str:
+    where = "" if show == recording.sensor else f"{recording.sensor}, "
+    return f"{where}{recording.indenter_radius_mm:g} mm, {recording.preload_n:g} N"
+
+
+def _d33(row: AnyRow, campaign: Campaign, answer: Mapping[str, Any], table: SigmaTable) -> list[Drawn]:
+    from underskin import campaign_figures
+
+    found = inversion(campaign, answer, table)
+    if found is None:
+        return []
+    over_array, versus_preload, response = campaign_figures.figures(campaign, found)
+    place = f"/campaigns/{row.id}"
+    return [
+        drawn(
+            "preload",
+            versus_preload,
+            "FRF in the flat zone against preload, for each sphere; lines are the model with the array's d33.",
+            f"{place}/preload.csv",
+        ),
+        drawn("response", response, "d33 of each sensor with its 95 % interval.", f"{place}/d33.csv"),
+        drawn("map", over_array, "Each sensor where it lies, coloured by its d33.", f"{place}/d33.csv"),
+    ]
+
+
+def _curves(row: AnyRow, campaign: Campaign) -> list[Drawn]:
+    from underskin.figures import Curve, force_curves
+
+    kinds = (IndentationRecording, CompressionRecording)
+    chosen = [recording for recording in campaign.recordings if isinstance(recording, kinds)]
+    if not chosen:
+        return []
+    figure = force_curves([Curve(one.id, one.displacement_mm, one.force_n) for one in chosen[:_MOST_CURVES]])
+    about = f"Force against displacement of {min(len(chosen), _MOST_CURVES)} of {len(chosen)} recordings."
+    return [drawn("curves", figure, about, f"/campaigns/{row.id}/curves.csv")]

@@ -1,0 +1,52 @@
+"""A plotly figure in a page: its JSON, its words, and where its numbers are."""
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from fastapi import Response
+from markupsafe import Markup
+
+from service.pages.formats import json_inside
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure as the template has it."""
+
+    name: str
+    title: str
+    height: int
+    json: Markup
+    numbers: str | None  # address of its numbers as CSV
+    about: str
+
+
+def drawn(name: str, figure: "go.Figure", about: str, numbers: str | None = None) -> Drawn:
+    """For the template's macro `figure`; `about` says what is to be seen."""
+    title, height = figure.layout.title.text, figure.layout.height
+    return Drawn(name, title, height, json_inside(figure.to_json()), numbers, about)
+
+
+def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> Response:
+    """Columns as a CSV file to be saved."""
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    writer.writerows([_cell(value) for value in row] for row in zip(*columns.values(), strict=True))
+    headers = {"Content-Disposition": f'attachment; filename="{name}.csv"', "X-Content-Type-Options": "nosniff"}
+    return Response(text.getvalue(), headers=headers, media_type="text/csv; charset=utf-8")
+
+
+def _cell(value: Any) -> Any:
+    """A text that a spreadsheet would take for a formula is marked as text."""
+    if value is None:
+        return "NaN"
+    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value

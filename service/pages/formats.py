@@ -1,0 +1,54 @@
+"""Numbers, times and words as pages show them: short, with the exact value under the pointer."""
+
+import math
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from typing import Any
+
+import orjson
+from markupsafe import Markup, escape
+
+_UNSAFE = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026", 0x2028: "\\u2028", 0x2029: "\\u2029"}
+
+
+def number(value: float | None, unit: str = "", digits: int = 3) -> Markup:
+    """A number with its unit; the pointer shows all its digits."""
+    if value is None or not math.isfinite(value):
+        return Markup('<span class="number">–</span>')
+    exact = f"{value!r} {unit}".strip()
+    shown = f"{value:.{digits}g}" if abs(value) < 1e5 else f"{value:,.0f}"
+    text = Markup('<span class="number" title="{}">{}</span>').format(exact, shown.replace("-", "−"))
+    return text + Markup('&nbsp;<span class="unit">{}</span>').format(unit) if unit else text
+
+
+def moment(text: str | None, *, date_only: bool = False) -> Markup:
+    """A time of the store; a script turns it to the viewer's zone."""
+    if text is None:
+        return Markup("–")
+    when = datetime.fromisoformat(text)
+    shown = when.strftime("%Y-%m-%d" if date_only else "%Y-%m-%d %H:%M UTC")
+    form = Markup(' data-form="date"') if date_only else Markup("")
+    return Markup('<time datetime="{}"{}>{}</time>').format(text, form, shown)
+
+
+def json_inside(document: Any) -> Markup:
+    """JSON (or an object that becomes JSON) that may stand inside a script element."""
+    text = document if isinstance(document, str) else orjson.dumps(document).decode()
+    return Markup(text.translate(_UNSAFE))  # noqa: S704 -- nothing in it can end the element
+
+
+def words(name: str) -> str:
+    """A name of the code as words."""
+    return name.replace("_", " ")
+
+
+def short(text: str, most: int = 60) -> Markup:
+    """A name that may be long: cut, the whole under the pointer."""
+    if len(text) <= most:
+        return escape(text)
+    return Markup('<span title="{}">{}…</span>').format(text[:1000], text[: most - 1])
+
+
+FILTERS: Mapping[str, Callable[..., Any]] = {
+    "number": number, "moment": moment, "json_inside": json_inside, "words": words, "short": short,
+}  # fmt: skip

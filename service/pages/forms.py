@@ -1,0 +1,43 @@
+"""Forms: read, and refused unless they were made for this session."""
+
+from typing import Annotated
+from urllib.parse import parse_qs
+
+from fastapi import Depends, Request, Security
+from fastapi.responses import RedirectResponse
+
+from service import session
+from service.dependencies import authorised
+from service.problems import Refusal
+
+TOKEN = "form_token"  # noqa: S105 -- the name of the field
+WRITE = [Security(authorised, scopes=["write"])]
+_LARGEST_BYTES = 100_000
+
+
+async def _fields(request: Request) -> dict[str, str]:
+    """The fields of a form, the first of each name; raises Refusal where another site may have made it."""
+    body = await request.body()
+    if len(body) > _LARGEST_BYTES:
+        raise Refusal(413, "The form is too long.")
+    try:
+        values = parse_qs(body.decode("utf-8", "replace"), keep_blank_values=True, max_num_fields=100)
+    except ValueError:
+        raise Refusal(400, "The form has too many fields.") from None
+    found = {name: entries[0] for name, entries in values.items()}
+    require_own(request, found.get(TOKEN, ""))
+    return found
+
+
+def require_own(request: Request, token: str) -> None:
+    """Refuses what was not sent from a page of this session."""
+    if not session.is_form_token(session.cookie_in(dict(request.scope["headers"])), token):
+        raise Refusal(403, "This form was not made for your session, or the session has ended: go back and reload it.")
+
+
+Form = Annotated[dict[str, str], Depends(_fields)]
+
+
+def see(path: str) -> RedirectResponse:
+    """After a form, the page that shows what it did."""
+    return RedirectResponse(path, 303)

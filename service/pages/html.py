@@ -1,0 +1,89 @@
+"""Templates into answers: every page goes through here, and gets its policy here."""
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from fastapi import Request
+from fastapi.responses import HTMLResponse
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from service import session
+from service.keys import Key
+from service.pages import formats
+from service.pages.assets import address, library_style_hash
+from underskin import __version__
+
+# Of the empty style element that plotly fills through the object model.
+_EMPTY_STYLE = "'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='"
+
+
+@cache
+def _policy() -> str:
+    """Nothing from outside, no script or style of a page's own; plotly sets style attributes, reaching no network."""
+    styles = f"'self' {_EMPTY_STYLE} {library_style_hash()}"
+    return (
+        f"default-src 'none'; script-src 'self'; style-src {styles}; style-src-elem {styles}; "
+        "style-src-attr 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self'; form-action 'self'; "
+        "frame-ancestors 'none'; base-uri 'none'"
+    )
+
+
+def headers() -> dict[str, str]:
+    """What every page is sent with."""
+    return {
+        "Content-Security-Policy": _policy(),
+        "X-Content-Type-Options": "nosniff",
+        "Referrer-Policy": "same-origin",  # with no referrer, a form would tell no origin either
+        "Cross-Origin-Opener-Policy": "same-origin",
+        "Cache-Control": "no-store",
+    }
+
+
+@cache
+def _templates() -> Environment:
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent / "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        auto_reload=False,
+    )
+    environment.filters.update(formats.FILTERS)
+    environment.globals.update(static=address, version=__version__, segment=lambda text: quote(text, safe=""))
+    return environment
+
+
+def render(template: str, **values: Any) -> str:
+    """A template as text."""
+    return _templates().get_template(template).render(**values)
+
+
+def page(
+    request: Request, template: str, *, status: int = 200, cookie: str | None = None, **values: Any
+) -> HTMLResponse:
+    """A template as the answer to a request; `cookie` replaces the session's."""
+    kept = session.cookie_in(dict(request.scope["headers"]))
+    current = cookie or kept or session.anonymous()
+    key: Key | None = request.scope["key"]
+    viewer = {
+        "key": key,
+        "may_write": key is None or key.scope == "write",
+        "form_token": session.form_token(current),
+        "path": request.url.path,
+    }
+    answer = HTMLResponse(render(template, viewer=viewer, **values), status, headers())
+    if current != kept:
+        set_session(request, answer, current)
+    return answer
+
+
+def set_session(request: Request, answer: Any, cookie: str) -> None:
+    """Put the session's cookie into an answer; behind TLS it goes back through TLS only."""
+    told: Mapping[str, str] = request.headers
+    secure = told.get("origin", "").startswith("https://")
+    age = session.LASTS_S
+    answer.set_cookie(session.COOKIE, cookie, max_age=age, httponly=True, samesite="strict", secure=secure, path="/")

@@ -1,0 +1,47 @@
+"""Logging in with a key, where keys are needed."""
+
+from typing import Annotated
+from urllib.parse import quote
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.responses import RedirectResponse
+
+from service import session
+from service.gate import Gate
+from service.pages.forms import Form
+from service.pages.html import page, set_session
+
+router = APIRouter()
+
+
+@router.get("/login")
+def form(request: Request, back: Annotated[str, Query(alias="next")] = "/") -> Response:
+    """Asks for a key."""
+    return page(request, "login.html", back=back, refused=False)
+
+
+@router.post("/login")
+def login(request: Request, sent: Form) -> Response:
+    """Starts a session."""
+    gate: Gate = request.app.state.gate
+    key = gate.key_of_login(sent.get("key", ""))
+    back = sent.get("next", "/")
+    if key is None:
+        return page(request, "login.html", status=401, back=back, refused=True)
+    answer = RedirectResponse(_own(back), 303)
+    set_session(request, answer, session.logged_in(key))
+    return answer
+
+
+@router.post("/logout")
+def logout(request: Request, sent: Form) -> Response:  # noqa: ARG001 -- reading it checks the session
+    """Ends it in this browser."""
+    answer = RedirectResponse("/login", 303)
+    set_session(request, answer, session.anonymous())
+    return answer
+
+
+def _own(path: str) -> str:
+    """A path of this server, whatever the form said."""
+    plain = path.startswith("/") and not path.startswith("//") and "\\" not in path and path.isprintable()
+    return quote(path, safe="/?=&") if plain else "/"

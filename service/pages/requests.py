@@ -1,0 +1,46 @@
+"""Which request would return what a page shows, to copy: for a shell and for Python."""
+
+import json
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fastapi import Request
+
+
+@dataclass(frozen=True)
+class SameRequest:
+    """The request as a command of a shell and as Python."""
+
+    curl: str
+    python: str
+
+
+def get(request: Request, path: str, call: str) -> SameRequest:
+    """GET `path`; `call` is the same with underskin.Client."""
+    return SameRequest(_curl(request, path), _python(request, call))
+
+
+def post(request: Request, path: str, document: Mapping[str, Any], call: str) -> SameRequest:
+    """POST a JSON document."""
+    body = shlex.quote(json.dumps(document, ensure_ascii=False))
+    return SameRequest(
+        f"{_curl(request, path)} \\\n  -H 'Content-Type: application/json' -d {body}", _python(request, call)
+    )
+
+
+def _curl(request: Request, path: str) -> str:
+    key = ' -H "Authorization: Bearer $UNDERSKIN_API_KEY"' if request.scope["key"] is not None else ""
+    return f"curl -s {shlex.quote(_origin(request) + path)}{key}"
+
+
+def _python(request: Request, call: str) -> str:
+    key = ', os.environ["UNDERSKIN_API_KEY"]' if request.scope["key"] is not None else ""
+    imports = "import os\n\nimport underskin" if key else "import underskin"
+    return f"{imports}\n\nwith underskin.Client({_origin(request)!r}{key}) as client:\n    print({call})"
+
+
+def _origin(request: Request) -> str:
+    """The address by which the browser came: behind TLS the proxy's, as far as the browser says so."""
+    return f"{request.url.scheme}://{request.headers['host']}"

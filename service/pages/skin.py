@@ -1,0 +1,200 @@
+"""A skin: its array as a map, its sensors over time, its campaigns."""
+
+from collections.abc import Mapping, Sequence
+from statistics import median
+from typing import Annotated, Any, Literal
+from urllib.parse import quote
+
+from fastapi import APIRouter, Query, Request, Response
+from starlette.background import BackgroundTask
+
+from service import histories, inverting
+from service.campaigns import before as number_of
+from service.dependencies import SkinId, Store, Table
+from service.pages import requests
+from service.pages.figures import Drawn, csv_answer, drawn
+from service.pages.html import page
+from service.skin_models import History, SensorHistory
+from service.store import campaigns, inversions, models, overview, skins
+from service.store.engine import Database
+from service.store.tables import AnyRow
+from underskin.surrogate import SigmaTable
+
+router = APIRouter(prefix="/skins/{skin_id}")
+
+_ON_A_PAGE = 50
+_MOST_POINTS = 600  # of a history that shows each sensor
+_AT_ONCE = 2  # campaigns whose d33 a page waits for
+
+Shown = Literal["d33", "uncertainty", "trend"]
+
+
+@router.get("")
+def skin(
+    request: Request,
+    skin_id: SkinId,
+    store: Store,
+    table: Table,
+    show: Annotated[Shown, Query()] = "d33",
+    sensor: Annotated[str | None, Query()] = None,
+    before: Annotated[str | None, Query()] = None,
+) -> Response:
+    """All at a glance; `sensor` picks the one whose history is drawn."""
+    root, waiting = _completed(store, table, skin_id)
+    with store.reading() as connection:
+        filters = campaigns.Filters(skin=root, state=None)
+        rows = campaigns.listed(connection, filters, number_of(before), _ON_A_PAGE + 1)
+        latest = campaigns.listed(connection, campaigns.Filters(skin=root, state="current"), None, 1)
+        medians = overview.medians(connection, [row.number for row in rows], table.sha256)
+        history = histories.history(connection, root, table.sha256)
+        model = models.in_force(connection, root)
+    last = latest[0] if latest else None
+    answer = None if last is None else inverting.answer(store, table, last, None)
+    figures = []
+    if last is not None and answer is not None and answer["sensors"]:
+        figures.append(_map(root, last, answer, history, show))
+    if history.sensors:
+        figures.append(_history(root, history, sensor))
+    path = f"/v1/skins/{quote(root, safe='')}"
+    made = page(
+        request,
+        "skin.html",
+        skin_id=root,
+        last=last,
+        answer=answer,
+        described=None if last is None else last.about["skin"],
+        rows=[(row, campaigns.state(row), medians.get(row.number)) for row in rows[:_ON_A_PAGE]],
+        following=rows[_ON_A_PAGE - 1].number if len(rows) > _ON_A_PAGE else None,
+        history=history,
+        model=model,
+        figures=figures,
+        show=show,
+        sensor=sensor,
+        waiting=waiting,
+        same=requests.get(request, f"{path}/history", f"client.skins.history({root!r})"),
+    )
+    if waiting:
+        made.background = BackgroundTask(inverting.complete, store, table, root)
+    return made
+
+
+@router.get("/map.csv")
+def map_csv(skin_id: SkinId, store: Store, table: Table) -> Response:
+    """d33 of each sensor in the latest campaign."""
+    with store.reading() as connection:
+        root = skins.require_root(connection, skin_id)
+        latest = campaigns.listed(connection, campaigns.Filters(skin=root, state="current"), None, 1)
+    columns: dict[str, list[Any]] = {name: [] for name in _MAP_COLUMNS}
+    for row in latest:
+        answer = inverting.answer(store, table, row, None)
+        places = {entry["id"]: entry for entry in row.about["skin"]["sensors"]}
+        for entry in answer["sensors"]:
+            values = {**entry, **places[entry["sensor"]]}
+            for name in _MAP_COLUMNS:
+                columns[name].append(values[name])
+    return csv_answer("map", columns)
+
+
+_MAP_COLUMNS = (
+    "sensor", "x_mm", "y_mm", "d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n",
+)  # fmt: skip
+
+
+@router.get("/history.csv")
+def history_csv(skin_id: SkinId, store: Store, table: Table) -> Response:
+    """d33 of every sensor in every current campaign."""
+    root, _ = _completed(store, table, skin_id)
+    with store.reading() as connection:
+        history = histories.history(connection, root, table.sha256)
+    points = [(entry.sensor, point) for entry in history.sensors for point in entry.points]
+    return csv_answer(
+        "history",
+        {
+            "sensor": [name for name, _ in points],
+            "campaign_id": [point.campaign_id for _, point in points],
+            "time": [point.time for _, point in points],
+            "time_is": [point.time_is for _, point in points],
+            "d33_pc_per_n": [point.d33_pc_per_n for _, point in points],
+            "d33_uncertainty_pc_per_n": [point.d33_uncertainty_pc_per_n for _, point in points],
+        },
+    )
+
+
+def _completed(store: Database, table: SigmaTable, skin_id: str) -> tuple[str, int]:
+    """The skin's own id, and of how many campaigns d33 is still to be computed; a few are computed at once."""
+    with store.reading() as connection:
+        root = skins.require_root(connection, skin_id)
+        missing = len(inversions.missing_of_skin(connection, root, table.sha256))
+    if 0 < missing <= _AT_ONCE:
+        inverting.complete(store, table, root)
+        return root, 0
+    return root, missing
+
+
+def _map(root: str, row: AnyRow, answer: Mapping[str, Any], history: History, show: Shown) -> Drawn:
+    from underskin.figures import Quantity, array_map
+
+    places = {entry["id"]: entry for entry in row.about["skin"]["sensors"]}
+    entries = answer["sensors"]
+    names = [entry["sensor"] for entry in entries]
+    if show == "trend":
+        trends = {entry.sensor: entry.trend for entry in history.sensors}
+        found = [trends.get(name) for name in names]
+        values = [None if line is None else line.slope_pc_per_n_per_year for line in found]
+        uncertainties = [None if line is None else line.slope_uncertainty_pc_per_n_per_year for line in found]
+        quantity = Quantity("trend", "pC/N a year", diverging=True)
+    else:
+        uncertainties = [entry["d33_uncertainty_pc_per_n"] for entry in entries]
+        values = uncertainties if show == "uncertainty" else [entry["d33_pc_per_n"] for entry in entries]
+        quantity = Quantity("uncertainty of d33", "pC/N") if show == "uncertainty" else Quantity("d33", "pC/N")
+    figure = array_map(
+        names,
+        [places[name]["x_mm"] for name in names],
+        [places[name]["y_mm"] for name in names],
+        _floats(values),
+        _floats(uncertainties),
+        ["; ".join(flag["reason"] for flag in entry["flags"]) for entry in entries],
+        quantity,
+    )
+    about = f"Each sensor where it lies, coloured by {quantity.name}, in the latest campaign, {row.name}."
+    return drawn("map", figure, about, f"/skins/{quote(root, safe='')}/map.csv")
+
+
+def _history(root: str, history: History, sensor: str | None) -> Drawn:
+    from underskin.figures import SensorPoints, array_history, d33_history
+
+    numbers = f"/skins/{quote(root, safe='')}/history.csv"
+    chosen = [entry for entry in history.sensors if sensor in (None, entry.sensor)]
+    if sum(len(entry.points) for entry in chosen) > _MOST_POINTS and sensor is None:
+        by_time: dict[str, list[float]] = {}
+        for entry in chosen:
+            for point in entry.points:
+                by_time.setdefault(point.time, []).append(point.d33_pc_per_n)
+        times = sorted(by_time)
+        levels = [[pick(by_time[time]) for time in times] for pick in (min, median, max)]
+        about = "Median d33 over the sensors in each campaign, and the range from the lowest to the highest sensor."
+        return drawn("history", array_history(times, *levels), about, numbers)
+    points = [
+        SensorPoints(
+            entry.sensor,
+            [point.time for point in entry.points],
+            [point.d33_pc_per_n for point in entry.points],
+            [point.d33_uncertainty_pc_per_n for point in entry.points],
+            trend_in_words(entry),
+        )
+        for entry in chosen
+    ]
+    return drawn("history", d33_history(points), "d33 of each sensor in every campaign, ± its uncertainty.", numbers)
+
+
+def trend_in_words(entry: SensorHistory) -> str:
+    """What the sensor's d33 does over time."""
+    line = entry.trend
+    if line is None:
+        return f"no trend: {entry.no_trend}"
+    slope = f"{line.slope_pc_per_n_per_year:+.2g} ± {line.slope_uncertainty_pc_per_n_per_year:.1g} pC/N a year"
+    return slope if line.significant else f"no significant trend ({slope})"
+
+
+def _floats(values: Sequence[float | None]) -> list[float]:
+    return [float("nan") if value is None else value for value in values]

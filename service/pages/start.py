@@ -1,0 +1,39 @@
+"""The start: skins at a glance."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+
+from service.campaigns import before as number_of
+from service.dependencies import Store, Table
+from service.pages import requests
+from service.pages.html import page
+from service.pages.sparkline import sparkline
+from service.store import overview
+
+router = APIRouter()
+
+_ON_A_PAGE = 25
+
+
+@router.get("/")
+def start(
+    request: Request,
+    store: Store,
+    table: Table,
+    find: Annotated[str, Query(max_length=200)] = "",
+    before: Annotated[str | None, Query()] = None,
+) -> Response:
+    """The skins whose campaigns came last, first."""
+    with store.reading() as connection:
+        found = overview.glances(connection, find or None, number_of(before), _ON_A_PAGE + 1, table.sha256)
+    shown = found[:_ON_A_PAGE]
+    return page(
+        request,
+        "start.html",
+        glances=[(glance, sparkline(glance.d33)) for glance in shown],
+        find=find,
+        following=shown[-1].cursor if len(found) > _ON_A_PAGE else None,
+        first=before is None,
+        same=requests.get(request, "/v1/skins", "list(client.skins.all())"),
+    )

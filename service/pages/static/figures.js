@@ -1,0 +1,51 @@
+"use strict";
+// Draws the figures of a page, one at a time and as they come into view, so that the page never stands still.
+
+const CONFIG = { displaylogo: false, responsive: true, displayModeBar: false };
+
+function document_of(plot) {
+  return JSON.parse(plot.parentElement.querySelector('script[type="application/json"]').textContent);
+}
+
+async function draw(plot) {
+  if (plot.dataset.drawn) return;
+  plot.dataset.drawn = "yes";
+  const { data, layout } = document_of(plot);
+  const margin = { ...layout.template?.layout?.margin, ...layout.margin, t: 30 };
+  // The caption above says the title.
+  await Plotly.newPlot(plot, data, { ...layout, title: undefined, margin, autosize: true }, CONFIG);
+  plot.dispatchEvent(new CustomEvent("drawn", { bubbles: true }));
+}
+
+let queue = Promise.resolve();
+function soon(plot) {
+  queue = queue.then(() => new Promise((done) => setTimeout(done))).then(() => draw(plot));
+}
+
+const seen = new IntersectionObserver(
+  (entries) => {
+    for (const entry of entries) {
+      if (entry.isIntersecting) {
+        seen.unobserve(entry.target);
+        soon(entry.target);
+      }
+    }
+  },
+  { rootMargin: "400px" },
+);
+for (const plot of document.querySelectorAll(".plot")) {
+  plot.style.minHeight = `${plot.dataset.height}px`;
+  seen.observe(plot);
+}
+addEventListener("beforeprint", () => document.querySelectorAll(".plot").forEach(draw));
+
+for (const button of document.querySelectorAll("[data-save]")) {
+  button.addEventListener("click", async () => {
+    const plot = button.closest("figure").querySelector(".plot");
+    const { data, layout } = document_of(plot);
+    const size = { width: Math.max(plot.clientWidth, 640), height: Number(plot.dataset.height) + 30 };
+    await Plotly.downloadImage({ data, layout: { ...layout, ...size } }, {
+      format: button.dataset.save, filename: button.dataset.name, scale: button.dataset.save === "png" ? 2 : 1, ...size,
+    });
+  });
+}

@@ -1,0 +1,41 @@
+"use strict";
+// Small helps on every page; each works without as well.
+
+// Times in the viewer's zone, the exact one under the pointer.
+for (const time of document.querySelectorAll("time[datetime]")) {
+  const when = new Date(time.dateTime);
+  if (Number.isNaN(when.getTime())) continue;
+  const date = { year: "numeric", month: "short", day: "numeric" };
+  const clock = time.dataset.form === "date" ? {} : { hour: "2-digit", minute: "2-digit" };
+  time.title = time.dateTime;
+  time.textContent = when.toLocaleString(undefined, { ...date, ...clock });
+}
+
+// A choice takes effect at once; what is chosen empty does not stand in the address.
+function submit(form) {
+  for (const field of form.elements) {
+    if ("emptyLeftOut" in field.dataset && field.value === "") field.disabled = true;
+  }
+  form.submit();
+}
+for (const choice of document.querySelectorAll("[data-submit]")) {
+  choice.form.classList.add("at-once");
+  choice.addEventListener("change", () => submit(choice.form));
+}
+
+for (const button of document.querySelectorAll("[data-copy]")) {
+  button.addEventListener("click", async () => {
+    const text = button.closest(".code").querySelector("code").textContent;
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch {
+      const range = document.createRange(); // without a secure connection there is no clipboard: select it
+      range.selectNodeContents(button.closest(".code").querySelector("code"));
+      getSelection().removeAllRanges();
+      getSelection().addRange(range);
+      document.execCommand("copy");
+    }
+    button.textContent = "Copied";
+    setTimeout(() => (button.textContent = "Copy"), 1500);
+  });
+}

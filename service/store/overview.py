@@ -1,0 +1,96 @@
+"""Skins at a glance: how many campaigns, the latest, d33 over the last few, and what was diagnosed last."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from statistics import median
+from typing import Any
+
+from sqlalchemy import ColumnElement, Connection, func, select
+
+from service.store import campaigns as kept
+from service.store import inversions
+from service.store.tables import AnyRow, campaigns, diagnoses, models, sensor_d33, skins
+from service.store.tables import inversions as derived
+
+_LATELY = 12  # campaigns of a trend
+
+
+@dataclass
+class Glance:
+    """One skin; `d33`: (time, median over the sensors [pC/N]) of the last few campaigns, by time."""
+
+    skin_id: str
+    campaigns: int
+    last: AnyRow | None  # campaign; None where none is current
+    cursor: int
+    d33: list[tuple[str, float]] = field(default_factory=list)
+    diagnosis: AnyRow | None = None  # the latest of the last campaign
+    adopted: bool = False  # whether that diagnosis is the model of a skin
+
+
+def glances(
+    connection: Connection, contains: str | None, before: int | None, limit: int, table_sha256: str
+) -> list[Glance]:
+    """Skins by their latest arrival, those that arrived before the number `before`."""
+    last = func.max(campaigns.c.number)
+    query = select(skins.c.root_id, func.count(), last).join(skins, skins.c.id == campaigns.c.skin_id)
+    query = query.group_by(skins.c.root_id).order_by(last.desc()).limit(limit)
+    if contains is not None:
+        query = query.where(func.lower(skins.c.root_id).contains(contains.lower(), autoescape=True))
+    if before is not None:
+        query = query.having(last < before)
+    found = {row[0]: Glance(row[0], row[1], None, row[2]) for row in connection.execute(query)}
+    recent = _recent(connection, list(found))
+    values = medians(connection, [row.number for row in recent], table_sha256)
+    for row in recent:
+        glance = found[row.root_id]
+        glance.last = row
+        if row.number in values:
+            glance.d33.append((row.time, values[row.number]))
+    _add_diagnoses(connection, [glance for glance in found.values() if glance.last is not None])
+    return list(found.values())
+
+
+def _recent(connection: Connection, roots: Sequence[str]) -> Sequence[AnyRow]:
+    """The last few current campaigns of each skin, the oldest first."""
+    time = func.coalesce(campaigns.c.recorded_at, campaigns.c.received_at)
+    place = func.row_number().over(partition_by=skins.c.root_id, order_by=(time.desc(), campaigns.c.number.desc()))
+    columns = [column for column in campaigns.c if column.name in ("id", "number", "name", "recordings", "excluded")]
+    ranked = (
+        select(skins.c.root_id, time.label("time"), place.label("place"), *columns)
+        .join(skins, skins.c.id == campaigns.c.skin_id)
+        .where(kept.CURRENT, skins.c.root_id.in_(roots))
+        .subquery()
+    )
+    query = select(ranked).where(ranked.c.place <= _LATELY).order_by(ranked.c.time, ranked.c.number)
+    return connection.execute(query).all()
+
+
+def medians(connection: Connection, numbers: Sequence[int], table_sha256: str) -> dict[int, float]:
+    """Median over the sensors of d33 [pC/N], of those campaigns of which it is kept."""
+    query = (
+        select(sensor_d33.c.campaign, sensor_d33.c.d33_pc_per_n)
+        .join(campaigns, campaigns.c.number == sensor_d33.c.campaign)
+        .join(derived, inversions.fresh(table_sha256))
+        .where(campaigns.c.number.in_(numbers))
+    )
+    by_campaign: dict[int, list[float]] = {}
+    for number, value in connection.execute(query):
+        by_campaign.setdefault(number, []).append(value)
+    return {number: median(values) for number, values in by_campaign.items()}
+
+
+def _add_diagnoses(connection: Connection, found: Sequence[Glance]) -> None:
+    by_campaign = {glance.last.number: glance for glance in found if glance.last is not None}
+    columns: list[ColumnElement[Any]] = [
+        column for column in diagnoses.c if column.name in ("id", "campaign", "state", "verdict", "probability")
+    ]
+    query = (
+        select(*columns, models.c.id.label("model_id"))
+        .outerjoin(models, models.c.diagnosis == diagnoses.c.number)
+        .where(diagnoses.c.campaign.in_(by_campaign))
+        .order_by(diagnoses.c.number)
+    )
+    for row in connection.execute(query):
+        glance = by_campaign[row.campaign]
+        glance.diagnosis, glance.adopted = row, row.model_id is not None

@@ -1,0 +1,83 @@
+"""A newcomer's way: the example, its skin, a campaign, figures saved, with a real browser."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from tests.pages.conftest import Visit
+
+EXAMPLE = "/skins/example"
+
+
+@pytest.fixture
+def newcomer(visitor: Visit) -> Visit:
+    """Somebody who loads the example."""
+    visitor.go("/")
+    visitor.page.get_by_role("button", name="Load the example skin").click()
+    visitor.page.wait_for_url(f"**{EXAMPLE}")
+    return visitor
+
+
+def test_from_the_start_to_a_campaign(newcomer: Visit) -> None:
+    page = newcomer.page
+    newcomer.drawn(2)
+    newcomer.require_accessible()
+    page.get_by_role("link", name="Skins").first.click()
+    row = page.get_by_role("row", name="example, after six months")
+    assert "64 recordings" in row.inner_text()
+    assert row.locator("svg polyline").count() == 1
+    newcomer.require_accessible()
+    row.get_by_role("link", name="example, after six months").click()
+    newcomer.drawn(4)
+    assert "d33 of the array" in page.get_by_role("main").inner_text()
+    newcomer.require_accessible()
+    page.get_by_label("Lines of").select_option("s03")
+    page.wait_for_url("**show=s03*")
+    newcomer.drawn(4)
+    assert page.locator("#figure-frf .legend .traces").count() == 8
+
+
+def test_loading_the_example_again_adds_nothing(newcomer: Visit) -> None:
+    newcomer.go("/")
+    newcomer.page.get_by_role("button", name="Load the example skin").click()
+    newcomer.page.wait_for_url(f"**{EXAMPLE}")
+    assert newcomer.page.get_by_role("row", name="example, ").count() == 4
+
+
+def test_a_figure_is_saved_as_it_is_and_its_numbers_too(newcomer: Visit, downloads: Path) -> None:
+    page = newcomer.page
+    newcomer.drawn(2)
+    figure = page.locator("#figure-history")
+    for kind, start in (("SVG", b"<svg"), ("PNG", b"\x89PNG")):
+        with page.expect_download() as saving:
+            figure.get_by_role("button", name=kind).click()
+        saving.value.save_as(downloads / kind)
+        assert (downloads / kind).read_bytes().startswith(start)
+    with page.expect_download() as saving:
+        figure.get_by_role("link", name="CSV").click()
+    saving.value.save_as(downloads / "numbers.csv")
+    rows = list(csv.DictReader((downloads / "numbers.csv").read_text().splitlines()))
+    assert len(rows) == 4 * 8
+    assert 12 < float(rows[0]["d33_pc_per_n"]) < 15
+
+
+def test_the_request_that_a_page_names_returns_the_same(newcomer: Visit) -> None:
+    newcomer.page.get_by_text("The same by request").click()
+    command = newcomer.page.get_by_label("Shell").inner_text()
+    path = command.removeprefix("curl -s ").strip().removeprefix(newcomer.address)
+    shown = newcomer.page.request.get(newcomer.address + path).json()
+    assert [entry["sensor"] for entry in shown["sensors"]] == [f"s{number:02d}" for number in range(1, 9)]
+
+
+def test_times_are_in_the_viewer_s_zone(newcomer: Visit) -> None:
+    time = newcomer.page.locator("table time").last
+    assert time.get_attribute("datetime") == "2024-05-14T08:30:00.000000Z"
+    assert "10:30" in time.inner_text()  # in Rome
+
+
+def test_what_is_not_there_is_said_on_a_page(visitor: Visit) -> None:
+    visitor.go("/skins/nobody")
+    assert "There is no skin 'nobody'." in visitor.page.get_by_role("alert").inner_text()
+    visitor.require_accessible()
+    assert visitor.wrong.pop().startswith("Failed to load resource")  # the browser says so of every 404

@@ -1,0 +1,24 @@
+"""Figures of arrays, FRFs, histories and designs: the same in pages, reports and notebooks.
+
+Built from columns in lab units; colours that colour-blind people tell apart, and what a colour says, a marker, a dash
+or the text under the pointer says too.
+"""
+
+from underskin.figures.array import Quantity, array_map, frf_versus_preload, response_per_sensor
+from underskin.figures.curves import Curve, force_curves
+from underskin.figures.frf import frf_overview, frf_recordings
+from underskin.figures.history import SensorPoints, array_history, d33_history
+
+__all__ = [
+    "Curve",
+    "Quantity",
+    "SensorPoints",
+    "array_history",
+    "array_map",
+    "d33_history",
+    "force_curves",
+    "frf_overview",
+    "frf_recordings",
+    "frf_versus_preload",
+    "response_per_sensor",
+]

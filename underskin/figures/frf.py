@@ -1,0 +1,117 @@
+"""FRFs over frequency: magnitude, phase and coherence, with the flat zone."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from underskin.figures.style import COLOURS, DASHES, ZONE, label, styled
+from underskin.frf_summary import FrfLines, FrfSpread
+from underskin.units import Floats
+
+_ROWS = (("magnitude_pc_per_n", "|FRF| [pC/N]"), ("phase_deg", "phase [°]"), ("coherence", "coherence"))
+_HEIGHT = 640
+
+
+def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | None) -> go.Figure:
+    """The median of each condition, and from the lowest to the highest of its recordings as a band."""
+    figure = _panels()
+    for number, spread in enumerate(spreads):
+        colour, dash = _look(spread, spreads)
+        name = f"{spread.indenter_radius_mm:g} mm, {spread.preload_n:g} N ({spread.recordings})"
+        group = str(number)
+        for row, (field, _) in enumerate(_ROWS, start=1):
+            low, middle, high = getattr(spread, field)
+            if np.isnan(middle).all():
+                continue
+            figure.add_scatter(
+                x=_short(np.concatenate([spread.frequency_hz, spread.frequency_hz[::-1]])),
+                y=_short(np.concatenate([high, low[::-1]])),
+                fill="toself",
+                fillcolor=_faint(colour),
+                line={"width": 0},
+                hoverinfo="skip",
+                showlegend=False,
+                legendgroup=group,
+                row=row,
+                col=1,
+            )
+            line = {"color": colour, "width": 1.5, "dash": dash}
+            _add(figure, row, name, group, spread.frequency_hz, middle, line)
+    return _finished(figure, zone_hz, "FRF: median and range of the recordings alike")
+
+
+def frf_recordings(recordings: Sequence[FrfLines], zone_hz: tuple[float, float] | None) -> go.Figure:
+    """Each recording's lines."""
+    figure = _panels()
+    for number, entry in enumerate(recordings):
+        line = {
+            "color": COLOURS[number % len(COLOURS)],
+            "width": 1.2,
+            "dash": DASHES[number // len(COLOURS) % len(DASHES)],
+        }
+        for row, (field, _) in enumerate(_ROWS, start=1):
+            values = getattr(entry, field)
+            if not np.isnan(values).all():
+                _add(figure, row, label(entry.name), str(number), entry.frequency_hz, values, line)
+    return _finished(figure, zone_hz, "FRF of each recording")
+
+
+def _panels() -> go.Figure:
+    return make_subplots(3, 1, shared_xaxes=True, vertical_spacing=0.04, row_heights=[0.5, 0.27, 0.23])
+
+
+def _add(
+    figure: go.Figure, row: int, name: str, group: str, frequency_hz: Floats, values: Floats, line: dict[str, Any]
+) -> None:
+    figure.add_scatter(
+        x=_short(frequency_hz),
+        y=_short(values),
+        mode="lines",
+        name=name,
+        legendgroup=group,
+        showlegend=row == 1,
+        line=line,
+        hovertemplate=f"{name}<br>%{{x:.4g}} Hz: %{{y:.4g}}<extra></extra>",
+        row=row,
+        col=1,
+    )
+
+
+def _finished(figure: go.Figure, zone_hz: tuple[float, float] | None, title: str) -> go.Figure:
+    if zone_hz is not None:
+        figure.add_vrect(x0=zone_hz[0], x1=zone_hz[1], fillcolor=ZONE, line_width=0, layer="below")
+        figure.add_annotation(
+            text="flat zone", x=np.log10(zone_hz[0]), y=1, yref="y domain", xanchor="left", yanchor="top",
+            showarrow=False, font={"size": 12, "color": "#00664b"},
+        )  # fmt: skip
+    figure.update_xaxes(type="log", dtick=1)
+    figure.update_xaxes(title="frequency [Hz]", row=3, col=1)
+    for row, (_, title_of_axis) in enumerate(_ROWS, start=1):
+        figure.update_yaxes(title=title_of_axis, row=row, col=1)
+    figure.update_yaxes(rangemode="tozero", row=1, col=1)
+    figure.update_yaxes(range=[0, 1.02], row=3, col=1)
+    return styled(figure, title, _HEIGHT)
+
+
+def _look(spread: FrfSpread, spreads: Sequence[FrfSpread]) -> tuple[str, str]:
+    """A colour for each preload, a dash for each indenter."""
+    preloads = sorted({entry.preload_n for entry in spreads})
+    radii = sorted({entry.indenter_radius_mm for entry in spreads})
+    return (
+        COLOURS[preloads.index(spread.preload_n) % len(COLOURS)],
+        DASHES[radii.index(spread.indenter_radius_mm) % len(DASHES)],
+    )
+
+
+def _faint(colour: str) -> str:
+    red, green, blue = (int(colour[place : place + 2], 16) for place in (1, 3, 5))
+    return f"rgba({red},{green},{blue},0.12)"
+
+
+def _short(values: Floats) -> "np.ndarray[Any, np.dtype[np.float32]]":
+    """Half the bytes; seven digits are more than a figure shows."""
+    with np.errstate(over="ignore"):
+        return values.astype(np.float32)

@@ -1,0 +1,65 @@
+"""d33 of each sensor over time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import ArrayLike
+
+from underskin.figures.style import COLOURS, DASHES, MARKERS, label, styled
+
+
+@dataclass(frozen=True)
+class SensorPoints:
+    """One sensor: times (ISO 8601, UTC), d33 and its standard uncertainty [pC/N]; `trend`: its trend in words."""
+
+    sensor: str
+    times: Sequence[str]
+    d33_pc_per_n: Sequence[float]
+    d33_uncertainty_pc_per_n: Sequence[float]
+    trend: str
+
+
+def d33_history(sensors: Sequence[SensorPoints]) -> go.Figure:
+    """A line for each sensor, with standard uncertainties."""
+    figure = go.Figure()
+    for number, entry in enumerate(sensors):
+        colour = COLOURS[number % len(COLOURS)]
+        figure.add_scatter(
+            x=list(entry.times),
+            y=list(entry.d33_pc_per_n),
+            error_y={"type": "data", "array": list(entry.d33_uncertainty_pc_per_n), "thickness": 1, "width": 3},
+            mode="lines+markers",
+            name=label(entry.sensor),
+            line={"color": colour, "width": 1.5, "dash": DASHES[number // len(COLOURS) % len(DASHES)]},
+            marker={"symbol": MARKERS[number % len(MARKERS)], "size": 8},
+            hovertemplate=f"{label(entry.sensor)}, %{{x|%d %b %Y %H:%M}} UTC<br>d33 %{{y:.4g}} "
+            f"± %{{error_y.array:.2g}} pC/N<br>{label(entry.trend)}<extra></extra>",
+        )
+    return _finished(figure, "d33 of each sensor over time")
+
+
+def array_history(
+    times: Sequence[str], low_pc_per_n: ArrayLike, median_pc_per_n: ArrayLike, high_pc_per_n: ArrayLike
+) -> go.Figure:
+    """The median over the sensors at each time, and from the lowest to the highest sensor as a band."""
+    figure = go.Figure()
+    band = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
+    figure.add_scatter(x=list(times), y=np.asarray(high_pc_per_n), showlegend=False, **band)
+    figure.add_scatter(
+        x=list(times), y=np.asarray(low_pc_per_n), name="lowest to highest sensor", fill="tonexty",
+        fillcolor="rgba(0,114,178,0.15)", **band,
+    )  # fmt: skip
+    figure.add_scatter(
+        x=list(times), y=np.asarray(median_pc_per_n), mode="lines+markers", name="median of the sensors",
+        line={"color": COLOURS[0], "width": 1.5}, marker={"size": 6},
+        hovertemplate="%{x|%d %b %Y %H:%M} UTC<br>median d33 %{y:.4g} pC/N<extra></extra>",
+    )  # fmt: skip
+    return _finished(figure, "d33 of the array over time")
+
+
+def _finished(figure: go.Figure, title: str) -> go.Figure:
+    figure.update_xaxes(title="recorded", type="date")
+    figure.update_yaxes(title="d33 [pC/N]", rangemode="tozero")
+    return styled(figure, title)

@@ -1,0 +1,50 @@
+"""How all figures look: colours of Okabe and Ito, and Cividis, that colour-blind people tell apart."""
+
+from html import escape
+
+import plotly.graph_objects as go
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MARKERS = ("circle", "square", "diamond", "triangle-up", "cross", "x", "star")
+DASHES = ("solid", "dash", "dot", "dashdot")
+INK, GRID, ZONE = "#1b2733", "#e3e7eb", "rgba(0,158,115,0.12)"
+_LONGEST_LABEL = 60
+_AXIS = {
+    "gridcolor": GRID,
+    "zerolinecolor": "#c3cad1",
+    "linecolor": "#8a949e",
+    "showline": True,
+    "ticks": "outside",
+    "tickcolor": "#8a949e",
+    "ticklen": 4,
+    "title": {"standoff": 8},
+    "automargin": True,
+}
+_TEMPLATE = go.layout.Template(
+    layout={
+        "font": {
+            "family": "system-ui, -apple-system, Segoe UI, Helvetica, Arial, sans-serif",
+            "size": 13,
+            "color": INK,
+        },
+        "paper_bgcolor": "#ffffff",
+        "plot_bgcolor": "#ffffff",
+        "colorway": list(COLOURS),
+        "hoverlabel": {"font": {"size": 13}},
+        "xaxis": _AXIS,
+        "yaxis": _AXIS,
+        "margin": {"l": 60, "r": 20, "t": 50, "b": 50},
+        "legend": {"orientation": "h", "yanchor": "bottom", "y": 1.02, "x": 0},
+        "title": {"font": {"size": 16}, "x": 0},
+    }
+)
+
+
+def styled(figure: go.Figure, title: str, height: int = 420) -> go.Figure:
+    """The figure with its title, looking like all others; `height` in pixels."""
+    return figure.update_layout(template=_TEMPLATE, title=title, height=height)
+
+
+def label(text: str) -> str:
+    """A name that came with a campaign, as plotly shows it: short, and its markup as text."""
+    return escape(text if len(text) <= _LONGEST_LABEL else text[: _LONGEST_LABEL - 1] + "…", quote=False)
