@@ -6,6 +6,18 @@ from typing import Any
 
 from rig.errors import RigError
 
+_UNITS = {
+    "_pc_per_n": "pC/N", "_n_per_mm": "N/mm", "_n_per_root_s": "N/√s", "_mm_per_s": "mm/s", "_j_per_m2": "J/m²",
+    "_per_mpa": "1/MPa", "_mm": "mm", "_mpa": "MPa", "_n": "N", "_pc": "pC", "_hz": "Hz", "_s": "s", "_us": "µs",
+    "_g": "g", "_h": "h",
+}  # fmt: skip
+
+
+def in_unit(field: str) -> str:
+    """The unit that a field's name ends with, after a space; nothing where it has none."""
+    name = field.split("[")[0].rsplit(".", 1)[-1]
+    return next((f" {unit}" for ending, unit in _UNITS.items() if f"_{name}".endswith(ending)), "")
+
 
 def mapping(field: str, value: Any, known: Sequence[str]) -> Mapping[str, Any]:
     """A mapping whose names are all known."""
@@ -20,9 +32,9 @@ def mapping(field: str, value: Any, known: Sequence[str]) -> Mapping[str, Any]:
 def number(field: str, value: Any, low: float, high: float) -> float:
     """A finite number from low to high, limits included."""
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise RigError(field, value, f"must be a number, {low:g} to {high:g}")
+        raise RigError(field, value, f"must be a number, {low:g} to {high:g}{in_unit(field)}")
     if not (math.isfinite(value) and low <= value <= high):
-        raise RigError(field, value, f"must be {low:g} to {high:g}")
+        raise RigError(field, value, f"must be {low:g} to {high:g}{in_unit(field)}")
     return float(value)
 
 

@@ -168,7 +168,9 @@ def checked(kind: str, document: Any) -> dict[str, Values]:
             if parameter in entry:
                 values[parameter] = checks.number(f"{field}.{parameter}", entry[parameter], low, high)
             elif parameter not in effect.optional:
-                raise RigError(f"{field}.{parameter}", None, f"required, {low:g} to {high:g}")
+                raise RigError(
+                    f"{field}.{parameter}", None, f"required, {low:g} to {high:g}{checks.in_unit(parameter)}"
+                )
         for parameter in needed_by_law(name, values):
             if parameter not in values:
                 raise RigError(f"{field}.{parameter}", None, f"required by the law {values['law']}")

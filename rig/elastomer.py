@@ -6,6 +6,7 @@ with t₁ = t while the contact grows; as a sphere is drawn back, t₁ is the ti
 size, ∫_{t₁}^{t} E(t − s) du(s) = 0 (Ting 1966). A cylinder's t₁ is always t.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -22,6 +23,7 @@ from rig.pressed import stiffening
 
 _APPROACH = 0.08  # of the largest indentation, before contact
 _RADII = 3000
+_LEAST_LOADING = 8  # samples; fewer tell no law from another
 
 Law = Callable[[Floats, bool], Floats]  # force for unit modulus at displacements, while drawn back or not
 
@@ -83,17 +85,27 @@ def _course(experiment: Experiment, shape: Mapping[str, float], speed: float) ->
     curves = experiment.curves
     assert curves is not None
     largest = curves.largest_displacement_mm
-    if largest >= 0.9 * min(shape.get("sample_height_mm", np.inf), shape.get("indenter_radius_mm", np.inf)):
-        raise RigError(
-            "curves.largest_displacement_mm", largest, "must be below 0.9 of the sphere's radius or the height"
-        )
+    deepest = 0.9 * min(shape.get("sample_height_mm", np.inf), shape.get("indenter_radius_mm", np.inf))
+    if largest >= deepest:
+        allowed = f"must be below {deepest:g} mm, 0.9 of the sphere's radius or the cylinder's height"
+        raise RigError("curves.largest_displacement_mm", largest, allowed)
     start = -_APPROACH * largest if experiment.kind == INDENTATION else 0.0
     corners = [start, largest, largest, start] + ([-largest, start] if curves.tension else [])
     waits = [0.0, (largest - start) / speed, curves.hold_s, (largest - start) / speed] + (
         [largest / speed, largest / speed] if curves.tension else []
     )
     time = np.linspace(0, sum(waits), curves.samples)
-    return time, np.interp(time, np.cumsum(waits), corners)
+    pressed = np.interp(time, np.cumsum(waits), corners)
+    loading = int(((time <= waits[1]) & (pressed > 0)).sum())
+    if loading < _LEAST_LOADING:
+        needed = math.ceil(curves.samples * (_LEAST_LOADING + 1) / max(loading, 1))
+        raise RigError(
+            "curves.samples",
+            curves.samples,
+            f"leaves {loading} samples while the load rises, in {waits[1]:g} s of {time[-1]:g} s: must leave at least "
+            f"{_LEAST_LOADING}; about {needed} samples do, or a shorter hold_s",
+        )
+    return time, pressed
 
 
 def _with_relaxation(on: Mapping[str, Values], law: Law, time: Floats, pressed: Floats, memory: bool) -> Floats:
@@ -144,7 +156,8 @@ def _sphere(experiment: Experiment, radius: float) -> Law:
         depth = a**2 / radius - np.sqrt(2 * np.pi * work * a / plane)
         force = 4 * plane * a**3 / (3 * radius) - np.sqrt(8 * np.pi * work * plane * a**3)
     if depth[-1] < largest:
-        raise RigError("curves.largest_displacement_mm", largest, "makes a contact wider than 4 thicknesses: lower it")
+        allowed = f"must be at most {depth[-1]:.3g} mm: beyond, the contact is wider than 4 thicknesses"
+        raise RigError("curves.largest_displacement_mm", largest, allowed)
     if "strain_stiffening" in on:
         reached = depth <= 1.01 * largest
         force = np.append(0.0, force[reached] * stiffening(on["strain_stiffening"], 0.2 * a[reached] / radius))

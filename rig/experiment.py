@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any
 
-from rig import checks, effects
+from rig import checks, effects, feasible
 from rig.effects import COMPRESSION, FRF, INDENTATION
 from rig.errors import RigError
 
@@ -130,7 +130,7 @@ class Experiment:
 
 _RANGES: dict[str, tuple[float, float]] = {
     "thickness_mm": (0.05, 100), "youngs_modulus_mpa": (1e-3, 1e4), "sensor_radius_mm": (0.05, 50),
-    "d33_pc_per_n": (-1e4, 1e4), "width_mm": (0.1, 1e4), "length_mm": (0.1, 1e4),
+    "d33_pc_per_n": (-5000, 5000), "width_mm": (0.1, 1e4), "length_mm": (0.1, 1e4),
     "indenters_mm": (0.05, 200), "preloads_n": (1e-6, 1e4), "dynamic_forces_n": (1e-6, 1e3), "dwells_s": (0, 1e7),
     "cycles_per_recording": (0, 1e9), "minutes_per_recording": (0, 1e5),
     "low_hz": (1e-3, 1e6), "high_hz": (1e-3, 1e6), "sample_rate_hz": (1, 1e6), "duration_s": (1e-3, 3600),
@@ -167,15 +167,20 @@ def parse(document: Any) -> Experiment:
         raise RigError("lines", given.get("lines"), "give either lines (FRF) or drive (time series)")
     for band, part in (("lines", lines), ("drive", drive)):
         if part is not None and not part.low_hz < part.high_hz:
-            raise RigError(f"{band}.high_hz", part.high_hz, f"must be above low_hz, {part.low_hz:g}")
+            raise RigError(f"{band}.high_hz", part.high_hz, f"must be above low_hz, {part.low_hz:g} Hz")
     if drive is not None:
         checks.one_of("drive.kind", drive.kind, ("random", "sweep", "stepped_sine"))
         checks.number("drive.high_hz", drive.high_hz, 0, drive.sample_rate_hz / 2.56)
-        checks.number("drive.duration_s · sample_rate_hz", drive.duration_s * drive.sample_rate_hz, 256, 2**24)
+        checks.number(
+            "drive.samples (duration_s · sample_rate_hz)", drive.duration_s * drive.sample_rate_hz, 256, 2**24
+        )
     skin = _skin(given.get("skin"))
     design = _part(Design, "design", given.get("design", {}))
     for index, name in enumerate(design.sensors):
         checks.one_of(f"design.sensors[{index}]", name, [sensor[0] for sensor in skin.sensors])
+    if kind == FRF:
+        feasible.check_skin(skin)
+        feasible.check_presses(design, skin)
     return Experiment(
         name=checks.text("name", given.get("name")),
         seed=checks.whole("seed", given.get("seed", 0), 0, 2**63 - 1),

@@ -94,8 +94,8 @@ def disc_mean(s: Floats) -> Floats:
 def base_stress(spectrum: Floats, rt_over_h: float, offset_over_h: Floats) -> Floats:
     """Mean stress on sensors, in units of 3F/(2πh²), of loads whose stress on the base has the transform `spectrum`.
 
-    `spectrum` (rows, WAVENUMBERS), `offset_over_h` (rows,) or (rows, sensors).
+    `spectrum` (rows, WAVENUMBERS), `offset_over_h` (rows,) or (rows, sensors). Beyond the disc's rim it is 0.
     """
     felt = spectrum * (SERIES * disc_mean(WAVENUMBERS * rt_over_h))
     waves = j0(np.multiply.outer(offset_over_h, WAVENUMBERS))
-    return np.einsum("rk,r...k->r...", felt, waves)
+    return np.where(offset_over_h + rt_over_h < RIM, np.einsum("rk,r...k->r...", felt, waves), 0.0)

@@ -137,8 +137,11 @@ def test_every_effect_of_these_kinds_is_tested() -> None:
 
 
 def test_what_cannot_be_pressed_is_named() -> None:
-    with pytest.raises(RigError, match=r"curves\.largest_displacement_mm = 2\.4: must be below 0\.9"):
+    with pytest.raises(RigError, match=r"curves\.largest_displacement_mm = 2\.4: must be below 2\.25 mm, 0\.9"):
         curve("indentation", {}, largest_displacement_mm=2.4)
+    held = r"curves\.samples = 60: leaves 4 samples while the load rises, in 8 s of 116 s: must leave at least 8"
+    with pytest.raises(RigError, match=held):
+        curve("compression", {}, samples=60, hold_s=100.0, largest_displacement_mm=0.8, speeds_mm_per_s=[0.1])
     with pytest.raises(RigError, match=r"effects\.strain_stiffening\.coefficient = 15\.0: locks at this load"):
         curve(
             "compression", {"strain_stiffening": {"coefficient": 15.0, "law": "limited"}}, largest_displacement_mm=1.0

@@ -1,0 +1,63 @@
+"""What no rig can carry out, refused by name: sensors in one place, presses beside the skin, spheres that lift off."""
+
+import math
+from collections.abc import Sequence
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+from rig.errors import RigError
+
+if TYPE_CHECKING:
+    from rig.experiment import Design, Skin
+
+_LEAST_D33 = 0.05  # pC/N; a polymer without poling has as much
+_FELT_WITHIN = 8.0  # thicknesses; further off less than a millionth of the stress arrives
+
+
+def check_skin(skin: "Skin") -> None:
+    """A d33 that shows, and sensors beside each other; raises RigError."""
+    size = abs(skin.d33_pc_per_n)
+    if size < _LEAST_D33:
+        slip = f"; {size:g} C/N would be {1e12 * size:g} pC/N" if 1e12 * size >= _LEAST_D33 else ""
+        raise RigError("skin.d33_pc_per_n", skin.d33_pc_per_n, f"must be at least {_LEAST_D33:g} pC/N in size{slip}")
+    for (first, *here), (second, *there) in combinations(skin.sensors, 2):
+        apart = math.dist(here, there)
+        if first == second:
+            raise RigError("skin.sensors", first, "must be the id of one sensor alone")
+        touching = 2 * skin.sensor_radius_mm
+        if apart < touching * (1 - 1e-9):
+            allowed = f"must be at least {touching:g} mm apart, two sensor radii, else they overlap"
+            raise RigError("skin.sensors", f"{first} and {second}, {apart:g} mm apart", allowed)
+
+
+def check_presses(design: "Design", skin: "Skin") -> None:
+    """Spheres that stay down, on the skin, where the sensor feels them; raises RigError."""
+    lowest = min(design.preloads_n)
+    for index, force in enumerate(design.dynamic_forces_n):
+        if force >= lowest:
+            allowed = f"must be below the lowest preload, {lowest:g} N: the sphere would lift off"
+            raise RigError(f"design.dynamic_forces_n[{index}]", force, allowed)
+    reach = _FELT_WITHIN * skin.thickness_mm - skin.sensor_radius_mm
+    for index, offset in enumerate(design.offsets_mm):
+        field, away = f"design.offsets_mm[{index}]", math.hypot(*offset)
+        if away > max(reach, 0.0):
+            allowed = f"must be 0 to {max(reach, 0):g} mm from the sensor's centre, which feels nothing further off"
+            raise RigError(field, list(offset), allowed)
+        _check_on_skin(field, offset, skin, design.sensors)
+
+
+def _check_on_skin(field: str, offset: Sequence[float], skin: "Skin", sensors: Sequence[str]) -> None:
+    """The array lies in the middle of the skin, whose length runs along x."""
+    for axis, extent, name in ((0, skin.length_mm, "length_mm"), (1, skin.width_mm, "width_mm")):
+        if extent is None:
+            continue
+        centres = [centre[axis] for _, *centre in skin.sensors]
+        middle = (min(centres) + max(centres)) / 2
+        for sensor, *centre in skin.sensors:
+            place = centre[axis] + offset[axis]
+            if (not sensors or sensor in sensors) and abs(place - middle) > extent / 2:
+                allowed = (
+                    f"puts the sphere of {sensor} at {'xy'[axis]} = {place:g} mm: must be {middle - extent / 2:g} to "
+                    f"{middle + extent / 2:g} mm, on the skin (skin.{name})"
+                )
+                raise RigError(field, list(offset), allowed)
