@@ -48,8 +48,12 @@ def _cycles(bench: "Bench", effect: str) -> Floats:
 
 def _ageing(bench: "Bench") -> Floats:
     rate, unit = (effects.of(bench.on, "ageing", name) for name in ("rate", "cycles"))
-    age = _cycles(bench, "ageing") / unit
+    cycles = _cycles(bench, "ageing")
+    age = cycles / unit
     lost = np.log10(1 + age) if bench.on["ageing"]["law"] == "log" else -np.expm1(-age)
+    if rate * lost.max() >= 1:
+        allowed = f"must be below {1 / lost.max():.3g}: by {cycles.max():.0f} load cycles nothing would be left"
+        raise RigError("effects.ageing.rate", rate, allowed)
     return 1 - rate * lost
 
 

@@ -190,6 +190,16 @@ def test_the_command_writes_a_report_for_each_readable_file(tmp_path: Path, tabl
     assert [file.name for file in (tmp_path / "reports").iterdir()] == ["palm.json"]
 
 
+def test_campaigns_of_one_name_are_told_what_to_do(tmp_path: Path) -> None:
+    files = [tmp_path / folder / "campaign.json" for folder in ("monday", "tuesday")]
+    asked = ["diagnose", *map(str, files), "--campaign", "campaign", "--output-dir", str(tmp_path / "reports")]
+    result = CliRunner(env={"COLUMNS": "400"}).invoke(app, asked)
+    assert result.exit_code == 2
+    assert f"{files[0]} and {files[1]} and --campaign campaign would all become campaign.json" in result.stderr
+    assert "with an --output-dir of its own" in result.stderr
+    assert not (tmp_path / "reports").exists()
+
+
 def test_a_plan_separates_what_is_confusable(tmp_path: Path, table: SigmaTable) -> None:
     made = replace(SENSORS, mechanisms=("strain_stiffening",), parameters=(8.0,), modulus_mpa=2.7)
     file = tmp_path / "palm.json"

@@ -73,6 +73,7 @@ def put(path: str, value: Any) -> Any:
         ("effects", {"gremlins": {}}, "effects.gremlins = {}: unknown; known: moving_contact_edge"),
         ("effects", {"ageing": {"rate": 0.1}}, "effects.ageing.cycles = None: required, 1 to 1e+09"),
         ("effects", {"ageing": {"rate": 2, "cycles": 5}}, "effects.ageing.rate = 2: must be 0 to 1"),
+        ("effects", {"ageing": {"rate": 1, "cycles": 1}}, "effects.ageing.rate = 1.0: must be below 0.3"),
         ("effects", {"sensor_relaxation": {"law": "step"}}, "sensor_relaxation.step = None: required by the law step"),
         ("effects", {"platen_friction": {"friction": 1}}, "acts on recordings of kind compression"),
         ("curves", {}, "curves = {}: not for recordings of kind frf"),

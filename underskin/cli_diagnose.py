@@ -88,7 +88,13 @@ def _refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_
         raise typer.BadParameter("give files or --campaign", param_hint="FILES")
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise typer.BadParameter(f"{twice[0]}: two reports would have this name", param_hint="FILES")
+        given = [(file.stem, str(file)) for file in files] + [(name, f"--campaign {name}") for name in campaigns]
+        clashing = " and ".join(source for name, source in given if name == twice[0])
+        problem = (
+            f"reports are named like their campaigns: {clashing} would all become {twice[0]}.json. "
+            "Rename files, or run once for each, with an --output-dir of its own"
+        )
+        raise typer.BadParameter(problem, param_hint="FILES")
     lost = [file for file in files if (output_dir / f"{file.stem}.json").resolve() == file.resolve()]
     if lost:
         raise typer.BadParameter(f"the report would overwrite {lost[0]}", param_hint="--output-dir")

@@ -2,7 +2,8 @@
 charge over force depends on how hard the shaker drives.
 
 Law: σ → (1 − m) σ + m · (first harmonic of (F + Fd sin ωt) σ(F + Fd sin ωt))/Fd, with the edge moving and every other
-mechanism inside; tends to moving_contact_edge as Fd/F → 0.
+mechanism of contact and stress inside; tends to moving_contact_edge as Fd/F → 0. d33 is that at the preload: where it
+changes with stress (preload_dependent_d33) it multiplies the harmonic and does not vary within the cycle.
 
 Assumptions: quasi-static over the cycle; the sphere never leaves the skin (Fd < F); m, the edge's mobility, is the same
 for all recordings.

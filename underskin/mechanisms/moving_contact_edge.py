@@ -1,7 +1,8 @@
 """The edge of the contact moves with the dynamic force, so the oscillating part of the pressure sits towards the rim,
 and a wide contact gives less charge than the steady pressure's shape says.
 
-Law: σ → (1 − m) σ + m d(Fσ)/dF at fixed R, with every other mechanism inside the derivative; for the linear Hertz case
+Law: σ → (1 − m) σ + m d(Fσ)/dF at fixed R, with every other mechanism of contact and stress inside the derivative (d33
+multiplies it: preload_dependent_d33's is the tangent coefficient already); for the linear Hertz case
 d(Fσ)/dF = σ + (a/3) ∂σ/∂a, the flat punch's σ. FRF = charge over oscillating force.
 
 Assumptions: m, the mobile fraction, is the same for all recordings; oscillations small against the preload.
