@@ -1,6 +1,6 @@
 """Columns out: one answer as JSON (null where there is no value) or as CSV (NaN there)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
@@ -26,11 +26,20 @@ class AnswerInColumns(BaseModel):
     )
 
 
+class FindingModel(BaseModel):
+    """A value that looks wrong."""
+
+    field: str = Field(description="Name of the field.")
+    index: int | None = Field(description="First such row, from 0; null for a single value.")
+    statement: str = Field(description="What is unusual, and a guess at the reason.")
+
+
 @dataclass(frozen=True)
 class Columns:
     """An answer: columns that broadcast to `rows`, which rows are inside the domain, and values for all rows.
 
-    A column may have a second axis (lines of a spectrum), named by `line_hz`.
+    A column may have a second axis (lines of a spectrum), named by `line_hz`. `names`: columns of text, one a row, that
+    go before the others.
     """
 
     rows: int
@@ -40,6 +49,7 @@ class Columns:
     columns: Mapping[str, Floats]
     shared: Mapping[str, Any] = field(default_factory=dict)
     line_hz: Floats | None = None
+    names: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def full(self, name: str) -> Floats:
         """A column in its full length, contiguous."""
@@ -60,6 +70,7 @@ class Columns:
             "model": self.model,
             "table_sha256": self.table_sha256,
             **self.shared,
+            **self.names,
             **{name: self.full(name) for name in self.columns},
             "status": self.status(),
         }
@@ -77,8 +88,8 @@ class Columns:
 
     def csv(self) -> bytes:
         """The columns as CSV; a column of spectra becomes one CSV column a frequency, `name[10.0 Hz]`."""
-        header: list[str] = []
-        cells: list[list[str]] = []
+        header: list[str] = list(self.names)
+        cells: list[list[str]] = [list(map(_quoted, texts)) for texts in self.names.values()]
         for name in self.columns:
             values = self.full(name)
             if values.ndim == 1:
@@ -94,6 +105,11 @@ class Columns:
 
 def _texts(values: Floats) -> list[str]:
     return ["NaN" if value != value else repr(value) for value in values.tolist()]
+
+
+def _quoted(text: str) -> str:
+    """A text as a cell, quoted where it must be (RFC 4180)."""
+    return '"' + text.replace('"', '""') + '"' if set(text) & set(',"\r\n') else text
 
 
 def wants_csv(accept: str) -> bool:

@@ -72,24 +72,30 @@ def rows(columns: Mapping[str, Floats]) -> int:
 
 def parse(kind: type[Request], body: bytes, content_type: str) -> Request:
     """The request in `body`; raises Refusal 400 (unreadable), 415 (another type) or 422 (a field is wrong)."""
-    media_type = content_type.split(";", 1)[0].strip().lower()
-    if media_type in ("", "application/json"):
-        fields = _from_json(body)
-    elif media_type == "text/csv":
-        fields = _from_csv(kind, body)
-    else:
-        raise Refusal(415, f"Content-Type {media_type!r} cannot be read; send application/json or text/csv.")
+    fields = (
+        _from_csv(kind, body)
+        if _media_type(content_type) == "text/csv"
+        else json_document(body, content_type, " or text/csv")
+    )
     try:
         return kind.model_validate(fields)
     except ValidationError as error:
         raise from_validation(error) from None
 
 
-def _from_json(body: bytes) -> Any:
+def json_document(body: bytes, content_type: str, also: str = "") -> Any:
+    """What a JSON body holds; raises Refusal 400 (unreadable) or 415 (another type; `also` says what else is read)."""
+    media_type = _media_type(content_type)
+    if media_type not in ("", "application/json"):
+        raise Refusal(415, f"Content-Type {media_type!r} cannot be read; send application/json{also}.")
     try:
         return from_json(body)  # reads NaN too, so that it is refused by field and row
     except ValueError as error:
         raise Refusal(400, f"The body is not JSON: {error}.") from None
+
+
+def _media_type(content_type: str) -> str:
+    return content_type.split(";", 1)[0].strip().lower()
 
 
 def _from_csv(kind: type[ColumnsRequest], body: bytes) -> dict[str, Any]:

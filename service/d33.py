@@ -6,10 +6,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 from fastapi import APIRouter, Request, Response
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from service.adopted import press, serving_of
-from service.answers import Accept, Columns
+from service.answers import Accept, Columns, FindingModel
 from service.columns import NonNegative, Numbers, NumbersPerRow, Signed, rows
 from service.dependencies import Store, Table, columns_body, columns_route
 from service.frf import EXAMPLE as FRF_EXAMPLE
@@ -57,14 +57,6 @@ class D33Columns(PressedSkinColumns):
     band_hz: Numbers | None = Field(
         default=None, min_length=2, max_length=2, description="Lowest and highest frequency averaged over [Hz]."
     )
-
-
-class FindingModel(BaseModel):
-    """A measured value that looks wrong."""
-
-    field: str = Field(description="Name of the field.")
-    index: int | None = Field(description="First such row, from 0; null for a single value.")
-    statement: str = Field(description="What is unusual, and a guess at the reason.")
 
 
 class D33Answer(PressedSkinAnswer):

@@ -68,10 +68,15 @@ def columns_route(
 
         if len(body) <= _INLINE_BYTES and b"adopted" not in body:  # that model is in the store
             return work()
-        async with _threads:
-            return await asyncio.to_thread(work)
+        return await in_thread(work)
 
     return endpoint
+
+
+async def in_thread(work: Callable[[], Response]) -> Response:
+    """What `work` answers, which may take long: a few at a time, beside the event loop."""
+    async with _threads:
+        return await asyncio.to_thread(work)
 
 
 def columns_body(kind: type[ColumnsRequest], examples: dict[str, Any]) -> dict[str, Any]:

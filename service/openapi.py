@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field
 
 from service.gate import OPEN
 from service.problems import MEDIA_TYPE, Problem
-from service.stress import StressRequest
+from service.stress_models import StressRequest
 
 router = APIRouter(tags=["openapi"])
 

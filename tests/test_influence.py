@@ -14,7 +14,8 @@ from tests.oracle import NEEDS_ORACLE
 from underskin import TableError, layer
 from underskin.influence import InfluenceTable, load_influence
 from underskin.layer import Layer
-from underskin.stress import Contact, contact_load, pressure_map_load
+from underskin.sphere_pressure import HERTZ_SHAPE, SpherePressure
+from underskin.stress import Load, array_stress, contact_load, pressure_map_loads
 from underskin.surrogate import tables_folder
 from underskin.table_format import read_table
 from underskin.units import Floats
@@ -28,6 +29,11 @@ def assert_accurate(found: Floats, exact: Floats) -> None:
     allowed = np.where(np.abs(exact) > 0.01, 1e-4 * np.abs(exact), 1e-5)
     worst = int(np.argmax(np.abs(found - exact) / allowed))
     assert (np.abs(found - exact) <= allowed).all(), (worst, found.flat[worst], exact.flat[worst])
+
+
+def hertz_load(a: float, place: Floats) -> Load:
+    """1 N spread by Hertz over a contact of radius a on a layer of unit thickness."""
+    return contact_load(place, (0.0, 0.0, 1.0), SpherePressure(a, HERTZ_SHAPE), 1.0)
 
 
 def oracle_rows(*quantities: str) -> list[dict[str, str]]:
@@ -62,7 +68,7 @@ def test_the_hertz_pressure_beside_the_sensor_equals_the_oracle() -> None:
         poisson_ratio, slip, rho, offset, value = numbers(row)
         influence = TABLE.at(rho, poisson_ratio, slip)
         assert influence is not None
-        load = contact_load(Contact(0.0, 0.0, 1.0, (0.0, 0.0, 1.0)), float(row["a_over_h"]), 1.0)
+        load = hertz_load(float(row["a_over_h"]), np.zeros(2))
         answer = influence.stress(1.0, np.array([[0.6 * offset, -0.8 * offset]]), load.places, load.forces)
         found.append(-float(answer.stress[0]) * 2 * np.pi / 3)
         exact.append(value)
@@ -139,13 +145,12 @@ def test_a_map_of_the_hertz_pressure_gives_the_contact(cells: int) -> None:
     influence = TABLE.at(0.6)
     assert influence is not None
     a, sensors = 1.0, np.array([[0.0, 0.0], [0.7, 0.4], [3.0, -1.0]])
-    load = contact_load(Contact(0.1, 0.2, 1.0, (0.0, 0.0, 1.0)), a, 1.0)
+    load = hertz_load(a, np.array([0.1, 0.2]))
     contact = influence.stress(1.0, sensors, load.places, load.forces).stress
     x = np.linspace(-1.2, 1.4, cells)
     square = ((x - 0.1) ** 2 + (x[:, None] - 0.2 - 0.1) ** 2) / a**2
     pressure = 1.5 / np.pi / a**2 * np.sqrt(np.clip(1 - square, 0, None))
-    drawn = pressure_map_load(x, x + 0.0 - 0.1, pressure, 1.0)
-    found = influence.stress(1.0, sensors, drawn.places, drawn.forces).stress
+    found = array_stress(influence, 1.0, sensors, pressure_map_loads(x, x - 0.1, pressure, 1.0)).stress
     assert found == pytest.approx(contact, rel=1.5 / cells)
 
 
@@ -156,8 +161,8 @@ def test_uniform_pressure_over_wide_cells_is_integrated_within_them() -> None:
     sensors = np.array([[0.3, 0.0], [2.0, 1.0]])
     wide = np.array([-2.0, 0.0, 2.0])
     narrow = -3 + 6 * (np.arange(120) + 0.5) / 120
-    loads = [pressure_map_load(x, x, np.ones((x.size, x.size)), 1.0) for x in (wide, narrow)]
-    first, second = (influence.stress(1.0, sensors, load.places, load.forces).stress for load in loads)
+    maps = [pressure_map_loads(x, x, np.ones((x.size, x.size)), 1.0) for x in (wide, narrow)]
+    first, second = (array_stress(influence, 1.0, sensors, loads).stress for loads in maps)
     assert first == pytest.approx(second, rel=3e-5)
 
 

@@ -5,6 +5,7 @@ import io
 import json
 import subprocess
 import sys
+import tracemalloc
 from collections.abc import Callable
 from copy import deepcopy
 from pathlib import Path
@@ -16,10 +17,14 @@ import pytest
 
 from service.stress import EXAMPLE
 from underskin import Client, layer
+from underskin.contact import SphereOnLayer
 from underskin.half_space import stress as half_space_stress
+from underskin.hankel import normal_stress
 from underskin.influence import load_influence
 from underskin.layer import Layer
-from underskin.stress_request import answer, read_request
+from underskin.stress_answer import answer
+from underskin.stress_request import read_request
+from underskin.units import Floats
 
 TABLE = load_influence()
 COMMAND = Path(sys.executable).with_name("underskin")
@@ -69,18 +74,25 @@ def test_charges_are_those_of_the_exact_layer_whatever_the_load(http: httpx.Clie
     exact = Layer(0.45, 1 / 6)
     for number, sensor in enumerate(SKIN["sensors"][:3]):
         total = 0.0
-        for contact in contacts:
+        for contact, radius_mm in zip(contacts, found["contact_radius_mm"], strict=True):
             away = np.array([contact["x_mm"] - sensor["x_mm"], contact["y_mm"] - sensor["y_mm"]])
             r = float(np.hypot(*away)) / 2.5
-            a = np.cbrt(0.75 * contact["normal_force_n"] * 4.0 * (1 - 0.45**2) / 16.0) / 2.5
+            pressed = SphereOnLayer(4e-3, 16e6, 2.5e-3, exact).at_force(contact["normal_force_n"])
+            assert radius_mm == pytest.approx(pressed.contact_radius * 1e3, rel=1e-8)
+            a = pressed.contact_radius / 2.5e-3
             outward = float(np.dot(contact["tangential_force_n"], away)) / np.hypot(*away)
-            total += contact["normal_force_n"] * float(layer.sigma(exact, a, 0.6, r))
+            total += float(transmitted(exact, pressed.pressure_transform, a, r))
             total -= outward * tangential(exact, a, r)
         assert found["charge_pc"][number] == pytest.approx(14.0 * 1.5 * 0.36 * total, rel=2e-4)
 
 
+def transmitted(body: Layer, transform: Callable[[Floats], Floats], a: float, r: float) -> Floats:
+    """F σ at ρ 0.6 under a pressure of which the transform is known."""
+    return normal_stress(lambda k: body.transmission(k).value, transform, a, 0.6, r)
+
+
 def tangential(exact: Layer, a: float, r: float) -> float:
-    """γ_t averaged over the Hertz pressure, along the line of centres."""
+    """γ_t averaged over the Hertz pressure, which small contacts have, along the line of centres."""
     angle, share = np.pi * (np.arange(24) + 0.5) / 24, 1 / 24
     t, weight = np.polynomial.legendre.leggauss(12)
     t, weight = (1 + t) / 2, weight / 2
@@ -89,6 +101,27 @@ def tangential(exact: Layer, a: float, r: float) -> float:
     distance = np.hypot(x, y)
     values = layer.gamma_t(exact, distance, 0.6) * x / distance
     return float((3 * t**2 * weight) @ values.sum(axis=1) * share)
+
+
+@pytest.mark.parametrize("hertz_a_over_h", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize(("poisson_ratio", "glue_stiffness"), [(0.5, None), (0.35, 2.0)])
+def test_wide_contacts_are_those_of_the_layer(
+    hertz_a_over_h: float, poisson_ratio: float, glue_stiffness: float | None
+) -> None:
+    """Radius and charge of the exact contact, not those of Hertz' half space, which is 10 % off at a/h 1."""
+    force = float(4 * 1e5 * (hertz_a_over_h * 2.5e-3) ** 3 / (3 * 50e-3 * (1 - poisson_ratio**2)))
+    contact = {"x_mm": 0.7, "y_mm": 0.0, "indenter_radius_mm": 50.0, "normal_force_n": force}
+    changes = {"poisson_ratio": poisson_ratio, "glue_stiffness": glue_stiffness, "youngs_modulus_mpa": 0.1}
+    found = answer(TABLE, read_request(document(contact, **changes)))
+    body = Layer(poisson_ratio, 0.0 if glue_stiffness is None else 1 / (1 + glue_stiffness))
+    pressed = SphereOnLayer(50e-3, 1e5, 2.5e-3, body).at_force(force)
+    assert found.contact_radius_mm == pytest.approx([pressed.contact_radius * 1e3], rel=1e-8)
+    for number, x in ((0, 0.0), (1, 8.0)):
+        total = transmitted(body, pressed.pressure_transform, pressed.contact_radius / 2.5e-3, abs(x - 0.7) / 2.5)
+        charge = 14.0 * 1.5 * 0.36 * float(total)
+        assert found.columns["charge_pc"][number] == pytest.approx(charge, rel=1e-4, abs=1e-5 * 14.0 * 0.54 * force)
+    ratio = found.contact_radius_mm[0] / 2.5 / hertz_a_over_h
+    assert ratio < (0.997 if hertz_a_over_h == 0.3 else 0.95)
 
 
 def test_several_contacts_add_up(http: httpx.Client) -> None:
@@ -133,25 +166,20 @@ def test_only_sensors_that_no_load_reaches_are_out_of_the_domain(http: httpx.Cli
     assert both["charge_error_pc"][0] > found["charge_error_pc"][0]
 
 
-@pytest.mark.parametrize("fields", [{"poisson_ratio": 0.2}, {"sensor_radius_mm": 7.6}])
-def test_a_skin_outside_the_table_has_no_values(http: httpx.Client, fields: Document) -> None:
-    found = posted(http, document(PRESS, **fields))
-    assert found["status"] == ["out_of_domain"] * 5
-    assert found["charge_pc"] == [None] * 5
-    assert found["reach_mm"] is None
-
-
 def test_csv_has_a_row_a_sensor(http: httpx.Client) -> None:
-    plain = posted(http, document(PRESS))
-    reply = http.post("/v1/stress", json=document(PRESS), headers={"Accept": "text/csv"})
+    names = ["s0", 's1, "left"', "s2", "ü", "s4"]
+    sensors = [{**sensor, "id": name} for sensor, name in zip(SKIN["sensors"], names, strict=True)]
+    plain = posted(http, document(PRESS, sensors=sensors))
+    reply = http.post("/v1/stress", json=document(PRESS, sensors=sensors), headers={"Accept": "text/csv"})
     header, *lines = csv.reader(io.StringIO(reply.text, newline=""))
-    assert header == ["x_mm", "y_mm", "charge_pc", "charge_error_pc", "mean_stress_mpa", "status"]
-    assert [float(line[2]) for line in lines] == plain["charge_pc"]
+    assert header == ["sensor", "x_mm", "y_mm", "charge_pc", "charge_error_pc", "mean_stress_mpa", "status"]
+    assert [float(line[3]) for line in lines] == plain["charge_pc"]
+    assert [line[0] for line in lines] == names
 
 
 def map_of(**changes: Any) -> Callable[[Document], None]:
     def change(request: Document) -> None:
-        del request["contacts"]
+        request.pop("contacts", None)
         pressure: list[list[Any]] = [[0.1, 0.1], [0.1, 0.1]]
         request["pressure_map"] = {"x_mm": [0.0, 1.0], "y_mm": [0.0, 1.0], "pressure_mpa": pressure, **changes}
 
@@ -170,28 +198,50 @@ def without(name: str) -> Callable[[Document], None]:
     return lambda request: request.pop(name)
 
 
+WIDE = {"x_mm": [0.0, 1.0, 2.0, 3.0], "y_mm": [0.0, 1.0, 2.0]}
 REFUSED: list[tuple[Callable[[Document], Any], str, str]] = [
-    (contact_with(x_mm=0.9), "contacts", "must not overlap contact 0: the centres are 1.0"),
-    (skin_with(length_mm=5.0), "contacts", "must lie on the skin, x from 1.5 to 6.5 mm"),
-    (skin_with(width_mm=1.5), "contacts", "must lie on the skin, y from -0.75 to 0.75 mm"),
-    (contact_with(normal_force_n=-1.0), "contacts", ""),
+    (contact_with(x_mm=0.9), "contacts[1]", "must not overlap contacts[0]: the centres are 1.0"),
+    (skin_with(length_mm=5.0), "length_mm", "must be at least 8: so far apart are the sensors"),
+    (skin_with(width_mm=1.5), "contacts[1]", "must lie on the skin, y from -0.75 to 0.75 mm"),
+    (skin_with(width_mm=2.8), "contacts[1]", "must lie on the skin, y from -1.4 to 1.4 mm"),
+    (
+        skin_with(thickness_mm=0.1, sensor_radius_mm=0.1, youngs_modulus_mpa=0.05),
+        "contacts[0].normal_force_n",
+        "press less",
+    ),
+    (contact_with(normal_force_n=-1.0), "contacts[1].normal_force_n", "greater than 0"),
+    (contact_with(normal_force_n=0), "contacts[1].normal_force_n", "greater than 0"),
     (contact_with(normal_force_n=1e-6), "contacts[1].normal_force_n", "in magnitude"),
     (contact_with(indenter_radius_mm=0.004), "contacts[1].indenter_radius_mm", "was it given in m?"),
-    (contact_with(tangential_force_n=[1.0]), "contacts", ""),
-    (contact_with(force=1.0), "contacts", "is not a field"),
-    (skin_with(poisson_ratio=0.6), "poisson_ratio", ""),
-    (skin_with(glue_stiffness=-1.0), "glue_stiffness", ""),
+    (contact_with(tangential_force_n=[1.0]), "contacts[1].tangential_force_n", "two numbers, x and y"),
+    (contact_with(tangential_force_n=[1.0, "2"]), "contacts[1].tangential_force_n[1]", "must be a number"),
+    (contact_with(force=1.0), "contacts[1].force", "unknown field; known: x_mm, y_mm"),
+    (lambda request: request["contacts"][1].pop("normal_force_n"), "contacts[1].normal_force_n", "required"),
+    (skin_with(contacts=[]), "contacts", "must be a list of 1 to 1000 contacts"),
+    (skin_with(contacts={"x_mm": 1.0}), "contacts", "must be a list"),
+    (skin_with(poisson_ratio=0.6), "poisson_ratio", "must be 0 to 0.5"),
+    (skin_with(poisson_ratio=0.2), "poisson_ratio", "must be 0.3 to 0.5: the table of influences holds no other"),
+    (skin_with(sensor_radius_mm=7.6), "sensor_radius_mm", "must be 0 to 3 times thickness_mm (2.5)"),
+    (skin_with(glue_stiffness=-1.0), "glue_stiffness", "must be 0 or greater"),
     (skin_with(thickness_mm=0.0025), "thickness_mm", "was it given in m?"),
-    (skin_with(sensors=[]), "sensors", "must not be empty"),
+    (skin_with(sensors=[]), "sensors", "must hold at least one sensor"),
     (skin_with(sensors=[{"id": "a", "x_mm": 0.0, "y_mm": 0.0}] * 2), "sensors[1].id", "must differ"),
+    (skin_with(sensors=[{"id": "a", "x_mm": 0.0}]), "sensors[0].y_mm", "required"),
     (without("contacts"), "contacts", "or pressure_map, but not both"),
     (without("youngs_modulus_mpa"), "youngs_modulus_mpa", "is required with contacts"),
     (map_of(pressure_mpa=[[0.1, 0.1], [0.1, -0.1]]), "pressure_map.pressure_mpa[1][1]", "must be at least 0"),
+    (
+        map_of(**WIDE, pressure_mpa=[[0.1, -0.1, 0.1, 0.1], *[[-0.1] * 4] * 2]),
+        "pressure_map.pressure_mpa[0][1]",
+        "does not pull; so are [1][0], [1][1], [1][2], [1][3] and 4 more",
+    ),
     (map_of(pressure_mpa=[[0.1, 0.1]] * 3), "pressure_map.pressure_mpa", "must have a row for each y_mm (2)"),
     (map_of(pressure_mpa=[[0.1, 0.1], [0.1]]), "pressure_map.pressure_mpa", "must have as many as row 0"),
+    (map_of(pressure_mpa=[]), "pressure_map.pressure_mpa", "must be a list of rows"),
     (map_of(x_mm=[1.0, 1.0]), "pressure_map.x_mm", "must be greater than the entry before"),
     (map_of(x_mm=[0.0, 1.0, 3.0]), "pressure_map.x_mm", "evenly spaced"),
-    (map_of(x_mm=[0.0, "1"]), "pressure_map", "must be a number"),
+    (map_of(x_mm=[0.0, "1"]), "pressure_map.x_mm", "must be a number"),
+    (map_of(x_mm=[0.0, 1000.0]), "pressure_map.x_mm", "steps of at most 30 mm"),
 ]
 
 
@@ -208,12 +258,17 @@ def test_what_cannot_be_is_refused_by_name(
     assert allowed in error["allowed"]
 
 
-def test_a_map_beside_the_skin_is_refused(http: httpx.Client) -> None:
-    request = deepcopy(EXAMPLE)
-    map_of(x_mm=[0.0, 30.0])(request)
-    reply = http.post("/v1/stress", json={**request, "length_mm": 40.0})
-    assert reply.json()["errors"][0]["field"] == "pressure_map"
-    assert "x from -16 to 24 mm" in reply.json()["errors"][0]["allowed"]
+def test_a_map_may_reach_the_skins_edge_with_its_cells_and_no_further(http: httpx.Client) -> None:
+    request = deepcopy(EXAMPLE)  # its sensors' middle is at x 4
+    map_of(x_mm=[-14.5, -11.5], y_mm=[-0.5, 0.5], pressure_mpa=[[0.1, 0.0], [0.0, 0.0]])(request)
+    assert http.post("/v1/stress", json={**request, "length_mm": 40.0, "width_mm": 2.0}).status_code == 200
+    for places, refused in (([-14.6, -11.6], [0, 0]), ([19.6, 22.6], [1, 1])):
+        pressure = [[0.0, 0.0], [0.0, 0.0]]
+        pressure[refused[0]][refused[1]] = 0.1
+        map_of(x_mm=places, pressure_mpa=pressure)(request)
+        (error,) = http.post("/v1/stress", json={**request, "length_mm": 40.0}).json()["errors"]
+        assert error["field"] == "pressure_map.pressure_mpa[{}][{}]".format(*refused)
+        assert "x from -16 to 24 mm (length_mm 40, about the middle of the sensors)" in error["allowed"]
 
 
 def test_nan_is_refused_and_a_batch_too_large_says_so(http: httpx.Client) -> None:
@@ -242,7 +297,10 @@ def test_client_and_command_give_the_services_numbers(http: httpx.Client, server
     shown = subprocess.run(
         [COMMAND, "stress", "-"], input=json.dumps(request), capture_output=True, text=True, check=True
     ).stdout
-    assert "charge" in shown or "Q" in shown
+    first_words = [line.split()[0] for line in shown.splitlines() if line.strip()]
+    assert [word for word in first_words if word in found.sensor] == ["s0", "s1", "s2", "s3", "s4"]
+    assert found.contact_radius_mm == pytest.approx(plain["contact_radius_mm"])
+    assert found.findings == ()
 
 
 def test_the_command_names_what_is_wrong(tmp_path: Path) -> None:
@@ -277,6 +335,78 @@ def test_idle_maps_and_impossible_contacts(http: httpx.Client) -> None:
     assert (found["status"], found["charge_pc"]) == (["ok"] * 5, [0.0] * 5)
     refused = http.post("/v1/stress", json=document({**PRESS, "normal_force_n": 100.0}, youngs_modulus_mpa=0.05))
     assert (refused.status_code, "must press less" in refused.text) == (422, True)
-    coarse = {"x_mm": [0, 1e4], "y_mm": [0, 1e4], "pressure_mpa": [[1, 0], [0, 0]]}
-    refused = http.post("/v1/stress", json={**SKIN, "pressure_map": coarse})
-    assert (refused.status_code, "points" in refused.text) == (422, True)
+    costly = {"x_mm": np.arange(60) * 25.0, "y_mm": np.arange(60) * 25.0, "pressure_mpa": np.ones((60, 60))}
+    costly = {name: values.tolist() for name, values in costly.items()}
+    refused = http.post("/v1/stress", json={**SKIN, "pressure_map": costly})
+    assert (refused.status_code, "sensors times points of the load must be" in refused.text) == (422, True)
+
+
+def test_a_huge_map_takes_little_more_memory_than_itself() -> None:
+    """Half a million coarse cells, and twenty million point forces, of which a gigabyte would be needed at once."""
+    x = np.arange(707) * 1.5
+    request = read_request(
+        {
+            **SKIN,
+            "sensors": SKIN["sensors"][:1],
+            "pressure_map": {
+                "x_mm": x.tolist(),
+                "y_mm": x.tolist(),
+                "pressure_mpa": np.full((707, 707), 0.01).tolist(),
+            },
+        }
+    )
+    tracemalloc.start()
+    answer(TABLE, request)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 150e6
+
+
+def test_doubtful_answers_say_why(http: httpx.Client, tmp_path: Path) -> None:
+    hard = {**PRESS, "normal_force_n": 30.0, "x_mm": 24.0}
+    sheared = {**PRESS, "tangential_force_n": [0.9, 1.2]}
+    found = posted(http, document(sheared, hard))["findings"]
+    assert [finding["field"] for finding in found] == ["contacts[1]", "contacts[0]"]
+    assert "L = F/(R²E) is 0.12" in found[0]["statement"]
+    assert "1.5 times the normal one" in found[1]["statement"]
+    assert posted(http, document(PRESS))["findings"] == []
+    drawn = {"x_mm": [0, 1], "y_mm": [0, 1], "pressure_mpa": [[0, 0], [0, 20]]}
+    (found,) = posted(http, {**SKIN, "pressure_map": drawn})["findings"]
+    assert found["field"] == "pressure_map.pressure_mpa[1][1]"
+    assert "more than the layer's modulus, 16 MPa" in found["statement"]
+    drawn["pressure_mpa"] = [[0, 0], [0, 20e3]]
+    (found,) = posted(http, {**SKIN, "pressure_map": drawn, "youngs_modulus_mpa": None})["findings"]
+    assert "was it given in Pa?" in found["statement"] or "was it given in kPa?" in found["statement"]
+    file = tmp_path / "load.json"
+    file.write_text(json.dumps(document(hard)))
+    written = subprocess.run([COMMAND, "stress", file], capture_output=True, text=True, check=True)
+    assert written.stderr.startswith("underskin: look at contacts[0]: L = F/(R²E) is 0.12")
+
+
+def test_a_body_that_is_not_json_is_refused(http: httpx.Client) -> None:
+    for content, kind, status in (("{", "application/json", 400), ("x_mm\n1\n", "text/csv", 415)):
+        assert http.post("/v1/stress", content=content, headers={"Content-Type": kind}).status_code == status
+    assert http.post("/v1/stress", json=[1]).json()["errors"][0]["field"] == "body"
+
+
+def test_the_command_takes_a_map_from_csv(tmp_path: Path) -> None:
+    skin, pressed = tmp_path / "skin.json", tmp_path / "map.csv"
+    skin.write_text(json.dumps(SKIN))
+    pressed.write_text("y_mm \\ x_mm,7,8,9\n-1,0,0.1,0\n0,0.1,0.3,0.1\n1,0,0.1,0\n")
+    drawn = {"x_mm": [7, 8, 9], "y_mm": [-1, 0, 1], "pressure_mpa": [[0, 0.1, 0], [0.1, 0.3, 0.1], [0, 0.1, 0]]}
+    expected = answer(TABLE, read_request({**SKIN, "pressure_map": drawn})).columns["charge_pc"].tolist()
+    command: list[str | Path] = [COMMAND, "stress", skin, "--pressure-map", pressed, "--csv"]
+    rows = csv.DictReader(io.StringIO(subprocess.run(command, capture_output=True, text=True, check=True).stdout))
+    assert [(row["sensor"], float(row["charge_pc"])) for row in rows] == list(
+        zip(["s0", "s1", "s2", "s3", "s4"], expected, strict=True)
+    )
+    for content, says in (
+        ("a;b;c\n1;2;3\n2;3;4\n", "separated by commas"),
+        (",1,2\n0,1,x\n1,1,1\n", "must be a number (line 2, cell 3"),
+        (",1,2\n0,1\n1,1,1\n", "must have as many as row 0"),
+        (",1,2\n1,1,1\n0,1,1\n", "pressure_map.y_mm[1] = 0: must be greater than the entry before"),
+        (",1,2\n0,1,1\n1,nan,1\n", "pressure_map.pressure_mpa[1][0] = 'nan': must be finite"),
+    ):
+        pressed.write_text(content)
+        refused = subprocess.run(command, capture_output=True, text=True)
+        assert (refused.returncode, says in refused.stderr) == (2, True), refused.stderr

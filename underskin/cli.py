@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from underskin import cli_campaign, cli_diagnose, cli_store
+from underskin import cli_campaign, cli_diagnose, cli_store, cli_stress
 from underskin.errors import UnderskinError
 
 if TYPE_CHECKING:
@@ -171,25 +171,6 @@ def d33(
     _answer(given, defaults, input_file, csv, lambda table, columns: answers.d33(table, columns, units_checked))
 
 
-@app.command(no_args_is_help=True)
-def stress(
-    request: Annotated[
-        str, typer.Argument(metavar="FILE", help="JSON as for POST /v1/stress: skin, sensors and loads; - is stdin.")
-    ],
-    csv: Csv = False,
-) -> None:
-    """The charge on every sensor of an array under several contacts or a pressure map."""
-    from underskin import columns
-    from underskin.influence import load_influence
-    from underskin.stress_request import answer, read_file
-
-    found = answer(load_influence(), read_file(request))
-    write = columns.write_csv if csv else columns.write_table
-    write(found.columns, found.inside, len(found.sensors))
-    if not csv and not found.inside.all():
-        typer.echo(f"Out of the domain are sensors with no load within {found.reach_mm:g} mm.")
-
-
 def _answer(
     given: Mapping[str, _Given],
     defaults: Mapping[str, float],
@@ -206,8 +187,7 @@ def _answer(
     table = load_table()
     answer = compute(table, gathered)
     everything = {**gathered, **answer.columns}
-    for finding in answer.findings:
-        typer.echo(f"underskin: look at {finding.field}: {finding.statement}", err=True)
+    columns.say(answer.findings)
     if as_csv:
         columns.write_csv(everything, answer.inside, count)
     else:
@@ -216,6 +196,7 @@ def _answer(
             typer.echo(f"The domain is {answer.domain}.")
 
 
+app.command("stress", no_args_is_help=True)(cli_stress.stress)
 app.command("import", no_args_is_help=True)(cli_store.import_files)
 app.command("export", no_args_is_help=True)(cli_store.export_skin)
 cli_diagnose.add_commands(app)

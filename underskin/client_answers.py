@@ -66,7 +66,10 @@ class D33Answer(PressedSkinAnswer):
 
 @dataclass(frozen=True)
 class StressAnswer(Answer):
-    """What each sensor bears: ids, places, charge with the table's error, and stress (compression positive)."""
+    """What each sensor bears: ids, places, charge with the table's error, and stress (compression positive).
+
+    `contact_radius_mm`: one entry a contact, none for a map.
+    """
 
     sensor: tuple[str, ...]
     x_mm: Floats
@@ -74,7 +77,9 @@ class StressAnswer(Answer):
     charge_pc: Floats
     charge_error_pc: Floats
     mean_stress_mpa: Floats
-    reach_mm: float | None
+    reach_mm: float
+    contact_radius_mm: Floats
+    findings: tuple[Finding, ...]
 
 
 @dataclass(frozen=True)

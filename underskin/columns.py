@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from underskin.errors import InvalidInput, UnderskinError
-from underskin.units import LAB, Floats
+from underskin.units import LAB, Finding, Floats
 
 STANDARD_INPUT = "-"
 
@@ -40,6 +40,7 @@ _NAMES = {
     "charge_pc": ("charge Q", "Q"),
     "charge_error_pc": ("error of the charge", "Q ±"),
 }
+_NO_NAMES: Mapping[str, Sequence[str]] = {}
 PIPED_WIDTH = 200  # of a table that goes into a file or a pipe
 
 
@@ -106,20 +107,30 @@ def rows(columns: Mapping[str, Floats]) -> int:
     return 1 if first is None else long[first]
 
 
-def write_csv(columns: Mapping[str, Floats], inside: NDArray[np.bool_], count: int) -> None:
-    """All columns and `status` as CSV on standard output, numbers in full, NaN where there is no value."""
+def write_csv(
+    columns: Mapping[str, Floats], inside: NDArray[np.bool_], count: int, names: Mapping[str, Sequence[str]] = _NO_NAMES
+) -> None:
+    """All columns and `status` as CSV on standard output, numbers in full, NaN where there is no value.
+
+    `names`: columns of text, one a row, that go first.
+    """
     full = [np.broadcast_to(values, (count,)).tolist() for values in columns.values()]
+    cells = [["NaN" if number != number else repr(number) for number in numbers] for numbers in full]
     writer = csv.writer(sys.stdout, lineterminator="\n")
-    writer.writerow([*columns, "status"])
-    for *numbers, row_inside in zip(*full, np.broadcast_to(inside, (count,)).tolist(), strict=True):
-        writer.writerow(["NaN" if number != number else repr(number) for number in numbers] + [status(row_inside)])
+    writer.writerow([*names, *columns, "status"])
+    writer.writerows(zip(*names.values(), *cells, map(status, np.broadcast_to(inside, (count,)).tolist()), strict=True))
 
 
-def write_table(columns: Mapping[str, Floats], inside: NDArray[np.bool_], count: int) -> None:
-    """What is the same in all rows as a list, the rest as a table, rounded to be read."""
+def write_table(
+    columns: Mapping[str, Floats], inside: NDArray[np.bool_], count: int, names: Mapping[str, Sequence[str]] = _NO_NAMES
+) -> None:
+    """What is the same in all rows as a list, the rest as a table, rounded to be read; `names` go first."""
     console = Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH)
     varying = {name: values for name, values in columns.items() if values.size > 1 and np.unique(values).size > 1}
     listed = Table.grid(padding=(0, 2))
+    if count == 1:
+        for name, (text,) in names.items():
+            listed.add_row(name, Text(text))
     for name, values in columns.items():
         if name not in varying:
             listed.add_row(_NAMES[name][0], _rounded(name, float(values.flat[0])), _unit(name))
@@ -127,17 +138,27 @@ def write_table(columns: Mapping[str, Floats], inside: NDArray[np.bool_], count:
         listed.add_row("status", status(bool(inside.flat[0])))
     console.print(listed)
     if count > 1:
-        console.print(_rows_table(varying, np.broadcast_to(inside, (count,))))
+        console.print(_rows_table(varying, np.broadcast_to(inside, (count,)), names))
 
 
-def _rows_table(columns: Mapping[str, Floats], inside: NDArray[np.bool_]) -> Table:
+def _rows_table(columns: Mapping[str, Floats], inside: NDArray[np.bool_], names: Mapping[str, Sequence[str]]) -> Table:
     table = Table(box=SIMPLE_HEAD, padding=0)
+    for name in names:
+        table.add_column(name, overflow="fold")
     for name in columns:
         table.add_column(Text(f"{_NAMES[name][1]}\n{_unit(name)}"), justify="right", overflow="fold")
     table.add_column("status", overflow="fold")
     for number, row_inside in enumerate(inside.tolist()):
-        table.add_row(*(_rounded(name, values[number]) for name, values in columns.items()), status(row_inside))
+        texts = (Text(each[number]) for each in names.values())
+        rounded = (_rounded(name, values[number]) for name, values in columns.items())
+        table.add_row(*texts, *rounded, status(row_inside))
     return table
+
+
+def say(findings: Sequence[Finding]) -> None:
+    """What looks wrong and is used all the same, a line each on standard error."""
+    for finding in findings:
+        sys.stderr.write(f"underskin: look at {finding.field}: {finding.statement}\n")
 
 
 def status(inside: bool) -> str:

@@ -4,7 +4,7 @@ A rigid frictionless sphere of radius R is pressed with the force F into an inco
 rigid base; L = F/(R² E). Splines of degree 5 in ln(R/h), L^(1/3) and rT/h. Rows outside the domain are NaN.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import NdBSpline, make_interp_spline
 
 from underskin import hertz
-from underskin.errors import TableError
 from underskin.surrogate import tables_folder
-from underskin.table_format import CONTACT_SCHEMA, read_table
+from underskin.table import Table
+from underskin.table_format import CONTACT_SCHEMA
 from underskin.units import Floats
 
 CONTACT_TABLE = "contact.h5"
@@ -60,28 +60,21 @@ class ContactStress:
     inside: NDArray[np.bool_]
 
 
-class ContactTable:
+class ContactTable(Table):
     """A verified table of contacts; see the module."""
 
-    def __init__(self, path: Path) -> None:
-        """Read and verify the table; raises TableError with the reason."""
-        file = read_table(path, CONTACT_SCHEMA)
-        self.path = path
-        self.sha256 = file.sha256
-        self.attributes = file.attributes
-        data = file.data
-        try:
-            self.axes = (
-                data["contact/indenter_radius_over_h"],
-                data["contact/cbrt_load_parameter"],
-                data["stress/rt_over_h"],
-            )
-            self._contact = _Splines(self._spline_axes[:2], [data[f"contact/{name}"] for name in _RATIOS])
-            self._contact_errors = [data[f"contact/{name}_error"] for name in _RATIOS]
-            self._stress = _Splines(self._spline_axes, [data[f"stress/{name}"] for name in _STRESSES])
-            self._stress_errors = [data[f"stress/{name}_error"] for name in _STRESSES]
-        except KeyError as error:
-            raise TableError(f"table {path} lacks the dataset {error}") from error
+    schema = CONTACT_SCHEMA
+
+    def _take(self, data: Mapping[str, Floats]) -> None:
+        self.axes = (
+            data["contact/indenter_radius_over_h"],
+            data["contact/cbrt_load_parameter"],
+            data["stress/rt_over_h"],
+        )
+        self._contact = _Splines(self._spline_axes[:2], [data[f"contact/{name}"] for name in _RATIOS])
+        self._contact_errors = [data[f"contact/{name}_error"] for name in _RATIOS]
+        self._stress = _Splines(self._spline_axes, [data[f"stress/{name}"] for name in _STRESSES])
+        self._stress_errors = [data[f"stress/{name}_error"] for name in _STRESSES]
 
     @property
     def domain(self) -> dict[str, tuple[float, float]]:

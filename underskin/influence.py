@@ -6,7 +6,7 @@ For a point force on the surface of the linear layer at the distance r̂ and the
 The layer is linear, so the stress under many forces is the sum over them.
 """
 
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 
-from underskin.errors import TableError
 from underskin.surrogate import tables_folder
-from underskin.table_format import INFLUENCE_SCHEMA, read_table
+from underskin.table import Table
+from underskin.table_format import INFLUENCE_SCHEMA
 from underskin.units import Floats
 
 INFLUENCE_TABLE = "influence.h5"
 _DEGREE = 5
-_PAIRS_AT_ONCE = 1 << 20
 _AXES = ("poisson_ratio", "slip", "rt_over_h", "r_over_h")
 
 
@@ -70,49 +69,41 @@ class Influence:
         """
         scale = 1.5 / np.pi / thickness**2
         normal, tangential = np.abs(forces[:, 2]), np.hypot(forces[:, 0], forces[:, 1])
-        found = [self._on_one(sensor / thickness, places / thickness, forces) for sensor in sensors]
-        stress = np.array([stress for stress, _ in found])
-        near = np.array([near for _, near in found]).reshape(len(sensors), len(places))
-        inside_error = near @ (normal * self.normal_error + tangential * self.tangential_error)
-        beyond_error = ~near @ (normal * self.normal_beyond + tangential * self.tangential_beyond)
-        within = near.any(axis=1) | (len(places) == 0)  # no load at all is known to do nothing
-        return SensorStress(-scale * stress, scale * (inside_error + beyond_error), np.asarray(within))
-
-    def _on_one(self, sensor: Floats, places: Floats, forces: Floats) -> tuple[float, NDArray[np.bool_]]:
-        """Σ F3 γ_n − F_outward γ_t over the forces within reach, and which ones these are."""
-        total = 0.0
-        near = np.zeros(len(places), dtype=bool)
-        for part in _parts(len(places)):
-            away = places[part] - sensor
+        known = normal * self.normal_error + tangential * self.tangential_error
+        beyond = normal * self.normal_beyond + tangential * self.tangential_beyond
+        stress, error = np.empty((2, len(sensors)))
+        inside = np.full(len(sensors), len(places) == 0)  # no load at all is known to do nothing
+        for number, sensor in enumerate(sensors):
+            away = (places - sensor) / thickness
             distance = np.hypot(away[:, 0], away[:, 1])
-            near[part] = kept = distance <= self.reach
-            r, force = distance[kept], forces[part][kept]
-            outward = (force[:, :2] * away[kept]).sum(axis=1) / np.where(r > 0, r, 1.0)
-            total += float(force[:, 2] @ self._normal(r))
-            if outward.any():
-                total -= float(outward @ self._tangential(r))
-        return total, near
+            near = distance <= self.reach
+            stress[number] = -scale * self._on_one(away[near], distance[near], forces[near])
+            error[number] = scale * np.where(near, known, beyond).sum()
+            inside[number] |= near.any()
+        return SensorStress(stress, error, inside)
+
+    def _on_one(self, away: Floats, distance: Floats, forces: Floats) -> float:
+        """Σ F3 γ_n − F_outward γ_t over forces within reach, `away` from the sensor (points, 2) by `distance`."""
+        total = float(forces[:, 2] @ self._normal(distance))
+        if forces[:, :2].any():
+            outward = (forces[:, :2] * away).sum(axis=1) / np.where(distance > 0, distance, 1.0)
+            total -= float(outward @ self._tangential(distance))
+        return total
 
     def _evaluate(self, spline: BSpline, offset: ArrayLike) -> Floats:
         r = np.asarray(offset, dtype=float)
         return np.where((r >= 0) & (r <= self.reach), spline(r), np.nan)
 
 
-class InfluenceTable:
+class InfluenceTable(Table):
     """A verified table of γ_n and γ_t."""
 
-    def __init__(self, path: Path) -> None:
-        """Read and verify the table; raises TableError with the reason."""
-        file = read_table(path, INFLUENCE_SCHEMA)
-        self.path = path
-        self.sha256 = file.sha256
-        self.attributes = file.attributes
-        try:
-            self.axes = tuple(file.data[f"influence/{name}"] for name in _AXES)
-            self._values = [file.data[f"influence/{name}"] for name in ("gamma_n", "gamma_t")]
-            self._errors = [file.data[f"influence/{name}_error"] for name in ("gamma_n", "gamma_t")]
-        except KeyError as error:
-            raise TableError(f"table {path} lacks the dataset {error}") from error
+    schema = INFLUENCE_SCHEMA
+
+    def _take(self, data: Mapping[str, Floats]) -> None:
+        self.axes = tuple(data[f"influence/{name}"] for name in _AXES)
+        self._values = [data[f"influence/{name}"] for name in ("gamma_n", "gamma_t")]
+        self._errors = [data[f"influence/{name}_error"] for name in ("gamma_n", "gamma_t")]
 
     @property
     def domain(self) -> dict[str, tuple[float, float]]:
@@ -157,8 +148,3 @@ def load_influence(path: Path | None = None) -> InfluenceTable:
 def interpolation_weights(nodes: Floats, x: float) -> Floats:
     """Weights of the values at the nodes in their interpolating spline of degree 5 (not-a-knot ends) at x."""
     return np.asarray(make_interp_spline(nodes, np.eye(nodes.size), k=_DEGREE)(x))
-
-
-def _parts(count: int) -> Iterator[slice]:
-    for start in range(0, count, _PAIRS_AT_ONCE):
-        yield slice(start, start + _PAIRS_AT_ONCE)

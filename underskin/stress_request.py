@@ -1,32 +1,26 @@
-"""What `POST /v1/stress` and `underskin stress` are asked, as the lab writes it, and their answer.
+"""What `POST /v1/stress` and `underskin stress` are asked, as the lab writes it.
 
-The skin's fields are named as in a campaign; x runs along its length, y along its width. Where both are given, the skin
-is taken to be centred on the middle of the sensors' extent, and a load beside it is refused.
+The skin's fields are named as in a campaign; x runs along its length, y along its width.
 """
 
+import csv
 import sys
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import orjson
-from numpy.typing import NDArray
 
 from underskin.errors import InvalidInput
-from underskin.influence import InfluenceTable
-from underskin.layer import slip
 from underskin.recordings import fields as field
 from underskin.recordings.campaign import Sensors
 from underskin.recordings.fields import shown
-from underskin.stress import Contact, Load, array_stress, charge, contact_load, map_points, pressure_map_load, together
-from underskin.units import Floats, checked, to_lab, to_si
+from underskin.units import Floats
 
 MOST_CONTACTS = 1000
-MOST_PAIRS = 50_000_000  # of a sensor and a point force: about ten seconds
-_WIDEST = 12.0  # thicknesses; no sensor is influenced from further away
 _EVEN = 1e-6  # of a cell, how evenly the map's places must be spaced
+_MOST_NAMED = 5  # cells of a map that are refused
 
 
 @dataclass(frozen=True)
@@ -66,13 +60,19 @@ def _pressure_map(name: str, value: Any, units_checked: bool) -> PressureMap:
         rows, columns = found.pressure_mpa.shape
         allowed = f"must have a row for each y_mm ({shape[0]}) and a column for each x_mm ({shape[1]})"
         raise InvalidInput(f"{name}.pressure_mpa", f"{rows} rows, {columns} columns", allowed)
-    row, column = np.unravel_index(int(np.argmin(found.pressure_mpa)), shape)
-    if found.pressure_mpa[row, column] < 0:
-        place = f"{name}.pressure_mpa[{row}][{column}]"
-        raise InvalidInput(
-            place, float(found.pressure_mpa[row, column]), "must be at least 0: a pressure does not pull"
-        )
+    _refuse_pull(f"{name}.pressure_mpa", found.pressure_mpa)
     return found
+
+
+def _refuse_pull(name: str, pressure: Floats) -> None:
+    """Refuse negative cells, and name the first ones."""
+    cells = np.argwhere(pressure < 0)
+    if cells.size:
+        first, *others = [f"[{row}][{column}]" for row, column in cells[:_MOST_NAMED]]
+        more = f" and {len(cells) - _MOST_NAMED} more" if len(cells) > _MOST_NAMED else ""
+        also = f"; so are {', '.join(others)}{more}" if others else ""
+        allowed = f"must be at least 0: a pressure does not pull{also}"
+        raise InvalidInput(name + first, float(pressure[tuple(cells[0])]), allowed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,25 +95,46 @@ class StressRequest:
     pressure_map: Annotated[PressureMap | None, _pressure_map] = None
 
 
-@dataclass(frozen=True)
-class StressAnswer:
-    """One entry a sensor; NaN where no load is within the table's reach (not `inside`)."""
-
-    columns: Mapping[str, Floats]
-    sensors: tuple[str, ...]
-    inside: NDArray[np.bool_]
-    reach_mm: float
-
-
-def read_file(path: str) -> StressRequest:
-    """The request in a JSON file (`-`: standard input); raises InvalidInput."""
+def read_file(path: str, map_path: str | None = None) -> StressRequest:
+    """The request in a JSON file (`-`: standard input), with the pressure map of a CSV file; raises InvalidInput."""
     try:
         content = sys.stdin.buffer.read() if path == "-" else Path(path).read_bytes()
         document = orjson.loads(content)
     except (OSError, orjson.JSONDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise InvalidInput("file", path, f"must be a readable JSON file ({reason})") from error
+    if map_path is not None:
+        document = {**field.mapping("body", document), "pressure_map": _map_in_file(map_path)}
     return read_request(document)
+
+
+def _map_in_file(path: str) -> dict[str, Any]:
+    """A pressure map from CSV: x_mm in the first line, from its second cell; then y_mm and the row's pressure_mpa."""
+    try:
+        with Path(path).open(encoding="utf-8-sig", newline="") as file:
+            lines = [line for line in csv.reader(file, strict=True) if any(cell.strip() for cell in line)]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InvalidInput("pressure_map", path, f"must be a readable CSV file ({reason})") from error
+    if len(lines) < 3 or len(lines[0]) < 3:
+        allowed = (
+            "must be CSV, separated by commas: x_mm in the first line, from its second cell; then y_mm and pressure_mpa"
+        )
+        raise InvalidInput("pressure_map", path, allowed)
+    numbers = [
+        [_map_number(path, row, column, cell) for column, cell in enumerate(line) if row or column]
+        for row, line in enumerate(lines)
+    ]
+    x, *rows = numbers
+    return {"x_mm": x, "y_mm": [row[0] for row in rows], "pressure_mpa": [row[1:] for row in rows]}
+
+
+def _map_number(path: str, row: int, column: int, cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        place = f"line {row + 1}, cell {column + 1} of {path}"
+        raise InvalidInput("pressure_map", cell, f"must be a number ({place})") from None
 
 
 def read_request(document: Any) -> StressRequest:
@@ -132,108 +153,3 @@ def read_request(document: Any) -> StressRequest:
     if request.contacts and request.youngs_modulus_mpa is None:
         raise InvalidInput("youngs_modulus_mpa", None, "is required with contacts, whose radii depend on it")
     return request
-
-
-def answer(table: InfluenceTable, request: StressRequest) -> StressAnswer:
-    """Charge and mean stress on every sensor; raises InvalidInput for loads beside the skin or over one another."""
-    thickness, radius, d33 = (
-        float(checked(name, getattr(request, name), units_checked=True))
-        for name in ("thickness_mm", "sensor_radius_mm", "d33_pc_per_n")
-    )
-    sensors = to_si("x_mm", [[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
-    load = _contacts_load(request, thickness) if request.contacts else _map_load(request, thickness)
-    _refuse_many(request, len(load.places))
-    glue = np.inf if request.glue_stiffness is None else request.glue_stiffness
-    influence = table.at(radius / thickness, request.poisson_ratio, slip(glue))
-    unknown = np.full(len(sensors), np.nan)
-    stress, error, inside, reach = unknown, unknown, np.zeros(len(sensors), dtype=bool), np.nan
-    if influence is not None:
-        found = array_stress(influence, thickness, sensors, load)
-        inside, reach = found.inside, influence.reach * thickness
-        stress, error = (np.where(inside, values, np.nan) for values in (found.stress, found.error))
-    columns = {
-        "x_mm": to_lab("x_mm", sensors[:, 0]),
-        "y_mm": to_lab("y_mm", sensors[:, 1]),
-        "charge_pc": to_lab("charge_pc", charge(stress, d33, radius)),
-        "charge_error_pc": to_lab("charge_error_pc", np.abs(charge(error, d33, radius))),
-        "mean_stress_mpa": to_lab("mean_stress_mpa", 0.0 - stress),
-    }
-    names = tuple(sensor.id for sensor in request.sensors)
-    return StressAnswer(columns, names, inside, float(to_lab("x_mm", reach)))
-
-
-def _contacts_load(request: StressRequest, thickness: float) -> Load:
-    modulus = float(to_si("youngs_modulus_mpa", request.youngs_modulus_mpa or np.nan))
-    contacts = [
-        Contact(
-            float(to_si("x_mm", contact.x_mm)),
-            float(to_si("x_mm", contact.y_mm)),
-            float(to_si("indenter_radius_mm", contact.indenter_radius_mm)),
-            (*contact.tangential_force_n, contact.normal_force_n),
-        )
-        for contact in request.contacts
-    ]
-    places = np.array([[contact.x, contact.y] for contact in contacts])
-    _refuse_beside_skin(request, "contacts", places)
-    radii = np.array([contact.radius(modulus, request.poisson_ratio) for contact in contacts])
-    _refuse_wide(request, radii, thickness)
-    _refuse_overlap(places, radii)
-    return together([contact_load(contact, a, thickness) for contact, a in zip(contacts, radii, strict=True)])
-
-
-def _map_load(request: StressRequest, thickness: float) -> Load:
-    found = request.pressure_map
-    assert found is not None
-    x, y = to_si("x_mm", found.x_mm), to_si("x_mm", found.y_mm)
-    row, column = np.nonzero(found.pressure_mpa)
-    _refuse_beside_skin(request, "pressure_map", np.stack([x[column], y[row]], axis=-1))
-    pressure = to_si("pressure_mpa", found.pressure_mpa)
-    _refuse_many(request, map_points(x, y, pressure, thickness))
-    return pressure_map_load(x, y, pressure, thickness)
-
-
-def _refuse_many(request: StressRequest, points: int) -> None:
-    if len(request.sensors) * points > MOST_PAIRS:
-        allowed = f"sensors times points of the load must be at most {MOST_PAIRS}: send fewer, or coarser, at a time"
-        raise InvalidInput("sensors", f"{len(request.sensors)} sensors, {points} points", allowed)
-
-
-def _refuse_wide(request: StressRequest, radii: Floats, thickness: float) -> None:
-    """Refuse contacts that Hertz cannot mean: wider than their sphere, or than the skin's influence reaches."""
-    for index, (contact, a) in enumerate(zip(request.contacts, radii, strict=True)):
-        widest = min(float(to_si("x_mm", contact.indenter_radius_mm)), _WIDEST * thickness)
-        if a >= widest:
-            allowed = (
-                f"must press less: the contact's radius by Hertz, {to_lab('x_mm', a):.3g} mm, must be below the "
-                f"sphere's and {_WIDEST:g} thicknesses, {to_lab('x_mm', widest):.3g} mm; is the modulus in MPa?"
-            )
-            raise InvalidInput("contacts", contact.normal_force_n, allowed, index)
-
-
-def _refuse_beside_skin(request: StressRequest, name: str, places: Floats) -> None:
-    """Refuse loads beside the skin, as far as its length and width are known."""
-    sensors = np.array([[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
-    middle = (sensors.min(axis=0) + sensors.max(axis=0)) / 2
-    for axis, extent in enumerate(("length_mm", "width_mm")):
-        size = getattr(request, extent)
-        if size is None:
-            continue
-        away = to_lab("x_mm", places[:, axis]) - middle[axis]
-        beside = np.abs(away) > size / 2 * (1 + 1e-9)
-        if beside.any():
-            first = int(np.argmax(beside))
-            low, high = middle[axis] - size / 2, middle[axis] + size / 2
-            allowed = f"must lie on the skin, {'xy'[axis]} from {low:g} to {high:g} mm ({extent} {size:g})"
-            value = f"{'xy'[axis]} = {away[first] + middle[axis]:g} mm"
-            raise InvalidInput(name, value, allowed, index=first if name == "contacts" else None)
-
-
-def _refuse_overlap(places: Floats, radii: Floats) -> None:
-    distance = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
-    apart = radii[:, None] + radii
-    first, second = np.nonzero(np.triu(distance < apart, 1))
-    if first.size:
-        i, j = int(first[0]), int(second[0])
-        gap, least = to_lab("x_mm", distance[i, j]), to_lab("x_mm", apart[i, j])
-        allowed = f"must not overlap contact {i}: the centres are {gap:.4g} mm apart, the radii add to {least:.4g} mm"
-        raise InvalidInput("contacts", f"contact {j}", allowed, index=j)

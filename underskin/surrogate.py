@@ -6,7 +6,7 @@ proportional to the strain (a/R, Seminara 2018, equation 16). Rows outside the d
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import NdBSpline, make_interp_spline
 
-from underskin.errors import TableError
 from underskin.point_spline import PointSpline, cell_of
-from underskin.table_format import SIGMA_SCHEMA, read_table
+from underskin.table import Table
+from underskin.table_format import SIGMA_SCHEMA
 from underskin.units import Floats
 
 SIGMA_TABLE = "sigma.h5"
@@ -31,29 +31,20 @@ class Sigma:
     inside: NDArray[np.bool_]
 
 
-class SigmaTable:
+class SigmaTable(Table):
     """A verified table of σ, ready to answer; see the module."""
 
-    def __init__(self, path: Path) -> None:
-        """Read and verify the table; raises TableError with the reason."""
-        file = read_table(path, SIGMA_SCHEMA)
-        self.path = path
-        self.sha256 = file.sha256
-        self.attributes = file.attributes
-        data = file.data
-        try:
-            self.axes = tuple(data[f"sigma/{name}"] for name in ("a_over_h", "rt_over_h", "cbrt_load_parameter"))
-            self._sigma = _spline(self.axes, data["sigma/sigma"])
-            self._point_sigma = PointSpline(self._sigma)
-            self._point_axes = [axis.tolist() for axis in self.axes]
-            self._cell_error = _largest_at_corners(
-                data["sigma/discretisation_error"] + data["sigma/interpolation_error"]
-            )
-            self.fem_linear_error = data["sigma/fem_linear_error"]
-            self._profile_axes = (data["profile/a_over_h"], data["profile/r_over_h"], self.axes[2])
-            self._profile = _spline(self._profile_axes, data["profile/profile"])
-        except KeyError as error:
-            raise TableError(f"table {path} lacks the dataset {error}") from error
+    schema = SIGMA_SCHEMA
+
+    def _take(self, data: Mapping[str, Floats]) -> None:
+        self.axes = tuple(data[f"sigma/{name}"] for name in ("a_over_h", "rt_over_h", "cbrt_load_parameter"))
+        self._sigma = _spline(self.axes, data["sigma/sigma"])
+        self._point_sigma = PointSpline(self._sigma)
+        self._point_axes = [axis.tolist() for axis in self.axes]
+        self._cell_error = _largest_at_corners(data["sigma/discretisation_error"] + data["sigma/interpolation_error"])
+        self.fem_linear_error = data["sigma/fem_linear_error"]
+        self._profile_axes = (data["profile/a_over_h"], data["profile/r_over_h"], self.axes[2])
+        self._profile = _spline(self._profile_axes, data["profile/profile"])
 
     @property
     def domain(self) -> dict[str, tuple[float, float]]:

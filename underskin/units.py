@@ -59,7 +59,7 @@ LAB: dict[str, LabField] = {
         LabField("y_mm", "mm", 1e-3, signed=True),
         LabField("charge_error_pc", "pC", 1e-12),
         LabField("normal_force_n", "N", 1.0, (1e-3, 1e3)),
-        LabField("pressure_mpa", "MPa", 1e6),
+        LabField("pressure_mpa", "MPa", 1e6, (1e-5, 100.0)),
     )
 }
 
