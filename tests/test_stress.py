@@ -332,7 +332,10 @@ def test_idle_maps_and_impossible_contacts(http: httpx.Client) -> None:
     """A frame without pressure gives no charge; contacts wider than their sphere and costly maps are refused."""
     idle = {"x_mm": [0, 1], "y_mm": [0, 1], "pressure_mpa": [[0, 0], [0, 0]]}
     found = posted(http, {**SKIN, "pressure_map": idle})
-    assert (found["status"], found["charge_pc"]) == (["ok"] * 5, [0.0] * 5)
+    assert (found["status"], str(found["charge_pc"])) == (["ok"] * 5, str([0.0] * 5))
+    beyond = {**idle, "pressure_mpa": [[1e308, 1e308], [0, 0]]}
+    found = posted(http, {**SKIN, "pressure_map": beyond})
+    assert (found["status"], found["charge_pc"]) == (["out_of_domain"] * 5, [None] * 5)
     refused = http.post("/v1/stress", json=document({**PRESS, "normal_force_n": 100.0}, youngs_modulus_mpa=0.05))
     assert (refused.status_code, "must press less" in refused.text) == (422, True)
     costly = {"x_mm": np.arange(60) * 25.0, "y_mm": np.arange(60) * 25.0, "pressure_mpa": np.ones((60, 60))}
@@ -400,6 +403,10 @@ def test_the_command_takes_a_map_from_csv(tmp_path: Path) -> None:
     assert [(row["sensor"], float(row["charge_pc"])) for row in rows] == list(
         zip(["s0", "s1", "s2", "s3", "s4"], expected, strict=True)
     )
+    skin.write_text(json.dumps({**SKIN, "pressure_map": drawn}))
+    refused = subprocess.run(command, capture_output=True, text=True)
+    assert (refused.returncode, "give it once" in refused.stderr) == (2, True), refused.stderr
+    skin.write_text(json.dumps(SKIN))
     for content, says in (
         ("a;b;c\n1;2;3\n2;3;4\n", "separated by commas"),
         (",1,2\n0,1,x\n1,1,1\n", "must be a number (line 2, cell 3"),

@@ -84,7 +84,7 @@ def array_stress(influence: Influence, thickness: float, sensors: Floats, loads:
 
 def charge(stress: Floats, d33: float, sensor_radius: float) -> Floats:
     """Q = −d33 π rT² T̄ [C]: positive in compression for a positive d33."""
-    return -d33 * np.pi * sensor_radius**2 * stress
+    return 0.0 - d33 * np.pi * sensor_radius**2 * stress  # no load is 0, not −0
 
 
 def _rule_of(size: float) -> tuple[int, int]:

@@ -18,7 +18,7 @@ from underskin.units import Finding, Floats, checked, to_lab, to_si
 
 @dataclass(frozen=True)
 class StressAnswer:
-    """One entry a sensor; NaN where no load is within the table's reach (not `inside`).
+    """One entry a sensor; NaN where no load is within the table's reach, or numbers overflow (not `inside`).
 
     `contact_radius_mm`: one entry a contact; empty for a map.
     """
@@ -46,7 +46,8 @@ def answer(table: InfluenceTable, request: StressRequest) -> StressAnswer:
     pressures = _pressures(request, thickness)
     loads = [_contacts_load(request, pressures, thickness)] if request.contacts else _map_loads(request, thickness)
     found = array_stress(influence, thickness, sensors, loads)
-    stress, error = (np.where(found.inside, values, np.nan) for values in (found.stress, found.error))
+    inside = found.inside & np.isfinite(found.stress)
+    stress, error = (np.where(inside, values, np.nan) for values in (found.stress, found.error))
     columns = {
         "x_mm": to_lab("x_mm", sensors[:, 0]),
         "y_mm": to_lab("y_mm", sensors[:, 1]),
@@ -57,7 +58,7 @@ def answer(table: InfluenceTable, request: StressRequest) -> StressAnswer:
     return StressAnswer(
         columns=columns,
         sensors=tuple(sensor.id for sensor in request.sensors),
-        inside=found.inside,
+        inside=inside,
         reach_mm=float(to_lab("x_mm", influence.reach * thickness)),
         contact_radius_mm=to_lab("x_mm", [pressure.radius for pressure in pressures]),
         findings=findings(request),

@@ -104,7 +104,9 @@ def read_file(path: str, map_path: str | None = None) -> StressRequest:
         reason = error.strerror if isinstance(error, OSError) else error
         raise InvalidInput("file", path, f"must be a readable JSON file ({reason})") from error
     if map_path is not None:
-        document = {**field.mapping("body", document), "pressure_map": _map_in_file(map_path)}
+        if field.mapping("body", document).get("pressure_map") is not None:
+            raise InvalidInput("pressure_map", map_path, f"is in {path} already; give it once")
+        document = {**document, "pressure_map": _map_in_file(map_path)}
     return read_request(document)
 
 
