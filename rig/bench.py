@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rig import effects, linear_filters
 from rig.effects import Values
 from rig.experiment import Experiment
-from rig.gains import sensitivity
+from rig.gains import sensitivity, under_stress
 from rig.layer import Floats, base_stress
 from rig.linear_filters import Complexes
 from rig.plan import Plan
@@ -90,8 +90,22 @@ class Bench:
         return Felt.of(self)
 
     def sigma(self, factor: float | Floats = 1.0) -> Floats:
-        """σ of each recording's sensor (with crosstalk), its preload times `factor` (rows,), edge at its place."""
+        """σ of each recording's sensor, its preload times `factor` (rows,), edge at its place.
+
+        With crosstalk its neighbours' add, each as strongly as its d33 answers under its own static stress.
+        """
         pressed = self.pressed if np.all(factor == 1.0) else self.pressed.at(self.pressed.force * factor)
+        return (self.felt.weight * self.answer * self._each_sigma(pressed)).sum(axis=1)
+
+    @cached_property
+    def answer(self) -> Floats:
+        """d33 of each sensor heard under its own static stress, over that at rest (rows, heard)."""
+        if "preload_dependent_d33" not in self.on:
+            return np.ones_like(self.felt.weight)
+        stress = 1.5 * self.plan.preload_n[:, None] * self._each_sigma(self.pressed) / (np.pi * self.thickness**2)
+        return under_stress(self.on["preload_dependent_d33"], stress)
+
+    def _each_sigma(self, pressed: Pressed) -> Floats:
         return self.felt.sigma(pressed.spectrum, self.contact, self.experiment.skin.sensor_radius_mm, self.thickness)
 
     @cached_property
@@ -168,11 +182,10 @@ class Felt:
         return cls(distance, weights[np.ix_(own, used)])
 
     def sigma(self, spectrum: Floats, contact: NDArray[np.intp], rt: float, thickness: float) -> Floats:
-        """The weighted σ of each recording (rows,)."""
-        result = np.zeros(len(contact))
+        """σ of each sensor heard (rows, heard); 0 where it has no weight."""
+        result = np.zeros(self.distance.shape)
         for column in range(self.distance.shape[1]):
             heard = np.flatnonzero(self.weight[:, column])
             offset = self.distance[heard, column] / thickness
-            stress = base_stress(spectrum[contact[heard]], rt / thickness, offset)
-            result[heard] += self.weight[heard, column] * stress
+            result[heard, column] = base_stress(spectrum[contact[heard]], rt / thickness, offset)
         return result

@@ -1,10 +1,11 @@
-"""What multiplies d33 from one recording to the next: sensor, age, preload, time of day, history, place."""
+"""What multiplies d33 from one recording to the next: sensor, age, time of day, history, place; and stress."""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig import effects
+from rig.effects import Values
 from rig.errors import RigError
 from rig.layer import Floats
 
@@ -19,7 +20,6 @@ def sensitivity(bench: "Bench") -> Floats:
     """
     result = bench.sensor_gains[bench.plan.sensor].copy()
     for name, law in (
-        ("preload_dependent_d33", _preload),
         ("ageing", _ageing),
         ("cracked_electrode", _cracked),
         ("temperature_drift", _temperature),
@@ -31,9 +31,8 @@ def sensitivity(bench: "Bench") -> Floats:
     return result
 
 
-def _preload(bench: "Bench") -> Floats:
-    values = bench.on["preload_dependent_d33"]
-    stress = 1.5 * bench.plan.preload_n * bench.sigma() / (np.pi * bench.thickness**2)
+def under_stress(values: Values, stress: Floats) -> Floats:
+    """d33 under a static mean stress [MPa], over that at rest: preload_dependent_d33."""
     beta = float(values["beta_per_mpa"])
     if values["law"] == "linear":
         return 1 + beta * stress

@@ -202,6 +202,19 @@ def test_layered_contact_tends_to_hertz_on_a_thick_layer() -> None:
     assert layered == pytest.approx(base, rel=1e-4)
 
 
+def test_a_neighbour_s_charge_is_what_it_makes_of_its_own_stress() -> None:
+    under = {"preload_dependent_d33": {"beta_per_mpa": 3.0, "law": "linear"}}
+    made = {
+        "skin": {"array": {"columns": 2, "pitch_mm": 4.0}},
+        "design": {"preloads_n": [3.0], "indenters_mm": [10.0], "offsets_mm": [[1.5, 0.0], [-2.5, 0.0]]},
+    }
+    alone = bench(effects=under, **made).level
+    coupled = bench(effects={**under, "crosstalk": {"fraction": 0.4}}, **made).level
+    first, second = 0, 3  # the sphere in one place, 1.5 mm from the first sensor and 2.5 mm from the second
+    assert coupled[first] == pytest.approx(alone[first] + 0.4 * alone[second], rel=1e-12)
+    assert coupled[second] == pytest.approx(alone[second] + 0.4 * alone[first], rel=1e-12)
+
+
 def test_a_neighbour_far_off_on_a_thin_skin_adds_no_charge() -> None:
     thin = {
         "skin": {"thickness_mm": 0.2, "sensor_radius_mm": 0.1, "array": {"columns": 2, "pitch_mm": 8.0}},
