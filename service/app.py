@@ -10,6 +10,7 @@ from starlette.types import ASGIApp
 from service import (
     campaigns,
     d33,
+    design,
     diagnoses,
     exports,
     frf,
@@ -67,7 +68,7 @@ def create_api(settings: Settings, table: SigmaTable, gate: Gate, store: Databas
     api.state.runner = runner(settings, table, store)
     install_handlers(api)
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"])])
-    for noun in (sigma, frf, d33, stress, tables, campaigns, diagnoses, exports, skins, models):
+    for noun in (sigma, frf, d33, stress, design, tables, campaigns, diagnoses, exports, skins, models):
         v1.include_router(noun.router)
     for router in (v1, umbridge.router, health.router, metrics.router, openapi.router, pages.router):
         api.include_router(router)

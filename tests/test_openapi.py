@@ -29,6 +29,7 @@ OPERATIONS = {
     ("post", "/v1/frf"): "frf_columns",
     ("post", "/v1/d33"): "d33_columns",
     ("post", "/v1/stress"): "stress",
+    ("post", "/v1/design"): "design",
     ("get", "/v1/tables"): "tables",
     ("post", "/v1/campaigns"): "post_campaigns",
     ("get", "/v1/campaigns"): "campaigns",

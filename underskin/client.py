@@ -151,6 +151,11 @@ class Client:
         values = {field.name: _field(field.name, document, single=False) for field in fields(StressAnswer)}
         return StressAnswer(**values | {"sensor": tuple(document["sensor"])})
 
+    def design(self, **fields: float) -> dict[str, Any]:
+        """How much of a load a skin's sensors feel, how finely its array tells where it is, and how far apart two loads
+        must be; `fields` as `POST /v1/design` takes them."""
+        return self._request("POST", "/v1/design", fields)
+
     def tables(self) -> tuple[TableEntry, ...]:
         """The tables that answers come from."""
         document = self._request("GET", "/v1/tables")

@@ -101,5 +101,6 @@ def _extremes(frequency: Floats, magnitude: Floats) -> NDArray[np.intp]:
 
 
 def _polar(values: Complexes) -> tuple[Floats, Floats]:
-    """Magnitude [pC/N] and phase [°]."""
-    return to_lab("frf_pc_per_n", np.abs(values)), np.degrees(np.angle(values))
+    """Magnitude [pC/N], and phase [°] from −270 to 90: past a resonance it falls to −180, where noise must not jump."""
+    phase = np.mod(np.degrees(np.angle(values)) + 270.0, 360.0) - 270.0
+    return to_lab("frf_pc_per_n", np.abs(values)), phase

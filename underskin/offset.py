@@ -64,6 +64,18 @@ def positioned_sigma(
     return PositionedSigma(np.where(seen, commanded, np.nan), offset_over_h, curve)
 
 
+def sigma_beside(table: SigmaTable, a_over_h: float, rt_over_h: float, load_parameter: float) -> tuple[Floats, Floats]:
+    """Offsets e/h, from 0 as far as the table's profile reaches, and σ there of one contact; NaN outside the domain."""
+    farthest = table.profile_reach
+    offsets = _grid(farthest - rt_over_h)
+    radii = np.minimum(_grid(farthest), farthest)
+    profile = table.profile(radii, a_over_h, load_parameter)
+    if not np.isfinite(profile).all():
+        return offsets, np.full(len(offsets), np.nan)
+    distance, weight = _over_disc(offsets, rt_over_h)
+    return offsets, np.einsum("r,ora->o", weight, make_interp_spline(radii, profile, k=3)(distance))
+
+
 def _grid(end: float) -> Floats:
     """0 to the end, which a last point may pass by rounding alone."""
     return _SPACING * np.arange(np.floor(end / _SPACING + 1e-9) + 1)
@@ -71,14 +83,20 @@ def _grid(end: float) -> Floats:
 
 def _disc_average(radii: Floats, offsets: Floats, rt_over_h: float) -> Floats:
     """The matrix (offsets, radii) that averages a profile given at the radii over the offset disc."""
+    distance, weight = _over_disc(offsets, rt_over_h)
+    basis = make_interp_spline(radii, np.eye(len(radii)), k=3)(distance)
+    return np.einsum("r,orak->ok", weight, basis)
+
+
+def _over_disc(offsets: Floats, rt_over_h: float) -> tuple[Floats, Floats]:
+    """How far the points of a quadrature over the offset disc are from the contact (offsets, radial, angular), and the
+    weights of those at each radius."""
     x, weight = np.polynomial.legendre.leggauss(_RADIAL)
     s = rt_over_h * (x + 1) / 2
     weight = weight * (x + 1) / 2 / _ANGULAR
     angle = np.pi * (np.arange(_ANGULAR) + 0.5) / _ANGULAR
     across = offsets[:, None, None]
-    distance = np.sqrt(across**2 + s[:, None] ** 2 + 2 * across * s[:, None] * np.cos(angle))
-    basis = make_interp_spline(radii, np.eye(len(radii)), k=3)(distance)
-    return np.einsum("r,orak->ok", weight, basis)
+    return np.sqrt(across**2 + s[:, None] ** 2 + 2 * across * s[:, None] * np.cos(angle)), weight
 
 
 def _each_row(curve: CubicSpline, at: Floats) -> Floats:

@@ -12,12 +12,26 @@ _UNSAFE = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026", 0x2028
 
 
 def number(value: float | None, unit: str = "", digits: int = 3) -> Markup:
-    """A number with its unit; the pointer shows all its digits."""
+    """A computed number to so many digits, with its unit; the pointer shows all its digits."""
+    shown, exact = short_and_exact(value, unit, digits)
+    return _with_unit(shown, exact, unit)
+
+
+def given(value: float | None, unit: str = "") -> Markup:
+    """A number as somebody gave it, with its unit."""
+    return _with_unit("–" if value is None else f"{value:.6g}", "" if value is None else repr(value), unit)
+
+
+def short_and_exact(value: float | None, unit: str, digits: int) -> tuple[str, str]:
+    """A number to so many digits, and with its unit all of it."""
     if value is None or not math.isfinite(value):
-        return Markup('<span class="number">–</span>')
-    exact = f"{value!r} {unit}".strip()
-    shown = f"{value:.{digits}g}" if abs(value) < 1e5 else f"{value:,.0f}"
-    text = Markup('<span class="number" title="{}">{}</span>').format(exact, shown.replace("-", "−"))
+        return "–", "not known"
+    shown = f"{value:#.{digits}g}".rstrip(".") if 1e-4 <= abs(value) < 1e5 else f"{value:.{digits}g}"
+    return shown.replace("-", "−"), f"{value!r} {unit}".strip()
+
+
+def _with_unit(shown: str, exact: str, unit: str) -> Markup:
+    text = Markup('<span class="number" title="{}">{}</span>').format(exact, shown)
     return text + Markup('&nbsp;<span class="unit">{}</span>').format(unit) if unit else text
 
 
@@ -50,5 +64,5 @@ def short(text: str, most: int = 60) -> Markup:
 
 
 FILTERS: Mapping[str, Callable[..., Any]] = {
-    "number": number, "moment": moment, "json_inside": json_inside, "words": words, "short": short,
+    "number": number, "given": given, "moment": moment, "json_inside": json_inside, "words": words, "short": short,
 }  # fmt: skip

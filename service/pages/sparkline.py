@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 _WIDTH, _HEIGHT, _EDGE = 120, 28, 3
+_LEAST_SPAN = 0.2  # of the values, over the height
 
 
 @dataclass(frozen=True)
@@ -25,8 +26,10 @@ def sparkline(values: Sequence[tuple[str, float]]) -> Sparkline | None:
     moments = [datetime.fromisoformat(time).timestamp() for time, _ in values]
     numbers = [value for _, value in values]
     x = _scaled(moments, _WIDTH)
-    # From zero, so that a scatter of a few per cent looks like one.
-    low, high = min(0.0, *numbers), max(0.0, *numbers)
+    # No less than a fifth of the value, so that a scatter of a few per cent looks like one.
+    middle = (min(numbers) + max(numbers)) / 2
+    half = max(max(numbers) - middle, _LEAST_SPAN / 2 * abs(middle))
+    low, high = middle - half, middle + half
     y = [_HEIGHT - _EDGE - (value - low) / ((high - low) or 1.0) * (_HEIGHT - 2 * _EDGE) for value in numbers]
     pairs = list(zip(x, y, strict=True))
     change = f"d33 {numbers[0]:.3g} to {numbers[-1]:.3g} pC/N, {values[0][0][:10]} to {values[-1][0][:10]}"

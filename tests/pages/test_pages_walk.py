@@ -81,3 +81,23 @@ def test_what_is_not_there_is_said_on_a_page(visitor: Visit) -> None:
     assert "There is no skin 'nobody'." in visitor.page.get_by_role("alert").inner_text()
     visitor.require_accessible()
     assert visitor.wrong.pop().startswith("Failed to load resource")  # the browser says so of every 404
+
+
+def test_a_slider_of_the_design_view_answers_at_once(newcomer: Visit) -> None:
+    page = newcomer.page
+    page.get_by_role("link", name="Design view").click()
+    newcomer.drawn(2)
+    newcomer.require_accessible()
+    told = page.locator("[data-told=resolution] b")
+    before = float(told.inner_text().split()[0])
+    assert before == pytest.approx(3.34, abs=0.01)  # the paper's geometry
+    slider = page.get_by_label("thickness h, slider")
+    with page.expect_response("**/design/answer?*"):
+        for _ in range(5):
+            slider.press("ArrowRight")
+    page.wait_for_function(
+        "before => parseFloat(document.querySelector('[data-told=resolution] b').textContent) > before", arg=before
+    )
+    page.wait_for_url("**thickness_mm=2.*")
+    page.locator("#pitch_mm").fill("1")
+    page.get_by_role("alert").get_by_text("cannot overlap").wait_for()

@@ -6,16 +6,20 @@ or the text under the pointer says too.
 
 from underskin.figures.array import Quantity, array_map, frf_versus_preload, response_per_sensor
 from underskin.figures.curves import Curve, force_curves
+from underskin.figures.design import Mark, array_response, design_overview
 from underskin.figures.frf import frf_overview, frf_recordings
 from underskin.figures.history import SensorPoints, array_history, d33_history
 
 __all__ = [
     "Curve",
+    "Mark",
     "Quantity",
     "SensorPoints",
     "array_history",
     "array_map",
+    "array_response",
     "d33_history",
+    "design_overview",
     "force_curves",
     "frf_overview",
     "frf_recordings",

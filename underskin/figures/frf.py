@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
+from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
 
 from underskin.figures.style import COLOURS, DASHES, ZONE, label, styled
@@ -13,6 +14,8 @@ from underskin.units import Floats
 
 _ROWS = (("magnitude_pc_per_n", "|FRF| [pC/N]"), ("phase_deg", "phase [°]"), ("coherence", "coherence"))
 _HEIGHT = 640
+_BRIGHTEST = 0.85  # of Viridis, that still shows on white
+_WIDE = 3.0  # largest magnitude over the median, from which on the axis is logarithmic
 
 
 def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | None) -> go.Figure:
@@ -91,24 +94,32 @@ def _finished(figure: go.Figure, zone_hz: tuple[float, float] | None, title: str
     figure.update_xaxes(title="frequency [Hz]", row=3, col=1)
     for row, (_, title_of_axis) in enumerate(_ROWS, start=1):
         figure.update_yaxes(title=title_of_axis, row=row, col=1)
-    figure.update_yaxes(rangemode="tozero", row=1, col=1)
+    _scale_magnitude(figure)
     figure.update_yaxes(range=[0, 1.02], row=3, col=1)
     return styled(figure, title, _HEIGHT)
 
 
+def _scale_magnitude(figure: go.Figure) -> None:
+    """Logarithmic where a resonance would leave the rest a line at the foot."""
+    values = np.concatenate([np.abs(trace.y) for trace in figure.data if trace.yaxis == "y"])
+    values = values[values > 0]
+    wide = len(values) > 0 and values.max() > _WIDE * np.median(values)
+    figure.update_yaxes(**{"type": "log", "dtick": 1} if wide else {"rangemode": "tozero"}, row=1, col=1)
+
+
 def _look(spread: FrfSpread, spreads: Sequence[FrfSpread]) -> tuple[str, str]:
-    """A colour for each preload, a dash for each indenter."""
+    """A colour for each preload, from dark to bright; a dash for each indenter."""
     preloads = sorted({entry.preload_n for entry in spreads})
     radii = sorted({entry.indenter_radius_mm for entry in spreads})
+    place = _BRIGHTEST * preloads.index(spread.preload_n) / max(len(preloads) - 1, 1)
     return (
-        COLOURS[preloads.index(spread.preload_n) % len(COLOURS)],
+        sample_colorscale("Viridis", [place])[0],
         DASHES[radii.index(spread.indenter_radius_mm) % len(DASHES)],
     )
 
 
 def _faint(colour: str) -> str:
-    red, green, blue = (int(colour[place : place + 2], 16) for place in (1, 3, 5))
-    return f"rgba({red},{green},{blue},0.12)"
+    return colour.replace("rgb(", "rgba(").replace(")", ", 0.12)")
 
 
 def _short(values: Floats) -> "np.ndarray[Any, np.dtype[np.float32]]":

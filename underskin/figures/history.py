@@ -61,5 +61,5 @@ def array_history(
 
 def _finished(figure: go.Figure, title: str) -> go.Figure:
     figure.update_xaxes(title="recorded", type="date")
-    figure.update_yaxes(title="d33 [pC/N]", rangemode="tozero")
+    figure.update_yaxes(title="d33 [pC/N]")
     return styled(figure, title)

@@ -10,10 +10,15 @@ function document_of(plot) {
 async function draw(plot) {
   if (plot.dataset.drawn) return;
   plot.dataset.drawn = "yes";
+  await redraw(plot);
+}
+
+// With the JSON as it is now.
+async function redraw(plot) {
   const { data, layout } = document_of(plot);
   const margin = { ...layout.template?.layout?.margin, ...layout.margin, t: 30 };
   // The caption above says the title.
-  await Plotly.newPlot(plot, data, { ...layout, title: undefined, margin, autosize: true }, CONFIG);
+  await Plotly.react(plot, data, { ...layout, title: undefined, margin, autosize: true }, CONFIG);
   plot.dispatchEvent(new CustomEvent("drawn", { bubbles: true }));
 }
 

@@ -1,0 +1,59 @@
+"use strict";
+// Sliders: each moves its number by the same ratio a step, and the answer comes while they move.
+
+const form = document.getElementById("design");
+const refused = document.getElementById("refused");
+let asking = null;
+
+function ratio(slider) {
+  return Math.log(slider.dataset.high / slider.dataset.low);
+}
+function place(slider) {
+  const value = Number(form.elements[slider.dataset.for].value);
+  slider.value = String(Math.round((1000 * Math.log(value / slider.dataset.low)) / ratio(slider)));
+}
+
+async function answer() {
+  asking?.abort();
+  asking = new AbortController();
+  const query = new URLSearchParams(new FormData(form));
+  let found;
+  try {
+    found = await (await fetch(`/design/answer?${query}`, { signal: asking.signal })).json();
+  } catch {
+    return; // a later question took this one's place
+  }
+  refused.hidden = !found.error;
+  refused.textContent = found.error ?? "";
+  if (found.error) return;
+  history.replaceState(null, "", `/design?${query}`);
+  for (const [name, [text, exact, note]] of Object.entries(found.told)) {
+    const entry = document.querySelector(`[data-told="${name}"]`);
+    const value = entry.querySelector("b");
+    value.textContent = text;
+    value.title = exact;
+    entry.querySelector(".quiet").textContent = note;
+  }
+  for (const [name, figure] of Object.entries(found.figures)) {
+    const place = document.getElementById(`figure-${name}`);
+    place.querySelector('script[type="application/json"]').textContent = figure;
+    await redraw(place.querySelector(".plot"));
+    const numbers = place.querySelector(".tools a");
+    numbers.search = query;
+  }
+  document.querySelectorAll(".same code").forEach((code, index) => (code.textContent = found.same[index]));
+}
+
+for (const slider of form.querySelectorAll("[type=range]")) {
+  slider.hidden = false;
+  place(slider);
+  slider.addEventListener("input", () => {
+    const value = slider.dataset.low * Math.exp((slider.value / 1000) * ratio(slider));
+    form.elements[slider.dataset.for].value = String(Number(value.toPrecision(3)));
+    answer();
+  });
+  form.elements[slider.dataset.for].addEventListener("input", () => {
+    place(slider);
+    answer();
+  });
+}
