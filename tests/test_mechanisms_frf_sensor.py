@@ -124,6 +124,26 @@ def test_pick_up_is_charge_over_dynamic_force_at_the_mains_that_stands_out() -> 
         assert (answer.value == predicted([], campaign(recordings))).all()
 
 
+def test_a_pick_up_as_weak_as_the_noise_is_at_the_mains_whose_lines_stray_more_than_the_others() -> None:
+    """More lines lie near 50 Hz and its harmonics here than near those of 60 Hz: noise alone would point to 50."""
+    frequency = np.array(
+        [10.0, 20.0, 30.0, 49.5, 55.0, 60.5, 67.0, 80.0, 100.5, 125.0, 150.0, 165.0, 200.0, 220.0, 250.0]
+    )
+    for seed in range(5):
+        random = np.random.default_rng(seed)
+        noise = 0.25 * (random.normal(size=(30, len(frequency))) + 1j * random.normal(size=(30, len(frequency))))
+        picked = 0.5 * np.exp(2j * np.pi * random.random(30))
+        measured = 5.0 + noise + np.where(frequency == 60.5, 1.0, 0.0) * picked[:, None]
+        recordings = [
+            frf_recording(id=f"r{n}", frequency_hz=frequency, frf_re_pc_per_n=row.real, frf_im_pc_per_n=row.imag)
+            for n, row in enumerate(measured)
+        ]
+        model = compose(["mains_pickup"], campaign(recordings), table())
+        pickup = model.predict(fit_of(model, pickup_charge=0.02)).pickup
+        assert pickup is not None
+        assert frequency[pickup[: len(frequency)].argmax()] == 60.5
+
+
 def test_a_spread_of_the_sensors_is_what_its_parameter_says() -> None:
     recordings = [frf_recording(), frf_recording(id="other", sensor="s2")]
     model = compose(["sensor_spread"], campaign(recordings), table())

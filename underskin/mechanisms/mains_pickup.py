@@ -24,7 +24,9 @@ _MAINS_HZ = (50.0, 60.0)
 _HARMONICS = np.arange(1, 6)
 _WIDTH_HZ = 1.5
 _REACH_HZ = 3.0
-_NEAR, _FAR = 0.3, 0.05
+_NEAR, _FAR = 0.3, 0.05  # of the shape
+_LEAST_LINES = 3
+_LEAST_STRAY = 1e-6  # relative; of recordings without noise
 
 
 class MainsPickup(Mechanism):
@@ -60,7 +62,7 @@ class MainsPickup(Mechanism):
     def pickup_shape(self, campaign: Campaign, design: FrfDesign) -> Floats:
         """The lines' shape over Fd [1/N]."""
         lines = [lines_of(entry) for entry in frf_recordings(campaign)]
-        mains = max(_MAINS_HZ, key=lambda mains: sum(_departure(entry, mains) for entry in lines))
+        mains = max(_MAINS_HZ, key=lambda mains: sum(_excess(entry, mains) for entry in lines))
         return _shape(design.row_frequency, mains) / design.row_dynamic_force
 
     def pickup_charge(self, values: Values) -> Differentiated:
@@ -68,14 +70,20 @@ class MainsPickup(Mechanism):
         return 1e-12 * values["pickup_charge"]
 
 
-def _departure(lines: Frf, mains: float) -> float:
-    """How far the lines near the mains lie from a straight line between those beside them, relative, squared."""
+def _excess(lines: Frf, mains: float) -> float:
+    """How much further the lines near the mains stray from a straight line between the nearest that no mains reach than
+    those do from each other: Σ shape² (|stray|² over theirs − 1), the score of a variance of that shape."""
     shape = _shape(lines.frequency, mains)
-    near, far = shape > _NEAR, shape < _FAR
-    if not near.any() or far.sum() < 2:
+    near, far = shape > _NEAR, np.flatnonzero(shape < _FAR)
+    if not near.any() or len(far) < _LEAST_LINES:
         return 0.0
-    expected = np.interp(lines.frequency[near], lines.frequency[far], lines.values[far])
-    return float((np.abs(lines.values[near] - expected) ** 2).sum() / np.median(np.abs(lines.values)) ** 2)
+    size = np.maximum(np.abs(lines.values), max(float(np.median(np.abs(lines.values))), 1e-300))
+    between = np.interp(lines.frequency[near], lines.frequency[far], lines.values[far])
+    stray = np.abs(lines.values[near] - between) / size[near]
+    odd, even = far[1::2], far[::2]
+    others = np.abs(lines.values[odd] - np.interp(lines.frequency[odd], lines.frequency[even], lines.values[even]))
+    usual = float(np.median((others / size[odd]) ** 2)) / np.log(2.0)  # |·|² of normal parts: median = mean · ln 2
+    return float((shape[near] ** 2 * (stray**2 / max(usual, _LEAST_STRAY**2) - 1)).sum())
 
 
 def _shape(frequency: Floats, mains: float) -> Floats:
