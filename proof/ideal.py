@@ -4,17 +4,21 @@ Its likelihood: each recording's amplitude has its gain scatter and, to second o
 variance, its scatter of position; lines have the rig's own noise; d33 is even in its logarithm from 8 to 30 pC/N;
 E, h and the sensors' gains are what is declared. It supposes nothing, every effect of the catalogue, every one
 that is not in it, and where two effects were drawn every pair that shares one with them. Each supposition is evaluated
-on a coarse grid; the six best, and the true one from its true values, are maximised (Nelder–Mead) and integrated by
-Laplace's method. So it is told where the true answer lies and never overlooks it: no diagnosis can hope to be better.
+on a coarse grid, from the true values of what it shares with the truth; the six best, and the true one, are maximised
+(Nelder–Mead) and integrated by Laplace's method. So it is told where the true answer lies and never overlooks it: no
+diagnosis can hope to be better.
+
+What the truth gains in χ² over every other answer, both at their best, says whether anybody could name it here.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
 from scipy.special import logsumexp
-from scipy.stats import norm, qmc
+from scipy.stats import qmc
 
 from proof.cases import DrawnCase
 from proof.ideal_laws import Supposition, suppositions
@@ -31,6 +35,7 @@ _SCALES = np.linspace(_D33[0], _D33[1], 1001)
 _WIDE = np.linspace(_D33[0] - 1.0, _D33[1] + 1.0, 2501)  # of d33 times a sensor's gain
 _REFINED = 6
 _COARSE = {0: 1, 1: 12, 2: 32, 3: 64}
+_ROOT_2PI = np.sqrt(2 * np.pi)
 _NODE = np.sqrt(3.0)  # of a Gauss–Hermite rule of three points; its outer weights are 1/6
 _PICKUP_WIDTH_HZ = 1.5
 
@@ -67,7 +72,7 @@ class Likelihood:
         shape = plain.lines(self.recorded.frequency_hz) / mean[:, None]
         if self.noise.position_mm:
             for step in _NODE * self.noise.position_mm * np.eye(2):
-                up, down = (replace(plain, missed_mm=nowhere + sign * step).level for sign in (1, -1))
+                up, down = (plain.elsewhere(nowhere + sign * step).level for sign in (1, -1))
                 mean = mean + (up + down - 2 * plain.level) / 6
                 variance = variance + ((up - down) / (2 * _NODE)) ** 2 + ((up + down - 2 * plain.level) ** 2) / 18
         scatter = variance + self.noise.gain**2 * (mean**2 + variance)
@@ -82,7 +87,9 @@ class Likelihood:
         np.add.at(each, index, self._at(_WIDE, mean, scatter, found))
         top = each.max(axis=1, keepdims=True)
         coarse = _SCALES[::10]
-        weight = norm.pdf(_WIDE, coarse[:, None], spread) * (_WIDE[1] - _WIDE[0])
+        weight = np.exp(-0.5 * ((_WIDE - coarse[:, None]) / spread) ** 2) * (
+            (_WIDE[1] - _WIDE[0]) / (spread * _ROOT_2PI)
+        )
         whole = np.log(np.maximum(np.exp(each - top) @ weight.T, 1e-300)) + top
         return found.rest + float(logsumexp(whole.sum(axis=0)) - np.log(len(coarse)))
 
@@ -109,36 +116,64 @@ class Likelihood:
         return _Amplitudes(sy.real / ss.real, 1 / ss.real, rest)
 
 
+@dataclass(frozen=True)
+class Tried:
+    """A supposition that was maximised: ln p at its best, and ln ∫ p over the unit cube."""
+
+    supposed: Supposition
+    log_likelihood: float
+    log_evidence: float
+
+
 def diagnosed(case: DrawnCase) -> dict[str, Any]:
-    """The ideal diagnoser's answer on a drawn campaign and its probability."""
+    """The ideal diagnoser's answer on a drawn campaign, its probability, and `chi2_over_rivals`: by how much 2 ln p of
+    the truth is more than that of any other answer; None where nothing is hidden."""
     description = drawn(case.seed, case.number, case.what)
     recorded = record(description)
     truth: dict[str, Values] = {name: dict(values) for name, values in recorded.bench.on.items()}
     likelihood = Likelihood(recorded)
     sets = _sets(tuple(truth))
     ranges = of_frf(description)
-    coarse = {}
-    for names in sets:
-        for supposed in suppositions(names, ranges):
-            coarse[id(supposed)] = (supposed, *_best_of(supposed, likelihood))
-    ranked = sorted(coarse.values(), key=lambda entry: -entry[2])[:_REFINED]
-    true = [(entry, place) for entry, *_ in coarse.values() if (place := entry.place_of(truth)) is not None]
-    evidence: dict[tuple[str, ...], list[float]] = {}
-    for supposed, place, _ in ranked:
-        evidence.setdefault(supposed.names, []).append(_evidence(supposed, likelihood, place))
-    for supposed, place in true:
-        evidence.setdefault(supposed.names, []).append(_evidence(supposed, likelihood, place))
+    laws = {names: suppositions(names, ranges) for names in sets}
+    supposed = [entry for entries in laws.values() for entry in entries if _starts_at(entry, truth)]
+    coarse = [(entry, *_best_of(entry, likelihood, truth)) for entry in supposed]
+    starts = [(entry, place) for entry, place, _ in sorted(coarse, key=lambda found: -found[2])[:_REFINED]]
+    starts += [(entry, place) for entry, *_ in coarse if (place := entry.place_of(truth)) is not None]
+    tried = [_integrated(entry, likelihood, place) for entry, place in starts]
+    evidence: dict[tuple[str, ...], float] = {}
+    for entry in tried:
+        names = entry.supposed.names
+        evidence[names] = max(evidence.get(names, -np.inf), entry.log_evidence)
     weight: dict[tuple[str, ...], list[float]] = {}
     for names, found in evidence.items():
-        answer = (UNKNOWN_ANSWER,) if set(names) & set(UNKNOWN) else names
-        variants = len(suppositions(names, ranges))
-        weight.setdefault(answer, []).append(max(found) - np.log(variants) + sets[names])
+        weight.setdefault(_answer(names), []).append(found - np.log(len(laws[names])) + sets[names])
     total = {answer: float(logsumexp(values)) for answer, values in weight.items()}
     leader = max(total, key=lambda answer: total[answer])
     return {
         "answer": list(leader),
         "probability": float(np.exp(total[leader] - logsumexp(list(total.values())))),
+        "chi2_over_rivals": _over_rivals(tried, _answer(tuple(sorted(truth)))) if truth else None,
     }
+
+
+def _starts_at(supposed: Supposition, truth: Mapping[str, Values]) -> bool:
+    """Whether a pair has the law and the sign of the true effect that it shares; a single may have any."""
+    if len(supposed.names) < 2:
+        return True
+    known = np.isfinite(supposed.place_of_shared(truth))
+    shared = [entry.effect in truth for entry in supposed.coordinates]
+    return bool(known[shared].all())
+
+
+def _answer(names: tuple[str, ...]) -> tuple[str, ...]:
+    return (UNKNOWN_ANSWER,) if set(names) & set(UNKNOWN) else names
+
+
+def _over_rivals(tried: list[Tried], truth: tuple[str, ...]) -> float:
+    """2 ln p of the truth's best less that of the best of any other answer."""
+    true = [entry.log_likelihood for entry in tried if _answer(entry.supposed.names) == truth]
+    rivals = [entry.log_likelihood for entry in tried if _answer(entry.supposed.names) != truth]
+    return round(2 * (max(true) - max(rivals)), 2) if rivals else np.inf
 
 
 def _sets(truth: tuple[str, ...]) -> dict[tuple[str, ...], float]:
@@ -156,19 +191,21 @@ def _sets(truth: tuple[str, ...]) -> dict[tuple[str, ...], float]:
     return sets
 
 
-def _best_of(supposed: Supposition, likelihood: Likelihood) -> tuple[Floats, float]:
-    """The best of evenly spread places (Halton), and ln p there."""
-    size = len(supposed.coordinates)
-    if not size:
-        return np.zeros(0), likelihood(supposed.effects(np.zeros(0)))
-    places = qmc.Halton(size, scramble=False).random(_COARSE.get(size, 64) + 1)[1:]
+def _best_of(supposed: Supposition, likelihood: Likelihood, truth: Mapping[str, Values]) -> tuple[Floats, float]:
+    """The best of evenly spread places (Halton), effects that are true held at their true values, and ln p there."""
+    known = supposed.place_of_shared(truth)
+    free = np.isnan(known)
+    if not free.any():
+        return known, likelihood(supposed.effects(known))
+    places = np.tile(known, (_COARSE.get(int(free.sum()), 64), 1))
+    places[:, free] = qmc.Halton(int(free.sum()), scramble=False).random(len(places) + 1)[1:]
     values = [likelihood(supposed.effects(place)) for place in places]
     best = int(np.argmax(values))
     return places[best], values[best]
 
 
-def _evidence(supposed: Supposition, likelihood: Likelihood, start: Floats) -> float:
-    """ln ∫ p over the unit cube, by Laplace's method from a start; no wider than the cube."""
+def _integrated(supposed: Supposition, likelihood: Likelihood, start: Floats) -> Tried:
+    """The best near a start, and ln ∫ p over the unit cube by Laplace's method there; no wider than the cube."""
     size = len(supposed.coordinates)
 
     def loss(place: Floats) -> float:
@@ -176,7 +213,7 @@ def _evidence(supposed: Supposition, likelihood: Likelihood, start: Floats) -> f
 
     start = np.clip(start, 0.0, 1.0)
     if not size or not np.isfinite(loss(start)):
-        return -loss(start)
+        return Tried(supposed, -loss(start), -loss(start))
     simplex = np.vstack(
         [start, *(start + np.where(start[k] > 0.5, -0.04, 0.04) * np.eye(size)[k] for k in range(size))]
     )
@@ -195,7 +232,7 @@ def _evidence(supposed: Supposition, likelihood: Likelihood, start: Floats) -> f
             both = loss(best + inward[i] * np.eye(size)[i] + inward[j] * np.eye(size)[j]) - least
             hessian[i, j] = hessian[j, i] = (both - single[i] - single[j]) / (inward[i] * inward[j])
     values = np.maximum(np.linalg.eigvalsh(hessian), 2 * np.pi)
-    return -least + 0.5 * float((np.log(2 * np.pi) - np.log(values)).sum())
+    return Tried(supposed, -least, -least + 0.5 * float((np.log(2 * np.pi) - np.log(values)).sum()))
 
 
 def _step(loss: Any, best: Floats, least: float, axis: Floats) -> float:

@@ -65,16 +65,24 @@ class Supposition:
 
     def place_of(self, effects: Mapping[str, Values]) -> Floats | None:
         """Where these effects are, None where this supposition does not hold them."""
-        if set(effects) != set(self.fixed):
-            return None
-        if any(effects[name].get(key) != value for name, part in self.fixed.items() for key, value in part.items()):
-            return None
+        place = self.place_of_shared(effects)
+        return place if set(effects) == set(self.fixed) and not np.isnan(place).any() else None
+
+    def place_of_shared(self, effects: Mapping[str, Values]) -> Floats:
+        """Where those of these effects are that this supposition holds as they are; nan elsewhere."""
         known = {name: dict(values) for name, values in effects.items()}
         if "misalignment" in known:
             x, y = (float(known["misalignment"][name]) for name in ("x_mm", "y_mm"))
             known["misalignment"] = {"size": math.hypot(x, y), "angle": math.atan2(y, x)}
-        place = np.array([entry.place(float(known[entry.effect][entry.parameter])) for entry in self.coordinates])
-        return place if np.all((place > -0.01) & (place < 1.01)) else None
+        place = np.full(len(self.coordinates), np.nan)
+        for name, values in self.fixed.items():
+            own = [index for index, entry in enumerate(self.coordinates) if entry.effect == name]
+            if name not in known or any(known[name].get(key) != value for key, value in values.items()):
+                continue
+            at = np.array([self.coordinates[i].place(float(known[name][self.coordinates[i].parameter])) for i in own])
+            if np.all((at > -0.01) & (at < 1.01)):
+                place[own] = np.clip(at, 0.0, 1.0)
+        return place
 
 
 def suppositions(names: Sequence[str], ranges: Ranges) -> list[Supposition]:

@@ -4,7 +4,7 @@ level = d33 · gain · (3/2) ρ² · σ_eff [pC/N]; on a line at f it goes throu
 and amplifier (`linear_filters`) and the delay. σ_eff is σ with a held edge, plus what moving edges add.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -68,6 +68,12 @@ class Bench:
         modulus = self.experiment.skin.youngs_modulus_mpa * (effects.of(self.on, "modulus_error", "factor") or 1.0)
         radius, force, dwell, _ = unique.T
         return Pressed(self.thickness, modulus, self.on, radius, force, dwell), index.reshape(-1)
+
+    def elsewhere(self, missed_mm: Floats) -> "Bench":
+        """The same with other errors of position (rows, 2); contacts, which do not depend on place, are kept."""
+        other = replace(self, missed_mm=missed_mm)
+        vars(other)["_distinct"] = self._distinct
+        return other
 
     @property
     def pressed(self) -> Pressed:
@@ -146,15 +152,20 @@ class Bench:
 
     def filters(self, row: int) -> list[linear_filters.Filter]:
         """Resonance and electronics of one recording, without the delay."""
-        mechanical = linear_filters.resonance(self.on, float(self.stiffness[row]))
+        resonates = "contact_resonance" in self.on  # else nobody needs the stiffness, which is dear
+        mechanical = linear_filters.resonance(self.on, float(self.stiffness[row])) if resonates else []
         return mechanical + linear_filters.electrical(self.on, float(self.plan.preload_n[row]))
 
     def lines(self, frequency_hz: Floats) -> Complexes:
         """The FRF before noise and mains (rows, lines) [pC/N]."""
         late = np.exp(-2j * np.pi * frequency_hz * 1e-6 * effects.of(self.on, "timing_delay", "delay_us"))
         shapes = np.empty((len(self.pressed.force), len(frequency_hz)), dtype=complex)
+        chain, shape = None, np.ones(len(frequency_hz), dtype=complex)
         for row in np.unique(self.contact, return_index=True)[1]:
-            shapes[self.contact[row]] = linear_filters.response(self.filters(int(row)), frequency_hz)
+            filters = self.filters(int(row))
+            if filters != chain:
+                chain, shape = filters, linear_filters.response(filters, frequency_hz)
+            shapes[self.contact[row]] = shape
         return self.level[:, None] * shapes[self.contact] * late
 
 

@@ -26,6 +26,7 @@ WIDEST = 4.0  # a/h
 _RADII = np.concatenate([[0.0], np.geomspace(0.02, WIDEST, 40)])
 
 
+@lru_cache
 def _nodes(count: int, end: float) -> tuple[Floats, Floats]:
     x, w = np.polynomial.legendre.leggauss(count)
     return end * (x + 1) / 2, end * w / 2

@@ -52,12 +52,21 @@ def drawn(seed: int, number: int, what: str | None = None) -> dict[str, Any]:
         description = _description(random, f"drawn {seed}/{number}", sought)
         ranges = of_frf(description)
         description["effects"] = {name: drawn_parameters(random, name, ranges) for name in names}
-        try:
-            record_lines(parse(description))
-        except RigError:
-            continue
-        return description
+        if _feasible(description):
+            return description
     raise RuntimeError(f"no feasible experiment {seed}/{number}")
+
+
+def _feasible(description: Mapping[str, Any]) -> bool:
+    """Whether the rig reaches the experiment, and it without any one effect, against which that effect is judged."""
+    effects = description["effects"]
+    try:
+        for without in (None, *effects):
+            left = {name: values for name, values in effects.items() if name != without}
+            record_lines(parse({**description, "effects": left}))
+    except RigError:
+        return False
+    return True
 
 
 def record(description: Mapping[str, Any]) -> RecordedLines:

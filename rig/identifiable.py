@@ -82,7 +82,7 @@ class _Fit:
             base = bench.lines(recorded.frequency_hz)
             self.moved = np.stack(
                 [
-                    (replace(bench, missed_mm=bench.missed_mm + step).lines(recorded.frequency_hz) - base)
+                    (bench.elsewhere(bench.missed_mm + step).lines(recorded.frequency_hz) - base)
                     * (self.noise.position_mm / _SMALL_MM)
                     for step in _SMALL_MM * np.eye(2)
                 ]

@@ -34,8 +34,15 @@ class Pressed:
     dwell: Floats
 
     def at(self, force: Floats) -> "Pressed":
-        """The same under another force."""
-        return Pressed(self.thickness, self.modulus, self.on, self.radius, force, self.dwell)
+        """The same under another force; kept."""
+        key = force.tobytes()
+        if key not in self._others:
+            self._others[key] = Pressed(self.thickness, self.modulus, self.on, self.radius, force, self.dwell)
+        return self._others[key]
+
+    @cached_property
+    def _others(self) -> dict[bytes, "Pressed"]:
+        return {}
 
     @cached_property
     def layer(self) -> Layer:
