@@ -4,9 +4,9 @@ Its likelihood: each recording's amplitude has its gain scatter and, to second o
 variance, its scatter of position; lines have the rig's own noise; d33 is even in its logarithm from 8 to 30 pC/N;
 E, h and the sensors' gains are what is declared. It supposes nothing, every effect of the catalogue, every one
 that is not in it, and where two effects were drawn every pair that shares one with them. Each supposition is evaluated
-on a coarse grid, from the true values of what it shares with the truth; the six best, and the true one, are maximised
-(Nelder–Mead) and integrated by Laplace's method. So it is told where the true answer lies and never overlooks it: no
-diagnosis can hope to be better.
+on a coarse grid, from the true values of what it shares with the truth; the six best, the three best that are not the
+true answer, and the true one are maximised (Nelder–Mead) and integrated by Laplace's method. So it is told where the
+true answer lies and never overlooks it: no diagnosis can hope to be better.
 
 What the truth gains in χ² over every other answer, both at their best, says whether anybody could name it here.
 """
@@ -33,7 +33,7 @@ from underskin.units import Floats
 _D33 = np.log([8.0, 30.0])  # as the rig draws it
 _SCALES = np.linspace(_D33[0], _D33[1], 1001)
 _WIDE = np.linspace(_D33[0] - 1.0, _D33[1] + 1.0, 2501)  # of d33 times a sensor's gain
-_REFINED = 6
+_REFINED, _RIVALS = 6, 3  # of all, and of those that do not give the true answer
 _COARSE = {0: 1, 1: 12, 2: 32, 3: 64}
 _ROOT_2PI = np.sqrt(2 * np.pi)
 _NODE = np.sqrt(3.0)  # of a Gauss–Hermite rule of three points; its outer weights are 1/6
@@ -137,7 +137,11 @@ def diagnosed(case: DrawnCase) -> dict[str, Any]:
     laws = {names: suppositions(names, ranges) for names in sets}
     supposed = [entry for entries in laws.values() for entry in entries if _starts_at(entry, truth)]
     coarse = [(entry, *_best_of(entry, likelihood, truth)) for entry in supposed]
-    starts = [(entry, place) for entry, place, _ in sorted(coarse, key=lambda found: -found[2])[:_REFINED]]
+    coarse.sort(key=lambda found: -found[2])
+    hidden = _answer(tuple(sorted(truth)))
+    rivals = [found for found in coarse if _answer(found[0].names) != hidden]
+    chosen = {id(found): found for found in (*coarse[:_REFINED], *rivals[:_RIVALS])}
+    starts = [(entry, place) for entry, place, _ in chosen.values()]
     starts += [(entry, place) for entry, *_ in coarse if (place := entry.place_of(truth)) is not None]
     tried = [_integrated(entry, likelihood, place) for entry, place in starts]
     evidence: dict[tuple[str, ...], float] = {}
@@ -152,7 +156,7 @@ def diagnosed(case: DrawnCase) -> dict[str, Any]:
     return {
         "answer": list(leader),
         "probability": float(np.exp(total[leader] - logsumexp(list(total.values())))),
-        "chi2_over_rivals": _over_rivals(tried, _answer(tuple(sorted(truth)))) if truth else None,
+        "chi2_over_rivals": _over_rivals(tried, hidden) if truth else None,
     }
 
 
@@ -173,7 +177,7 @@ def _over_rivals(tried: list[Tried], truth: tuple[str, ...]) -> float:
     """2 ln p of the truth's best less that of the best of any other answer."""
     true = [entry.log_likelihood for entry in tried if _answer(entry.supposed.names) == truth]
     rivals = [entry.log_likelihood for entry in tried if _answer(entry.supposed.names) != truth]
-    return round(2 * (max(true) - max(rivals)), 2) if rivals else np.inf
+    return round(2 * (max(true) - max(rivals)), 2)
 
 
 def _sets(truth: tuple[str, ...]) -> dict[tuple[str, ...], float]:

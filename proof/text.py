@@ -1,7 +1,7 @@
 """docs/proof.md as text: every number in it is computed from the parts that were worked out."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from proof.judge import QUIET, Judged, shown
 from proof.markdown import table
 from proof.statistics import Share, bootstrap, calibration, share
 from proof.text_real import recordings, riddle
+from rig.identifiable import THRESHOLD
 from underskin.units import Floats
 
 Result = Mapping[str, Any]
@@ -26,7 +27,9 @@ in brackets. The diagnosis is called as `underskin diagnose` calls it: it gets t
 An answer is *right* if the set of mechanisms that leads is exactly the set that was hidden: for nothing by the
 verdict `no_mismatch`, for physics outside the catalogue by the verdict `unexplained`. A leading set counts under
 `ambiguous` too. Something hidden is *visible* if the truth gains more than 20 in χ² over the base model, a pair if
-each of its members does so beside the other.
+each of its members does so beside the other. On our own rig it is *identifiable* if, besides, the truth gains more than
+20 in χ² over every other answer as well, all by the rig's own equations and at their best: a moving edge and a finite
+amplitude at one amplitude are twins, and nobody could name the one or the other. No report enters either definition.
 """
 
 
@@ -59,15 +62,15 @@ def _right(judged: Sequence[Judged]) -> str:
     return _percent(share([entry.right for entry in judged]))
 
 
-def _misses(judged: Sequence[Judged]) -> str:
+def _misses(judged: Sequence[Judged], identifiable: Collection[str] = ()) -> str:
     rows = [
         [entry.name, shown(entry.truth), shown(entry.answer), entry.verdict, f"{entry.probability:.2f}",
-         "yes" if entry.visible else "no", f"{entry.size:.1f}"]
+         "identifiable" if entry.name in identifiable else "visible" if entry.visible else "no", f"{entry.size:.1f}"]
         for entry in judged if not entry.right
     ]  # fmt: skip
     if not rows:
         return "No misses.\n"
-    header = ["campaign", "hidden", "named", "verdict", "probability", "visible", "size, units of noise"]
+    header = ["campaign", "hidden", "named", "verdict", "probability", "to be seen", "size, units of noise"]
     return table(header, rows)
 
 
@@ -96,16 +99,17 @@ def _mixture(result: Result, ceiling: Result | None) -> str:
     judged = judged_of(result)
     seen = [entry for entry in judged if entry.visible]
     parts = {kind: [entry for entry in seen if entry.kind == kind] for kind in ("none", "single", "pair", "unknown")}
-    rows = [[kind, str(sum(entry.kind == kind for entry in judged)), _right(found), _ideal(found, ceiling)]
+    parts["all"] = seen
+    drawn = Counter(entry.kind for entry in judged) + Counter(all=len(judged))
+    rows = [[kind, str(drawn[kind]), _right(found), _ideal(found, ceiling), _right(_identifiable(found, ceiling))]
             for kind, found in parts.items()]  # fmt: skip
-    rows.append(["all visible", str(len(judged)), _right(seen), _ideal(seen, ceiling)])
     return f"""\
 ## Campaigns of our own rig
 
 {len(judged)} of {own_rig.MIXTURE} campaigns (seed {own_rig.SEED}), drawn evenly from subtle to strong; the rig
 shares no code with the diagnosis, and its laws are not the catalogue's.
 
-{table(["hidden", "drawn", "right, of the visible", "ideal diagnoser, of those it was run on"], rows)}
+{table(["hidden", "drawn", "right, of the visible", "ideal diagnoser, of these", "right, of the identifiable"], rows)}
 {_CEILING if ceiling else ""}
 What was named where the answer is not right, of the visible. *Left open* is the verdict `ambiguous` with the truth
 among the rivals: for near-twins (a moving edge and a finite amplitude at one amplitude) there is no better answer.
@@ -113,21 +117,20 @@ among the rivals: for near-twins (a moving edge and a finite amplitude at one am
 {_confused(seen)}
 ![What was hidden against what was named](figures/proof-confusion.svg)
 
-{_probabilities(judged, seen)}
+{_probabilities(judged, seen, _identifiable(seen, ceiling))}
 ![Calibration, and accuracy against the effect's size](figures/proof-calibration.svg)
 
 {_held_out(seen)}
 ### Every miss
 
-{_misses(judged)}"""
+{_misses(judged, {entry.name for entry in _identifiable(seen, ceiling)})}"""
 
 
 _CEILING = """\
 The ideal diagnoser owns the rig's equations (those outside the catalogue included), its noise levels, the ranges
-and shares that it draws from, and knows E, h and the sensors' gains exactly. It takes the most probable of nothing,
-every single effect and, where two are hidden, every pair that shares one with them, by Laplace evidence; the true
-set is maximised from its true values, so it never overlooks it. Its likelihood treats the scatter of position to
-second order.
+and shares that it draws from, and knows E and h exactly. It takes the most probable of nothing, every single effect
+and, where two are hidden, every pair that shares one with them, by Laplace evidence; the true set is maximised from
+its true values, so it never overlooks it. Its likelihood treats the scatter of position to second order.
 """
 
 
@@ -135,6 +138,13 @@ def _ideal(judged: Sequence[Judged], ceiling: Result | None) -> str:
     answers = ceiling["answers"] if ceiling else {}
     right = [tuple(answers[entry.name]["answer"]) == entry.truth for entry in judged if entry.name in answers]
     return _percent(share(right)) if right else "not run"
+
+
+def _identifiable(judged: Sequence[Judged], ceiling: Result | None) -> list[Judged]:
+    """Those of the visible that an ideal diagnoser could name; of those it was run on."""
+    answers = ceiling["answers"] if ceiling else {}
+    gains = {name: answer["chi2_over_rivals"] for name, answer in answers.items()}
+    return [entry for entry in judged if entry.name in gains and (not entry.truth or gains[entry.name] > THRESHOLD)]
 
 
 def _confused(judged: Sequence[Judged]) -> str:
@@ -159,9 +169,11 @@ def _outcome(entry: Judged) -> str:
     return "part of it" if set(entry.truth) & set(entry.answer) else "other mechanisms"
 
 
-def _probabilities(judged: Sequence[Judged], seen: Sequence[Judged]) -> str:
+def _probabilities(judged: Sequence[Judged], seen: Sequence[Judged], identifiable: Sequence[Judged]) -> str:
     rows = []
-    for name, entries in (("visible", seen), ("all", judged)):
+    for name, entries in (("identifiable", identifiable), ("visible", seen), ("all", judged)):
+        if not entries:
+            continue
         found = calibration([entry.probability for entry in entries], [entry.right for entry in entries])
         low, high = found.chance_range
         inside = "inside" if found.error <= high else "outside"
