@@ -31,10 +31,10 @@ class SensorSpread(Mechanism):
                 unit="-",
                 low=0.02,
                 high=0.8,
-                prior=Normal(-2.1, 0.6),
+                prior=Normal(-2.5, 0.9),
                 scale="log",
                 limit=SENSOR_SPREAD,
-                reason="poled films and printed electrodes vary by some to 30 percent; 12 % within a factor of 1.8",
+                reason="poled films and printed electrodes vary by some to 30 percent; 8 % within a factor of 2.5",
             ),
         )
 
