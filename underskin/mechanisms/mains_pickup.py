@@ -83,7 +83,7 @@ def _excess(lines: Frf, mains: float) -> float:
     odd, even = far[1::2], far[::2]
     others = np.abs(lines.values[odd] - np.interp(lines.frequency[odd], lines.frequency[even], lines.values[even]))
     usual = float(np.median((others / size[odd]) ** 2)) / np.log(2.0)  # |·|² of normal parts: median = mean · ln 2
-    return float((shape[near] ** 2 * (stray**2 / max(usual, _LEAST_STRAY**2) - 1)).sum())
+    return float((shape[near] ** 2 * (stray**2 - usual)).sum() / max(usual, _LEAST_STRAY**2))
 
 
 def _shape(frequency: Floats, mains: float) -> Floats:
