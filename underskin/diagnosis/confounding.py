@@ -14,6 +14,7 @@ import numpy as np
 from underskin.diagnosis.explanation import Workbench
 from underskin.diagnosis.fit import COVARIANCE_NAMES, Fitter
 from underskin.diagnosis.likelihood import Marginal, Moments, NoiseLevels
+from underskin.diagnosis.smooth_error import TYPICAL
 from underskin.mechanisms.catalogue import CATALOGUE
 from underskin.mechanisms.mechanism import Normal, Parameter, Unsupported
 from underskin.units import Floats
@@ -55,7 +56,8 @@ def confounding(bench: Workbench) -> list[Confounding]:
     slopes = np.concatenate([base.prediction.slopes, np.array(signatures)])
     prediction = replace(base.prediction, slopes=slopes)
     lines = bench.lines
-    moments = Moments(lines, prediction, np.zeros(lines.recordings), bench.curvature, 0.0)
+    ratio = TYPICAL if lines.curves else 0.0
+    moments = Moments(lines, prediction, np.zeros(lines.recordings), bench.curvature, 0.0, ratio)
     information, _ = Marginal(lines, moments, NoiseLevels(_GAIN, 1.0, 0.0, 0.01)).normal_equations()
     return _told(names, information, fitter.parameters)
 

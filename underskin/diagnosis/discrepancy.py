@@ -9,7 +9,7 @@ Amplitudes and lengths are on grids of equal prior probability. An amplitude bel
 is right to that is not missing physics.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,12 @@ from scipy.optimize import minimize_scalar
 from scipy.special import logsumexp
 
 from underskin.diagnosis.axes import recording_axes
+from underskin.diagnosis.evidence import laplace
 from underskin.diagnosis.explanation import Explanation, Workbench
-from underskin.diagnosis.fit import Evaluated
+from underskin.diagnosis.fit import Evaluated, Fitter
 from underskin.diagnosis.residuals import line_residuals, whole_prediction
 from underskin.diagnosis.scatter import GAIN_PRIOR, Bell, level_prior
+from underskin.diagnosis.smooth_error import UNNAMED
 from underskin.mechanisms.differentiated import Array
 from underskin.mechanisms.mechanism import Normal, Parameter
 from underskin.units import Floats
@@ -47,6 +49,8 @@ class Discrepancy:
 
 def discrepancy(bench: Workbench, explanation: Explanation) -> Discrepancy:
     """What a process gains on top of an explanation."""
+    if bench.lines.curves:
+        return _along_curves(bench, explanation)
     over = {"recordings": _over_recordings(bench, explanation), "lines": _over_lines(bench, explanation)}
     gained = {kind: _mean(list(gains.values())) for kind, gains in over.items() if gains}
     if len(gained) == 2:
@@ -54,6 +58,15 @@ def discrepancy(bench: Workbench, explanation: Explanation) -> Discrepancy:
     each = [np.log(_KINDS[kind]) + gain for kind, gain in gained.items()]
     total = float(logsumexp(each)) if each else -np.inf
     return Discrepancy(explanation.log_evidence + total, {**over["recordings"], **over["lines"]})
+
+
+def _along_curves(bench: Workbench, explanation: Explanation) -> Discrepancy:
+    """The smooth error that every hypothesis has of curves, large: everything is fitted again beneath it."""
+    fitter = Fitter(replace(bench.hypothesis(explanation.names, placed=False), smooth=UNNAMED))
+    covariance = explanation.point.covariance.copy()
+    covariance[2] = max(covariance[2], UNNAMED.low)
+    best = laplace(fitter, fitter.improve(replace(explanation.point, covariance=covariance)))
+    return Discrepancy(best.log_evidence, {"displacement_mm": best.log_evidence - explanation.log_evidence})
 
 
 def _mean(log_values: list[float]) -> float:

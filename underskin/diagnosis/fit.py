@@ -12,13 +12,16 @@ import numpy as np
 
 from underskin.diagnosis.likelihood import Curvature, Marginal, Moments, NoiseLevels
 from underskin.diagnosis.lines import Lines
-from underskin.diagnosis.scatter import GAIN_PRIOR, POSITION_PRIOR, level_prior
+from underskin.diagnosis.scatter import GAIN_PRIOR, POSITION_PRIOR, Plateau, level_prior
+from underskin.diagnosis.smooth_error import USUAL
 from underskin.mechanisms.catalogue import CATALOGUE
 from underskin.mechanisms.composition import SENSOR_SPREAD, parameters_together
 from underskin.mechanisms.mechanism import Normal, Parameter
 from underskin.mechanisms.model import Model, Prediction
 from underskin.units import Floats
 
+_LEAST_LEVEL = 0.5  # of curves: cells are not more accurate than that, however smooth
+_CURVE_SETTLING = 8
 _STEP = 0.05  # of the finite differences in the covariance's logarithms
 _LARGEST_STEP = 1.0
 _CONVERGED = 0.01  # in log posterior
@@ -40,12 +43,13 @@ class CovarianceParameter:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A model and the lines it is to explain, with or without positioning scatter."""
+    """A model and the lines it is to explain, with or without positioning scatter; of curves, how large η may be."""
 
     model: Model
     lines: Lines
     curvature: Curvature
     placed: bool  # whether there is positioning scatter
+    smooth: Plateau = USUAL
 
     @property
     def mean_places(self) -> list[int]:
@@ -54,14 +58,16 @@ class Hypothesis:
 
     @property
     def covariance(self) -> tuple[CovarianceParameter, ...]:
-        """Gain scatter, line level, position scatter where there is one, then the model's own."""
+        """Gain scatter, line level, position scatter or smooth error where there is one, then the model's own."""
         level = level_prior(self.lines.noise.log_level_sd)
         common = [
             CovarianceParameter("gain", np.log(1e-3), np.log(0.5), GAIN_PRIOR.log_density),
-            CovarianceParameter("level", np.log(0.1), np.log(100.0), level.log_density),
+            CovarianceParameter("level", np.log(_LEAST_LEVEL if self.lines.curves else 0.1), np.log(100.0), level.log_density),
         ]
         if self.placed:
             common.append(CovarianceParameter("position", np.log(2e-5), np.log(6e-4), POSITION_PRIOR.log_density))
+        if self.lines.curves:
+            common.append(CovarianceParameter("smooth", np.log(1e-5), np.log(2.0), self.smooth.log_density))
         own = [
             CovarianceParameter(entry.name, *entry.bounds, entry.log_prior)
             for entry in self.model.parameters
@@ -137,6 +143,8 @@ class Fitter:
         covariance = [GAIN_PRIOR.middle, 0.0]
         if self.hypothesis.placed:
             covariance.append(POSITION_PRIOR.middle)
+        if self.hypothesis.lines.curves:
+            covariance.append(self.hypothesis.smooth.middle)
         return Point(fit, np.array([*covariance, *fit[self._own]]), self.no_bend)
 
     def start(
@@ -179,7 +187,8 @@ class Fitter:
         position = float(np.exp(point.covariance[2])) if hypothesis.placed else 0.0
         lines = hypothesis.lines
         for _ in range(_BENDINGS):
-            moments = Moments(lines, prediction, point.bend[lines.sensor], hypothesis.curvature, position)
+            ratio = self._smooth(point) / float(np.exp(point.covariance[1]))
+            moments = Moments(lines, prediction, point.bend[lines.sensor], hypothesis.curvature, position, ratio)
             at = self._weigh(point, point.fit, prediction, moments)
             if self.levels(point, point.fit).spread < _FREE_SPREAD:
                 break
@@ -190,7 +199,12 @@ class Fitter:
         return at
 
     def _weigh(self, point: Point, predicted_at: Floats, prediction: Prediction, moments: Moments) -> Evaluated:
-        marginal = Marginal(self.hypothesis.lines, moments, self.levels(point, predicted_at))
+        lines, levels = self.hypothesis.lines, self.levels(point, predicted_at)
+        if lines.curves and levels.smooth != moments.ratio * levels.level:
+            ratio = levels.smooth / levels.level
+            bend = point.bend[lines.sensor]
+            moments = Moments(lines, prediction, bend, self.hypothesis.curvature, 0.0, ratio)
+        marginal = Marginal(lines, moments, levels)
         cost = -marginal.log_likelihood - self._log_prior(point)
         return Evaluated(point, predicted_at, prediction, moments, marginal, cost)
 
@@ -202,8 +216,17 @@ class Fitter:
         if self._pickup is not None:
             pickup = float(np.exp(point.fit[self._pickup] - predicted_at[self._pickup]))
         return NoiseLevels(
-            float(np.exp(point.covariance[0])), float(np.exp(point.covariance[1])), position, spread, pickup
+            float(np.exp(point.covariance[0])),
+            float(np.exp(point.covariance[1])),
+            position,
+            spread,
+            pickup,
+            self._smooth(point),
         )
+
+    def _smooth(self, point: Point) -> float:
+        """η, which follows the two that all recordings have."""
+        return float(np.exp(point.covariance[2])) if self.hypothesis.lines.curves else 0.0
 
     def _with_own(self, fit: Floats, covariance: Floats) -> Floats:
         if not self._own:
@@ -220,12 +243,23 @@ class Fitter:
 
     def improve(self, start: Point, iterations: int = _MOST_ITERATIONS) -> Evaluated:
         """The most probable point near the start."""
-        best = self.settle(self.evaluate(start), 3)
+        if not self.hypothesis.lines.curves:
+            return self.settle(self._descend(self.settle(self.evaluate(start), 3), iterations, 1), 2)
+        # Small smooth error and close fit, or large and loose: each may be a maximum of its own.
+        found = []
+        for smooth in (self.hypothesis.smooth.low, self.hypothesis.smooth.middle):
+            begin = replace(start, covariance=np.array([GAIN_PRIOR.middle, 0.0, smooth]))
+            fitted = self.settle(self._descend(self.evaluate(begin), iterations, 0), _CURVE_SETTLING)
+            found.append(self.settle(self._descend(fitted, iterations, 1), _CURVE_SETTLING))
+        return min(found, key=lambda at: at.cost)
+
+    def _descend(self, best: Evaluated, iterations: int, settling: int) -> Evaluated:
+        """Steps of the mean parameters, each followed by so many of the covariance's."""
         damping = 1e-3
         for _ in range(iterations):
             step = self._step(best, damping)
             moved = replace(best.point, fit=np.clip(best.point.fit + step, self.low, self.high))
-            tried = self.settle(self.evaluate(moved), 1)
+            tried = self.settle(self.evaluate(moved), settling)
             gained = best.cost - tried.cost
             if gained > 0:
                 best = tried
@@ -238,7 +272,7 @@ class Fitter:
                 damping = max(damping * 10, 1e-2)
                 if gained > -_CONVERGED and damping > 1:
                     break
-        return self.settle(best, 2)
+        return best
 
     def _step(self, at: Evaluated, damping: float) -> Floats:
         """A Gauss–Newton step of the mean parameters, damped, within the bounds."""
@@ -282,6 +316,8 @@ class Fitter:
             high = np.array([entry.high for entry in self.covariance])
             eigenvalues, vectors = np.linalg.eigh(hessian)
             step = -vectors @ ((vectors.T @ gradient) / np.maximum(np.abs(eigenvalues), 1.0))
+            outwards = ((at.point.covariance <= low) & (step < 0)) | ((at.point.covariance >= high) & (step > 0))
+            step = np.where(outwards, 0.0, step)
             step *= min(1.0, 0.7 / max(np.abs(step).max(), 1e-12))
             for _ in range(4):
                 point = self.moved(at.point, np.clip(at.point.covariance + step, low, high))

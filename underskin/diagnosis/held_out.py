@@ -8,10 +8,12 @@ a new recording: gain, positioning and line scatter, and the sensors' gains wher
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.errors import InvalidInput
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.lines import Lines
 from underskin.diagnosis.search import log_prior
@@ -21,6 +23,7 @@ from underskin.mechanisms.model import Prediction as Predicted
 from underskin.mechanisms.model import compose
 
 _FURTHEST = 0.6  # of a curve's highest force
+_LEAST_AFTER = 6  # samples beyond the highest force that make a hold or a way back
 _LEAST_KEPT = 3  # recordings that must remain
 _BEST = 10  # sets among which the choice is repeated
 _BEHIND = 15.0  # nats
@@ -70,10 +73,7 @@ def groups(lines: Lines) -> dict[str, NDArray[np.bool_]]:
     """The rows of each group that can be left out, with enough recordings remaining."""
     found: dict[str, NDArray[np.bool_]] = {}
     if lines.curves:
-        # A curve's contact point is its own, so what can be left out is the part of each curve that reaches furthest.
-        force = np.abs(lines.value.real)  # tension is negative
-        highest = np.maximum.reduceat(force, lines.first)[lines.recording]
-        return {f"force_n above {_FURTHEST:.0%}": force > _FURTHEST * highest}
+        return _parts_of_curves(lines)
     entries = frf_recordings(lines.campaign)
 
     def add(name: str, column: Sequence[float | str | None], last: Callable[[list[float | str]], float | str]) -> None:
@@ -98,6 +98,20 @@ def groups(lines: Lines) -> dict[str, NDArray[np.bool_]]:
     }
 
 
+def _parts_of_curves(lines: Lines) -> dict[str, NDArray[np.bool_]]:
+    """A curve's contact point is its own, so parts of each are left out: the highest force of curves that only load,
+    and the later half of what follows the highest force where curves hold or return."""
+    force = np.abs(lines.value.real)  # tension is negative
+    later = np.zeros(len(force), dtype=bool)
+    for low, high in pairwise((*lines.first, len(force))):
+        rest = high - 1 - (low + int(np.argmax(force[low:high])))
+        later[high - rest // 2 : high] = rest >= _LEAST_AFTER
+    if later.any():
+        return {"the later half after the highest force_n": later}
+    highest = np.maximum.reduceat(force, lines.first)[lines.recording]
+    return {f"force_n above {_FURTHEST:.0%}": force > _FURTHEST * highest}
+
+
 def hold_out(bench: Workbench, ranked: Sequence[Explanation], nothing: Explanation, supported: int) -> list[HeldOut]:
     """Predict each group from the rest; `ranked` are the sets found on everything, the best first."""
     weights = [entry.log_evidence + log_prior(len(entry.names), supported) for entry in ranked]
@@ -111,8 +125,8 @@ def hold_out(bench: Workbench, ranked: Sequence[Explanation], nothing: Explanati
                 continue
             try:
                 fit = smaller.refit(entry)
-            except Unsupported:
-                continue  # what was left out is what the mechanism needs
+            except (Unsupported, InvalidInput):
+                continue  # what was left out is what the mechanism, or any model of a curve, needs
             if fit is not None:
                 fits[entry.names] = fit
         if nothing.names not in fits:
@@ -138,6 +152,8 @@ def _predict(smaller: Workbench, explanation: Explanation, bench: Workbench, row
     noise = (
         scatter[left.recording] * np.abs(value) ** 2 + (1 if left.curves else 2) * (levels.level * left.deviation) ** 2
     )
+    if left.smooth is not None:
+        noise = noise + (levels.smooth * left.smooth.scale) ** 2
     if prediction.position_slopes is not None:
         noise = noise + levels.position**2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
     if prediction.pickup is not None:

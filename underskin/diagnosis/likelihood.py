@@ -36,38 +36,47 @@ class Curvature:
 
 @dataclass(frozen=True)
 class NoiseLevels:
-    """`gain` s, `level` κ, `position` p [m] (0: none), `spread` τ, and the pick-up over the prediction's."""
+    """`gain` s, `level` κ, `position` p [m] (0: none), `spread` τ, the pick-up over the prediction's, `smooth` η."""
 
     gain: float
     level: float
     position: float
     spread: float
     pickup: float = 1.0
+    smooth: float = 0.0  # of curves
 
 
 class Moments:
     """All inner products over rows that the likelihood of one prediction needs, with 1/d² as the weight.
 
     Products are real, Re(a* b), summed over the rows of one recording. `bend` (recordings,) is b of each one's sensor;
-    `position` is the p at which the second-order mean is taken.
+    `position` is the p at which the second-order mean is taken, `ratio` the η/κ of curves (see smooth_error).
     """
 
     def __init__(
-        self, lines: Lines, prediction: Prediction, bend: Floats, curvature: Curvature, position: float
+        self,
+        lines: Lines,
+        prediction: Prediction,
+        bend: Floats,
+        curvature: Curvature,
+        position: float,
+        ratio: float = 0.0,
     ) -> None:
         """Weigh and sum."""
         self._first = self.lines_first = lines.first
         self._lines = lines
         self._bend, self._laplacian, self._position = bend, curvature.laplacian, position
         factor = np.exp(bend + 0.5 * position**2 * curvature.laplacian)
-        self._scale = (factor[lines.recording]) / lines.deviation
+        self._factor = factor[lines.recording]
+        self.ratio = ratio
+        self.log_determinant = 0.0 if lines.whitening is None else lines.whitening.log_determinant(ratio)
         self._slopes = prediction.slopes
-        model = prediction.value * self._scale
-        residual = lines.value / lines.deviation - model * (1 - bend[lines.recording])
+        model = self._weighed(prediction.value * self._factor)
+        residual = self._weighed(lines.value) - model * (1 - bend[lines.recording])
         direction, self.along = model, np.ones(lines.recordings)
         self.moved = np.zeros(lines.recordings)
         if position > 0 and prediction.position_slopes is not None:
-            direction = self._direction(model, prediction.position_slopes * self._scale)
+            direction = self._direction(model, self._weighed(prediction.position_slopes * self._factor))
         self._direction_rows = direction
         self._residual = residual
         self.second_order = curvature.square
@@ -106,6 +115,11 @@ class Moments:
         self.moved = (self._sum(direction, slopes[0]) / uu) ** 2 + (self._sum(direction, slopes[1]) / uu) ** 2
         return direction
 
+    def _weighed(self, rows: Array) -> Array:
+        """Over d; of curves such that their samples are independent."""
+        whitening = self._lines.whitening
+        return rows / self._lines.deviation if whitening is None else whitening(rows, self.ratio)
+
     def _sum(self, a: Array, b: Array) -> Floats:
         products = (a.conj() * b).real
         return products if len(self._first) == len(products) else np.add.reduceat(products, self._first)
@@ -118,7 +132,7 @@ class Moments:
     @cached_property
     def slopes(self) -> tuple[Floats, Floats, Floats, NDArray[np.complex128] | None]:
         """Of the model's derivatives J: JᵀJ (P, P); for each recording uᵀJ, Jᵀr, (c + i·ic)ᵀJ (recordings, P)."""
-        rows = self._slopes * self._scale
+        rows = self._weighed(self._slopes * self._factor)
         real = np.concatenate([rows.real, rows.imag], axis=1)
 
         def summed(products: Array) -> Array:
@@ -141,7 +155,7 @@ class Marginal:
         along, ur, rr, cr = moments.at_position(levels.position)
         self._along = along
         uu, ur, rr = moments.uu / k2, ur / k2, rr / k2
-        log_determinant = 0.0
+        log_determinant = moments.log_determinant
         self._cr = cr
         if moments.cu is not None and cr is not None:
             q2 = levels.pickup**2

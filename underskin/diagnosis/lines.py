@@ -6,11 +6,13 @@ first sum, which no such model changes, is carried along in `scatter`.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.line_noise import LineNoise, line_noise
+from underskin.diagnosis.smooth_error import SmoothError, Whitening
 from underskin.mechanisms.composition import kind_of
 from underskin.mechanisms.frf_design import frf_recordings
 from underskin.mechanisms.mechanism import Kind
@@ -27,7 +29,7 @@ class Lines:
 
     `campaign` holds exactly these rows, so that a model composed for it predicts them. `deviation` is the standard
     deviation of real and of imaginary part each, up to the common factor that every hypothesis fits. `scatter` is what
-    collapsing left out: Σ|y − ȳ|²/d² and its degrees of freedom.
+    collapsing left out: Σ|y − ȳ|²/d² and its degrees of freedom. `smooth` is the error that the samples of a curve share.
     """
 
     campaign: Campaign
@@ -38,6 +40,7 @@ class Lines:
     sensor: NDArray[np.intp]  # (recordings,)
     noise: LineNoise
     scatter: tuple[float, int] = (0.0, 0)
+    smooth: SmoothError | None = None  # of curves
 
     @property
     def recordings(self) -> int:
@@ -63,6 +66,11 @@ class Lines:
     def first(self) -> NDArray[np.intp]:
         """The first row of each recording."""
         return np.searchsorted(self.recording, np.arange(self.recordings))
+
+    @cached_property
+    def whitening(self) -> Whitening | None:
+        """What makes the samples of curves independent."""
+        return None if self.smooth is None else Whitening(self.smooth, self.deviation, self.recording)
 
     def collapsed(self) -> "Lines":
         """One line a recording: the weighted mean; see the module."""
@@ -106,6 +114,7 @@ class Lines:
             recording=np.repeat(np.arange(len(rows)), [len(own) for own in rows]),
             sensor=self.sensor[recordings],
             scatter=(0.0, self.scatter[1] and -len(order)),
+            smooth=None if self.smooth is None else self.smooth.part(order),
         )
 
 

@@ -104,6 +104,8 @@ class Thinned:
         """The variance from positioning and mains pick-up, of each row."""
         prediction, levels = explanation.best.at.prediction, explanation.best.at.marginal.levels
         variance = np.zeros(len(prediction.value))
+        if self.lines.smooth is not None:
+            variance += (levels.smooth * self.lines.smooth.scale) ** 2
         if prediction.position_slopes is not None:
             variance += levels.position**2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
         if prediction.pickup is not None:

@@ -262,6 +262,7 @@ def _noise(explanation: Explanation) -> dict[str, Any]:
         "gain_percent": rounded(100 * levels.gain),
         "position_mm": rounded(1e3 * levels.position),
         "line_level": rounded(levels.level),
+        "smooth_percent": rounded(100 * levels.smooth),
     }
 
 

@@ -79,12 +79,10 @@ class CompressionModel:
 
     def _relative_stress(self, curve: Curve, strain: Differentiated) -> Differentiated:
         """Nominal stress over E."""
-        stretch = 1.0 - strain
-        stress = strain if curve.yeoh is None else stiffened(stretch, curve.yeoh) / 3.0
+        stress = strain if curve.yeoh is None else stiffened(1.0 - strain, curve.yeoh) / 3.0
         if curve.platen_friction is None:
             return stress
-        # The shape factor D/4H of the sample as it is now: D ∝ λ^(−1/2), H ∝ λ.
-        return stress * (1.0 + 2.0 * self._shape_factor**2 * curve.platen_friction / (stretch * stretch * stretch))
+        return stress * (1.0 + 2.0 * self._shape_factor**2 * curve.platen_friction)
 
 
 def _nuisances(recordings: Sequence[CompressionRecording], campaign: Campaign) -> list[Parameter]:

@@ -14,9 +14,10 @@ Source: Lee & Radok, J. Appl. Mech. 27 (1960) 438; Ting, J. Appl. Mech. 33 (1966
 
 from underskin.mechanisms.contact_state import Contacts
 from underskin.mechanisms.curve_state import Curve
+from underskin.mechanisms.curve_timing import time_runs_with_displacement
 from underskin.mechanisms.differentiated import exp
 from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Uniform, Values
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
 
 
 class ContactCreep(Mechanism):
@@ -25,7 +26,7 @@ class ContactCreep(Mechanism):
     name = "contact_creep"
     kinds = ("frf", "indentation", "compression")
     axes = ("dwell_s", "preload_n", "indenter_radius_mm", "time_s")
-    needs = "frf: dwell_s of every recording, not all the same; curves: time_s"
+    needs = "frf: dwell_s of every recording, not all the same; curves: time_s, and two speeds, a hold or a way back"
     contact_axes = ("dwell_s",)
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
@@ -54,10 +55,19 @@ class ContactCreep(Mechanism):
         )
 
     def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
-        """Times are needed: dwell_s that differ, or time_s of a curve."""
+        """Times are needed that say more than the loads: dwell_s that differ, or time_s apart from displacement."""
         if kind != "frf":
-            lacking = [entry.id for entry in campaign.recordings if entry.kind == kind and entry.time_s is None]  # type: ignore[union-attr]
-            return f"recording {lacking[0]!r} has no time_s" if lacking else None
+            curves = [
+                entry
+                for entry in campaign.recordings
+                if isinstance(entry, IndentationRecording | CompressionRecording) and entry.kind == kind
+            ]
+            lacking = [entry.id for entry in curves if entry.time_s is None]
+            if lacking:
+                return f"recording {lacking[0]!r} has no time_s"
+            if time_runs_with_displacement(curves):
+                return "all curves go one way at one speed: time cannot be told from displacement"
+            return None
         dwell = {entry.id: entry.dwell_s for entry in campaign.recordings if entry.kind == kind}
         lacking = [name for name, value in dwell.items() if value is None]
         if lacking:

@@ -1,10 +1,10 @@
 """The plates hold the ends of the compressed cylinder, so that it cannot widen freely and looks too stiff, the more so
 the flatter it is.
 
-Law: nominal stress · (1 + 2 f S²), S = D/4H of the sample as it is now (D ∝ λ^(−1/2), H ∝ λ), f from 0 (slips) to 1
-(sticks fully).
+Law: nominal stress · (1 + 2 f S²), S = D/4H of the unloaded sample, f from 0 (slips) to 1 (sticks fully).
 
-Assumptions: incompressible; Gent and Lindley's factor for bonded cylinders, carried along with the shape; f constant.
+Assumptions: incompressible; Gent and Lindley's factor for bonded cylinders, which they use with the unloaded shape at
+large compressions as well; f constant. Samples of one shape cannot tell it from the modulus.
 
 Source: Gent & Lindley, Proc. Inst. Mech. Eng. 173 (1959) 111.
 """

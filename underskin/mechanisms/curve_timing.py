@@ -1,0 +1,30 @@
+"""Whether the times of curves say more than their displacements: without that, no law of time can be told from a shape."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from underskin.recordings.campaign import CompressionRecording, IndentationRecording
+
+_TURNED_BACK = 0.02  # of the span
+_UNEVEN = 0.1  # of the duration
+_LIKE_SPEEDS = 1.5
+
+
+def time_runs_with_displacement(recordings: Sequence[IndentationRecording | CompressionRecording]) -> bool:
+    """True where all curves go one way at one and the same constant speed; recordings without time_s do not count."""
+    speeds = []
+    for entry in recordings:
+        if entry.time_s is None:
+            continue
+        moved = np.abs(entry.displacement_mm - entry.displacement_mm[0])
+        passed = entry.time_s - entry.time_s[0]
+        span, duration = float(moved.max()), float(passed[-1])
+        if span <= 0 or duration <= 0:
+            return False
+        turned = float((np.maximum.accumulate(moved) - moved).max())
+        uneven = float(np.abs(moved / span - passed / duration).max())
+        if turned > _TURNED_BACK * span or uneven > _UNEVEN:
+            return False
+        speeds.append(span / duration)
+    return bool(speeds) and max(speeds) < _LIKE_SPEEDS * min(speeds)
