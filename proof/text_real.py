@@ -30,6 +30,12 @@ def _rivals(report: Result) -> str:
     ) or "–"  # fmt: skip
 
 
+def _moduli(fit: Result | None) -> str:
+    """Young's modulus of the base model and of the explanation, where curves tell it."""
+    found = [fit[part].get("youngs_modulus_mpa") for part in ("before", "after")] if fit else []
+    return " → ".join(_number(entry["value"]) for entry in found if entry) or "–"
+
+
 def recordings(result: Result) -> str:
     """What came out of real recordings."""
     rows = []
@@ -37,13 +43,15 @@ def recordings(result: Result) -> str:
         report, fit = entry["report"], entry["report"]["fit"]
         errors = (fit["before"]["heldout_rmse_percent"], fit["after"]["heldout_rmse_percent"],
                   fit["noise_floor_percent"]) if fit else (None, None, None)  # fmt: skip
-        rows.append([entry["name"], f"{report['verdict']} {report['probability']:.2f}", _named(report), _rivals(report),
+        rows.append([entry["name"], f"{report['verdict']} {report['probability']:.2f}", _named(report), _rivals(report), _moduli(fit),
                      " → ".join(_number(value) for value in errors[:2]) + f" ({_number(errors[2])})"])  # fmt: skip
     told = table(
         ["campaign", "what the diagnosis was told"], [[entry["name"], entry["told"]] for entry in result["campaigns"]]
     )
     where = "\n".join(f"- **{entry['name']}**: {_said(entry['report'])}" for entry in result["campaigns"])
-    header = ["campaign", "verdict", "named", "rivals", "held-out error before → after (noise floor), %"]
+    header = [
+        "campaign", "verdict", "named", "rivals", "E before → after, MPa", "held-out error before → after (noise floor), %"
+    ]  # fmt: skip
     return f"""\
 ## Real recordings
 

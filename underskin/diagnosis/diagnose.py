@@ -18,7 +18,7 @@ from underskin.diagnosis.findings import inspect
 from underskin.diagnosis.lines import lines
 from underskin.diagnosis.locate import SEED, in_region, locate, region
 from underskin.diagnosis.plan import Limits, plan
-from underskin.diagnosis.remainder import describe
+from underskin.diagnosis.remainder import describe, worth_telling
 from underskin.diagnosis.report import Diagnosis, report
 from underskin.diagnosis.residuals import residuals, whole_prediction
 from underskin.diagnosis.search import search
@@ -86,7 +86,7 @@ def _work_out(
     shape = describe(bench, shown) if leader.explanation is None else ""
     return Diagnosis(
         name,
-        found,
+        (*found, *worth_telling(bench, shown, groups)),
         provenance,
         search=result,
         bench=bench,

@@ -1,26 +1,77 @@
 """The shape of what no mechanism describes: on which axis it lies, and which simple form fits it best there.
 
 Forms over an axis x: power law (x^n), step (at a level of x), periodic (sine and cosine of one period), drift (linear
-in x), and over frequency also a peak (a Lorentzian, real and imaginary part free). They are compared by the Bayesian
-information criterion; what is said is a description, not an explanation.
+in x), over frequency also a peak (a Lorentzian, real and imaginary part free), along a curve a bump (a Lorentzian).
+They are compared by the Bayesian information criterion; what is said is a description, not an explanation.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from underskin.diagnosis.axes import recording_axes
 from underskin.diagnosis.discrepancy import frequency_bins
 from underskin.diagnosis.explanation import Explanation, Workbench
-from underskin.diagnosis.residuals import residuals
+from underskin.diagnosis.findings import Finding
+from underskin.diagnosis.held_out import HeldOut, total
+from underskin.diagnosis.residuals import residuals, whole_prediction
 from underskin.units import Floats
 
 _GRID = 40
+_WORTH_TELLING, _LEAST_TOLD = 2.0, 3e-3  # times the noise, and of the largest force
+_ALONG_CURVES = {"displacement_mm": "mm", "time_s": "s"}
 _LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n", "load_cycles", "dwell_s", "frequency_hz")
 
 
 def describe(bench: Workbench, explanation: Explanation) -> str:
     """One or two sentences; the axis is the one where a form takes away most."""
+    beyond = f" beyond {' and '.join(explanation.names)}" if explanation.names else ""
+    gain, text = (_along_curves if bench.lines.curves else _over_axes)(bench, explanation)
+    return f"What remains{beyond} {f'looks like {text}' if gain else 'has no simple form over one axis'}."
+
+
+def worth_telling(bench: Workbench, explanation: Explanation, groups: Sequence[HeldOut]) -> list[Finding]:
+    """Of curves: what is left beyond the noise, and whether parts that were left out are predicted no better."""
+    lines = bench.lines
+    if lines.smooth is None:
+        return []
+    found = []
+    levels = explanation.best.at.marginal.levels
+    noise = levels.level * float(np.median(lines.deviation / lines.smooth.scale))
+    if levels.smooth > max(_WORTH_TELLING * noise, _LEAST_TOLD):
+        text = (
+            f"a smooth part of about {100 * levels.smooth:.2g} % of the largest force, {levels.smooth / noise:.0f} times "
+            "the noise of a sample, is left that no mechanism here describes"
+        )
+        found.append(Finding("remainder", "", "force_n", text))
+    before, after = total(groups)
+    if explanation.names and after.recordings and after.rmse_percent >= before.rmse_percent:
+        text = (
+            f"what was left out ({', '.join(entry.group for entry in groups)}) is predicted no better with "
+            f"{' and '.join(explanation.names)}: {before.rmse_percent:.3g} % before, {after.rmse_percent:.3g} % after; "
+            "do not extrapolate with it"
+        )
+        found.append(Finding("held_out_no_better", "", "force_n", text))
+    return found
+
+
+def _along_curves(bench: Workbench, explanation: Explanation) -> tuple[float, str]:
+    """The best form of the residual, relative to each curve's largest force, over displacement and over time."""
+    lines = bench.lines
+    assert lines.smooth is not None
+    relative = (lines.value - whole_prediction(bench, explanation)).real / lines.smooth.scale
+    weight = (lines.smooth.scale / lines.deviation) ** 2
+    best: tuple[float, str] = (0.0, "")
+    for name in ("displacement_mm", "time_s"):
+        columns = [getattr(entry, name) for entry in lines.campaign.recordings]
+        if all(column is not None for column in columns):
+            gain, text = _best_form(np.concatenate(columns), relative[:, None], weight, name)
+            best = max(best, (gain, f"{text} of the largest force over {name}"))
+    return best
+
+
+def _over_axes(bench: Workbench, explanation: Explanation) -> tuple[float, str]:
+    """The best form over the recordings' axes, or over the lines'."""
     levels = explanation.best.at.marginal.levels
     left = residuals(bench, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
     best: tuple[float, str] = (0.0, "")
@@ -38,7 +89,7 @@ def describe(bench: Workbench, explanation: Explanation) -> str:
         ]
         gain, text = _best_form(np.log(centres), np.stack(parts, axis=1), total, "frequency_hz")
         best = max(best, (gain, f"{text} over frequency_hz"))
-    return f"What remains looks like {best[1]}." if best[1] else "What remains has no simple form over one axis."
+    return best
 
 
 def _best_form(x: Floats, values: Floats, weight: Floats, axis: str) -> tuple[float, str]:
@@ -85,3 +136,8 @@ def _forms(x: Floats, axis: str) -> Iterator[tuple[Floats, int, str]]:
                     offset = (x - centre) / width
                     bell = 1 / (1 + offset**2)
                     yield np.column_stack([bell, offset * bell]), 2, f"a peak or notch at {np.exp(centre):.3g} Hz"
+    if axis in _ALONG_CURVES:
+        for centre in np.linspace(x.min(), x.max(), _GRID):
+            for width in (0.03, 0.1, 0.3):
+                bell = 1 / (1 + ((x - centre) / (width * span)) ** 2)
+                yield bell[:, None], 2, f"a bump at {centre:.3g} {_ALONG_CURVES[axis]}"

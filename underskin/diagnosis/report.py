@@ -235,8 +235,9 @@ def _fit(diagnosis: Diagnosis, explanation: Explanation) -> dict[str, Any]:
             "rmse_percent": rounded(fitted.rmse_percent),
             "heldout_rmse_percent": rounded(left.rmse_percent),
             "log_score": rounded(left.log_score / left.recordings) if left.recordings else None,
+            **_modulus(diagnosis.bench, entry),
         }
-        for name, fitted, left in zip(("before", "after"), inside, outside, strict=True)
+        for name, entry, fitted, left in zip(("before", "after"), (nothing, explanation), inside, outside, strict=True)
     }
     floor = outside[1].floor_percent if outside[1].recordings else inside[1].floor_percent
     return {
@@ -254,6 +255,15 @@ def _fit(diagnosis: Diagnosis, explanation: Explanation) -> dict[str, Any]:
         ],
         "noise": _noise(explanation),
     }
+
+
+def _modulus(bench: Workbench, explanation: Explanation) -> dict[str, Any]:
+    """Of curves: Young's modulus with its interval."""
+    if not bench.lines.curves:
+        return {}
+    found = _parameter(explanation, _place(explanation, "youngs_modulus"))
+    declared = bench.lines.campaign.skin.youngs_modulus_mpa or 1.0  # the parameter is then a factor
+    return {"youngs_modulus_mpa": {key: rounded(declared * found[key]) for key in ("value", "low", "high")}}
 
 
 def _noise(explanation: Explanation) -> dict[str, Any]:

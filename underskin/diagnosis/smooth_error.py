@@ -1,4 +1,4 @@
-"""What a curve deviates by, smoothly, under every hypothesis: no law of an elastomer holds to better than a percent.
+"""What a curve deviates by, smoothly, under every hypothesis: no law of a soft contact holds to better than a percent.
 
 Zero and gain of a load cell, where a surface begins, friction in a stage and every law's own idealisation bend a curve
 a little. Its samples share that, so that sixty of them are not sixty independent witnesses against a law. Within each
@@ -7,8 +7,8 @@ curve, with F_max its largest force, x the place along the curve from 0 to 1 and
     ε ~ N(0, η² B),  B = F_max² k(x − x'),
 
 k the mean of Matérn-3/2 of length 0.1 (where a contact begins, a grip that seats) and 0.4 (a law's idealisation).
-η is a parameter of every hypothesis: equal density of its logarithm from 0.1 to 1 %, falling off outside, more slowly
-downwards. Something without a name is the same process with η from 1.5 to 50 %.
+η is a parameter of every hypothesis: equal density of its logarithm from 0.1 to 1.5 %, falling off outside, more slowly
+downwards. Something without a name is the same process with η from 2.5 to 50 %.
 """
 
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ from underskin.diagnosis.scatter import Plateau
 from underskin.mechanisms.differentiated import Array
 from underskin.units import Floats
 
-USUAL = Plateau.of((1e-3, 1e-2), (1.0, 0.2))
-UNNAMED = Plateau.of((1.5e-2, 0.5), (0.05, 0.05))
+USUAL = Plateau.of((1e-3, 1.5e-2), (1.0, 0.2))
+UNNAMED = Plateau.of((2.5e-2, 0.5), (0.05, 0.05))
 TYPICAL = 3e-3
 _LENGTHS = (0.1, 0.4)
 
