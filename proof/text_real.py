@@ -43,14 +43,16 @@ def recordings(result: Result) -> str:
         report, fit = entry["report"], entry["report"]["fit"]
         errors = (fit["before"]["heldout_rmse_percent"], fit["after"]["heldout_rmse_percent"],
                   fit["noise_floor_percent"]) if fit else (None, None, None)  # fmt: skip
-        rows.append([entry["name"], f"{report['verdict']} {report['probability']:.2f}", _named(report), _rivals(report), _moduli(fit),
+        rows.append([entry["name"], f"{report['verdict']} {report['probability']:.2f}", _named(report), _rivals(report),
+                     _moduli(fit),
                      " → ".join(_number(value) for value in errors[:2]) + f" ({_number(errors[2])})"])  # fmt: skip
     told = table(
         ["campaign", "what the diagnosis was told"], [[entry["name"], entry["told"]] for entry in result["campaigns"]]
     )
     where = "\n".join(f"- **{entry['name']}**: {_said(entry['report'])}" for entry in result["campaigns"])
     header = [
-        "campaign", "verdict", "named", "rivals", "E before → after, MPa", "held-out error before → after (noise floor), %"
+        "campaign", "verdict", "named", "rivals", "E before → after, MPa",
+        "held-out error before → after (noise floor), %",
     ]  # fmt: skip
     return f"""\
 ## Real recordings
@@ -84,7 +86,9 @@ def _findings(result: Result) -> str:
     def naming(prefix: str, mechanism: str) -> str:
         chosen = [report for name, report in reports.items() if name.startswith(prefix)]
         named = [mechanism in {entry["name"] for entry in report["mechanisms"]} for report in chosen]
-        return f"{sum(named)} of {len(named)}"
+        beneath = [mechanism in report["fit"]["mechanisms"] for report in chosen]
+        further = sum(beneath) - sum(named)
+        return f"{sum(named)} of {len(named)}" + (f", and {further} beneath what is unexplained" if further else "")
 
     def tied(prefix: str, mechanism: str) -> str:
         chosen = [report for name, report in reports.items() if name.startswith(prefix)]

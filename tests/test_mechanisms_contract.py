@@ -21,7 +21,7 @@ from tests.mechanism_campaigns import (
 from underskin.errors import InvalidInput
 from underskin.mechanisms import CATALOGUE, Mechanism, Model, Parameter, Unsupported, compose
 from underskin.mechanisms.mechanism import UNITS, Kind
-from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording
 from underskin.units import Floats
 
 CAMPAIGNS: dict[Kind, Campaign] = {
@@ -279,6 +279,22 @@ def test_curves_without_times_cannot_support_creep() -> None:
         untimed = replace(timed, recordings=tuple(replace(entry, time_s=None) for entry in curves))
         with pytest.raises(Unsupported, match="has no time_s"):
             compose(["contact_creep"], untimed, table())
+
+
+def one_way(speed_mm_per_s: float, hold_s: float = 0.0) -> CompressionRecording:
+    displacement = np.append(np.linspace(0.0, 3.0, 40), np.full(10 if hold_s else 0, 3.0))
+    held = hold_s * np.linspace(0.1, 1.0, 10) if hold_s else np.zeros(0)
+    time = np.append(np.linspace(0.0, 3.0, 40), 3.0 + held * speed_mm_per_s) / speed_mm_per_s
+    return CompressionRecording(f"{speed_mm_per_s}", 30.0, 30.0, displacement, 20 * displacement, time_s=time)
+
+
+def test_creep_needs_times_that_displacements_do_not_tell() -> None:
+    slow, fast, held = one_way(0.1), one_way(1.0), one_way(0.1, hold_s=60.0)
+    for recordings in ((slow,), (slow, replace(slow, id="again"))):
+        with pytest.raises(Unsupported, match="one way at one speed"):
+            compose(["contact_creep"], Campaign("ramps", SKIN, recordings), table())
+    for recordings in ((slow, fast), (held,)):
+        assert compose(["contact_creep"], Campaign("ramps", SKIN, recordings), table()).names == ("contact_creep",)
 
 
 def test_bad_requests_are_named() -> None:

@@ -241,7 +241,7 @@ def test_real_recordings() -> None:
     assert any("instrument_compliance" in pair for pair in tied)
     assert "strain_stiffening" in found["tension-RTV615"][1]
     assert "contact_creep" in found["polymergel_creep"][1]
-    assert "contact_creep" in found["cell_stress_relaxation"][1]
+    assert "contact_creep" in found["cell_stress_relaxation"][0]["fit"]["mechanisms"]  # one time is not all of it
     for name in ("well-E6", "tension-RTV615", "cell_stress_relaxation"):
         fit = found[name][0]["fit"]
         assert fit["after"]["heldout_rmse_percent"] < 0.5 * fit["before"]["heldout_rmse_percent"]

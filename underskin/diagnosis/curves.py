@@ -1,9 +1,9 @@
 """Indentation and compression curves as the diagnosis uses them: samples of force in place of lines of an FRF.
 
-A curve is thinned to means over blocks of neighbouring samples that lie evenly along it. The deviation of a sample is its noise, read from
-second differences of the raw samples, and an instrument's usual accuracy: 0.2 % of the reading and 0.1 % of the full
-scale. How accurate it really is, the level of the noise says, which every hypothesis fits under the same wide prior.
-What neighbouring samples share is in smooth_error.
+A curve is thinned to means over blocks of neighbouring samples that lie evenly along it. The deviation of a sample is
+its noise, read from second differences of the raw samples, and an instrument's usual accuracy: 0.2 % of the reading and
+0.1 % of the full scale. How accurate it really is, the level of the noise says, which every hypothesis fits under the
+same prior. What neighbouring samples share is in smooth_error.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from underskin.units import Floats
 
 _SAMPLES = 60
 _READING, _FULL_SCALE = 2e-3, 1e-3
-_LEVEL_SD = 0.5  # of the logarithm of the noise's level
+_LEVEL_SD = 0.25  # of the logarithm of the noise's level
 _LEAST_SAMPLES = 5
 _COARSE, _BEYOND_NOISE = 240, 4.0  # samples at which changes of force are summed, standard deviations of noise
 _PLACE = (1.0, 10.0)  # the abscissa: displacement over a curve's range, on this scale
@@ -41,7 +41,7 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
             continue
         columns = [column[finite] for column in columns]
         noise = _roughness(columns[1])
-        way = _way(*columns[:2], noise)
+        way = _way(columns[0], columns[1], noise)
         starts = np.unique(np.searchsorted(way, np.linspace(0.0, 1.0, _SAMPLES, endpoint=False)))
         counts = np.diff(np.append(starts, len(way)))
         *thinned, place = [np.add.reduceat(column, starts) / counts for column in (*columns, way)]

@@ -20,7 +20,8 @@ from underskin.mechanisms.mechanism import Normal, Parameter
 from underskin.mechanisms.model import Model, Prediction
 from underskin.units import Floats
 
-_LEAST_LEVEL = 0.5  # of curves: cells are not more accurate than that, however smooth
+_LEVELS = (0.1, 100.0)  # bounds of the lines' level
+_CURVE_LEVELS = (0.5, 3.0)  # no cell is more accurate, however smooth; rougher than its neighbours differ is no noise
 _CURVE_SETTLING = 8
 _STEP = 0.05  # of the finite differences in the covariance's logarithms
 _LARGEST_STEP = 1.0
@@ -62,7 +63,7 @@ class Hypothesis:
         level = level_prior(self.lines.noise.log_level_sd)
         common = [
             CovarianceParameter("gain", np.log(1e-3), np.log(0.5), GAIN_PRIOR.log_density),
-            CovarianceParameter("level", np.log(_LEAST_LEVEL if self.lines.curves else 0.1), np.log(100.0), level.log_density),
+            CovarianceParameter("level", *np.log(_CURVE_LEVELS if self.lines.curves else _LEVELS), level.log_density),
         ]
         if self.placed:
             common.append(CovarianceParameter("position", np.log(2e-5), np.log(6e-4), POSITION_PRIOR.log_density))

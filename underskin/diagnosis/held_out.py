@@ -13,10 +13,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.errors import InvalidInput
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.lines import Lines
 from underskin.diagnosis.search import log_prior
+from underskin.errors import InvalidInput
 from underskin.mechanisms.frf_design import frf_recordings
 from underskin.mechanisms.mechanism import Unsupported
 from underskin.mechanisms.model import Prediction as Predicted

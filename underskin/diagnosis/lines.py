@@ -29,7 +29,8 @@ class Lines:
 
     `campaign` holds exactly these rows, so that a model composed for it predicts them. `deviation` is the standard
     deviation of real and of imaginary part each, up to the common factor that every hypothesis fits. `scatter` is what
-    collapsing left out: Σ|y − ȳ|²/d² and its degrees of freedom. `smooth` is the error that the samples of a curve share.
+    collapsing left out: Σ|y − ȳ|²/d² and its degrees of freedom. `smooth` is the error that a curve's
+    samples share.
     """
 
     campaign: Campaign

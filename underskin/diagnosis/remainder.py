@@ -39,10 +39,8 @@ def worth_telling(bench: Workbench, explanation: Explanation, groups: Sequence[H
     levels = explanation.best.at.marginal.levels
     noise = levels.level * float(np.median(lines.deviation / lines.smooth.scale))
     if levels.smooth > max(_WORTH_TELLING * noise, _LEAST_TOLD):
-        text = (
-            f"a smooth part of about {100 * levels.smooth:.2g} % of the largest force, {levels.smooth / noise:.0f} times "
-            "the noise of a sample, is left that no mechanism here describes"
-        )
+        size = f"{100 * levels.smooth:.2g} % of the largest force, {levels.smooth / noise:.0f} times a sample's noise"
+        text = f"a smooth part of about {size}, is left that no mechanism here describes"
         found.append(Finding("remainder", "", "force_n", text))
     before, after = total(groups)
     if explanation.names and after.recordings and after.rmse_percent >= before.rmse_percent:
@@ -118,7 +116,6 @@ def _best_form(x: Floats, values: Floats, weight: Floats, axis: str) -> tuple[fl
 def _forms(x: Floats, axis: str) -> Iterator[tuple[Floats, int, str]]:
     """Basis functions, the number of shape parameters, and words. Logarithmic axes come as logarithms."""
     logarithmic = axis in _LOGARITHMIC
-    span = float(np.ptp(x))
     yield x[:, None], 0, "a power law" if logarithmic else "a drift"
     levels = np.unique(x)
     for edge in (levels[1:] + levels[:-1])[:: max(1, len(levels) // _GRID)] / 2:
@@ -130,14 +127,22 @@ def _forms(x: Floats, axis: str) -> Iterator[tuple[Floats, int, str]]:
             angle = 2 * np.pi * natural / period
             yield np.column_stack([np.sin(angle), np.cos(angle)]), 1, f"a periodic change of period {period:.3g}"
     if axis == "frequency_hz":
-        for centre in np.linspace(x.min(), x.max(), 2 * _GRID):
-            for width in (0.05, 0.1, 0.2, 0.4):
-                if width < 0.5 * span:
-                    offset = (x - centre) / width
-                    bell = 1 / (1 + offset**2)
-                    yield np.column_stack([bell, offset * bell]), 2, f"a peak or notch at {np.exp(centre):.3g} Hz"
+        yield from _peaks(x)
     if axis in _ALONG_CURVES:
-        for centre in np.linspace(x.min(), x.max(), _GRID):
-            for width in (0.03, 0.1, 0.3):
-                bell = 1 / (1 + ((x - centre) / (width * span)) ** 2)
-                yield bell[:, None], 2, f"a bump at {centre:.3g} {_ALONG_CURVES[axis]}"
+        yield from _bumps(x, _ALONG_CURVES[axis])
+
+
+def _bumps(x: Floats, unit: str) -> Iterator[tuple[Floats, int, str]]:
+    for centre in np.linspace(x.min(), x.max(), _GRID):
+        for width in (0.03, 0.1, 0.3):
+            bell = 1 / (1 + ((x - centre) / (width * np.ptp(x))) ** 2)
+            yield bell[:, None], 2, f"a bump at {centre:.3g} {unit}"
+
+
+def _peaks(x: Floats) -> Iterator[tuple[Floats, int, str]]:
+    for centre in np.linspace(x.min(), x.max(), 2 * _GRID):
+        for width in (0.05, 0.1, 0.2, 0.4):
+            if width < 0.5 * np.ptp(x):
+                offset = (x - centre) / width
+                bell = 1 / (1 + offset**2)
+                yield np.column_stack([bell, offset * bell]), 2, f"a peak or notch at {np.exp(centre):.3g} Hz"

@@ -242,6 +242,7 @@ def _fit(diagnosis: Diagnosis, explanation: Explanation) -> dict[str, Any]:
     floor = outside[1].floor_percent if outside[1].recordings else inside[1].floor_percent
     return {
         **parts,
+        "mechanisms": list(explanation.names),  # of `after`, also where something beyond them is unexplained
         "noise_floor_percent": rounded(floor),
         "groups": [
             {
@@ -258,12 +259,11 @@ def _fit(diagnosis: Diagnosis, explanation: Explanation) -> dict[str, Any]:
 
 
 def _modulus(bench: Workbench, explanation: Explanation) -> dict[str, Any]:
-    """Of curves: Young's modulus with its interval."""
-    if not bench.lines.curves:
+    """Of curves whose modulus nobody declared: Young's modulus with its interval."""
+    if not bench.lines.curves or bench.lines.campaign.skin.youngs_modulus_mpa is not None:
         return {}
     found = _parameter(explanation, _place(explanation, "youngs_modulus"))
-    declared = bench.lines.campaign.skin.youngs_modulus_mpa or 1.0  # the parameter is then a factor
-    return {"youngs_modulus_mpa": {key: rounded(declared * found[key]) for key in ("value", "low", "high")}}
+    return {"youngs_modulus_mpa": {key: found[key] for key in ("value", "low", "high")}}
 
 
 def _noise(explanation: Explanation) -> dict[str, Any]:

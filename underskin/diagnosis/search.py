@@ -66,7 +66,11 @@ class Search:
         """The explanation that an answer stands on: for `none_of_these`, the one beneath its best process."""
         if answer.explanation is not None:
             return answer.explanation
-        return max(self.discrepancies, key=lambda pair: pair[1].log_evidence)[0]
+        beneath = [pair for pair in self.discrepancies if self.shows(pair[0])]
+        return max(beneath, key=lambda pair: self._log_weight_beneath(*pair))[0]
+
+    def _log_weight_beneath(self, explanation: Explanation, process: Discrepancy) -> float:
+        return process.log_evidence + log_prior_beneath(len(explanation.names), self.supported)
 
     @cached_property
     def answers(self) -> list[Answer]:
@@ -74,7 +78,7 @@ class Search:
         kept = [entry for entry in self.explanations if self.shows(entry)]
         weights = [self.log_weight(entry) for entry in kept]
         showing = [
-            process.log_evidence + log_prior_beneath(len(entry.names), self.supported)
+            self._log_weight_beneath(entry, process)
             for entry, process in self.discrepancies
             if process.log_evidence > entry.log_evidence + _SHOWS
         ]

@@ -7,12 +7,12 @@ curve, with F_max its largest force, x the place along the curve from 0 to 1 and
     ε ~ N(0, η² B),  B = F_max² k(x − x'),
 
 k the mean of Matérn-3/2 of length 0.1 (where a contact begins, a grip that seats) and 0.4 (a law's idealisation).
-η is a parameter of every hypothesis: equal density of its logarithm from 0.1 to 1.5 %, falling off outside, more slowly
-downwards. Something without a name is the same process with η from 2.5 to 50 %.
+η is a parameter of every hypothesis: equal density of its logarithm from 0.1 to 1 %, falling off outside, more slowly
+downwards. Something without a name is the same process with η from 2 to 50 %.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,8 @@ from underskin.diagnosis.scatter import Plateau
 from underskin.mechanisms.differentiated import Array
 from underskin.units import Floats
 
-USUAL = Plateau.of((1e-3, 1.5e-2), (1.0, 0.2))
-UNNAMED = Plateau.of((2.5e-2, 0.5), (0.05, 0.05))
+USUAL = Plateau.of((1e-3, 1e-2), (1.0, 0.25))
+UNNAMED = Plateau.of((2e-2, 0.5), (0.05, 0.05))
 TYPICAL = 3e-3
 _LENGTHS = (0.1, 0.4)
 
@@ -46,7 +46,7 @@ class Whitening:
         """Find the directions of each curve; `deviation` is D's square root (rows,)."""
         self._deviation = deviation
         edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
-        self._spans = [slice(low, high) for low, high in zip(edges[:-1], edges[1:], strict=True)]
+        self._spans = [slice(low, high) for low, high in pairwise(edges)]
         self._turns, sizes = [], []
         for span in self._spans:
             relative = error.scale[span] / deviation[span]

@@ -1,4 +1,4 @@
-"""Whether the times of curves say more than their displacements: without that, no law of time can be told from a shape."""
+"""Whether the times of curves say more than their displacements: else no law of time can be told from a shape."""
 
 from collections.abc import Sequence
 
