@@ -60,10 +60,11 @@ class Hypothesis:
     @property
     def covariance(self) -> tuple[CovarianceParameter, ...]:
         """Gain scatter, line level, position scatter or smooth error where there is one, then the model's own."""
+        low, high = _CURVE_LEVELS if self.lines.curves else _LEVELS
         level = level_prior(self.lines.noise.log_level_sd)
         common = [
             CovarianceParameter("gain", np.log(1e-3), np.log(0.5), GAIN_PRIOR.log_density),
-            CovarianceParameter("level", *np.log(_CURVE_LEVELS if self.lines.curves else _LEVELS), level.log_density),
+            CovarianceParameter("level", np.log(low), np.log(high), level.log_density),
         ]
         if self.placed:
             common.append(CovarianceParameter("position", np.log(2e-5), np.log(6e-4), POSITION_PRIOR.log_density))
