@@ -12,7 +12,7 @@ import numpy as np
 from underskin.diagnosis.axes import recording_axes
 from underskin.diagnosis.discrepancy import frequency_bins
 from underskin.diagnosis.explanation import Explanation, Workbench
-from underskin.diagnosis.findings import Finding
+from underskin.diagnosis.finding import Finding
 from underskin.diagnosis.held_out import HeldOut, total
 from underskin.diagnosis.residuals import residuals, whole_prediction
 from underskin.units import Floats
