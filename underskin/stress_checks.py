@@ -16,7 +16,7 @@ from underskin.units import findings as unusual
 
 MOST_PAIRS = 50_000_000  # of a sensor and a point force: about ten seconds
 _WIDEST_CELL = 12.0  # thicknesses; no sensor is influenced from further away
-_LINEAR = 0.01  # of L; there finite strain adds 3 % under a sphere (PHYSICS, section 2)
+_LINEAR = 0.01  # of L; there finite strain adds 3 % under a sphere
 _ROUNDING = 1e-9
 
 
