@@ -11,7 +11,7 @@ from underskin.mechanisms.receding_contact import Presses, relaxing
 from underskin.units import Floats
 
 _STEPS = 25
-_TOLERANCE = 1e-11  # of the largest travel
+_TOLERANCE = 1e-8  # of the largest travel, of the last step
 
 
 def relaxing_on_stage(

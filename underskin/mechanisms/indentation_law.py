@@ -22,7 +22,7 @@ from underskin.units import Floats
 _STRAIN = 0.2
 _SMALLEST_TRAVEL = 1e-12  # m; keeps the root's derivative finite
 _STEPS = 60
-_TOLERANCE = 1e-12  # of the contact radius
+_TOLERANCE = 1e-8  # of the contact radius, of the last step; the error that is left is about its square
 _LEAST, _MOST = 0.05, 3.0  # of JKR's unit of length, between which the contact ends
 _POINTS, _ROUNDS = 24, 4  # of that search; the travel is flat there
 
@@ -124,6 +124,9 @@ class Sphere:
         """a between `least` and `most` with that travel: Newton's steps, halved where they leave what brackets it."""
         low, high = least, most
         a = np.sqrt(self.radius * np.maximum(target, _SMALLEST_TRAVEL)) + 2 * least
+        if self.layer is not None:  # a² = Rδ/B, B(a/h) of a bonded incompressible layer within some percent
+            alpha = a / self._largest * REACH
+            a = a * np.sqrt((1 + 1.25 * alpha) / (1 + 0.35 * alpha))
         a = np.minimum(a, 0.5 * (low + np.minimum(most, 2 * a)))
         for _ in range(_STEPS):
             travel, slope = self._travel(a)

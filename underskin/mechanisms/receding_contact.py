@@ -27,7 +27,7 @@ from underskin.mechanisms.relaxation import faded, lagging
 from underskin.units import Floats
 
 _STEPS = 40
-_TOLERANCE = 1e-13
+_TOLERANCE = 1e-8  # of the last step; the error that is left is about its square
 
 Rows = NDArray[np.intp]
 
@@ -138,10 +138,10 @@ def relaxing(
         force = _put(force, now, receded + at.stiffness * history.carried(ring, now))
         inside[now] = reached
     now = np.flatnonzero(presses.started & (after < 0))
-    if len(now):
-        begin = np.maximum.accumulate(np.where(presses.begins, np.arange(len(after)), 0))[now]
-        left = 1.0 - fraction + fraction * history.kept(presses.time[begin], now)
-        at, holds, reached = _first_touch(sphere.rows(now), left, history, now)
+    held[now] = False
+    begin = np.maximum.accumulate(np.where(presses.begins, np.arange(len(after)), 0))
+    if spheres.curve.work_of_adhesion is not None or (depth.value[presses.begins] > 0).any():
+        left, at, holds, reached = _first_touch(sphere.rows(now), history, begin[now], now)
         force = _put(force, now, left * at.force)
         held[now], inside[now] = holds, reached
     return where(held, force, 0.0), held, inside
@@ -207,17 +207,18 @@ def _shares(history: _History, after: Rows, now: Rows, short: NDArray[np.bool_])
 
 
 def _first_touch(
-    sphere: Sphere, left: Differentiated, history: _History, now: Rows
-) -> tuple[ContactAt, NDArray[np.bool_], NDArray[np.bool_]]:
-    """The elastic contact that stands for what is left of the first touch, whether it holds, and is within reach."""
-    work = sphere.curve.work_of_adhesion
+    sphere: Sphere, history: _History, begin: Rows, now: Rows
+) -> tuple[Differentiated, ContactAt, NDArray[np.bool_], NDArray[np.bool_]]:
+    """e, and the elastic contact that stands for what is left of the first touch; whether it holds, is within reach."""
+    fraction, work = history.fraction, sphere.curve.work_of_adhesion
+    left = 1.0 - fraction + fraction * history.kept(history.time[begin], now)
     if work is not None:
         sphere = replace(sphere, curve=replace(sphere.curve, work_of_adhesion=work / (left * left)))
     least, lowest = sphere.pull_off()
-    depth = ((1.0 - history.fraction) * history.depth[now] + history.fraction * history.memory[now]) / left
+    depth = ((1.0 - fraction) * history.depth[now] + fraction * history.memory[now]) / left
     holds = depth.value > lowest
     at, inside = sphere.at_travel(depth, holds, least)
-    return at, holds, inside
+    return left, at, holds, inside
 
 
 def _put(force: Differentiated, rows: Rows, new: Differentiated) -> Differentiated:
