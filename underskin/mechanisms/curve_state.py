@@ -30,7 +30,7 @@ class Curve:
         return replace(self, **{field.name: _fixed(getattr(self, field.name), variables) for field in fields(self)})
 
 
-def _fixed(number: Any, variables: int) -> Any:  # noqa: ANN401
+def _fixed(number: Any, variables: int) -> Any:
     if isinstance(number, tuple):
         return tuple(_fixed(part, variables) for part in number)
     return constant(number.value, variables) if isinstance(number, Differentiated) else number

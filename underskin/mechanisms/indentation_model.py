@@ -6,6 +6,7 @@ through the body's history where it relaxes.
 """
 
 from collections.abc import Sequence
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +48,6 @@ class IndentationModel:
         self._radius = to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in recordings])
         self._displacement = to_si("displacement_mm", np.concatenate([entry.displacement_mm for entry in recordings]))
         self._time = times_of(recordings)
-        self._grid = CurveGrid(np.ones(1))
         self._last_layer: tuple[Layer, ContactCurves] | None = None
 
     def predict(self, fit: Floats) -> Prediction:
@@ -103,7 +103,8 @@ class IndentationModel:
         ahead = np.append(touched[1:] & ~self._first[1:], False) & ~touched
         time = Differentiated(self._time, np.zeros_like(travel.slopes))
         then = np.minimum(np.arange(len(ahead)) + 1, len(ahead) - 1)
-        way = where(ahead, travel, 0.0) / where(ahead, travel - travel[then], constant(-1.0, 1).spread(len(ahead)))
+        still = constant(-1.0, 1).spread(len(ahead))
+        way = where(ahead, travel, 0.0) / where(ahead, travel - travel[then], still)
         presses = Presses(
             self.recording,
             time + way * (self._time[then] - self._time),
@@ -117,7 +118,7 @@ class IndentationModel:
     def _layer_curves(self, curve: Curve) -> ContactCurves:
         layer = Layer(float(curve.poisson_ratio.value[0]))
         if self._last_layer is None or self._last_layer[0] != layer:
-            self._last_layer = layer, self._grid.curves(layer)
+            self._last_layer = layer, _grid().curves(layer)
         return self._last_layer[1]
 
 
@@ -140,16 +141,31 @@ def _since(found: NDArray[np.bool_], first: NDArray[np.bool_]) -> NDArray[np.boo
     return np.asarray(total > before)
 
 
+@cache
+def _grid() -> CurveGrid:
+    """No stress is asked for: one wave number, of no use."""
+    return CurveGrid(np.ones(1))
+
+
 def _nuisances(recordings: Sequence[IndentationRecording], campaign: Campaign) -> list[Parameter]:
     estimates, per_recording = [], []
     for entry in recordings:
+        columns = [np.asarray(column, dtype=float).tobytes() for column in (entry.displacement_mm, entry.force_n)]
         try:
-            hertz = elastomer.of_indentation(entry, campaign.skin.poisson_ratio)
+            modulus, begins = _hertz(*columns, entry.indenter_radius_mm, campaign.skin.poisson_ratio)
         except InvalidInput as refusal:
             raise InvalidInput(f"recordings[{entry.id}].{refusal.field}", refusal.value, refusal.allowed) from refusal
-        estimates.append(hertz.modulus)
+        estimates.append(modulus)
         span = float(np.ptp(to_si("displacement_mm", entry.displacement_mm)))
-        per_recording.append(contact_point(entry.id, hertz.contact_point, 0.1 * span, 0.8 * span))
+        per_recording.append(contact_point(entry.id, begins, 0.1 * span, 0.8 * span))
         per_recording.append(force_offset(entry.id, float(np.abs(entry.force_n).max())))
     thickness = [] if campaign.skin.thickness_mm is None else [THICKNESS]
     return [modulus_parameter(campaign.skin, estimates), *thickness, *per_recording]
+
+
+@lru_cache(maxsize=1024)  # a diagnosis composes some dozen models of the same recordings
+def _hertz(displacement_mm: bytes, force_n: bytes, radius_mm: float, poisson_ratio: float) -> tuple[float, float]:
+    """Modulus [Pa] and contact point [m] of the base model's own fit."""
+    columns = np.frombuffer(displacement_mm), np.frombuffer(force_n)
+    found = elastomer.of_indentation(IndentationRecording("", radius_mm, *columns), poisson_ratio)
+    return found.modulus, found.contact_point

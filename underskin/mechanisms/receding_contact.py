@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from underskin.mechanisms.differentiated import Differentiated, exp, where
 from underskin.mechanisms.indentation_law import ContactAt, Sphere
 from underskin.mechanisms.relaxation import faded, lagging
-from underskin.units import Floats
 
 _STEPS = 40
 _TOLERANCE = 1e-8  # of the last step; the error that is left is about its square
