@@ -1,8 +1,9 @@
 """Indentation and compression curves as the diagnosis uses them: samples of force in place of lines of an FRF.
 
-A curve is thinned to means over blocks of neighbouring samples. The deviation of a sample is its noise, read from
-second differences of the raw samples, and an instrument's usual accuracy: 0.2 % of the reading and 0.1 % of the full
-scale. How accurate it really is, the level of the noise says, which every hypothesis fits under the same wide prior.
+A curve is thinned to means over blocks of neighbouring samples; near a jump every sample stays. The deviation of a
+sample is its noise, read from second differences of the raw samples, and an instrument's usual accuracy: 0.2 % of the
+reading and 0.1 % of the full scale. How accurate it really is, the level of the noise says, which every hypothesis fits
+under the same wide prior.
 """
 
 from collections.abc import Sequence
@@ -10,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from underskin.diagnosis.jumps import around_jumps
 from underskin.diagnosis.line_noise import LineNoise
 from underskin.diagnosis.lines import Lines
 from underskin.mechanisms.mechanism import Kind
@@ -37,16 +39,18 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         if finite.sum() < _LEAST_SAMPLES:
             continue
         columns = [column[finite] for column in columns]
+        noise = _roughness(columns[1])
         block = int(np.ceil(len(columns[0]) / _SAMPLES))
-        noise = _roughness(columns[1]) / np.sqrt(block)
-        thinned = [_block_means(column, block) for column in columns]
+        starts = np.union1d(np.arange(0, len(columns[0]), block), around_jumps(columns[1], noise, block))
+        counts = np.diff(np.append(starts, len(columns[0])))
+        thinned = [np.add.reduceat(column, starts) / counts for column in columns]
         displacement, force = thinned[:2]
         entries.append(
             replace(entry, displacement_mm=displacement, force_n=force, time_s=thinned[2] if len(thinned) > 2 else None)
         )
         forces.append(force)
         scale = float(np.abs(force).max())
-        deviations.append(np.sqrt(noise**2 + (_READING * force) ** 2 + (_FULL_SCALE * scale) ** 2))
+        deviations.append(np.sqrt(noise**2 / counts + (_READING * force) ** 2 + (_FULL_SCALE * scale) ** 2))
         span = float(np.ptp(displacement)) or 1.0
         places.append(_PLACE[0] + (_PLACE[1] - _PLACE[0]) * (displacement - displacement.min()) / span)
     value = _joined(forces)
@@ -65,11 +69,6 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
 
 def _joined(columns: Sequence[Floats]) -> Floats:
     return np.concatenate([*columns, np.zeros(0)])
-
-
-def _block_means(column: Floats, block: int) -> Floats:
-    starts = np.arange(0, len(column), block)
-    return np.add.reduceat(column, starts) / np.diff(np.append(starts, len(column)))
 
 
 def _roughness(force: Floats) -> float:

@@ -148,17 +148,26 @@ def _grid() -> CurveGrid:
 
 
 def _nuisances(recordings: Sequence[IndentationRecording], campaign: Campaign) -> list[Parameter]:
-    estimates, per_recording = [], []
+    """Around the base model's own fits; a recording that does not load begins where it shows least force.
+
+    Raises InvalidInput where none loads, or one does not move.
+    """
+    estimates, per_recording, refused = [], [], None
     for entry in recordings:
         columns = [np.asarray(column, dtype=float).tobytes() for column in (entry.displacement_mm, entry.force_n)]
         try:
             modulus, begins = _hertz(*columns, entry.indenter_radius_mm, campaign.skin.poisson_ratio)
+            estimates.append(modulus)
         except InvalidInput as refusal:
-            raise InvalidInput(f"recordings[{entry.id}].{refusal.field}", refusal.value, refusal.allowed) from refusal
-        estimates.append(modulus)
+            refused = InvalidInput(f"recordings[{entry.id}].{refusal.field}", refusal.value, refusal.allowed)
+            begins = float(to_si("displacement_mm", entry.displacement_mm[int(np.abs(entry.force_n).argmin())]))
         span = float(np.ptp(to_si("displacement_mm", entry.displacement_mm)))
+        if refused is not None and span == 0:
+            raise refused
         per_recording.append(contact_point(entry.id, begins, 0.1 * span, 0.8 * span))
         per_recording.append(force_offset(entry.id, float(np.abs(entry.force_n).max())))
+    if refused is not None and not estimates:
+        raise refused
     thickness = [] if campaign.skin.thickness_mm is None else [THICKNESS]
     return [modulus_parameter(campaign.skin, estimates), *thickness, *per_recording]
 
