@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from underskin.diagnosis.curves import curve_lines
-from underskin.diagnosis.findings import Finding
+from underskin.diagnosis.finding import Finding
 from underskin.errors import InvalidInput
 from underskin.mechanisms.mechanism import Kind
 from underskin.recordings import elastomer
