@@ -11,7 +11,7 @@ import typer
 def prove(
     part: Annotated[
         list[str] | None,
-        typer.Argument(help="open, sealed, mixture, quiet, ceiling, recordings, riddle; default: all of them."),
+        typer.Argument(help="open, sealed, recordings, riddle, mixture, ceiling, quiet; default: all of them."),
     ] = None,
     count: Annotated[int | None, typer.Option(min=1, help="Campaigns of each part at most; default: all.")] = None,
     workers: Annotated[int, typer.Option(min=0, help="Processes; 0 is one for each core.")] = 0,
@@ -29,9 +29,11 @@ def prove(
         if name not in PARTS:
             raise typer.BadParameter(f"{name!r}: must be one of {', '.join(PARTS)}", param_hint="PART")
     work = Work(work_dir, workers or os.cpu_count() or 1, count)
+    written: list[Path] = []
     for name in part or PARTS:
         work_out(name, work, partial(_tell, name))
-    for path in write_page(kept_parts(work), docs_dir):
+        written = write_page(kept_parts(work), docs_dir)  # after each part: a run that is stopped leaves what it has
+    for path in written:
         typer.echo(str(path))
 
 

@@ -20,6 +20,7 @@ import underskin
 from proof.cases import Case
 
 Item = TypeVar("Item")
+FAILED = "failed"
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -100,5 +101,9 @@ def _diagnosed(document: dict[str, Any]) -> dict[str, Any]:
     from underskin.recordings.campaign import from_dict
     from underskin.surrogate import load_table
 
-    campaign, refused = from_dict(document)
-    return diagnosis_report(campaign, load_table(), refused=refused)
+    try:
+        campaign, refused = from_dict(document)
+        return diagnosis_report(campaign, load_table(), refused=refused)
+    except Exception as error:  # a diagnosis that fails is a wrong answer, and no reason to lose the others
+        failed = {"verdict": FAILED, "probability": 0.0, "statement": repr(error), "mechanisms": [{"name": FAILED}]}
+        return {**failed, "alternatives": [], "fit": None}

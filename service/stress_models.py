@@ -88,5 +88,5 @@ class StressAnswer(AnswerInColumns):
         description="Radius of each contact on this layer, smaller than Hertz's on a half space; empty for a map [mm]."
     )
     findings: list[FindingModel] = Field(
-        description="What makes it doubtful: finite strain, slipping, a pressure that looks like a slip of units."
+        description="What makes it doubtful: finite strain, slipping, what looks like a slip of units."
     )

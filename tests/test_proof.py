@@ -12,15 +12,16 @@ import typer
 from typer.testing import CliRunner
 
 from proof import figures, own_rig, riddle
-from proof.cases import DrawnCase, FileCase
+from proof.cases import DrawnCase, FileCase, MadeCase
 from proof.commands import prove
 from proof.ideal import diagnosed
 from proof.ideal_laws import suppositions
-from proof.judge import Judged, judge
-from proof.kept import Work, kept, of_each, sources
+from proof.judge import QUIET, Judged, judge
+from proof.kept import Work, kept, of_each, reports, sources
 from proof.real import recorded
 from proof.results import PARTS
 from proof.statistics import calibration, share
+from proof.text import document
 from rig.draw import CATALOGUED, UNKNOWN, drawn
 from rig.experiment import parse as parse_experiment
 from rig.strengths import of_frf
@@ -191,6 +192,34 @@ def test_a_small_run_writes_the_page_and_goes_on_from_what_it_kept(tmp_path: Pat
     assert CliRunner().invoke(command, ["mixture", *options]).exit_code == 0
     assert {file: file.stat().st_mtime_ns for file in (tmp_path / "work/reports").iterdir()} == reports
     assert (tmp_path / "docs/proof.md").read_text(encoding="utf-8") == page
+
+
+def test_identifiable_is_what_stands_out_from_every_rival() -> None:
+    """Of two that are visible the twin is nobody's to name; what is wrong beside it counts."""
+    plain = Judged("plain", ("a",), ("a",), False, "explained", 0.9, True, True, 9.0, None)
+    judged = [plain, replace(plain, name="twin", answer=("b",)), replace(plain, name="quiet", truth=(), answer=())]
+    gains = {"plain": 31.0, "twin": -0.4, "quiet": None}
+    answers = {name: {"answer": ["a"], "chi2_over_rivals": gain} for name, gain in gains.items()}
+    page = document({
+        "mixture": {"judged": [asdict(entry) for entry in judged], "sources": "x"},
+        "ceiling": {"answers": answers, "sources": "x"},
+    })  # fmt: skip
+    row = next(line for line in page.splitlines() if line.startswith("| single |")).split("|")
+    assert row[3].strip().startswith("1 of 2")
+    assert row[5].strip().startswith("1 of 1")
+
+
+def test_the_ideal_diagnoser_finds_a_twin_no_better_than_the_truth() -> None:
+    found = diagnosed(DrawnCase(7001, 12, "single"))
+    assert set(drawn(7001, 12, "single")["effects"]) == {"amplitude_nonlinearity"}
+    assert abs(found["chi2_over_rivals"]) < 3.0
+
+
+def test_a_diagnosis_that_fails_is_a_wrong_answer(tmp_path: Path) -> None:
+    [made] = reports(Work(tmp_path), [MadeCase("broken", {"schema": "campaign/1"})], lambda _: None)
+    found = judge("broken", made, {"effects": [], "identifiable": True, "chi2_gain_of_truth": 0.0})
+    assert not found.right
+    assert found.verdict not in QUIET
 
 
 def test_an_unknown_part_is_named() -> None:

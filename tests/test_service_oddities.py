@@ -97,7 +97,7 @@ def test_half_a_character_is_refused(http: httpx.Client, path: str, place: str) 
     problem_of(answer, answer.status_code)
 
 
-@pytest.mark.parametrize("path", ["/%FF", "/a%0Ab", "/v1/sigma%00", "/..%2F..%2Fetc/passwd", "//", "/" + "x" * 5000])
+@pytest.mark.parametrize("path", ["/%FF", "/a%0Ab", "/v1/sigma%00", "/..%2F..%2Fetc/passwd", "/" + "x" * 5000])
 def test_an_odd_path_is_not_found(http: httpx.Client, path: str) -> None:
     problem_of(http.get(path), 404)
 
@@ -133,7 +133,7 @@ def test_an_upgrade_is_not_taken(http: httpx.Client) -> None:
         "Sec-WebSocket-Key": "eA==",
     }
     assert http.get(ONE_SIGMA, headers=asked).status_code == 200
-    problem_of(http.get("/", headers=asked), 404)
+    assert http.get("/", headers=asked).status_code == 200
 
 
 def test_nothing_odd_was_a_failure_of_the_server(server: Server, http: httpx.Client) -> None:

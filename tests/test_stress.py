@@ -290,7 +290,7 @@ def test_client_and_command_give_the_services_numbers(http: httpx.Client, server
     assert found.charge_pc.tolist() == plain["charge_pc"]
     assert found.status.tolist() == plain["status"]
     file = tmp_path / "load.json"
-    file.write_text(json.dumps(request))
+    file.write_text(json.dumps(request), encoding="utf-8-sig")  # as some editors write it
     written = subprocess.run([COMMAND, "stress", file, "--csv"], capture_output=True, text=True, check=True).stdout
     rows = list(csv.DictReader(io.StringIO(written)))
     assert [float(row["charge_pc"]) for row in rows] == plain["charge_pc"]
@@ -305,7 +305,13 @@ def test_client_and_command_give_the_services_numbers(http: httpx.Client, server
 
 def test_the_command_names_what_is_wrong(tmp_path: Path) -> None:
     file = tmp_path / "load.json"
-    for content, says in (("{", "readable JSON"), (json.dumps(document()), "contacts"), ("[]", "named fields")):
+    missing = subprocess.run([COMMAND, "stress", tmp_path / "none.json"], capture_output=True, text=True)
+    assert (missing.returncode, "No such file" in missing.stderr) == (2, True)
+    for content, says in (
+        ("{", "line 1, column 2: not JSON"),
+        (json.dumps(document()), "contacts"),
+        ("[]", "named fields"),
+    ):
         file.write_text(content)
         refused = subprocess.run([COMMAND, "stress", file], capture_output=True, text=True)
         assert refused.returncode == 2
@@ -366,6 +372,9 @@ def test_a_huge_map_takes_little_more_memory_than_itself() -> None:
 
 
 def test_doubtful_answers_say_why(http: httpx.Client, tmp_path: Path) -> None:
+    twice = [{"id": name, "x_mm": 0.0, "y_mm": 0.0} for name in ("left", "right", "third")]
+    (found,) = posted(http, document(PRESS, sensors=twice))["findings"]
+    assert "left and right lie over one another" in found["statement"]
     hard = {**PRESS, "normal_force_n": 30.0, "x_mm": 24.0}
     sheared = {**PRESS, "tangential_force_n": [0.9, 1.2]}
     found = posted(http, document(sheared, hard))["findings"]
@@ -373,6 +382,9 @@ def test_doubtful_answers_say_why(http: httpx.Client, tmp_path: Path) -> None:
     assert "L = F/(R²E) is 0.12" in found[0]["statement"]
     assert "1.5 times the normal one" in found[1]["statement"]
     assert posted(http, document(PRESS))["findings"] == []
+    in_m = [{"id": f"s{i}", "x_mm": 0.008 * i, "y_mm": 0.0} for i in range(5)]
+    (found,) = posted(http, document(PRESS, sensors=in_m))["findings"]
+    assert "s0 and s1 lie over one another, their centres 0.008 mm apart: are x and y in mm?" in found["statement"]
     drawn = {"x_mm": [0, 1], "y_mm": [0, 1], "pressure_mpa": [[0, 0], [0, 20]]}
     (found,) = posted(http, {**SKIN, "pressure_map": drawn})["findings"]
     assert found["field"] == "pressure_map.pressure_mpa[1][1]"

@@ -40,7 +40,7 @@ _STIFFNESS: _Law = ((1.0, 0.0, 4, False),)
 
 @dataclass(frozen=True)
 class Rows:
-    """`value` (rows,) and `slopes` (4, rows): derivatives with respect to what was given (P or Δ), U, ν and slip."""
+    """`value` (rows,) and `slopes` (4, rows): derivatives with respect to what was given (P or α), U, ν and slip."""
 
     value: Floats
     slopes: Floats
@@ -91,7 +91,7 @@ class ContactCurves:
         slopes = self.interval.derivative(coefficients[:, :1])
         self._coefficients = np.concatenate([coefficients[:, :1], slopes, coefficients[:, 1:]], axis=1)
         at = self._evaluated(grid.table_basis)
-        self._load_start, self._depth_start = _Start(_LOAD, 3.0, at), _Start(_DEPTH, 2.0, at)
+        self._start = _Start(at)
         shapes = np.concatenate([solved.sphere_shape, solved.punch_shape]).transpose(1, 0, 2)
         transforms = (shapes @ grid.transforms).transpose(1, 0, 2)
         self.sphere_transform, self.punch_transform = transforms[:3], transforms[3:]
@@ -100,23 +100,9 @@ class ContactCurves:
         """Contacts at P (rows,), U (rows,) on the branch that is stable under a given force."""
         jkr = 3 * np.pi * root_adhesion**2
         equivalent = load + jkr + np.sqrt(np.maximum(jkr * (2 * load + jkr), 0.0))
-        start = self._load_start(np.cbrt(equivalent), root_adhesion)
-        return self._contacts(load, root_adhesion, start, _LOAD)
-
-    def at_depth(self, depth: Floats, root_adhesion: Floats) -> ContactRows:
-        """Contacts at Δ (rows,), U (rows,) on the branch that is stable under a given displacement."""
-        equivalent = np.sqrt(np.maximum(depth, 0.0)) + np.cbrt(2 * np.pi * root_adhesion**2)
-        start = self._depth_start(equivalent, root_adhesion)
-        return self._contacts(depth, root_adhesion, start, _DEPTH)
-
-    def stiffness_at(self, alpha: Floats) -> Floats:
-        """S at given a/h (rows,), 0 to REACH: its value and derivatives by α, ν and slip (4, rows)."""
-        return self._evaluated(self.interval.basis(alpha))[:, _STIFFNESS[0][2]]
-
-    def _contacts(self, target: Floats, root_adhesion: Floats, start: Floats, given: _Law) -> ContactRows:
-        alpha = self._newton(target, root_adhesion, start, given)
+        alpha = self._newton(load, root_adhesion, self._start(np.cbrt(equivalent), root_adhesion))
         at = self._evaluated(self.interval.basis(alpha))
-        _, by_alpha, *partial = _law(given, alpha, root_adhesion, at)
+        _, by_alpha, *partial = _law(_LOAD, alpha, root_adhesion, at)
         slopes = np.stack([1 / by_alpha, *(-x / by_alpha for x in partial)])
 
         def rows(law: _Law) -> Rows:
@@ -127,11 +113,26 @@ class ContactCurves:
 
         return ContactRows(Rows(alpha, slopes), *(rows(law) for law in (_LOAD, _DEPTH, _SPHERE_LOAD, _STIFFNESS)))
 
-    def _newton(self, target: Floats, root_adhesion: Floats, start: Floats, given: _Law) -> Floats:
-        """α; the law is convex, so that from the stable side the steps end at its root, or cross its minimum."""
+    def at_radius(self, alpha: Floats, root_adhesion: Floats) -> ContactRows:
+        """Contacts at a/h (rows,), above 0 and up to REACH, and U (rows,), stable or not."""
+        at = self._evaluated(self.interval.basis(alpha))
+        one = np.outer([1.0, 0.0, 0.0, 0.0], np.ones_like(alpha))
+
+        def rows(law: _Law) -> Rows:
+            value, *slopes = _law(law, alpha, root_adhesion, at)
+            return Rows(value, np.stack(slopes))
+
+        return ContactRows(Rows(alpha, one), *(rows(law) for law in (_LOAD, _DEPTH, _SPHERE_LOAD, _STIFFNESS)))
+
+    def stiffness_at(self, alpha: Floats) -> Floats:
+        """S at given a/h (rows,), 0 to REACH: its value and derivatives by α, ν and slip (4, rows)."""
+        return self._evaluated(self.interval.basis(alpha))[:, _STIFFNESS[0][2]]
+
+    def _newton(self, target: Floats, root_adhesion: Floats, start: Floats) -> Floats:
+        """α; the law of load is convex: from the stable side the steps end at its root, or cross its minimum."""
         alpha = np.clip(start, _SMALLEST, REACH)
         for _ in range(_ITERATIONS):
-            value, by_alpha, *_rest = _law(given, alpha, root_adhesion, self._evaluated(self.interval.basis(alpha)))
+            value, by_alpha, *_rest = _law(_LOAD, alpha, root_adhesion, self._evaluated(self.interval.basis(alpha)))
             lost = (by_alpha <= 0) | ((alpha == REACH) & (value < target))
             step = np.where(lost, np.nan, (value - target) / by_alpha)
             alpha = np.clip(alpha - step, alpha / 4, REACH)
@@ -147,17 +148,17 @@ class ContactCurves:
 
 
 class _Start:
-    """A first guess of α, on the stable side of the law's minimum, where U = (sphere's slope)/(adhesion's slope)."""
+    """A first guess of α, on the stable side of P's minimum, where U = (sphere's slope)/(adhesion's slope)."""
 
-    def __init__(self, law: _Law, power: float, at: Floats) -> None:
-        value, slope, *_ = _law(law, _TABLE, np.zeros_like(_TABLE), at)
-        adhesion = slope - _law(law, _TABLE, np.ones_like(_TABLE), at)[1]
-        self._root = np.append(0.0, value ** (1 / power))
+    def __init__(self, at: Floats) -> None:
+        value, slope, *_ = _law(_LOAD, _TABLE, np.zeros_like(_TABLE), at)
+        adhesion = slope - _law(_LOAD, _TABLE, np.ones_like(_TABLE), at)[1]
+        self._root = np.append(0.0, np.cbrt(value))
         self._critical = np.append(0.0, (slope / np.maximum(adhesion, _SMALLEST * slope)) ** (2 / 3))
         self._alpha = np.append(0.0, _TABLE)
 
     def __call__(self, root: Floats, root_adhesion: Floats) -> Floats:
-        """From the root of the value that a sphere without adhesion would have, and U."""
+        """From the cube root of the load that a sphere without adhesion would have, and U."""
         unstable = np.interp(root_adhesion ** (2 / 3), self._critical, self._alpha)
         start: Floats = np.maximum(np.interp(root, self._root, self._alpha), 1.02 * unstable)
         return start

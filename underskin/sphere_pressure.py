@@ -1,7 +1,7 @@
 """The pressure under spheres that are pressed into the linear layer without friction, many at once.
 
 On a layer that is thin beside the contact, contacts are smaller and more peaked than Hertz's on a half space: at a/h 1
-by 9 % of the radius and 10 % of the stress on a sensor beneath (bonded, incompressible; PHYSICS, section 5). With φ of
+by 9 % of the radius and 10 % of the stress on a sensor beneath (bonded, incompressible). With φ of
 the contact equation over its mean, f(x) at x = r/a, where f(1) = 0 without adhesion, a pressure of the force F is
     p(r) = −F/(2πa²) ∫ f'(x)/√(x² − r²/a²) dx     from r/a to 1     (Sneddon; Hertz: f = (3/2)(1 − x²))
 """

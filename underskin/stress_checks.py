@@ -6,6 +6,7 @@ Where the skin's length and width are given, it is taken to be centred on the mi
 from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from underskin import hertz
 from underskin.errors import InvalidInput
@@ -15,7 +16,7 @@ from underskin.units import findings as unusual
 
 MOST_PAIRS = 50_000_000  # of a sensor and a point force: about ten seconds
 _WIDEST_CELL = 12.0  # thicknesses; no sensor is influenced from further away
-_LINEAR = 0.01  # of L; there finite strain adds 3 % under a sphere (PHYSICS, section 2)
+_LINEAR = 0.01  # of L; there finite strain adds 3 % under a sphere
 _ROUNDING = 1e-9
 
 
@@ -82,11 +83,12 @@ def refuse_overlap(places: Floats, radii: Floats) -> None:
 def findings(request: StressRequest) -> list[Finding]:
     """What the answer is right for, but hardly the skin."""
     if request.pressure_map is not None:
-        return list(_about_map(request.pressure_map, request.youngs_modulus_mpa))
+        return [*_about_sensors(request), *_about_map(request.pressure_map, request.youngs_modulus_mpa)]
     modulus = request.youngs_modulus_mpa or np.nan
     strained = [(_load_parameter(contact, modulus), i) for i, contact in enumerate(request.contacts)]
     slipping = [(_shear(contact) / contact.normal_force_n, i) for i, contact in enumerate(request.contacts)]
     return [
+        *_about_sensors(request),
         *_worst(
             ((load, i) for load, i in strained if load > _LINEAR),
             "L = F/(R²E) is {:.2g}: the layer is linear here, and finite strain is left out; "
@@ -97,6 +99,20 @@ def findings(request: StressRequest) -> list[Finding]:
             "the tangential force is {:.3g} times the normal one: it slips unless friction is stronger",
         ),
     ]
+
+
+def _about_sensors(request: StressRequest) -> Iterator[Finding]:
+    places = np.array([[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
+    if len(places) < 2:
+        return
+    distances, nearest = (np.asarray(found) for found in cKDTree(places).query(places, k=2))  # each finds itself too
+    distance = distances[:, 1]
+    first = int(np.argmin(distance))
+    other = next(int(i) for i in nearest[first] if i != first)
+    if distance[first] < 2 * request.sensor_radius_mm * (1 - _ROUNDING):
+        pair = f"{request.sensors[first].id} and {request.sensors[other].id}"
+        statement = f"{pair} lie over one another, their centres {distance[first]:g} mm apart: are x and y in mm?"
+        yield Finding(f"sensors[{first}]", None, statement)
 
 
 def _worst(found: Iterable[tuple[float, int]], statement: str) -> Iterator[Finding]:

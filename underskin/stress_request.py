@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-import orjson
 
 from underskin.errors import InvalidInput
 from underskin.recordings import fields as field
+from underskin.recordings import json_file
 from underskin.recordings.campaign import Sensors
 from underskin.recordings.fields import shown
 from underskin.units import Floats
@@ -96,13 +96,15 @@ class StressRequest:
 
 
 def read_file(path: str, map_path: str | None = None) -> StressRequest:
-    """The request in a JSON file (`-`: standard input), with the pressure map of a CSV file; raises InvalidInput."""
+    """The request in a JSON file (`-`: standard input), with the pressure map of a CSV file.
+
+    Raises InvalidInput, or FileError that names line and column of what is not JSON.
+    """
     try:
         content = sys.stdin.buffer.read() if path == "-" else Path(path).read_bytes()
-        document = orjson.loads(content)
-    except (OSError, orjson.JSONDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise InvalidInput("file", path, f"must be a readable JSON file ({reason})") from error
+    except OSError as error:
+        raise InvalidInput("file", path, f"must be a readable JSON file ({error.strerror})") from error
+    document = json_file.document(content, path)
     if map_path is not None:
         if field.mapping("body", document).get("pressure_map") is not None:
             raise InvalidInput("pressure_map", map_path, f"is in {path} already; give it once")

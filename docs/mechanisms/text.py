@@ -29,8 +29,9 @@ layered_contact, adhesion, or both) → position (misalignment) → σ → incre
 amplitude_nonlinearity: both differentiate F σ at fixed R with everything before inside) → d33 under its own stress
 (preload_dependent_d33) → charge of the neighbours (crosstalk) → ageing → dynamics, line by line (contact_resonance,
 sensor_relaxation, amplifier_high_pass, timing_delay). mains_pickup stands beside, as a covariance, and sensor_spread as
-the variance of the sensors' gains. Curves: material → depth (instrument_compliance) → force (strain_stiffening,
-platen_friction) → relaxation in time (contact_creep).
+the variance of the sensors' gains. Curves: material → force at a given contact (layered_contact, adhesion,
+strain_stiffening, platen_friction) → its history (contact_creep) → the stage's give by that force
+(instrument_compliance), all solved together for the displacement that was measured.
 
 Where a mechanism leaves the table's ground (ν < 0.5, a yielding glue line, a pressure that is not Hertz') σ is the
 exact linear layer's plus what finite strain adds in the table at the mechanism's own a and L. Contacts beyond the

@@ -1,9 +1,9 @@
 """Indentation and compression curves as the diagnosis uses them: samples of force in place of lines of an FRF.
 
-A curve is thinned to means over blocks of neighbouring samples that lie evenly along it. The deviation of a sample is
-its noise, read from second differences of the raw samples, and an instrument's usual accuracy: 0.2 % of the reading and
-0.1 % of the full scale. How accurate it really is, the level of the noise says, which every hypothesis fits under the
-same prior. What neighbouring samples share is in smooth_error.
+A curve is thinned to means over blocks of neighbouring samples that lie evenly along it; near a jump every sample
+stays. The deviation of a sample is its noise, read from second differences of the raw samples, and an instrument's
+usual accuracy: 0.2 % of the reading and 0.1 % of the full scale. How accurate it really is, the level of the noise
+says, which every hypothesis fits under the same prior. What neighbouring samples share is in smooth_error.
 """
 
 from collections.abc import Sequence
@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from underskin.diagnosis.jumps import around_jumps
 from underskin.diagnosis.line_noise import LineNoise
 from underskin.diagnosis.lines import Lines
 from underskin.diagnosis.smooth_error import SmoothError
@@ -42,7 +43,9 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         columns = [column[finite] for column in columns]
         noise = _roughness(columns[1])
         way = _way(columns[0], columns[1], noise)
-        starts = np.unique(np.searchsorted(way, np.linspace(0.0, 1.0, _SAMPLES, endpoint=False)))
+        even = np.searchsorted(way, np.linspace(0.0, 1.0, _SAMPLES, endpoint=False))
+        block = int(np.ceil(len(way) / _SAMPLES))
+        starts = np.union1d(even, around_jumps(columns[1], noise, block))
         counts = np.diff(np.append(starts, len(way)))
         *thinned, place = [np.add.reduceat(column, starts) / counts for column in (*columns, way)]
         displacement, force = thinned[:2]

@@ -11,6 +11,7 @@ import scipy
 import underskin
 from underskin.diagnosis import held_out
 from underskin.diagnosis.confounding import confounding
+from underskin.diagnosis.curve_findings import without_unusable
 from underskin.diagnosis.curves import curve_lines
 from underskin.diagnosis.explanation import Workbench
 from underskin.diagnosis.finding import Finding
@@ -41,16 +42,20 @@ def diagnose(
     Raises InvalidInput where the campaign has no FRF recording.
     """
     provenance = _provenance(table)
-    for kind in _CURVES:
-        rows = curve_lines(campaign, kind)
-        if rows.recordings and not any(isinstance(entry, FrfRecording) for entry in campaign.recordings):
-            return _work_out(campaign.name, Workbench(rows, table), [], provenance, progress, limits)
+    left_out: list[Finding] = []
+    for kind in () if any(isinstance(entry, FrfRecording) for entry in campaign.recordings) else _CURVES:
+        curves, found = without_unusable(campaign, kind)
+        left_out += found
+        rows = curve_lines(curves, kind)
+        if rows.recordings:
+            return _work_out(campaign.name, Workbench(rows, table), left_out, provenance, progress, limits)
     frf = tuple(entry for entry in campaign.recordings if isinstance(entry, FrfRecording))
     inspected = inspect(replace(campaign, recordings=frf), table)
+    found = [*left_out, *inspected.found]
     if inspected.lacking:
-        return Diagnosis(campaign.name, inspected.found, provenance, lacking=inspected.lacking)
+        return Diagnosis(campaign.name, found, provenance, lacking=inspected.lacking)
     bench = Workbench(lines(inspected.campaign), table)
-    return _work_out(campaign.name, bench, inspected.found, provenance, progress, limits)
+    return _work_out(campaign.name, bench, found, provenance, progress, limits)
 
 
 def _work_out(

@@ -5,8 +5,9 @@ Law: Johnson, Kendall and Roberts: on the half space a³ = (3R/4E') [F + 3πwR +
 less a flat punch's; on the layer φ(a) = −√(2awE'/π) in the integral equation of layered_contact.
 
 Assumptions: short-ranged adhesion (soft, large contacts: Tabor's number far above 1), equilibrium on the loading branch
-under a given force. FRF = Q(F)/F with the static pressure. An indentation sticks from the first touch to
-the pull-off.
+under a given force. FRF = Q(F)/F with the static pressure. An indentation sticks from the
+first touch to the pull-off, which comes where the travel δ + F/k has its least value: at JKR's depth under a stiff
+stage, at the force −3πwR/2 under a soft one; from there on it must touch again.
 
 Source: Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301.
 """

@@ -1,8 +1,9 @@
 """A characterisation curve on its way through a model: the elastomer, the bench, and the flow of time. SI."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
-from underskin.mechanisms.differentiated import Differentiated
+from underskin.mechanisms.differentiated import Differentiated, constant
 
 
 @dataclass
@@ -23,6 +24,16 @@ class Curve:
     def reduced_modulus(self) -> Differentiated:
         """E' = E/(1 − ν²) [Pa]."""
         return self.modulus / (1 - self.poisson_ratio**2.0)
+
+    def fixed(self, variables: int) -> "Curve":
+        """The same numbers, which none of so many variables changes."""
+        return replace(self, **{field.name: _fixed(getattr(self, field.name), variables) for field in fields(self)})
+
+
+def _fixed(number: Any, variables: int) -> Any:
+    if isinstance(number, tuple):
+        return tuple(_fixed(part, variables) for part in number)
+    return constant(number.value, variables) if isinstance(number, Differentiated) else number
 
 
 def stiffened(stretch: Differentiated, yeoh: tuple[Differentiated, Differentiated]) -> Differentiated:

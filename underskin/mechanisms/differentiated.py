@@ -97,6 +97,13 @@ def chain(value: Array, *terms: tuple[Array, Differentiated]) -> Differentiated:
     return Differentiated(value, np.asarray(slopes))
 
 
+def where(condition: NDArray[np.bool_], yes: Differentiated, no: Differentiated | float) -> Differentiated:
+    """Row by row the one or the other."""
+    if not isinstance(no, Differentiated):
+        return Differentiated(np.where(condition, yes.value, no), np.where(condition, yes.slopes, 0.0))
+    return Differentiated(np.where(condition, yes.value, no.value), np.where(condition, yes.slopes, no.slopes))
+
+
 def constant(value: Array | float, parameters: int) -> Differentiated:
     """A number that no parameter changes."""
     rows = np.atleast_1d(np.asarray(value))

@@ -1,10 +1,12 @@
 """The force of a campaign's indentation curves, sample by sample, under a set of mechanisms.
 
 Base model: Hertz on a half space, F = (4/3) E/(1 − ν²) √R (d − d0)^(3/2), with the contact point d0 and, where none is
-declared, E free. Stages: declared value → material → depth (the stage's give) → elastic force → relaxation.
+declared, E free. Stages: declared value → material → contact radius, depth and force together with the stage's give,
+through the body's history where it relaxes.
 """
 
 from collections.abc import Sequence
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,19 +14,17 @@ from numpy.typing import NDArray
 from underskin.contact_curves import ContactCurves, CurveGrid
 from underskin.errors import InvalidInput
 from underskin.layer import Layer
-from underskin.mechanisms import indentation_law
 from underskin.mechanisms.composition import Composition, Prediction
 from underskin.mechanisms.curve_state import Curve
-from underskin.mechanisms.differentiated import Differentiated, constant
+from underskin.mechanisms.differentiated import Differentiated, constant, where
+from underskin.mechanisms.giving_stage import relaxing_on_stage
+from underskin.mechanisms.indentation_law import Sphere, in_contact
 from underskin.mechanisms.mechanism import Mechanism, Parameter, Values
 from underskin.mechanisms.nuisances import THICKNESS, contact_point, force_offset, modulus_parameter
-from underskin.mechanisms.relaxation import relaxed
+from underskin.mechanisms.receding_contact import Presses, relaxing
 from underskin.recordings import elastomer
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
 from underskin.units import Floats, to_si
-
-_NEWTON_STEPS = 30
-_TOLERANCE = 1e-12
 
 
 class IndentationModel:
@@ -45,23 +45,21 @@ class IndentationModel:
         self.recording = np.repeat(np.arange(len(recordings)), lengths)
         self.valid = np.ones(len(self.recording), dtype=bool)
         self._first = np.diff(self.recording, prepend=-1) > 0
-        radii = to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in recordings])
-        self._radius = radii[self.recording]
+        self._radius = to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in recordings])
         self._displacement = to_si("displacement_mm", np.concatenate([entry.displacement_mm for entry in recordings]))
         self._time = times_of(recordings)
-        self._grid = CurveGrid(np.ones(1))
         self._last_layer: tuple[Layer, ContactCurves] | None = None
 
     def predict(self, fit: Floats) -> Prediction:
         """All samples at one point of the fit coordinates (parameters,)."""
-        own, nuisances, (at_depth,) = self._composition.values(np.asarray(fit, dtype=float), 1)
+        own, nuisances, _ = self._composition.values(np.asarray(fit, dtype=float), 1)
         curve = self._curve(own, nuisances)
-        layer = self._layer_curves(curve) if curve.layered else None
-        answer, inside = self._elastic(curve, layer, self._pressed(nuisances), at_depth)
-        if curve.relaxation is not None:
-            answer = relaxed(answer, self._time, self._first, *curve.relaxation)
-            if curve.work_of_adhesion is None:
-                answer = _pushing(answer)
+        spheres = Sphere(curve, self._radius, self._layer_curves(curve) if curve.layered else None)
+        travel = self._travel(nuisances)
+        if curve.relaxation is None:
+            answer, inside = self._elastic(spheres, travel)
+        else:
+            answer, inside = self._relaxing(spheres, travel)
         offsets = [nuisances[f"force_offset {name}"] for name in self._ids]
         value = answer.value + np.concatenate([offset.value for offset in offsets])[self.recording]
         slopes = answer.slopes + np.concatenate([offset.slopes for offset in offsets], axis=1)[:, self.recording]
@@ -83,7 +81,7 @@ class IndentationModel:
             mechanism.on_curve(curve, own[mechanism.name])
         return curve
 
-    def _pressed(self, nuisances: Values) -> Differentiated:
+    def _travel(self, nuisances: Values) -> Differentiated:
         """Displacement since the contact point [m], (rows,)."""
         points = [nuisances[f"contact_point {name}"] for name in self._ids]
         begins = Differentiated(
@@ -92,31 +90,35 @@ class IndentationModel:
         )
         return self._displacement - begins
 
-    def _elastic(
-        self, curve: Curve, layer: ContactCurves | None, pressed: Differentiated, at_depth: Differentiated
-    ) -> tuple[Differentiated, NDArray[np.bool_]]:
-        """F with δ + F/k = displacement; `at_depth` is the variable that stands for δ."""
-        touched = _met(pressed.value, self._first)
-        give = 0.0 if curve.stage_stiffness is None else 1 / float(curve.stage_stiffness.value[0])
-        depth = pressed.value
-        for _ in range(_NEWTON_STEPS):
-            answer, inside = indentation_law.force(curve, self._radius, at_depth + depth, touched, layer)
-            rate = answer.slopes[-1]
-            step = (depth + give * answer.value - pressed.value) / (1 + give * rate)
-            if not (np.abs(step) > _TOLERANCE * np.abs(pressed.value).max()).any():
-                break
-            depth = depth - step
-        moved = pressed.slopes - give * answer.slopes
-        if curve.stage_stiffness is not None:
-            moved = moved + give**2 * answer.value * curve.stage_stiffness.slopes
-        by_depth = (moved + give * rate * at_depth.slopes) / (1 + give * rate)
-        slopes = answer.slopes - rate * at_depth.slopes + rate * by_depth
-        return Differentiated(answer.value, slopes), inside
+    def _elastic(self, spheres: Sphere, travel: Differentiated) -> tuple[Differentiated, NDArray[np.bool_]]:
+        """F, and which rows the layer's curves reach."""
+        least, lowest = (limit[self.recording] for limit in spheres.pull_off())
+        held = in_contact(travel.value, lowest, self._first)
+        at, inside = spheres.rows(self.recording).at_travel(travel, held, least)
+        return at.force, inside
+
+    def _relaxing(self, spheres: Sphere, travel: Differentiated) -> tuple[Differentiated, NDArray[np.bool_]]:
+        """The same through the history, which begins where a recording touches, between two samples."""
+        touched = _since(travel.value >= 0, self._first)
+        ahead = np.append(touched[1:] & ~self._first[1:], False) & ~touched
+        time = Differentiated(self._time, np.zeros_like(travel.slopes))
+        then = np.minimum(np.arange(len(ahead)) + 1, len(ahead) - 1)
+        still = constant(-1.0, 1).spread(len(ahead))
+        way = where(ahead, travel, 0.0) / where(ahead, travel - travel[then], still)
+        presses = Presses(
+            self.recording,
+            time + way * (self._time[then] - self._time),
+            started=touched | ahead,
+            begins=ahead | (touched & self._first),
+        )
+        on = relaxing if spheres.curve.stage_stiffness is None else relaxing_on_stage
+        force, _, inside = on(spheres, where(~ahead, travel, 0.0), presses)
+        return where(touched, force, 0.0), inside
 
     def _layer_curves(self, curve: Curve) -> ContactCurves:
         layer = Layer(float(curve.poisson_ratio.value[0]))
         if self._last_layer is None or self._last_layer[0] != layer:
-            self._last_layer = layer, self._grid.curves(layer)
+            self._last_layer = layer, _grid().curves(layer)
         return self._last_layer[1]
 
 
@@ -132,31 +134,47 @@ def times_of(recordings: Sequence[IndentationRecording | CompressionRecording]) 
     )
 
 
-def _pushing(force: Differentiated) -> Differentiated:
-    """Without adhesion the surfaces part where a relaxed force would pull."""
-    pushes = force.value > 0
-    return Differentiated(np.where(pushes, force.value, 0.0), np.where(pushes, force.slopes, 0.0))
+def _since(found: NDArray[np.bool_], first: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """From the first row where it is `found` on, in each recording."""
+    total = np.cumsum(found)
+    before = np.maximum.accumulate(np.where(first, total - found, 0))
+    return np.asarray(total > before)
 
 
-def _met(pressed: Floats, first: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which samples come at or after the first that reaches the surface, in each recording."""
-    reached = (pressed >= 0).astype(int)
-    total = np.cumsum(reached)
-    before = np.maximum.accumulate(np.where(first, total - reached, 0))
-    met: NDArray[np.bool_] = total > before
-    return met
+@cache
+def _grid() -> CurveGrid:
+    """No stress is asked for: one wave number, of no use."""
+    return CurveGrid(np.ones(1))
 
 
 def _nuisances(recordings: Sequence[IndentationRecording], campaign: Campaign) -> list[Parameter]:
-    estimates, per_recording = [], []
+    """Around the base model's own fits; a recording that does not load begins where it shows least force.
+
+    Raises InvalidInput where none loads, or one does not move.
+    """
+    estimates, per_recording, refused = [], [], None
     for entry in recordings:
+        columns = [np.asarray(column, dtype=float).tobytes() for column in (entry.displacement_mm, entry.force_n)]
         try:
-            hertz = elastomer.of_indentation(entry, campaign.skin.poisson_ratio)
+            modulus, begins = _hertz(*columns, entry.indenter_radius_mm, campaign.skin.poisson_ratio)
+            estimates.append(modulus)
         except InvalidInput as refusal:
-            raise InvalidInput(f"recordings[{entry.id}].{refusal.field}", refusal.value, refusal.allowed) from refusal
-        estimates.append(hertz.modulus)
+            refused = InvalidInput(f"recordings[{entry.id}].{refusal.field}", refusal.value, refusal.allowed)
+            begins = float(to_si("displacement_mm", entry.displacement_mm[int(np.abs(entry.force_n).argmin())]))
         span = float(np.ptp(to_si("displacement_mm", entry.displacement_mm)))
-        per_recording.append(contact_point(entry.id, hertz.contact_point, 0.1 * span, 0.8 * span))
+        if refused is not None and span == 0:
+            raise refused
+        per_recording.append(contact_point(entry.id, begins, 0.1 * span, 0.8 * span))
         per_recording.append(force_offset(entry.id, float(np.abs(entry.force_n).max())))
+    if refused is not None and not estimates:
+        raise refused
     thickness = [] if campaign.skin.thickness_mm is None else [THICKNESS]
     return [modulus_parameter(campaign.skin, estimates), *thickness, *per_recording]
+
+
+@lru_cache(maxsize=1024)  # a diagnosis composes some dozen models of the same recordings
+def _hertz(displacement_mm: bytes, force_n: bytes, radius_mm: float, poisson_ratio: float) -> tuple[float, float]:
+    """Modulus [Pa] and contact point [m] of the base model's own fit."""
+    columns = np.frombuffer(displacement_mm), np.frombuffer(force_n)
+    found = elastomer.of_indentation(IndentationRecording("", radius_mm, *columns), poisson_ratio)
+    return found.modulus, found.contact_point

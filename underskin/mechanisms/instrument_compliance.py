@@ -1,7 +1,7 @@
 """The stage gives way under the force, so the displacement read off it is larger than the indentation and the sample
 looks too soft, most of all at high force.
 
-Law: measured displacement = indentation + F/k.
+Law: measured displacement = indentation + F/k, with the F that is measured: relaxed, and adhesive.
 
 Assumptions: a linear stage, the same in all recordings; without friction or backlash.
 

@@ -1,46 +1,52 @@
-"""A quasi-linear viscoelastic answer to any history: one Prony pair acting on the elastic answer.
+"""What a body that relaxes with one Prony pair remembers: E(t)/E(0) = 1 − g + g e^(−t/τ).
 
-u(t) is what an elastic body would show; F(t) = u − g ∫ (1 − e^(−(t−s)/τ)) du(s) = u − g q, τ q' = u − q, q = 0 at the
-start; u is taken as linear between samples, for which the step is exact (Fung, Biomechanics, 1993, section 7.6).
+u(t) is what an elastic body would show; F(t) = ∫ E(t−s)/E(0) du(s) = (1 − g) u(t) + g Y(t) with the fading memory
+Y(t) = ∫ e^(−(t−s)/τ) du(s). u is taken as linear between samples, for which the step is exact (Fung, Biomechanics,
+1993, section 7.6).
 """
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
-from underskin.mechanisms.differentiated import Differentiated
+from underskin.mechanisms.differentiated import Differentiated, chain, exp, where
 from underskin.units import Floats
+
+_SERIES = 1e-3
 
 
 def relaxed(
     elastic: Differentiated, time: Floats, first: NDArray[np.bool_], fraction: Differentiated, tau: Differentiated
 ) -> Differentiated:
-    """F of the histories u (rows,) at times [s]; `first` marks the first sample of each history."""
-    step = np.diff(time, prepend=time[0])
-    step[first] = 0.0
-    x = step / tau.value
-    decay, old, new, slopes = _step(x)
-    before = np.roll(elastic.value, 1)
-    decay[first] = 0.0  # at rest before
-    known = np.where(first, 0.0, old * before + new * elastic.value)
-    value = _march(decay, known[:, None])[:, 0]
-    decay_slope, old_slope, new_slope = slopes * (-x / tau.value)
-    by_tau = decay_slope * np.roll(value, 1) + old_slope * before + new_slope * elastic.value
-    rows = old * np.roll(elastic.slopes, 1, axis=1) + new * elastic.slopes + by_tau * tau.slopes
-    memory = Differentiated(value, _march(decay, np.where(first, 0.0, rows).T).T)
-    return elastic - fraction * memory
+    """F of the histories u (rows,) at times [s]; `first` marks the first sample of each history, at once there."""
+    at = Differentiated(time, np.zeros_like(elastic.slopes))
+    return (1.0 - fraction) * elastic + fraction * faded(elastic, at, first, tau)
 
 
-def _step(x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """e^(−x), the weights of u before and after the step, and the derivatives of the three by x."""
-    safe = np.maximum(x, 1e-3)
-    decay = np.exp(-x)
-    mean = np.where(x < safe, 1 - x / 2 + x**2 / 6, -np.expm1(-safe) / safe)
-    mean_slope = np.where(x < safe, -0.5 + x / 3, (np.exp(-safe) + np.expm1(-safe) / safe) / safe)
-    return decay, mean - decay, 1 - mean, np.stack([-decay, mean_slope + decay, -mean_slope])
+def faded(
+    history: Differentiated, time: Differentiated, begins: NDArray[np.bool_], tau: Differentiated
+) -> Differentiated:
+    """Y (rows,) of the histories u (rows,); all of u has just come where one `begins`."""
+    before = np.maximum(np.arange(len(begins)) - 1, 0)
+    x = where(~begins, (time - time[before]) / tau, 0.0)
+    decay = exp(-x)
+    known = where(begins, history, lagging(x) * (history - history[before]))
+    held = np.where(begins, 0.0, decay.value)
+    value = _march(held, known.value[:, None])[:, 0]
+    rows = np.where(begins, 0.0, decay.slopes * value[before]) + known.slopes
+    return Differentiated(value, _march(held, rows.T).T)
+
+
+def lagging(x: Differentiated) -> Differentiated:
+    """(1 − e^(−x))/x: what is left of a steady change at its end, x of its duration over τ."""
+    safe = np.maximum(x.value, _SERIES)
+    small = x.value < safe
+    value = np.where(small, 1 - x.value / 2 + x.value**2 / 6, -np.expm1(-safe) / safe)
+    slope = np.where(small, -0.5 + x.value / 3, (np.exp(-safe) + np.expm1(-safe) / safe) / safe)
+    return chain(value, (slope, x))
 
 
 def _march(decay: Floats, known: Floats) -> Floats:
-    """q_i = decay_i q_(i−1) + known_i, for each column."""
+    """y_i = decay_i y_(i−1) + known_i, for each column."""
     bands = np.stack([np.ones_like(decay), -np.append(decay[1:], 0.0)])
     return np.asarray(solve_banded((1, 0), bands, known))

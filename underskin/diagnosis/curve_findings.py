@@ -1,0 +1,38 @@
+"""Curves that nothing can be fitted to are named, and left out of a diagnosis."""
+
+from dataclasses import replace
+
+from underskin.diagnosis.curves import curve_lines
+from underskin.diagnosis.finding import Finding
+from underskin.errors import InvalidInput
+from underskin.mechanisms.mechanism import Kind
+from underskin.recordings import elastomer
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+
+
+def without_unusable(campaign: Campaign, kind: Kind) -> tuple[Campaign, list[Finding]]:
+    """The campaign without the curves of one kind that have too few samples or do not load, and what was found."""
+    thinned = {entry.id: entry for entry in curve_lines(campaign, kind).campaign.recordings}
+    found, kept = [], []
+    for entry in campaign.recordings:
+        lacking = None
+        if entry.kind == kind:
+            lacking = _lacking(thinned.get(entry.id), campaign.skin.poisson_ratio)
+        if lacking is None:
+            kept.append(entry)
+        else:
+            found.append(Finding("curve_not_usable", entry.id, lacking.field, f"{lacking}: left out"))
+    return replace(campaign, recordings=tuple(kept)), found
+
+
+def _lacking(entry: object, poisson_ratio: float) -> InvalidInput | None:
+    try:
+        if isinstance(entry, IndentationRecording):
+            elastomer.of_indentation(entry, poisson_ratio)
+        elif isinstance(entry, CompressionRecording):
+            elastomer.of_compression(entry)
+        else:
+            return InvalidInput("force_n", "too few finite samples", "must have at least 5")
+    except InvalidInput as refusal:
+        return refusal
+    return None
