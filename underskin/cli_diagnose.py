@@ -226,7 +226,7 @@ def plan(
 ) -> None:
     """The recordings that best separate what a campaign leaves confusable, and the chance that they do; JSON."""
     from underskin.diagnosis.diagnose import diagnose as work_out
-    from underskin.diagnosis.plan import Limits
+    from underskin.diagnosis.rig_limits import Limits
     from underskin.recordings import read_file
     from underskin.surrogate import load_table
 

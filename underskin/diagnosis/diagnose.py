@@ -19,10 +19,11 @@ from underskin.diagnosis.finding import Finding
 from underskin.diagnosis.findings import inspect
 from underskin.diagnosis.lines import lines
 from underskin.diagnosis.locate import SEED, in_region, locate, region
-from underskin.diagnosis.plan import Limits, plan
+from underskin.diagnosis.plan import plan
 from underskin.diagnosis.remainder import describe
 from underskin.diagnosis.report import Diagnosis, report
 from underskin.diagnosis.residuals import residuals, whole_prediction
+from underskin.diagnosis.rig_limits import Limits
 from underskin.diagnosis.search import search
 from underskin.mechanisms.mechanism import Kind
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
