@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.diagnosis_campaigns import Made, campaign
+from underskin.diagnosis.aliases import fit_and_plausibility, without_occam
 from underskin.diagnosis.axes import WORDS
 from underskin.diagnosis.confounding import Confounding, left_open
 from underskin.diagnosis.diagnose import diagnose
@@ -125,6 +126,21 @@ def test_sentences_hold_no_statistics(table: SigmaTable) -> None:
     assert "ageing" not in {entry["mechanism"] for entry in document["not_identifiable"]}
     low, high = document["location"]["effect_interval_percent"]
     assert low < document["location"]["effect_percent"] < high
+
+
+def test_prior_widths_decide_between_equals_neither_way(table: SigmaTable) -> None:
+    """What fits as well is raised to the leader's weight and stays behind it; what fits worse, and nothing, are not."""
+    ageing, wrong = (answer.explanation for answer in answers_of(table, {("ageing",): 0.9, ("adhesion",): 0.1}))
+    assert ageing is not None
+    assert wrong is not None
+    equal = replace(ageing, names=("ageing",))
+    raised = without_occam([equal, ageing, wrong], [-3.0, 0.0, -50.0])
+    assert raised[1] == 0.0
+    assert raised[0] == pytest.approx(0.0, abs=1e-5)
+    assert raised[0] < raised[1]
+    gap = fit_and_plausibility(wrong) - fit_and_plausibility(ageing)
+    assert raised[2] == pytest.approx(max(-50.0, gap))
+    assert gap < -10.0
 
 
 def test_how_much_less_probable_is_said_in_numbers(table: SigmaTable) -> None:

@@ -17,6 +17,8 @@ import numpy as np
 from underskin.diagnosis.explanation import Explanation, own_places
 from underskin.units import Floats
 
+_BEHIND = 1e-6  # of an equal: the leader stays the leader
+
 
 def fit_and_plausibility(explanation: Explanation) -> float:
     """s: the log posterior density at the best fit, were each own parameter's prior 1 at its peak."""
@@ -33,5 +35,5 @@ def without_occam(explanations: Sequence[Explanation], log_weights: Sequence[flo
     for number, rival in enumerate(explanations):
         if rival.names and len(rival.names) == len(leader.names):
             gap = fit_and_plausibility(rival) - fit_and_plausibility(leader)
-            weights[number] = max(weights[number], weights[first] + min(gap, 0.0))
+            weights[number] = max(weights[number], weights[first] + min(gap, -_BEHIND))
     return weights
