@@ -7,7 +7,7 @@ import time
 from importlib.metadata import version
 from pathlib import Path
 
-from bench import accuracy, batch, diagnosis, mechanisms, newton_step, orderings, single_requests, start, store
+from bench import accuracy, batch, diagnosis, mechanisms, newton_step, orderings, pages, single_requests, start, store
 from bench.page import keep, markdown, write
 
 PARTS = {
@@ -20,6 +20,7 @@ PARTS = {
     "mechanisms": mechanisms.measure,
     "diagnosis": diagnosis.measure,
     "store": store.measure,
+    "pages": pages.measure,
 }
 _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem")
 

@@ -27,6 +27,7 @@ _SECTIONS = {
     "newton": "Finite elements against FElupe",
     "orderings": "What was tried for the solver",
     "store": "Campaigns kept, listed and inverted",
+    "pages": "Pages",
     "mechanisms": "Predictions of composed mechanisms",
     "diagnosis": "A whole diagnosis",
 }
@@ -41,6 +42,9 @@ server and Tesseract Core's runtime, each serving the same spline.""",
     "newton": "One Newton step at equal unknowns, on one core.",
     "orderings": "Factors of one step's matrix, on one core.",
     "store": "Over HTTP, server and client on one machine; 1,000,000 recordings with UNDERSKIN_SOAK=1, else 50,000.",
+    "pages": """With 1,000 campaigns of 25 skins kept, and one of 656 recordings of 400 lines. Times of the
+server, over HTTP on one machine, the median of nine after the first; weight as sent, without plotly's script. The
+main thread is Chromium's, from the start of the page on, with plotly's script in its cache.""",
     "diagnosis": "Campaigns of the virtual rig; each diagnosis in a fresh process with one BLAS thread.",
     "mechanisms": """One prediction of all lines with its derivatives with respect to all parameters and to the
 contacts' positions, under three mechanisms; processor time on one core.""",

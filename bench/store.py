@@ -44,17 +44,18 @@ def measure() -> list[Figure]:
     ]
 
 
-def campaign(lines: int) -> dict[str, Any]:
-    """The paper's array, simulated: its loads, sensor spread 5 %, gain scatter 2 %, line noise 1 %."""
+def campaign(lines: int, sensors: int = SENSORS, preloads: int = len(PRELOADS)) -> dict[str, Any]:
+    """The paper's array, or a part of it, simulated: sensor spread 5 %, gain scatter 2 %, line noise 1 %."""
+    loads = PRELOADS[:: len(PRELOADS) // preloads]
     generator = np.random.default_rng(8)
     skin = Skin.from_lab(thickness_mm=2.5, youngs_modulus_mpa=16.0, sensor_radius_mm=1.5)
     frequency = np.linspace(1.0, 400.0, lines).tolist()
     recordings = []
     for radius in RADII:
-        reached = transmission(load_table(), skin, Indenter.from_lab(indenter_radius_mm=radius), PRELOADS)
-        for sensor in range(SENSORS):
-            level = reached.frf(14.0 * generator.normal(1, 0.05)) * generator.lognormal(0, 0.02, len(PRELOADS))
-            for preload, plateau in zip(PRELOADS.tolist(), level.tolist(), strict=True):
+        reached = transmission(load_table(), skin, Indenter.from_lab(indenter_radius_mm=radius), loads)
+        for sensor in range(sensors):
+            level = reached.frf(14.0 * generator.normal(1, 0.05)) * generator.lognormal(0, 0.02, len(loads))
+            for preload, plateau in zip(loads.tolist(), level.tolist(), strict=True):
                 recordings.append(
                     {
                         "id": f"s{sensor:02d}-{radius:g}mm-{preload:.2f}N",
@@ -74,7 +75,7 @@ def campaign(lines: int) -> dict[str, Any]:
         "youngs_modulus_mpa": 16.0,
         "poisson_ratio": 0.5,
         "sensor_radius_mm": 1.5,
-        "sensors": [{"id": f"s{sensor:02d}", "x_mm": 8.0 * sensor, "y_mm": 0.0} for sensor in range(SENSORS)],
+        "sensors": [{"id": f"s{sensor:02d}", "x_mm": 8.0 * sensor, "y_mm": 0.0} for sensor in range(sensors)],
     }
     return {"schema": "campaign/1", "name": "array", "skin": description, "recordings": recordings}
 

@@ -32,7 +32,7 @@ def _rivals(report: Result) -> str:
 
 def _moduli(fit: Result | None) -> str:
     """Young's modulus of the base model and of the explanation, where curves tell it."""
-    found = [fit[part].get("youngs_modulus_mpa") for part in ("before", "after")] if fit else []
+    found = [fit[part].get("youngs_modulus") for part in ("before", "after")] if fit else []
     return " → ".join(_number(entry["value"]) for entry in found if entry) or "–"
 
 

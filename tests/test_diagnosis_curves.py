@@ -82,7 +82,7 @@ def test_a_percent_that_no_law_describes_is_told_and_is_no_mechanism() -> None:
     assert report["verdict"] == "no_mismatch"
     (finding,) = [entry for entry in report["findings"] if entry["code"] == "remainder"]
     assert "% of the largest force" in finding["statement"]
-    assert report["fit"]["before"]["youngs_modulus_mpa"]["value"] == pytest.approx(0.5, rel=0.05)
+    assert report["fit"]["before"]["youngs_modulus"]["value"] == pytest.approx(0.5, rel=0.05)
 
 
 def test_a_large_bump_is_unexplained_and_described_along_the_curve() -> None:

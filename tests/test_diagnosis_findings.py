@@ -163,6 +163,16 @@ def test_units_that_were_checked_are_believed(good: Campaign, table: SigmaTable)
     assert inspect(slow, table).lacking == ""
 
 
+def test_a_resonance_is_not_taken_for_noise(table: SigmaTable) -> None:
+    """Few lines over a resonance differ as much as noise would, and their mean cancels: they are no silence."""
+    made = Made(("contact_resonance",), (6.0, 0.05), highest_hz=1000.0, lines=20, modulus_mpa=16.0)
+    for parameters in ((6.0, 0.05), (30.0, 0.05), (6.0, 0.02)):
+        resonant = campaign(replace(made, parameters=parameters), table)
+        inspected = inspect(changed(resonant, times(-1.0, *LINES), of_r3), table)
+        assert codes(inspected.found) == {("sign_flipped", "r3", "frf_re_pc_per_n")}
+        assert len(inspected.campaign.recordings) == len(resonant.recordings)
+
+
 def test_where_little_is_expected_silence_is_kept(table: SigmaTable) -> None:
     """Far beside the sensor the response is below the noise, as the model says: such recordings count."""
     far = campaign(Made(offsets_mm=(0.0, 5.5), lines=20, line=0.01), table)

@@ -1,9 +1,11 @@
 """The report as a page: complete, self-contained, safe whatever a campaign holds, and the same from a cluster."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -249,6 +251,20 @@ def test_reports_and_pages_are_the_same_on_a_dask_cluster_and_in_processes(tmp_p
     assert sorted(here) == ["palm-0.html", "palm-0.json", "palm-1.html", "palm-1.json"]
     assert there == here
     assert written("processes", "--workers", "2") == here
+
+
+def test_a_single_file_is_diagnosed_with_one_blas_thread(tmp_path: Path) -> None:
+    """As it is in a process of many: so that its report is the same on any machine."""
+    file = tmp_path / "palm.json"
+    file.write_text(json.dumps(to_dict(campaign(ALONE, load_table()))), encoding="utf-8")
+    code = (
+        "import threadpoolctl\nfrom underskin.cli import app\n"
+        f"app(['diagnose', {str(file)!r}, '--output-dir', {str(tmp_path)!r} + '/reports'], standalone_mode=False)\n"
+        "print({pool['num_threads'] for pool in threadpoolctl.threadpool_info()})"
+    )
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("NUM_THREADS")}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "{1}"
 
 
 def test_a_cluster_that_does_not_answer_is_named(tmp_path: Path) -> None:

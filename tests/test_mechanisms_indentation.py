@@ -252,6 +252,16 @@ def test_derivatives_match_differences_on_the_way_in_and_back(names: list[str], 
         assert error.max() < 5e-5 * np.abs(slopes[smooth]).max() + 1e-7 * np.abs(exact.value).max(), names_of[number]
 
 
+def test_every_share_and_time_of_relaxation_gives_finite_forces_and_slopes() -> None:
+    for path in (LOOP, LOOP + 0.003, LOOP[8:], LOOP[8:74], LOOP[:40]):
+        model = compose(["contact_creep", "layered_contact", "adhesion"], recorded(path), table())
+        for fraction in (0.0, 0.027, 0.5, 0.9):
+            for tau in (0.05, 1.0, 40.0, 5e4):
+                answer = model.predict(fit_of(model, relaxed_fraction=fraction, relaxation_time=tau))
+                assert np.isfinite(answer.value).all()
+                assert np.isfinite(answer.slopes).all()
+
+
 def test_two_recordings_do_not_feel_each_other() -> None:
     one = recorded(LOOP)
     first = one.recordings[0]

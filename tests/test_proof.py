@@ -248,6 +248,22 @@ def test_the_riddles_campaigns_say_what_the_paper_says() -> None:
     assert (preloads.count(3.0), preloads.count(1.0)) == (riddle.AT_HIGHER, riddle.AT_LOWER)
 
 
+def test_the_riddle_is_left_open_and_what_would_settle_it_is_planned() -> None:
+    """Preload and age go together on the array: both are named, neither is guessed, and the plan takes them apart."""
+    made = riddle.worlds()
+    array = diagnosis_report(parse(made["array"]), load_table())
+    rivals = {"preload_dependent_d33", "ageing"}
+    assert array["verdict"] == "ambiguous"
+    assert array["probability"] < 0.6
+    assert {entry["name"] for entry in array["mechanisms"]} | set(array["alternatives"][0]["mechanisms"]) == rivals
+    tied = [entry for entry in array["not_identifiable"] if entry["confounded_with"] in rivals]
+    assert [{entry["mechanism"], entry["confounded_with"]} for entry in tied] == [rivals]
+    planned = array["next_experiment"]
+    assert planned["probability_of_deciding"] > 0.9
+    assert {entry["preload_n"] for entry in planned["recordings"]} - {1.0}
+    assert all(entry["position_mm"] == [0.0, 0.0] for entry in planned["recordings"])
+
+
 def test_what_would_settle_the_riddle_does() -> None:
     """Both preloads on late sensors: what did it is named."""
     made = riddle.worlds()

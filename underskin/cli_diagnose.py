@@ -61,6 +61,7 @@ def diagnose(
     from rich.console import Console
     from rich.progress import Progress
 
+    _one_blas_thread()
     files, campaign = files or [], campaign or []
     _refuse_overwriting(files, campaign, output_dir)
     output_dir.mkdir(parents=True, exist_ok=True)
@@ -79,6 +80,12 @@ def diagnose(
                 console.print(line, markup=False, highlight=False, soft_wrap=True)
     if failed:
         raise typer.Exit(2)
+
+
+def _one_blas_thread() -> None:
+    """The same numbers whatever the number of cores; takes effect because NumPy has not been imported yet."""
+    for name in _THREADS:
+        os.environ[name] = "1"
 
 
 def _refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_dir: Path) -> None:
@@ -124,9 +131,7 @@ def _of_files(
 def _executor(workers: int, scheduler: str | None) -> Iterator[Executor]:
     """Processes on this machine, or a Dask cluster through the same interface."""
     if scheduler is None:
-        # A fresh interpreter a process (spawn), with one BLAS thread: the same numbers whatever the number of cores.
-        for name in _THREADS:
-            os.environ[name] = "1"
+        # A fresh interpreter a process (spawn): it, too, starts with one BLAS thread.
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
             yield pool
         return
@@ -221,12 +226,19 @@ def plan(
     offset_mm: Annotated[
         list[float] | None, typer.Option(help="How far beside the sensor the sphere can be put [mm]; repeatable.")
     ] = None,
+    dynamic_force_n: Annotated[
+        list[float] | None, typer.Option(help="A dynamic force that the shaker can give [N]; repeatable.")
+    ] = None,
     dwell_s: Annotated[list[float] | None, typer.Option(help="A time to hold the preload [s]; repeatable.")] = None,
     recordings: Annotated[int, typer.Option(min=1, help="Recordings at most.")] = 8,
 ) -> None:
-    """The recordings that best separate what a campaign leaves confusable, and the chance that they do; JSON."""
+    """The recordings that best separate what a campaign leaves confusable, and the chance that they do; JSON.
+
+    What is left out is as in the campaign; if all is and that separates nothing, what most rigs can do is tried too.
+    """
+    _one_blas_thread()
     from underskin.diagnosis.diagnose import diagnose as work_out
-    from underskin.diagnosis.plan import Limits
+    from underskin.diagnosis.rig_limits import Limits
     from underskin.recordings import read_file
     from underskin.surrogate import load_table
 
@@ -234,6 +246,7 @@ def plan(
     limits = Limits(
         preload_n=preload_n,
         indenter_radius_mm=indenter_radius_mm,
+        dynamic_force_n=dynamic_force_n,
         offset_mm=offset_mm,
         dwell_s=dwell_s,
         recordings=recordings,

@@ -1,6 +1,6 @@
 """The figures of a campaign's page, and their numbers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
@@ -24,16 +24,29 @@ _kept: dict[tuple[str, int, str, str], list[Drawn]] = {}  # by campaign, revisio
 
 
 def figures(store: Database, table: SigmaTable, row: AnyRow, answer: Mapping[str, Any], show: str) -> list[Drawn]:
-    """All that can be drawn of a campaign as it is now; `answer`: its d33, as `/d33` has it."""
-    which = (row.id, row.revision, table.sha256, show)
-    if which not in _kept:
-        with store.reading() as connection:
-            campaign = campaigns.load(connection, row, with_excluded=False)
-        found = [*_curves(row, campaign), *_frf(row, campaign, answer, show), *_d33(row, campaign, answer, table)]
-        if len(_kept) >= _MOST_KEPT:
-            _kept.pop(next(iter(_kept)))
-        _kept[which] = found
-    return _kept[which]
+    """All that can be drawn of a campaign as it is now; `answer`: its d33, as `/d33` has it. `show` as `measured` has
+    it."""
+    basis = (row.id, row.revision, table.sha256)
+    makers: dict[str, Callable[[Campaign], list[Drawn]]] = {
+        f"lines {show}": lambda campaign: [*_curves(row, campaign), *_frf(row, campaign, answer, show)],
+        "d33": lambda campaign: _d33(row, campaign, answer, table),
+    }
+    campaign: Campaign | None = None
+    found: list[Drawn] = []
+    for name, make in makers.items():
+        which = (*basis, name)
+        if which not in _kept:
+            campaign = campaign or _loaded(store, row)
+            if len(_kept) >= _MOST_KEPT:
+                _kept.pop(next(iter(_kept)), None)
+            _kept[which] = make(campaign)
+        found += _kept[which]
+    return found
+
+
+def _loaded(store: Database, row: AnyRow) -> Campaign:
+    with store.reading() as connection:
+        return campaigns.load(connection, row, with_excluded=False)
 
 
 def measured(campaign: Campaign, show: str = "") -> list[tuple[FrfRecording, "Frf"]]:
@@ -93,15 +106,15 @@ def _frf(row: AnyRow, campaign: Campaign, answer: Mapping[str, Any], show: str) 
     conditions = [(recording.indenter_radius_mm, recording.preload_n) for recording, _ in chosen]
     spreads = frf_summary.spreads([frf for _, frf in chosen], conditions)
     about = (
-        f"Magnitude, phase and coherence of {len(chosen)} recordings: for each sphere and preload the median line, "
-        "and from the lowest to the highest recording as a band."
+        f"{len(chosen)} recordings: for each sphere and preload the median magnitude and phase and the lowest "
+        "coherence; as a band, the magnitudes of all its recordings."
     )
     return [drawn("frf", frf_overview(spreads, zone), about, numbers)]
 
 
 def _title(recording: FrfRecording, show: str) -> str:
     where = "" if show == recording.sensor else f"{recording.sensor}, "
-    return f"{where}{recording.indenter_radius_mm:g} mm, {recording.preload_n:g} N"
+    return f"{where}{recording.indenter_radius_mm:.3g} mm, {recording.preload_n:.3g} N"
 
 
 def _d33(row: AnyRow, campaign: Campaign, answer: Mapping[str, Any], table: SigmaTable) -> list[Drawn]:

@@ -15,7 +15,7 @@ from service.design import DesignAnswer, DesignRequest, answer, designed
 from service.pages import requests
 from service.pages.figures import Drawn, csv_answer, drawn
 from service.pages.formats import short_and_exact
-from service.pages.html import page
+from service.pages.html import compress, page
 from service.problems import from_validation
 from service.store import campaigns, skins
 from service.store.engine import Database
@@ -82,14 +82,15 @@ def at_once(request: Request, store: Store, table: Table, skin: Annotated[str | 
     try:
         found, figures = _answered(table, _asked(values), own, skin)
     except UnderskinError as refused:
-        return _json({"error": str(refused)})
+        return _json(request, {"error": str(refused)})
     same = requests.post(request, "/v1/design", values, _call(values))
     return _json(
+        request,
         {
             "told": {entry.name: [entry.text, entry.exact, entry.note] for entry in told(found)},
             "figures": {figure.name: figure.json for figure in figures},
             "same": [same.curl, same.python],
-        }
+        },
     )
 
 
@@ -233,5 +234,7 @@ def _call(values: Mapping[str, float]) -> str:
     return f"client.design({', '.join(f'{name}={value:.6g}' for name, value in values.items())})"
 
 
-def _json(document: Any) -> Response:
-    return Response(orjson.dumps(document), media_type="application/json", headers={"Cache-Control": "no-store"})
+def _json(request: Request, document: Any) -> Response:
+    answer = Response(orjson.dumps(document), media_type="application/json", headers={"Cache-Control": "no-store"})
+    compress(request, answer)
+    return answer

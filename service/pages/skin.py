@@ -49,6 +49,7 @@ def skin(
         history = histories.history(connection, root, table.sha256)
         model = models.in_force(connection, root)
     last = latest[0] if latest else None
+    sensor = sensor if sensor in {entry.sensor for entry in history.sensors} else None
     answer = None if last is None else inverting.answer(store, table, last, None)
     figures = []
     if last is not None and answer is not None and answer["sensors"]:

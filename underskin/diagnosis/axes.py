@@ -9,6 +9,19 @@ from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.units import Floats
 
 _LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n")
+WORDS = {  # of each axis: what it is called, and its unit
+    "preload_n": ("preload", "N"),
+    "indenter_radius_mm": ("radius of the sphere", "mm"),
+    "sensor": ("sensor", ""),
+    "position_mm": ("distance from the sensor's centre", "mm"),
+    "dwell_s": ("time under preload", "s"),
+    "load_cycles": ("load cycles", ""),
+    "dynamic_force_n": ("dynamic force", "N"),
+    "recorded_at": ("day", ""),
+    "frequency_hz": ("frequency", "Hz"),
+    "phase": ("phase", ""),
+    "displacement_mm": ("displacement", "mm"),
+}
 _FROM_ZERO = ("load_cycles", "dwell_s")  # log(1 + x)
 
 

@@ -45,7 +45,8 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         way = _way(columns[0], columns[1], noise)
         even = np.searchsorted(way, np.linspace(0.0, 1.0, _SAMPLES, endpoint=False))
         block = int(np.ceil(len(way) / _SAMPLES))
-        starts = np.union1d(even, around_jumps(columns[1], noise, block))
+        largest = float(np.abs(columns[1]).max())
+        starts = np.union1d(even, around_jumps(columns[1], float(np.hypot(noise, _FULL_SCALE * largest)), block))
         counts = np.diff(np.append(starts, len(way)))
         *thinned, place = [np.add.reduceat(column, starts) / counts for column in (*columns, way)]
         displacement, force = thinned[:2]
@@ -53,7 +54,6 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
             replace(entry, displacement_mm=displacement, force_n=force, time_s=thinned[2] if len(thinned) > 2 else None)
         )
         forces.append(force)
-        largest = float(np.abs(force).max())
         deviations.append(np.sqrt(noise**2 / counts + (_READING * force) ** 2 + (_FULL_SCALE * largest) ** 2))
         scales.append(np.full(len(force), largest))
         ways.append(place)

@@ -10,18 +10,20 @@ import scipy
 
 import underskin
 from underskin.diagnosis import held_out
-from underskin.diagnosis.confounding import confounding
+from underskin.diagnosis.confounding import confounding, left_open
 from underskin.diagnosis.curve_findings import without_unusable
 from underskin.diagnosis.curves import curve_lines
+from underskin.diagnosis.effect import effect
 from underskin.diagnosis.explanation import Workbench
 from underskin.diagnosis.finding import Finding
 from underskin.diagnosis.findings import inspect
 from underskin.diagnosis.lines import lines
 from underskin.diagnosis.locate import SEED, in_region, locate, region
-from underskin.diagnosis.plan import Limits, plan
+from underskin.diagnosis.plan import plan
 from underskin.diagnosis.remainder import describe, worth_telling
 from underskin.diagnosis.report import Diagnosis, report
 from underskin.diagnosis.residuals import residuals, whole_prediction
+from underskin.diagnosis.rig_limits import Limits
 from underskin.diagnosis.search import search
 from underskin.mechanisms.mechanism import Kind
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
@@ -79,11 +81,7 @@ def _work_out(
     against_base = residuals(bench, nothing, gain, levels.position)
     axes = locate(bench.lines, against_base)
     ranges = region(bench.lines, against_base, axes)
-    inside = in_region(bench.lines, ranges)
-    predicted = whole_prediction(bench, nothing)
-    weight = bench.lines.deviation[inside] ** -2.0
-    measured = (predicted[inside].conj() * bench.lines.value[inside]).real
-    effect = 100 * float((weight * measured).sum() / (weight * np.abs(predicted[inside]) ** 2).sum() - 1)
+    size = effect(bench.lines, whole_prediction(bench, nothing), in_region(bench.lines, ranges), gain, levels.level)
     progress(0.8)
     ranked = [answer.explanation for answer in result.answers if answer.explanation is not None]
     groups = held_out.hold_out(bench, ranked, nothing, result.supported)
@@ -97,9 +95,9 @@ def _work_out(
         bench=bench,
         axes=axes,
         region=ranges,
-        effect_percent=effect,
+        effect=size,
         groups=groups,
-        confounded=confounded,
+        confounded=left_open(confounded, result.answers),
         shape=shape,
         next_experiment=plan(bench, result, limits),
     )

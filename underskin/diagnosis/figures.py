@@ -11,25 +11,14 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from underskin.diagnosis.axes import WORDS
 from underskin.diagnosis.explanation import Explanation, Workbench, own_places
 from underskin.diagnosis.locate import SIGNIFICANT
 from underskin.diagnosis.points import Levels, Points, Thinned
 from underskin.diagnosis.report import Diagnosis
 from underskin.units import Floats
 
-AXES = {
-    "preload_n": "preload [N]",
-    "indenter_radius_mm": "radius of the sphere [mm]",
-    "sensor": "sensor",
-    "position_mm": "distance from the sensor's centre [mm]",
-    "dwell_s": "time under preload [s]",
-    "load_cycles": "load cycles",
-    "dynamic_force_n": "dynamic force [N]",
-    "recorded_at": "day",
-    "frequency_hz": "frequency [Hz]",
-    "phase": "phase",
-    "displacement_mm": "displacement [mm]",
-}
+AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in WORDS.items()}
 _BLUE, _ORANGE, _GREY = "#0072B2", "#D55E00", "#BBBBBB"
 _SIGMAS = 1.96  # of a 95 % interval
 _MOST_LABELLED = 80  # cells of a map that show their number

@@ -7,6 +7,7 @@ own permutations; the p-values are those of the largest over all axes, (b + 1)/(
 axis with too few arrangements, or that the others determine, is undecidable.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import factorial
 
@@ -226,6 +227,15 @@ def in_region(lines: Lines, ranges: dict[str, list[float | str]]) -> NDArray[np.
         assert column is not None
         kept &= (column == limits[0]) if len(limits) == 1 else ((column >= limits[0]) & (column <= limits[1]))
     return kept
+
+
+def reaches_all_along(lines: Lines, name: str, ends: Sequence[float | str]) -> bool:
+    """Whether a region holds every value that the campaign has of one of its axes."""
+    column = axis_values(lines, name, True)
+    assert column is not None
+    if column.dtype.kind == "U":
+        return bool((column == ends[0]).all())
+    return bool(column.min() >= float(ends[0]) and column.max() <= float(ends[1]))
 
 
 def axis_values(lines: Lines, name: str, by_line: bool) -> Array | None:

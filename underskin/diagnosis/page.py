@@ -176,6 +176,8 @@ def _next(report: Report) -> str:
     planned = report["next_experiment"]
     if not planned:
         return ""
+    if not planned["recordings"]:
+        return _paragraph(planned["statement"])
     heads = list(dict.fromkeys(name for entry in planned["recordings"] for name in entry))
     rows = [[_plain(entry.get(name)) for name in heads] for entry in planned["recordings"]]
     chance = (

@@ -1,12 +1,12 @@
 """The next experiment: which recordings best separate the explanations that survive.
 
-Candidates lie within the rig's limits: the preloads between and a little beyond those used, the spheres, places,
-amplitudes and dwells of the campaign. Each surviving explanation predicts the logarithm of every candidate's response,
-with the covariance s² I + J Σ Jᵀ: s the gain scatter and the positioning's share, Σ what is still unknown of its own
-parameters (d33 among them, so that a common factor tells nothing). Recordings are added one by one, repeats allowed,
-the one first that raises the expected probability of deciding most; of equal ones that whose sphere is mounted already.
-That probability is simulated: truth drawn from the posterior, recordings from its prediction, and the posterior
-updated: the chance that the true explanation then holds at least 0.8.
+Candidates lie within the rig's limits, given or inferred from the campaign; where those separate nothing and the user
+gave none, within what most rigs can do besides. Each surviving explanation predicts the logarithm of every candidate's
+response, with the covariance S + J Σ Jᵀ: S the scatter of gains, of positioning and of lines, Σ what is still unknown
+of its own parameters (d33 among them, so that a common factor tells nothing). Recordings are added one by one, repeats
+allowed, the one first that raises the expected probability of deciding most; of equal ones that whose sphere is mounted
+already. That probability is simulated: truth drawn from the posterior, recordings from its prediction, and the
+posterior updated: the chance that the true explanation then holds at least 0.8.
 """
 
 import itertools
@@ -16,173 +16,139 @@ from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.explanation import Explanation, Workbench
+from underskin.diagnosis.axes import WORDS
+from underskin.diagnosis.explanation import Workbench
+from underskin.diagnosis.rig_limits import Limits, candidates, inferred, wider
 from underskin.diagnosis.search import Answer, Search
-from underskin.mechanisms.frf_design import frf_recordings
+from underskin.diagnosis.statements import in_words
+from underskin.mechanisms.catalogue import CATALOGUE
 from underskin.mechanisms.mechanism import Unsupported
 from underskin.mechanisms.model import compose
-from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.campaign import FrfRecording
 from underskin.units import Floats
 
 DECIDED = 0.8
 SEED = 20180206
 _SIMULATIONS = 2000
-_MOST_RECORDINGS = 8
 _ENOUGH = 0.95
 _LEAST_GAIN = 0.01  # in the probability of deciding that a further recording must bring
 _SURVIVES = 0.02
 _RIVALS = 4
-_FURTHER = 1.25  # beyond the highest preload used
-_PRELOADS = 8
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What the rig can do, in lab units; what is left None is inferred from the campaign."""
-
-    preload_n: tuple[float, float] | None = None
-    indenter_radius_mm: Sequence[float] | None = None
-    dynamic_force_n: Sequence[float] | None = None
-    dwell_s: Sequence[float] | None = None
-    offset_mm: Sequence[float] | None = None
-    recordings: int = _MOST_RECORDINGS
-    minutes_per_recording: float = 5.0
-    minutes_per_indenter: float = 10.0
 
 
 def plan(bench: Workbench, search: Search, limits: Limits) -> dict[str, Any]:
-    """The recordings to make, in lab units, what they cost, and the chance that they decide; empty where all is."""
-    if bench.lines.curves:
-        return {}
-    surviving = [answer for answer in search.answers if answer.explanation and answer.probability > _SURVIVES][:_RIVALS]
+    """The recordings to make, in lab units, what they cost, and the chance that they decide; empty if all is decided.
+
+    Where several answers remain and no recording can be planned, the document says why, with no recordings in it.
+    """
+    surviving = [answer for answer in search.answers if answer.probability > _SURVIVES][:_RIVALS]
     if len(surviving) < 2:
         return {}
-    candidates = _inside(bench, _candidates(bench.lines.campaign, limits))
-    if not candidates:
+    if not bench.lines.curves:
+        within = inferred(bench.lines.campaign, limits)
+        for beyond, rig in enumerate([within] if limits.given else [within, wider(bench.lines.campaign, within)]):
+            found = _planned(bench, surviving, rig, bool(beyond))
+            if found:
+                return found
+    return {} if surviving[0].probability >= DECIDED else _nothing_to_plan(surviving)
+
+
+def _planned(bench: Workbench, surviving: Sequence[Answer], limits: Limits, beyond: bool) -> dict[str, Any]:
+    """The best recordings within these limits; empty where none brings anything."""
+    allowed = candidates(bench.lines.campaign, limits)
+    rivals, outlook, allowed = _outlook(bench, surviving, allowed)
+    if len(rivals) < 2 or not allowed:
         return {}
-    rivals, responses, unknown = _responses(bench, surviving, candidates)
-    if len(rivals) < 2:
-        return {}
-    levels = rivals[0][1].best.at.marginal.levels
-    scatter = float(np.hypot(levels.gain, levels.position / _thickness(bench)))
-    prior = np.array([answer.probability for answer, _ in rivals])
-    outlook = _Outlook(responses, unknown, scatter, prior / prior.sum())
-    chosen, chance = _choose(outlook, candidates, limits)
+    chosen, chance = _choose(outlook, allowed, limits)
     if not chosen:
         return {}
-    spheres = {candidates[index].indenter_radius_mm for index in chosen}
+    spheres = {allowed[index].indenter_radius_mm for index in chosen}
+    names = [list(answer.names) for answer in rivals]
     return {
-        "recordings": _described(candidates, chosen),
-        "separates": [list(answer.names) for answer, _ in rivals],
+        "recordings": _described(allowed, chosen),
+        "separates": names,
         "probability_of_deciding": round(chance, 3),
         "without_it": round(outlook.deciding([]), 3),
         "minutes": round(len(chosen) * limits.minutes_per_recording + len(spheres) * limits.minutes_per_indenter, 1),
-        "statement": _statement(candidates, chosen, chance, rivals),
+        "statement": _statement(allowed, chosen, chance, names, beyond),
     }
 
 
-def _thickness(bench: Workbench) -> float:
-    thickness = bench.lines.campaign.skin.thickness_mm
-    assert thickness is not None
-    return 1e-3 * thickness
+def _nothing_to_plan(surviving: Sequence[Answer]) -> dict[str, Any]:
+    """Why no recording is planned, and on which axes the rivals would differ."""
+    names = [list(answer.names) for answer in surviving]
+    told = f"No recording within these limits tells {_together([in_words(entry) for entry in names])} apart."
+    axes = [
+        {axis for name in entry for axis in CATALOGUE[name].axes} for entry in names if set(entry) <= set(CATALOGUE)
+    ]
+    apart = {axis for own in axes for axis in own if any(axis not in other for other in axes)}
+    if apart:
+        words = sorted(WORDS[axis][0] if axis in WORDS else axis for axis in apart)
+        told += f" They differ in what they depend on: vary the {_together(words)} more widely than here."
+    return {
+        "recordings": [],
+        "separates": names,
+        "probability_of_deciding": 0.0,
+        "without_it": 0.0,
+        "minutes": 0.0,
+        "statement": told,
+    }
 
 
-def _candidates(campaign: Campaign, limits: Limits) -> list[FrfRecording]:
-    """One recording at every combination of what the rig can do, at the sensor that was recorded most."""
-    entries = frf_recordings(campaign)
-    sensors = [entry.sensor for entry in entries]
-    sensor = max(dict.fromkeys(sensors), key=sensors.count)
-    place = next((known.x_mm, known.y_mm) for known in campaign.skin.sensors if known.id == sensor)
-    used = [entry.preload_n for entry in entries]
-    low, high = limits.preload_n or (min(used), _FURTHER * max(used))
-    spheres = limits.indenter_radius_mm or sorted({entry.indenter_radius_mm for entry in entries})
-    amplitudes = limits.dynamic_force_n or sorted({entry.dynamic_force_n for entry in entries})
-    dwells = list(limits.dwell_s) if limits.dwell_s else _ends([entry.dwell_s for entry in entries])
-    thickness = campaign.skin.thickness_mm
-    assert thickness is not None
-    offsets = limits.offset_mm if limits.offset_mm is not None else (0.0, 0.5 * thickness, thickness)
-    cycles = [entry.load_cycles for entry in entries]
-    last = None if None in cycles else max(cycle for cycle in cycles if cycle is not None)
-    found = []
-    for number, (force, sphere, amplitude, dwell, offset) in enumerate(
-        itertools.product(np.geomspace(low, high, _PRELOADS), spheres, _two(amplitudes), dwells, offsets)
-    ):
-        if amplitude >= force:
-            continue
-        found.append(
-            replace(
-                entries[0],
-                id=f"candidate {number}",
-                sensor=sensor,
-                indenter_radius_mm=sphere,
-                preload_n=float(f"{force:.3g}"),
-                dynamic_force_n=amplitude,
-                dwell_s=dwell,
-                load_cycles=last,
-                position_mm=(place[0] + round(offset, 3), place[1]),
-                frequency_hz=np.array([30.0]),
-                frf_re_pc_per_n=np.array([1.0]),
-                frf_im_pc_per_n=np.array([0.0]),
-                coherence=None,
-                sample_rate_hz=None,
-                force_n=None,
-                charge_pc=None,
-            )
-        )
-    return found
+def _together(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-def _inside(bench: Workbench, candidates: list[FrfRecording]) -> list[FrfRecording]:
-    """Those within the tables as the skin is declared: beyond, no prediction is worth planning with."""
-    model = compose([], replace(bench.lines.campaign, recordings=tuple(candidates)), bench.table, "frf")
-    return [entry for entry, inside in zip(candidates, model.valid, strict=True) if inside]
-
-
-def _two(values: Sequence[float]) -> list[float]:
-    return sorted({min(values), max(values)})
-
-
-def _ends(values: Sequence[float | None]) -> list[float | None]:
-    known = [value for value in values if value is not None]
-    return [*sorted({min(known), max(known)})] if len(known) == len(values) else [None]
-
-
-def _responses(
-    bench: Workbench, surviving: Sequence[Answer], candidates: Sequence[FrfRecording]
-) -> tuple[list[tuple[Answer, Explanation]], Floats, list[Floats]]:
-    """The rivals that can be predicted there, log |response| (rivals, candidates), and of each rival W (candidates,
-    parameters) with W Wᵀ the covariance of that from its own parameters."""
+def _outlook(
+    bench: Workbench, surviving: Sequence[Answer], allowed: Sequence[FrfRecording]
+) -> tuple[list[Answer], "_Outlook", list[FrfRecording]]:
+    """The rivals whose laws can be predicted there, what they predict, and the candidates that all tables hold."""
     # The campaign's own recordings go along, so that each model has the parameters that it was fitted with.
     campaign = bench.collapsed.campaign
-    together = replace(campaign, recordings=(*campaign.recordings, *candidates))
+    together = replace(campaign, recordings=(*campaign.recordings, *allowed))
     own = len(campaign.recordings)
-    rivals, responses, unknown = [], [], []
+    inside = np.ones(len(allowed), dtype=bool)
+    rivals, predictions = [], []
     for answer in surviving:
-        explanation = answer.explanation
-        assert explanation is not None
+        if answer.explanation is None:
+            continue
         try:
-            model = compose(explanation.names, together, bench.table, "frf")
+            model = compose(answer.explanation.names, together, bench.table, "frf")
         except Unsupported:
             continue
-        if len(model.parameters) != len(explanation.point.fit):
+        if len(model.parameters) != len(answer.explanation.point.fit):
             continue
-        prediction = model.predict(explanation.point.fit)
-        value = prediction.value[own:]
-        slopes = (prediction.slopes[explanation.best.fitter.places][:, own:] / value).real
-        rivals.append((answer, explanation))
-        responses.append(np.log(np.maximum(np.abs(value), 1e-30)))
+        prediction = model.predict(answer.explanation.point.fit)
+        inside &= prediction.inside[own:] & (np.abs(prediction.value[own:]) > 0)
+        rivals.append(answer)
+        predictions.append(prediction)
+    kept = own + np.flatnonzero(inside)
+    line = float(np.median(np.add.reduceat(bench.lines.deviation**-2.0, bench.lines.first)) ** -0.5)
+    responses, unknown, scatter = [], [], []
+    for answer, prediction in zip(rivals, predictions, strict=True):
+        explanation = answer.explanation
+        assert explanation is not None
+        levels, value = explanation.best.at.marginal.levels, prediction.value[kept]
+        slopes = (prediction.slopes[explanation.best.fitter.places][:, kept] / value).real
+        responses.append(np.log(np.abs(value)))
         unknown.append(slopes.T @ np.linalg.cholesky(explanation.best.covariance))
-    return rivals, np.array(responses), unknown
+        variance = levels.gain**2 + (levels.level * line / np.abs(value)) ** 2
+        if prediction.position_slopes is not None:
+            variance += levels.position**2 * (np.abs(prediction.position_slopes[:, kept] / value) ** 2).sum(axis=0)
+        scatter.append(variance)
+    prior = np.array([answer.probability for answer in rivals])
+    outlook = _Outlook(np.array(responses), unknown, np.array(scatter), prior / prior.sum())
+    return rivals, outlook, [entry for entry, good in zip(allowed, inside, strict=True) if good]
 
 
 @dataclass(frozen=True)
 class _Outlook:
     """What the rivals predict, and how sure each is."""
 
-    responses: Floats
-    unknown: list[Floats]
-    scatter: float
-    prior: Floats
+    responses: Floats  # log |response| (rivals, candidates)
+    unknown: list[Floats]  # of each W (candidates, parameters), W Wᵀ the covariance from its own parameters
+    scatter: Floats  # variance of the logarithm of a new recording (rivals, candidates)
+    prior: Floats  # (rivals,)
 
     def deciding(self, chosen: Sequence[int]) -> float:
         """The simulated chance that the true explanation holds `DECIDED` after these recordings."""
@@ -191,9 +157,9 @@ class _Outlook:
         noise = random.normal(size=(_SIMULATIONS, len(chosen)))
         means = self.responses[:, chosen]
         roots = []
-        for unknown in self.unknown:
+        for unknown, scatter in zip(self.unknown, self.scatter, strict=True):
             rows = unknown[chosen]
-            roots.append(np.linalg.cholesky(rows @ rows.T + self.scatter**2 * np.eye(len(chosen))))
+            roots.append(np.linalg.cholesky(rows @ rows.T + np.diag(scatter[chosen])))
         measured = means[truth] + np.einsum("nab,nb->na", np.array(roots)[truth], noise)
         log_posterior = np.empty((_SIMULATIONS, len(self.prior)))
         for rival, root in enumerate(roots):
@@ -255,11 +221,14 @@ def _statement(
     candidates: Sequence[FrfRecording],
     chosen: Sequence[int],
     chance: float,
-    rivals: Sequence[tuple[Answer, Explanation]],
+    names: Sequence[Sequence[str]],
+    beyond: bool,
 ) -> str:
     entry = candidates[chosen[0]]
-    names = " from ".join(" and ".join(answer.names) for answer, _ in rivals[:2])
+    count = f"{len(chosen)} recordings, first" if len(chosen) > 1 else "One recording"
+    wider_than = " It goes beyond what this campaign did: check that the rig can." if beyond else ""
+    rivals = _together([in_words(rival) for rival in names])
     return (
-        f"{len(chosen)} recording(s), first with the {entry.indenter_radius_mm:g} mm sphere at {entry.preload_n:g} N, "
-        f"should tell {names} with a probability of {100 * chance:.0f} %."
+        f"{count} with the {entry.indenter_radius_mm:g} mm sphere at {entry.preload_n:g} N, should tell which of "
+        f"{rivals} it is, with a probability of {100 * chance:.0f} %.{wider_than}"
     )

@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
+from underskin.diagnosis.aliases import without_occam
 from underskin.diagnosis.discrepancy import Discrepancy, discrepancy
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.mechanisms.catalogue import CATALOGUE
@@ -76,7 +77,7 @@ class Search:
     def answers(self) -> list[Answer]:
         """The rivals, the most probable first; their probabilities sum to 1."""
         kept = [entry for entry in self.explanations if self.shows(entry)]
-        weights = [self.log_weight(entry) for entry in kept]
+        weights = without_occam(kept, [self.log_weight(entry) for entry in kept]).tolist()
         showing = [
             self._log_weight_beneath(entry, process)
             for entry, process in self.discrepancies

@@ -1,6 +1,7 @@
 """Recordings without a response above their own noise: a sensor that is dead, or not connected.
 
-The noise of a line is read from how much neighbouring lines differ, σ² = mean |z_j+1 − z_j|²/2 of the complex values.
+The noise of a line is read from how much neighbouring lines differ, σ² = median |z_j+1 − z_j|²/(2 ln 2) of the complex
+values, which a resonance between a few of them does not reach.
 A recording is silent where its mean over n lines is no larger than noise makes it, n |mean|²/σ² < 9 (which noise alone
 exceeds once in 8000 recordings), and its lines are no larger than noise, mean |z|² < 3 σ².
 """
@@ -32,7 +33,7 @@ def silence(entries: Sequence[FrfRecording]) -> tuple[Mask, Floats]:
         lines = lines[np.isfinite(lines)]
         if len(lines) < _LEAST_LINES:
             continue
-        noise = float(np.mean(np.abs(np.diff(lines)) ** 2)) / 2
+        noise = float(np.median(np.abs(np.diff(lines)) ** 2)) / (2 * np.log(2.0))
         variance[number] = noise / len(lines)
         quiet = float(np.abs(lines.mean()) ** 2) < _MEAN * variance[number]
         silent[number] = quiet and float(np.mean(np.abs(lines) ** 2)) < _LINES * noise

@@ -116,7 +116,7 @@ def frf_versus_preload(
             y=frf[chosen],
             error_y={"type": "data", "array": uncertainty[chosen], "thickness": 1},
             mode="markers",
-            name=f"{size:g} mm, measured",
+            name=f"{size:.3g} mm, measured",
             text=[label(recordings[row]) for row in np.flatnonzero(chosen).tolist()],
             hovertemplate=f"%{{text}}<br>sphere {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.3g}} pC/N<extra></extra>",
             marker={"color": colour, "symbol": marker, "size": 8, "opacity": 0.7},
@@ -126,7 +126,7 @@ def frf_versus_preload(
             x=at,
             y=model[chosen][first],
             mode="lines",
-            name=f"{size:g} mm, model",
+            name=f"{size:.3g} mm, model",
             hovertemplate=f"model, sphere {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.3g}} pC/N<extra></extra>",
             line={"color": colour, "dash": ("solid", "dash", "dot")[number % 3]},
         )

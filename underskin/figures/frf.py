@@ -15,34 +15,34 @@ from underskin.units import Floats
 _ROWS = (("magnitude_pc_per_n", "|FRF| [pC/N]"), ("phase_deg", "phase [°]"), ("coherence", "coherence"))
 _HEIGHT = 640
 _BRIGHTEST = 0.85  # of Viridis, that still shows on white
+_LEAST_PHASE = 10.0  # ° to each side, so that noise looks like noise
 _WIDE = 3.0  # largest magnitude over the median, from which on the axis is logarithmic
 
 
 def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | None) -> go.Figure:
-    """The median of each condition, and from the lowest to the highest of its recordings as a band."""
+    """Of each condition the median magnitude and phase and the lowest coherence; as a band, the magnitudes of all its
+    recordings."""
     figure = _panels()
     for number, spread in enumerate(spreads):
         colour, dash = _look(spread, spreads)
-        name = f"{spread.indenter_radius_mm:g} mm, {spread.preload_n:g} N ({spread.recordings})"
-        group = str(number)
-        for row, (field, _) in enumerate(_ROWS, start=1):
-            low, middle, high = getattr(spread, field)
-            if np.isnan(middle).all():
-                continue
-            figure.add_scatter(
-                x=_short(np.concatenate([spread.frequency_hz, spread.frequency_hz[::-1]])),
-                y=_short(np.concatenate([high, low[::-1]])),
-                fill="toself",
-                fillcolor=_faint(colour),
-                line={"width": 0},
-                hoverinfo="skip",
-                showlegend=False,
-                legendgroup=group,
-                row=row,
-                col=1,
-            )
-            line = {"color": colour, "width": 1.5, "dash": dash}
-            _add(figure, row, name, group, spread.frequency_hz, middle, line)
+        name = f"{spread.indenter_radius_mm:.3g} mm, {spread.preload_n:.3g} N ({spread.recordings})"
+        low, middle, high = spread.magnitude_pc_per_n
+        figure.add_scatter(
+            x=_short(np.concatenate([spread.frequency_hz, spread.frequency_hz[::-1]])),
+            y=_short(np.concatenate([high, low[::-1]])),
+            fill="toself",
+            fillcolor=_faint(colour),
+            line={"width": 0},
+            hoverinfo="skip",
+            showlegend=False,
+            legendgroup=str(number),
+            row=1,
+            col=1,
+        )
+        line = {"color": colour, "width": 1.5, "dash": dash}
+        for row, values in enumerate((middle, spread.phase_deg[1], spread.coherence[0]), start=1):
+            if not np.isnan(values).all():
+                _add(figure, row, name, str(number), spread.frequency_hz, values, line)
     return _finished(figure, zone_hz, "FRF: median and range of the recordings alike")
 
 
@@ -95,6 +95,10 @@ def _finished(figure: go.Figure, zone_hz: tuple[float, float] | None, title: str
     for row, (_, title_of_axis) in enumerate(_ROWS, start=1):
         figure.update_yaxes(title=title_of_axis, row=row, col=1)
     _scale_magnitude(figure)
+    phases = np.concatenate([trace.y for trace in figure.data if trace.yaxis == "y2"])
+    low, high = np.nanmin(phases, initial=-_LEAST_PHASE), np.nanmax(phases, initial=_LEAST_PHASE)
+    margin = 0.05 * (high - low)
+    figure.update_yaxes(range=[low - margin, high + margin], row=2, col=1)
     figure.update_yaxes(range=[0, 1.02], row=3, col=1)
     return styled(figure, title, _HEIGHT)
 

@@ -139,7 +139,8 @@ def relaxing(
     now = np.flatnonzero(presses.started & (after < 0))
     held[now] = False
     begin = np.maximum.accumulate(np.where(presses.begins, np.arange(len(after)), 0))
-    if spheres.curve.work_of_adhesion is not None or (depth.value[presses.begins] > 0).any():
+    adhesive = spheres.curve.work_of_adhesion is not None
+    if len(now) and (adhesive or (depth.value[presses.begins] > 0).any()):
         left, at, holds, reached = _first_touch(sphere.rows(now), history, begin[now], now)
         force = _put(force, now, left * at.force)
         held[now], inside[now] = holds, reached
@@ -199,7 +200,8 @@ def _shares(history: _History, after: Rows, now: Rows, short: NDArray[np.bool_])
     slopes = np.zeros((len(share.slopes), len(now)))
     slopes[-1] = 1.0
     excess = history.excess(history.ring(after, Differentiated(value, slopes)), now)
-    slopes = -excess.slopes / excess.slopes[-1]
+    held = excess.slopes[-1] == 0  # through a hold every ring is the same
+    slopes = np.where(held, 0.0, -excess.slopes / np.where(held, 1.0, excess.slopes[-1]))
     slopes[-1] = 0.0
     share.value[short], share.slopes[:, short] = value, slopes
     return share

@@ -1,0 +1,103 @@
+"""The pages with a thousand campaigns kept: the server's time, their weight, and how long a browser stands still."""
+
+import re
+import tempfile
+import time
+from pathlib import Path
+from statistics import median
+
+import httpx
+from playwright.sync_api import sync_playwright
+
+from bench import servers
+from bench.figures import Figure
+from bench.store import RECORDINGS, SKINS, campaign
+
+CAMPAIGNS = 1000
+ROUNDS = 9
+_AT_ONCE = 40
+_LIBRARY = "plotly"
+_WATCH = """new PerformanceObserver(list => list.getEntries().forEach(entry =>
+    (window.stood = window.stood || []).push(entry.duration))).observe({type: "longtask", buffered: true})"""
+
+
+def measure() -> list[Figure]:
+    """Server's time of each page, first view, weight, and the longest time that a browser's main thread is busy."""
+    with tempfile.TemporaryDirectory() as folder, servers.underskin(Path(folder)) as server:
+        small = campaign(lines=20, sensors=4, preloads=2)
+        for first in range(0, CAMPAIGNS, _AT_ONCE):
+            server.post(f"/v1/campaigns?skin=palm-{first // _AT_ONCE % SKINS}", [small] * _AT_ONCE)
+        whole = server.post("/v1/campaigns?skin=palm-3", campaign(lines=400))["id"]
+        paths = {
+            "Start": "/",
+            "Skin of 41 campaigns": "/skins/palm-3",
+            f"Campaign of {RECORDINGS} recordings": f"/campaigns/{whole}",
+            "The same, one sensor's lines": f"/campaigns/{whole}?show=s07",
+            "Design": "/design?skin=palm-3",
+            "Design, a slider's answer": "/design/answer?thickness_mm=3",
+        }
+        address = f"http://127.0.0.1:{server.port}"
+        with httpx.Client(base_url=address, headers={"Accept": "text/html"}, timeout=60) as client:
+            view = _first_view(client)
+            found = [Figure("First view: start, style and scripts", view, "s", 1.0, "lower")]
+            for name, path in paths.items():
+                times = [_milliseconds(client, path) for _ in range(ROUNDS + 1)]
+                found.append(Figure(f"{name}, first time", times[0], "ms", 300.0, "lower"))
+                found.append(Figure(name, median(times[1:]), "ms", 300.0, "lower"))
+            heaviest = max(_weight(client, path) for path in paths.values())
+        found.append(Figure("Weight of the heaviest page", heaviest / 1e3, "kB", 150.0, "lower"))
+        found.append(
+            Figure(
+                f"Longest busy spell of the main thread, {RECORDINGS} recordings drawn",
+                _stands_still(address, whole),
+                "ms",
+                200.0,
+                "lower",
+            )
+        )
+    return found
+
+
+def _milliseconds(client: httpx.Client, path: str) -> float:
+    start = time.perf_counter()
+    client.get(path).raise_for_status()
+    return 1e3 * (time.perf_counter() - start)
+
+
+def _first_view(client: httpx.Client) -> float:
+    start = time.perf_counter()
+    for path in ("/", *_loaded(client, "/")):
+        client.get(path).raise_for_status()
+    return time.perf_counter() - start
+
+
+def _loaded(client: httpx.Client, path: str) -> list[str]:
+    """What a page loads."""
+    return re.findall(r'(?:src|href)="(/static/[^"]+)"', client.get(path).text)
+
+
+def _weight(client: httpx.Client, path: str) -> int:
+    """Bytes of a page and of what it loads, as sent."""
+    total = 0
+    for part in (path, *{one for one in _loaded(client, path) if _LIBRARY not in one}):
+        with client.stream("GET", part) as answer:
+            total += sum(len(chunk) for chunk in answer.iter_raw())
+    return total
+
+
+def _stands_still(address: str, campaign_id: str) -> float:
+    """The longest task [ms] while the figures are drawn, once the library is loaded."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.goto(f"{address}/skins/palm-3")
+        page.wait_for_selector(".plot .main-svg")
+        page.add_init_script(_WATCH)
+        page.goto(f"{address}/campaigns/{campaign_id}")
+        for plot in page.locator(".plot").all():
+            plot.scroll_into_view_if_needed()
+        page.wait_for_function("[...document.querySelectorAll('.plot')].every(plot => plot.querySelector('.main-svg'))")
+        page.wait_for_timeout(1000)
+        longest = page.evaluate("Math.max(0, ...(window.stood || []))")
+        browser.close()
+    return float(longest)

@@ -1,0 +1,125 @@
+"""What a report says in words, for people who press skins: no statistics but percentages, values with their units."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from underskin.diagnosis.axes import WORDS
+from underskin.diagnosis.effect import Effect
+from underskin.diagnosis.locate import SIGNIFICANT, AxisResult
+from underskin.diagnosis.search import NONE_OF_THESE, NOTHING_MISSING, Answer
+from underskin.mechanisms.catalogue import CATALOGUE
+
+_WORTH_NAMING = 0.02
+
+
+def answer_statement(
+    answers: Sequence[Answer], verdict: str, shape: str, modulus: Mapping[str, Any] | None = None
+) -> str:
+    """Some plain sentences on what is missing; of curves also the modulus under the stated answer."""
+    said = _answer(answers, verdict, shape)
+    if modulus is None or verdict == "unexplained":
+        return said
+    interval = f"95 %: {modulus['low']:.3g} to {modulus['high']:.3g}"
+    return f"{said} Young's modulus under this answer: {modulus['value']:.3g} {modulus['unit']} ({interval})."
+
+
+def _answer(answers: Sequence[Answer], verdict: str, shape: str) -> str:
+    leader = answers[0]
+    percent = f"{100 * leader.probability:.0f} %"
+    if verdict == "no_mismatch":
+        return f"Recordings and base model agree within the noise (probability {percent}); nothing needs to be added."
+    if verdict == "unexplained":
+        described = f" {shape}" if shape else ""
+        return f"Something is missing that none of the known mechanisms describes (probability {percent}).{described}"
+    names = " and ".join(leader.names)
+    if verdict == "explained":
+        plain = " ".join(f"{name}: {_sentence(CATALOGUE[name].plain)}" for name in leader.names)
+        return f"The base model lacks {names} (probability {percent}). {plain}"
+    rivals = [answer for answer in answers[1:4] if answer.probability > _WORTH_NAMING]
+    listed = "; ".join(f"{in_words(answer.names)} ({100 * answer.probability:.0f} %)" for answer in rivals)
+    mentioned = dict.fromkeys(name for answer in (leader, *rivals) for name in answer.names if name in CATALOGUE)
+    plain = " ".join(f"{name}: {_sentence(CATALOGUE[name].plain)}" for name in mentioned)
+    return f"Best explained by {names} ({percent}), but these rivals remain: {listed}. {plain}"
+
+
+def _sentence(text: str) -> str:
+    return f"{text.rstrip('.')}."
+
+
+def in_words(names: Sequence[str]) -> str:
+    """An answer's names as a sentence has them."""
+    special = {NOTHING_MISSING: "nothing missing", NONE_OF_THESE: "something without a name"}
+    return " and ".join(special.get(name, name) for name in names)
+
+
+def why_not(answer: Answer, leader: Answer) -> str:
+    """Why an answer is less probable than the leading one."""
+    if answer.probability > 0.25 * leader.probability:
+        return "the recordings hardly tell it from the leading explanation"
+    if answer.explanation is None:
+        return "a smooth discrepancy without a name explains the recordings less well, or no better at a higher price"
+    if leader.explanation is None:
+        return "what it leaves of the misfit is not noise"
+    less = leader.explanation.log_evidence - answer.explanation.log_evidence
+    if less > 1:
+        factor = f"about {_round(np.exp(less))}" if less < np.log(1e6) else "more than a million"
+        return f"the recordings are {factor} times less probable under it"
+    return "it explains no more and is less probable beforehand" if less > -1 else "it is less probable beforehand"
+
+
+def _round(value: float) -> str:
+    return f"{float(f'{value:.1g}'):.0f}" if value >= 10 else f"{value:.1g}"
+
+
+def location_statement(
+    axes: Sequence[AxisResult],
+    region: Mapping[str, Sequence[float | str]],
+    whole: Mapping[str, bool],
+    effect: Effect,
+) -> str:
+    """One plain sentence; `whole` says of each axis of the region whether the region reaches all along it."""
+    telling = [entry for entry in axes if entry.p_value is not None and entry.p_value < SIGNIFICANT]
+    undecidable = [WORDS[entry.axis][0] for entry in axes if entry.p_value is None]
+    tail = f"; whether it depends on {_listed(undecidable)}, this design cannot tell" if undecidable else ""
+    if not telling:
+        return f"The misfit depends on none of the axes beyond chance{tail}."
+    names = _listed([WORDS[entry.axis][0] for entry in sorted(telling, key=lambda entry: entry.p_value or 0.0)])
+    parts = [_range(name, ends) for name, ends in region.items() if not whole[name]]
+    where = f"most of it lies at {_listed(parts)}, where" if parts else "it is spread over all of the recordings, where"
+    return f"The misfit depends on {names}; {where} {_size(effect)}{tail}."
+
+
+def _size(effect: Effect) -> str:
+    if effect.signed:
+        low, high = sorted((abs(effect.low), abs(effect.high)))
+        side = "above" if effect.percent > 0 else "below"
+        span = (
+            f"{effect.low:+.2g} to {effect.high:+.2g}" if effect.low * effect.high < 0 else f"{low:.3g} to {high:.3g}"
+        )
+        return f"the response is {_percent(effect.percent)} {side} the model (95 %: {span} %)"
+    return (
+        f"the response is off by {_percent(effect.percent)} (root mean square: above the model in parts, below it in "
+        f"others; 95 %: {effect.low:.3g} to {effect.high:.3g} %)"
+    )
+
+
+def _percent(value: float) -> str:
+    return f"{abs(value):.3g} %"
+
+
+def _range(axis: str, ends: Sequence[float | str]) -> str:
+    words, unit = WORDS[axis]
+    values = [value if isinstance(value, str) else _plain(value) for value in ends]
+    text = " to ".join(dict.fromkeys(values))
+    return f"{words} {text} {unit}".rstrip()
+
+
+def _plain(value: float) -> str:
+    """Four digits, never as a power of ten."""
+    return np.format_float_positional(float(f"{value:.4g}"), trim="-")
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
