@@ -29,6 +29,7 @@ _WIDTH_HZ = 1.5
 _REACH_HZ = 3.0
 _REACHED = 0.05  # of the shape
 _LEAST_LINES = 3
+_BESIDE = 9  # lines, the next in frequency, that say what is usual
 _LEAST_STRAY = 1e-6  # relative; of recordings without noise
 
 
@@ -75,8 +76,8 @@ class MainsPickup(Mechanism):
 
 def _excess(recordings: Sequence[Frf], mains: float) -> float:
     """How much further the lines that these mains reach stray from a straight line between those that none reach than
-    those do from each other: Σ shape² (|stray|² over theirs − 1)/√Σ shape⁴, the score of a variance of that shape in
-    units of its own scatter."""
+    the next ones do from each other: Σ shape² (|stray|² over theirs − 1)/√Σ shape⁴, the score of a variance of that
+    shape in units of its own scatter."""
     score = weight = 0.0
     for lines in recordings:
         shape = _shape(lines.frequency, mains)
@@ -85,9 +86,10 @@ def _excess(recordings: Sequence[Frf], mains: float) -> float:
             continue
         size = np.maximum(np.abs(lines.values), max(float(np.median(np.abs(lines.values))), 1e-300))
         odd, even = far[1::2], far[::2]
-        usual = float(np.median(_stray(lines, size, odd, even) ** 2)) / np.log(2.0)  # of normal parts: mean · ln 2
         stray = _stray(lines, size, np.flatnonzero(near), far)
-        score += float((shape[near] ** 2 * (stray**2 - usual)).sum()) / max(usual, _LEAST_STRAY**2)
+        beside = np.abs(lines.frequency[near, None] - lines.frequency[odd]).argsort(axis=1)[:, :_BESIDE]
+        usual = np.median(_stray(lines, size, odd, even)[beside] ** 2, axis=1) / np.log(2.0)  # median = mean · ln 2
+        score += float((shape[near] ** 2 * (stray**2 - usual) / np.maximum(usual, _LEAST_STRAY**2)).sum())
         weight += float((shape[near] ** 4).sum())
     return score / np.sqrt(weight) if weight else 0.0
 
