@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rig import effects, linear_filters
 from rig.effects import Values
+from rig.errors import RigError
 from rig.experiment import Experiment
 from rig.gains import sensitivity, under_stress
 from rig.layer import Floats, base_stress
@@ -62,7 +63,11 @@ class Bench:
     @cached_property
     def _distinct(self) -> tuple[Pressed, NDArray[np.intp]]:
         """The distinct contacts, and of each recording its contact."""
-        dwell = self.plan.dwell_s if self.plan.dwell_s is not None else np.zeros(len(self.plan.preload_n))
+        dwell = self.plan.dwell_s
+        if dwell is None:
+            if "contact_creep" in self.on:
+                raise RigError("design.dwells_s", None, "required by the effect contact_creep")
+            dwell = np.zeros(len(self.plan.preload_n))
         columns = np.column_stack([self.plan.indenter_mm, self.plan.preload_n, dwell, self.plan.dynamic_n])
         unique, index = np.unique(columns, axis=0, return_inverse=True)
         modulus = self.experiment.skin.youngs_modulus_mpa * (effects.of(self.on, "modulus_error", "factor") or 1.0)

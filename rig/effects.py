@@ -58,7 +58,7 @@ EFFECTS: dict[str, Effect] = {
         ("log", "exponential"),
     ),
     "contact_resonance": Effect(
-        "a tip mass on the contact spring of the layer, 1/(1 − (ω/ω0)² + 2iζω/ω0)",
+        "a tip mass on the contact spring of the layer (E unrelaxed), 1/(1 − (ω/ω0)² + 2iζω/ω0)",
         (FRF,),
         {"tip_mass_g": (0, 500), "damping": (1e-3, 2)},
     ),

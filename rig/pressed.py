@@ -76,9 +76,9 @@ class Pressed:
 
     @cached_property
     def stiffness(self) -> Floats:
-        """dF/dδ of the layer's contact, edge held [N/mm]."""
+        """dF/dδ of the layer's contact, edge held [N/mm], against an oscillation too fast to relax."""
         alpha = self.contact_radius / self.thickness
-        return self._curves.stiffness(alpha, self.effective_modulus) * self.thickness
+        return self._curves.stiffness(alpha, self.modulus * self._stiffening(self.contact_radius)) * self.thickness
 
     def sigma(self, rt: float, offset: Floats) -> Floats:
         """σ on sensors of radius rt at the offsets (rows,) or (rows, sensors)."""

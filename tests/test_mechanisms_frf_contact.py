@@ -102,6 +102,15 @@ def test_creep_is_the_relaxed_modulus() -> None:
         assert crept[0] == pytest.approx(softer[0], rel=1e-12)
 
 
+def test_a_fast_oscillation_meets_the_unrelaxed_modulus_on_the_contact_that_crept() -> None:
+    recordings = [frf_recording(dwell_s=1e6), frf_recording(id="other", dwell_s=0.0)]
+    names = ["contact_creep", "contact_resonance"]
+    crept = predicted(names, campaign(recordings), relaxed_fraction=0.4, relaxation_time=30.0, tip_mass=20.0)
+    softer = replace(SKIN, youngs_modulus_mpa=0.6 * 2.0)
+    grown = predicted(["contact_resonance"], campaign(recordings[:1], softer), tip_mass=0.6 * 20.0)
+    assert crept[: len(grown)] == pytest.approx(grown, rel=1e-9)
+
+
 def test_a_stiffening_contact_solves_its_own_strain() -> None:
     def misfit(factor: float) -> float:
         a = float(hertz.contact_radius(2.0, 4e-3, E * factor))

@@ -88,6 +88,7 @@ def test_what_cannot_be_used_is_named(path: str, value: Any, message: str) -> No
     [
         ("cycles_per_recording", "ageing", "design.cycles_per_recording = None: required by the effect ageing"),
         ("start", "temperature_drift", "design.start = None: required by the effect temperature_drift"),
+        ("dwells_s", "contact_creep", "design.dwells_s = None: required by the effect contact_creep"),
     ],
 )
 def test_an_effect_names_what_it_needs_of_the_experiment(missing: str, effect: str, message: str) -> None:

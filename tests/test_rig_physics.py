@@ -160,6 +160,13 @@ def test_edges_that_move_agree_in_the_limit_of_a_small_amplitude() -> None:
     assert moving == pytest.approx(cycling, rel=1e-5)
 
 
+def test_a_fast_oscillation_meets_the_unrelaxed_modulus_on_the_contact_that_crept() -> None:
+    crept = bench(effects={"contact_creep": {"fraction": 0.4, "time_s": 10.0}}, design={"dwells_s": [1e6]})
+    softer = bench(effects={"modulus_error": {"factor": 0.6}})
+    assert crept.pressed.contact_radius == pytest.approx(softer.pressed.contact_radius, rel=1e-12)
+    assert crept.stiffness == pytest.approx(softer.stiffness / 0.6, rel=1e-12)
+
+
 LIMITS: dict[str, dict[str, float]] = {
     "moving_contact_edge": {"mobile_fraction": 0}, "misalignment": {"x_mm": 0, "y_mm": 0},
     "adhesion": {"work_j_per_m2": 0}, "strain_stiffening": {"coefficient": 0},

@@ -203,7 +203,7 @@ def _answered(
         drawn(
             "row",
             array_response(found, asked.pitch_mm),
-            "The reading of each sensor of a row while the sphere moves along it.",
+            "The reading of each sensor of a row while the sphere moves along it, over that above a sensor.",
             f"/design/response.csv?{query}",
         ),
     ]

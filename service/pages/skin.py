@@ -45,7 +45,9 @@ def skin(
         filters = campaigns.Filters(skin=root, state=None)
         rows = campaigns.listed(connection, filters, number_of(before), _ON_A_PAGE + 1)
         latest = campaigns.listed(connection, campaigns.Filters(skin=root, state="current"), None, 1)
-        medians = overview.medians(connection, [row.number for row in rows], table.sha256)
+        numbers = [row.number for row in rows]
+        medians = overview.medians(connection, numbers, table.sha256)
+        diagnosed = overview.latest_diagnoses(connection, numbers)
         history = histories.history(connection, root, table.sha256)
         model = models.in_force(connection, root)
     last = latest[0] if latest else None
@@ -64,7 +66,9 @@ def skin(
         last=last,
         answer=answer,
         described=None if last is None else last.about["skin"],
-        rows=[(row, campaigns.state(row), medians.get(row.number)) for row in rows[:_ON_A_PAGE]],
+        rows=[
+            (row, campaigns.state(row), medians.get(row.number), diagnosed.get(row.number)) for row in rows[:_ON_A_PAGE]
+        ],
         following=rows[_ON_A_PAGE - 1].number if len(rows) > _ON_A_PAGE else None,
         history=history,
         model=model,

@@ -25,7 +25,6 @@ class Glance:
     cursor: int
     d33: list[tuple[str, float]] = field(default_factory=list)
     diagnosis: AnyRow | None = None  # the latest of the last campaign
-    adopted: bool = False  # whether that diagnosis is the model of a skin
 
 
 def glances(
@@ -47,7 +46,10 @@ def glances(
         glance.last = row
         if row.number in values:
             glance.d33.append((row.time, values[row.number]))
-    _add_diagnoses(connection, [glance for glance in found.values() if glance.last is not None])
+    diagnosed = latest_diagnoses(connection, [row.number for row in recent])
+    for glance in found.values():
+        if glance.last is not None:
+            glance.diagnosis = diagnosed.get(glance.last.number)
     return list(found.values())
 
 
@@ -80,17 +82,15 @@ def medians(connection: Connection, numbers: Sequence[int], table_sha256: str) -
     return {number: median(values) for number, values in by_campaign.items()}
 
 
-def _add_diagnoses(connection: Connection, found: Sequence[Glance]) -> None:
-    by_campaign = {glance.last.number: glance for glance in found if glance.last is not None}
+def latest_diagnoses(connection: Connection, numbers: Sequence[int]) -> dict[int, AnyRow]:
+    """The latest diagnosis of each of these campaigns that has one; `model_id`: of the model it was adopted as."""
     columns: list[ColumnElement[Any]] = [
         column for column in diagnoses.c if column.name in ("id", "campaign", "state", "verdict", "probability")
     ]
     query = (
         select(*columns, models.c.id.label("model_id"))
         .outerjoin(models, models.c.diagnosis == diagnoses.c.number)
-        .where(diagnoses.c.campaign.in_(by_campaign))
+        .where(diagnoses.c.campaign.in_(numbers))
         .order_by(diagnoses.c.number)
     )
-    for row in connection.execute(query):
-        glance = by_campaign[row.campaign]
-        glance.diagnosis, glance.adopted = row, row.model_id is not None
+    return {row.campaign: row for row in connection.execute(query)}

@@ -85,6 +85,6 @@ def array_response(design: Design, pitch_mm: float) -> go.Figure:
             line={"color": COLOURS[6], "width": 2}, marker={"symbol": "line-ns-open", "size": 12},
             hoverinfo="name",
         )  # fmt: skip
-    figure.update_xaxes(title="place of the contact along a row of sensors [mm]", range=[-reach, reach])
-    figure.update_yaxes(title="response [% of that above a sensor]")
+    figure.update_xaxes(title="place of the contact [mm]", range=[-reach, reach])
+    figure.update_yaxes(title="response [%]")
     return styled(figure, "What a row of sensors sees", 380)

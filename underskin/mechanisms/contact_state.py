@@ -13,11 +13,12 @@ class Contacts:
     force: Floats  # F [N]
     indenter_radius: Floats  # R [m]
     dwell: Floats  # time since the preload was put on [s]; 0 where no mechanism asks
-    modulus: Differentiated  # E [Pa] in force in each contact
+    modulus: Differentiated  # E [Pa] in force in each contact: that of the static contact
     thickness: Differentiated  # h [m], of one row
     poisson_ratio: Differentiated  # ν, of one row
     slip: Differentiated | None = None  # of the glue line, 1/(1 + κ), of one row; None where it is rigid
     work_of_adhesion: Differentiated | None = None  # w [J/m²], of one row; None without adhesion
+    relaxed: Differentiated | None = None  # that E over the one that a fast oscillation meets; None where they are one
     layered: bool = False  # contact by the layer of finite thickness, not by the half space
     stiffness: Differentiated | None = None  # dF/dδ [N/m] at the radius in force, where a mechanism asks
 

@@ -11,7 +11,10 @@ campaign's lines; harmonics up to the fifth.
 Source: Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling to leads).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from underskin.mechanisms.differentiated import Differentiated
 from underskin.mechanisms.frf_design import FrfDesign, frf_recordings
@@ -24,8 +27,9 @@ _MAINS_HZ = (50.0, 60.0)
 _HARMONICS = np.arange(1, 6)
 _WIDTH_HZ = 1.5
 _REACH_HZ = 3.0
-_NEAR, _FAR = 0.3, 0.05  # of the shape
+_REACHED = 0.05  # of the shape
 _LEAST_LINES = 3
+_BESIDE = 9  # lines, the next in frequency, that say what is usual
 _LEAST_STRAY = 1e-6  # relative; of recordings without noise
 
 
@@ -62,7 +66,7 @@ class MainsPickup(Mechanism):
     def pickup_shape(self, campaign: Campaign, design: FrfDesign) -> Floats:
         """The lines' shape over Fd [1/N]."""
         lines = [lines_of(entry) for entry in frf_recordings(campaign)]
-        mains = max(_MAINS_HZ, key=lambda mains: sum(_excess(entry, mains) for entry in lines))
+        mains = max(_MAINS_HZ, key=lambda mains: _excess(lines, mains))
         return _shape(design.row_frequency, mains) / design.row_dynamic_force
 
     def pickup_charge(self, values: Values) -> Differentiated:
@@ -70,20 +74,30 @@ class MainsPickup(Mechanism):
         return 1e-12 * values["pickup_charge"]
 
 
-def _excess(lines: Frf, mains: float) -> float:
-    """How much further the lines near the mains stray from a straight line between the nearest that no mains reach than
-    those do from each other: Σ shape² (|stray|² over theirs − 1), the score of a variance of that shape."""
-    shape = _shape(lines.frequency, mains)
-    near, far = shape > _NEAR, np.flatnonzero(shape < _FAR)
-    if not near.any() or len(far) < _LEAST_LINES:
-        return 0.0
-    size = np.maximum(np.abs(lines.values), max(float(np.median(np.abs(lines.values))), 1e-300))
-    between = np.interp(lines.frequency[near], lines.frequency[far], lines.values[far])
-    stray = np.abs(lines.values[near] - between) / size[near]
-    odd, even = far[1::2], far[::2]
-    others = np.abs(lines.values[odd] - np.interp(lines.frequency[odd], lines.frequency[even], lines.values[even]))
-    usual = float(np.median((others / size[odd]) ** 2)) / np.log(2.0)  # |·|² of normal parts: median = mean · ln 2
-    return float((shape[near] ** 2 * (stray**2 - usual)).sum() / max(usual, _LEAST_STRAY**2))
+def _excess(recordings: Sequence[Frf], mains: float) -> float:
+    """How much further the lines that these mains reach stray from a straight line between those that none reach than
+    the next ones do from each other: Σ shape² (|stray|² over theirs − 1)/√Σ shape⁴, the score of a variance of that
+    shape in units of its own scatter."""
+    score = weight = 0.0
+    for lines in recordings:
+        shape = _shape(lines.frequency, mains)
+        near, far = shape > _REACHED, np.flatnonzero(shape <= _REACHED)
+        if not near.any() or len(far) < _LEAST_LINES:
+            continue
+        size = np.maximum(np.abs(lines.values), max(float(np.median(np.abs(lines.values))), 1e-300))
+        odd, even = far[1::2], far[::2]
+        stray = _stray(lines, size, np.flatnonzero(near), far)
+        beside = np.abs(lines.frequency[near, None] - lines.frequency[odd]).argsort(axis=1)[:, :_BESIDE]
+        usual = np.median(_stray(lines, size, odd, even)[beside] ** 2, axis=1) / np.log(2.0)  # median = mean · ln 2
+        score += float((shape[near] ** 2 * (stray**2 - usual) / np.maximum(usual, _LEAST_STRAY**2)).sum())
+        weight += float((shape[near] ** 4).sum())
+    return score / np.sqrt(weight) if weight else 0.0
+
+
+def _stray(lines: Frf, size: Floats, rows: NDArray[np.intp], beside: NDArray[np.intp]) -> Floats:
+    """How far rows are from a straight line between others, relative to `size`."""
+    between = np.interp(lines.frequency[rows], lines.frequency[beside], lines.values[beside])
+    return np.asarray(np.abs(lines.values[rows] - between) / size[rows])
 
 
 def _shape(frequency: Floats, mains: float) -> Floats:

@@ -60,9 +60,10 @@ def _on_layer(contacts: Contacts, curves: ContactCurves) -> Pressed:
 
 
 def stiffness(contacts: Contacts, pressed: Pressed, curves: ContactCurves) -> Differentiated:
-    """dF/dδ = 2 E' a S(a/h) [N/m] of the layer at the contact radius in force, the edge held."""
+    """dF/dδ = 2 E' a S(a/h) [N/m] of the layer at the contact radius in force, the edge held, E' unrelaxed."""
     alpha = pressed.a_over_h
     value, by_alpha, by_poisson_ratio, by_slip = curves.stiffness_at(np.minimum(alpha.value, REACH))
     terms = [(by_alpha, alpha), (by_poisson_ratio, contacts.poisson_ratio)]
     terms += [] if contacts.slip is None else [(by_slip, contacts.slip)]
-    return 2.0 * contacts.reduced_modulus * alpha * contacts.thickness * chain(value, *terms)
+    held = 2.0 * contacts.reduced_modulus * alpha * contacts.thickness * chain(value, *terms)
+    return held if contacts.relaxed is None else held / contacts.relaxed

@@ -1,0 +1,123 @@
+"""Campaigns that have little, or nonsense, have their pages and numbers all the same."""
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.store.server import Server, campaign
+
+Document = dict[str, Any]
+FILES = Path(__file__).parents[2] / "examples" / "campaigns"
+BROWSING = {"Accept": "text/html"}
+
+
+def changed(change: Callable[[int, Document], None], **given: Any) -> Document:
+    document = campaign("odd", **given)
+    for number, recording in enumerate(document["recordings"]):
+        change(number, recording)
+    return document
+
+
+def no_charge(_: int, recording: Document) -> None:
+    recording["frf_re_pc_per_n"] = recording["frf_im_pc_per_n"] = [0.0] * 20
+
+
+def endless(_: int, recording: Document) -> None:
+    recording["frf_re_pc_per_n"] = [1e200] * 20
+
+
+def own_lines(number: int, recording: Document) -> None:
+    recording["frequency_hz"] = [(1 + number) * line for line in recording["frequency_hz"]]
+
+
+def bare(_: int, recording: Document) -> None:
+    del recording["coherence"], recording["recorded_at"]
+
+
+def time_series(_: int, recording: Document) -> None:
+    for name in ("frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n", "coherence"):
+        del recording[name]
+    force = np.random.default_rng(0).normal(size=4096) / 10
+    recording |= {"sample_rate_hz": 1024.0, "force_n": force.tolist(), "charge_pc": (7 * force).tolist()}
+
+
+def untouched(_: int, recording: Document) -> None:
+    assert recording
+
+
+ODD = {
+    "one line": changed(untouched, sensors=1, lines=1),
+    "no charge": changed(no_charge),
+    "endless": changed(endless),
+    "own lines": changed(own_lines),
+    "bare": changed(bare),
+    "time series": changed(time_series, sensors=1),
+    "many sensors": changed(untouched, sensors=60, lines=5),
+    "outside the table": changed(untouched, youngs_modulus_mpa=0.01),
+}
+
+
+def require_pages(server: Server, kept: Document) -> None:
+    campaign_page, skin_page = f"/campaigns/{kept['id']}", f"/skins/{kept['skin_id']}"
+    pages = [campaign_page, f"{campaign_page}?show=s0", skin_page, f"{skin_page}?show=trend", f"{skin_page}?sensor=s0"]
+    for path in [*pages, f"/design?skin={kept['skin_id']}"]:
+        assert server.http.get(path, headers=BROWSING).status_code == 200, path
+    files = [f"{campaign_page}/{name}.csv" for name in ("frf", "preload", "d33", "curves")]
+    for path in [*files, f"{skin_page}/map.csv", f"{skin_page}/history.csv"]:
+        answer = server.http.get(path)
+        assert answer.headers["content-type"].startswith("text/csv"), path
+        assert len({len(row) for row in csv.reader(answer.text.splitlines())}) <= 1, path
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_odd_campaigns(server: Server, name: str) -> None:
+    require_pages(server, server.http.post("/v1/campaigns", json=ODD[name]).json())
+
+
+def test_a_single_line_has_d33(server: Server) -> None:
+    kept = server.http.post("/v1/campaigns", json=ODD["one line"]).json()
+    found = server.http.get(f"/v1/campaigns/{kept['id']}/d33").json()
+    assert (found["status"], found["reason"]) == ("ok", None)
+
+
+def test_the_elastomer_alone(server: Server) -> None:
+    parts = [("file", FILES / "block.csv"), ("rig", FILES / "testing-machine.yaml")]
+    files = [(name, (file.name, file.read_bytes())) for name, file in parts]
+    answer = server.http.post("/v1/campaigns?skin=block", files=files)
+    (kept,) = answer.json()["campaigns"]
+    require_pages(server, kept)
+    page = server.http.get(f"/campaigns/{kept['id']}", headers=BROWSING).text
+    assert "Force against displacement" in page
+    assert "The elastomer" in page
+
+
+def test_texts_in_csv_are_no_formulas(server: Server) -> None:
+    document = campaign("formula", sensors=1)
+    document["skin"]["sensors"][0]["id"] = "=1+1"
+    for recording in document["recordings"]:
+        recording["sensor"] = "=1+1"
+    kept = server.http.post("/v1/campaigns", json=document).json()
+    rows = csv.DictReader(server.http.get(f"/campaigns/{kept['id']}/d33.csv").text.splitlines())
+    assert {row["sensor"] for row in rows} == {"'=1+1"}
+
+
+@pytest.mark.parametrize(
+    ("query", "said"),
+    [
+        ("thickness_mm=0.0025", "was it given in m"),
+        ("thickness_mm=nan", "thickness_mm"),
+        ("youngs_modulus_mpa=-1", "greater than 0"),
+        ("pitch_mm=1", "cannot overlap"),
+        ("dip_percent=0", "dip_percent"),
+        ("preload_n=500", "–"),
+    ],
+)
+def test_designs_that_cannot_be_are_explained(server: Server, query: str, said: str) -> None:
+    answer = server.http.get(f"/design?{query}", headers=BROWSING)
+    assert answer.status_code == 200
+    assert said in answer.text
+    assert server.http.get(f"/design/answer?{query}").status_code == 200
