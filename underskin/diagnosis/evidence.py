@@ -17,7 +17,7 @@ from underskin.units import Floats
 _NEAR = 4.0  # standard deviations from a bound within which it counts
 _POLISHING, _POLISHED = 4, 0.05  # steps at most, and the gain in log posterior below which it stops
 _LEAST_COVARIANCE_CURVATURE = 0.3  # of logarithms of noise levels: their priors are not wider
-_TRUSTED = 30.0  # gain in log posterior that polishing may leave
+_TRUSTED = 1.0  # gain in log posterior that polishing may leave
 _FLAT = 1e-3  # least standard deviations of the quadratic within a parameter's bounds: keeps H invertible
 
 

@@ -203,9 +203,7 @@ class Fitter:
     def _weigh(self, point: Point, predicted_at: Floats, prediction: Prediction, moments: Moments) -> Evaluated:
         lines, levels = self.hypothesis.lines, self.levels(point, predicted_at)
         if lines.curves and levels.smooth != moments.ratio * levels.level:
-            ratio = levels.smooth / levels.level
-            bend = point.bend[lines.sensor]
-            moments = Moments(lines, prediction, bend, self.hypothesis.curvature, 0.0, ratio)
+            moments = moments.at_ratio(levels.smooth / levels.level)
         marginal = Marginal(lines, moments, levels)
         cost = -marginal.log_likelihood - self._log_prior(point)
         return Evaluated(point, predicted_at, prediction, moments, marginal, cost)

@@ -12,6 +12,7 @@ extremum of σ, p acts in second order: on the mean by the factor exp(½ p² ∇
 the base model.
 """
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -80,9 +81,7 @@ class Moments:
         self._direction_rows = direction
         self._residual = residual
         self.second_order = curvature.square
-        self.uu = self._sum(direction, direction)
-        self.ur = self._sum(direction, residual)
-        self.rr = self._sum(residual, residual)
+        self._sum_up()
         self.picked = prediction.pickup is not None
         self.cu: Array | None = None
         self.cr: Array | None = None
@@ -115,6 +114,25 @@ class Moments:
         self.moved = (self._sum(direction, slopes[0]) / uu) ** 2 + (self._sum(direction, slopes[1]) / uu) ** 2
         return direction
 
+    def at_ratio(self, ratio: float) -> "Moments":
+        """Of curves: the same prediction at another η/κ; the rows are turned already and only weighed again."""
+        assert self._lines.whitening is not None
+        change = self._lines.whitening.weight(ratio) / self._lines.whitening.weight(self.ratio)
+        other = copy(self)
+        other.__dict__.pop("slopes", None)
+        other.ratio = ratio
+        other.log_determinant = self._lines.whitening.log_determinant(ratio)
+        other._direction_rows = self._direction_rows * change
+        other._residual = self._residual * change
+        other._slope_rows = self._slope_rows * change
+        other._sum_up()
+        return other
+
+    def _sum_up(self) -> None:
+        self.uu = self._sum(self._direction_rows, self._direction_rows)
+        self.ur = self._sum(self._direction_rows, self._residual)
+        self.rr = self._sum(self._residual, self._residual)
+
     def _weighed(self, rows: Array) -> Array:
         """Over d; of curves such that their samples are independent."""
         whitening = self._lines.whitening
@@ -130,9 +148,13 @@ class Moments:
         return products if len(self._first) == len(products) else np.add.reduceat(products, self._first)
 
     @cached_property
+    def _slope_rows(self) -> Array:
+        return self._weighed(self._slopes * self._factor)
+
+    @cached_property
     def slopes(self) -> tuple[Floats, Floats, Floats, NDArray[np.complex128] | None]:
         """Of the model's derivatives J: JᵀJ (P, P); for each recording uᵀJ, Jᵀr, (c + i·ic)ᵀJ (recordings, P)."""
-        rows = self._weighed(self._slopes * self._factor)
+        rows = self._slope_rows
         real = np.concatenate([rows.real, rows.imag], axis=1)
 
         def summed(products: Array) -> Array:

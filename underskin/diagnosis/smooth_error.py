@@ -59,11 +59,15 @@ class Whitening:
         """log|I + (η/κ)² D^(−½) B D^(−½)|."""
         return float(np.log1p(ratio**2 * self._size).sum())
 
-    def __call__(self, rows: Array, ratio: float) -> Array:
-        """The rows (…, rows) such that their covariance is κ² times the unit matrix, at η/κ."""
-        scaled = rows / self._deviation
+    def weight(self, ratio: float) -> Floats:
+        """What weighs the turned rows at η/κ (rows,)."""
+        return np.asarray(1 / np.sqrt(1 + ratio**2 * self._size))
+
+    def __call__(self, rows: Array, ratio: float) -> Floats:
+        """The rows (…, rows), forces, such that their covariance is κ² times the unit matrix, at η/κ."""
+        scaled = rows.real / self._deviation
         turned = [scaled[..., span] @ turn.T for span, turn in zip(self._spans, self._turns, strict=True)]
-        weighed: Array = np.concatenate(turned, axis=-1) / np.sqrt(1 + ratio**2 * self._size)
+        weighed: Floats = np.concatenate(turned, axis=-1) * self.weight(ratio)
         return weighed
 
 
