@@ -47,7 +47,7 @@ proof: $(VENV)/.dev ## judge the diagnosis on concealed campaigns and real recor
 	$(VENV)/bin/underskin prove
 
 bench: $(VENV)/.dev $(VENV)-tesseract/.installed ## measure speed, as ratios against peers in the same run
-	@scripts/system-packages.sh wrk
+	@scripts/system-packages.sh wrk chromium
 	$(PYTHON) -m bench
 
 lock: $(VENV)/.dev ## resolve pyproject.toml into the lock files
