@@ -10,7 +10,7 @@ TEST_PACKAGES = nginx openssl octave curl postgresql chromium
 PIP_INSTALL = $(PYTHON) -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test check tables paper mechanisms proof bench soak lock clean
+.PHONY: help serve test check tables paper tour mechanisms proof bench soak lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -40,6 +40,10 @@ tables: $(VENV)/.runtime ## solve the shipped tables again
 paper: $(VENV)/.dev ## regenerate docs/paper.md and its figures
 	$(PYTHON) -m docs.paper
 
+tour: $(VENV)/.dev ## regenerate docs/tour.md and its screenshots
+	@scripts/system-packages.sh chromium
+	$(PYTHON) -m docs.tour
+
 mechanisms: $(VENV)/.dev ## regenerate docs/mechanisms.md and its figures
 	$(PYTHON) -m docs.mechanisms
 
@@ -47,7 +51,7 @@ proof: $(VENV)/.dev ## judge the diagnosis on concealed campaigns and real recor
 	$(VENV)/bin/underskin prove
 
 bench: $(VENV)/.dev $(VENV)-tesseract/.installed ## measure speed, as ratios against peers in the same run
-	@scripts/system-packages.sh wrk
+	@scripts/system-packages.sh wrk chromium
 	$(PYTHON) -m bench
 
 lock: $(VENV)/.dev ## resolve pyproject.toml into the lock files

@@ -13,20 +13,20 @@ from typing import Any
 import yaml
 
 FOLDER = Path(__file__).parent.parent / "service" / "pages" / "example"
-CAMPAIGNS: tuple[tuple[str, str, str, float, float, dict[str, Any]], ...] = (
-    ("2024-05", "as built", "2024-05-14T08:30:00Z", 14.2, 130, {}),
-    ("2024-07", "after two months", "2024-07-09T09:10:00Z", 13.8, 130, {}),
-    ("2024-09", "after four months", "2024-09-17T08:45:00Z", 13.5, 130, {}),
-    ("2024-11", "after six months, new tip", "2024-11-12T10:05:00Z", 13.1, 1000,
+CAMPAIGNS: tuple[tuple[int, str, str, str, float, tuple[float, int], dict[str, Any]], ...] = (
+    (1, "2024-05", "as built", "2024-05-14T08:30:00Z", 14.2, (130, 20), {}),
+    (2, "2024-07", "after two months", "2024-07-09T09:10:00Z", 13.8, (130, 20), {}),
+    (3, "2024-09", "after four months", "2024-09-17T08:45:00Z", 13.5, (130, 20), {}),
+    (14, "2024-11", "after six months, new tip", "2024-11-12T10:05:00Z", 13.1, (1000, 60),
      {"contact_resonance": {"tip_mass_g": 6, "damping": 0.05}}),
 )  # fmt: skip
-_DIGITS = 5
+_DIGITS = 4
 
 
 def main() -> None:
     FOLDER.mkdir(exist_ok=True)
-    for seed, (name, state, start, d33, high_hz, effects) in enumerate(CAMPAIGNS, start=1):
-        described = experiment(f"example, {state}", seed, start, d33, high_hz, effects)
+    for seed, name, state, start, d33, lines, effects in CAMPAIGNS:
+        described = experiment(f"example, {state}", seed, start, d33, lines, effects)
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "experiment.yaml"
             file.write_text(yaml.safe_dump(described), encoding="utf-8")
@@ -38,7 +38,9 @@ def main() -> None:
         print(f"{name}.json {len(text)} bytes")
 
 
-def experiment(name: str, seed: int, start: str, d33: float, high_hz: float, effects: dict[str, Any]) -> dict[str, Any]:
+def experiment(
+    name: str, seed: int, start: str, d33: float, lines: tuple[float, int], effects: dict[str, Any]
+) -> dict[str, Any]:
     """What the rig is told."""
     return {
         "schema": "experiment/1",
@@ -60,7 +62,7 @@ def experiment(name: str, seed: int, start: str, d33: float, high_hz: float, eff
             "dynamic_forces_n": [0.09],
             "start": start,
         },
-        "lines": {"low_hz": 1, "high_hz": high_hz, "count": 30},
+        "lines": {"low_hz": 1, "high_hz": lines[0], "count": lines[1]},
         "noise": {"gain": 0.02, "line": 0.01, "averages": 16},
         "effects": effects,
     }

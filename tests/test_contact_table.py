@@ -16,7 +16,10 @@ from tablegen.sweep import sources_hash
 from tests import felupe_contact
 from tests.oracle import NEEDS_ORACLE
 from underskin import TableError, hertz, linear_layer
+from underskin.contact import SphereOnLayer
 from underskin.contact_table import ContactTable, load_contact
+from underskin.hankel import normal_stress
+from underskin.layer import Layer
 from underskin.surrogate import load_table, tables_folder
 
 TABLE = load_contact()
@@ -88,6 +91,18 @@ def test_a_small_contact_is_the_sigma_tables() -> None:
     radius = 0.1 / float(hertz.contact_radius_over_indenter_radius(load))
     prescribed = load_table().sigma(0.1, RHO, load).sigma
     assert TABLE.stress(radius, load, RHO).sigma == pytest.approx(prescribed, rel=5e-3)
+
+
+@pytest.mark.parametrize(("load", "most"), [(0.001, 0.006), (0.01, 0.013), (0.1, 0.03)])
+def test_finite_strain_adds_little_beneath_a_sphere(load: float, most: float) -> None:
+    """Less than under Hertz' pressure as a dead load; what README.md and the findings of /v1/stress say."""
+    rho = np.array([0.05, 0.2, 0.6, 1.2, 3.0])
+    for radius in np.geomspace(0.5, 8, 7):
+        contact = SphereOnLayer(radius, 1.0, 1.0, Layer()).at_force(load * radius**2)
+        pressure = contact.pressure_transform
+        linear = normal_stress(linear_layer.transmission, pressure, contact.contact_radius, rho) / contact.force
+        added = TABLE.stress(radius, load, rho).sigma / linear - 1
+        assert np.abs(added).max() < 1.02 * most
 
 
 def test_reported_errors_and_the_balance_of_forces() -> None:

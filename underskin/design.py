@@ -1,8 +1,8 @@
 """A skin before it is built: how much of a load reaches a sensor, how finely the array tells where it is, and how far
 apart two loads must be to be told from one (Seminara 2018, section 4, as a tool).
 
-A sensor's *response* to a contact at the distance e from its centre is σ(e), the share of the force that it sees. Two
-loads are equal, and of a linear layer: their responses add.
+A sensor's *response* to a contact at the distance e from its centre is σ(e): it bears the share (3/2) ρ² σ(e) of the
+force. Two loads are equal, and their responses add, as on a linear layer.
 """
 
 from dataclasses import dataclass

@@ -16,7 +16,7 @@ from underskin.units import findings as unusual
 
 MOST_PAIRS = 50_000_000  # of a sensor and a point force: about ten seconds
 _WIDEST_CELL = 12.0  # thicknesses; no sensor is influenced from further away
-_LINEAR = 0.01  # of L; there finite strain adds 3 % under a sphere
+_LINEAR = 0.01  # of L; there finite strain adds up to 1.3 % beneath a sphere
 _ROUNDING = 1e-9
 
 
@@ -92,7 +92,7 @@ def findings(request: StressRequest) -> list[Finding]:
         *_worst(
             ((load, i) for load, i in strained if load > _LINEAR),
             "L = F/(R²E) is {:.2g}: the layer is linear here, and finite strain is left out; "
-            "it adds some 3 % at L = 0.01 and 7 % at L = 0.1 to the stress under a sphere",
+            "it adds up to 1.3 % at L = 0.01 and 3 % at L = 0.1 to the stress on a sensor beneath a sphere",
         ),
         *_worst(
             ((ratio, i) for ratio, i in slipping if ratio > 1),

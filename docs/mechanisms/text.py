@@ -19,6 +19,10 @@ The mechanisms that a diagnosis can name, written by `make mechanisms` (`docs/me
 (`underskin/mechanisms/`, one file each). A figure shows what one does to recordings on a soft skin (h 2.5 mm, rT
 1.5 mm, E 2 MPa) with its parameters at the value in the column *shown*.
 
+*Needs* is what a campaign must hold beyond what every recording tells; FRFs also need the skin's thickness_mm,
+youngs_modulus_mpa and sensor_radius_mm. *Shows on* names along what the effect shows: a campaign that varies little
+there can support the mechanism and still not tell it from others, which a diagnosis then says.
+
 ## How they act together
 
 `compose(names, campaign, table)` puts any set of them on the base model: Hertz' radius on a half space, the contact

@@ -4,6 +4,7 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from fastapi import Response
@@ -33,6 +34,16 @@ def drawn(name: str, figure: "go.Figure", about: str, numbers: str | None = None
     """For the template's macro `figure`; `about` says what is to be seen."""
     title, height = figure.layout.title.text, figure.layout.height
     return Drawn(name, title, height, json_inside(figure.to_json()), numbers, about)
+
+
+@cache
+def prepare() -> None:
+    """Load what draws and what it needs, before somebody asks for the first figure: it takes half a second."""
+    import underskin.campaign_figures
+    from underskin.figures import frf_overview
+
+    assert underskin.campaign_figures
+    frf_overview([], None).to_json()
 
 
 def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> Response:

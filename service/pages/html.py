@@ -1,7 +1,6 @@
 """Templates into answers: every page goes through here, and gets its policy here."""
 
 import gzip
-from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from service import session
 from service.keys import Key
 from service.pages import formats
 from service.pages.assets import address, library_style_hash
+from service.pages.requests import scheme
 from underskin import __version__
 
 # Of the empty style element that plotly fills through the object model.
@@ -96,7 +96,6 @@ def compress(request: Request, answer: Response) -> None:
 
 def set_session(request: Request, answer: Any, cookie: str) -> None:
     """Put the session's cookie into an answer; behind TLS it goes back through TLS only."""
-    told: Mapping[str, str] = request.headers
-    secure = told.get("origin", "").startswith("https://")
+    secure = scheme(request) == "https"
     age = session.LASTS_S
     answer.set_cookie(session.COOKIE, cookie, max_age=age, httponly=True, samesite="strict", secure=secure, path="/")

@@ -4,11 +4,10 @@ from typing import Annotated
 from urllib.parse import quote
 
 from fastapi import APIRouter, Query, Request, Response
-from fastapi.responses import RedirectResponse
 
 from service import session
 from service.gate import Gate
-from service.pages.forms import Form
+from service.pages.forms import Form, see
 from service.pages.html import page, set_session
 
 router = APIRouter()
@@ -16,7 +15,10 @@ router = APIRouter()
 
 @router.get("/login")
 def form(request: Request, back: Annotated[str, Query(alias="next")] = "/") -> Response:
-    """Asks for a key."""
+    """Asks for a key, where one is needed."""
+    gate: Gate = request.app.state.gate
+    if not gate.keys_needed():
+        return see("/")
     return page(request, "login.html", back=back, refused=False)
 
 
@@ -28,7 +30,7 @@ def login(request: Request, sent: Form) -> Response:
     back = sent.get("next", "/")
     if key is None:
         return page(request, "login.html", status=401, back=back, refused=True)
-    answer = RedirectResponse(_own(back), 303)
+    answer = see(_own(back))
     set_session(request, answer, session.logged_in(key))
     return answer
 
@@ -36,7 +38,7 @@ def login(request: Request, sent: Form) -> Response:
 @router.post("/logout")
 def logout(request: Request, sent: Form) -> Response:  # noqa: ARG001 -- reading it checks the session
     """Ends it in this browser."""
-    answer = RedirectResponse("/login", 303)
+    answer = see("/login")
     set_session(request, answer, session.anonymous())
     return answer
 

@@ -42,5 +42,10 @@ def _python(request: Request, call: str) -> str:
 
 
 def _origin(request: Request) -> str:
-    """The address by which the browser came: behind TLS the proxy's, as far as the browser says so."""
-    return f"{request.url.scheme}://{request.headers['host']}"
+    """The address by which the browser came."""
+    return f"{scheme(request)}://{request.headers['host']}"
+
+
+def scheme(request: Request) -> str:
+    """http or https, as the browser sees it: a proxy with TLS says so in a header."""
+    return "https" if request.headers.get("x-forwarded-proto") == "https" else request.url.scheme

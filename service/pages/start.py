@@ -3,10 +3,12 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
+from starlette.background import BackgroundTask
 
 from service.campaigns import before as number_of
 from service.dependencies import Store, Table
 from service.pages import requests
+from service.pages.figures import prepare
 from service.pages.html import page
 from service.pages.sparkline import sparkline
 from service.store import overview
@@ -28,7 +30,7 @@ def start(
     with store.reading() as connection:
         found = overview.glances(connection, find or None, number_of(before), _ON_A_PAGE + 1, table.sha256)
     shown = found[:_ON_A_PAGE]
-    return page(
+    answer = page(
         request,
         "start.html",
         glances=[(glance, sparkline(glance.d33)) for glance in shown],
@@ -37,3 +39,5 @@ def start(
         first=before is None,
         same=requests.get(request, "/v1/skins", "list(client.skins.all())"),
     )
+    answer.background = BackgroundTask(prepare)
+    return answer

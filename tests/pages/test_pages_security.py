@@ -28,12 +28,19 @@ def anyone(server: Server) -> Iterator[httpx.Client]:
 
 
 def test_every_page_has_a_policy_that_lets_nothing_in(anyone: httpx.Client) -> None:
-    for path in ("/", "/login", "/nothing"):
+    for path in ("/", "/design", "/nothing"):
         policy = anyone.get(path).headers["content-security-policy"]
         assert policy.startswith("default-src 'none'; script-src 'self';")
         assert "frame-ancestors 'none'" in policy
         assert "http:" not in policy
         assert "unsafe-inline" not in policy.replace("style-src-attr 'unsafe-inline'", "")
+
+
+def test_behind_tls_the_cookie_goes_through_tls_only(anyone: httpx.Client) -> None:
+    plain, secure = anyone.get("/"), anyone.get("/", headers={"X-Forwarded-Proto": "https", "Cookie": "other=1"})
+    assert "; secure" not in plain.headers["set-cookie"].lower()
+    assert "; secure" in secure.headers["set-cookie"].lower()
+    assert "curl -s https://" in secure.text
 
 
 def test_a_form_of_another_session_is_refused(anyone: httpx.Client, server: Server) -> None:

@@ -177,7 +177,8 @@ def response_per_sensor(
             hovertemplate=_HOVER_INTERVAL,
             marker={"color": COLOURS[style], "symbol": MARKERS[(0, 5)[style]], "size": 9},
         )
-    figure.update_xaxes(title="sensor", categoryorder="array", categoryarray=list(map(label, sensors)))
+    # Names may be long.
+    figure.update_xaxes(title="sensor", automargin=True, categoryorder="array", categoryarray=list(map(label, sensors)))
     figure.update_yaxes(title="d33 [pC/N]")
     return styled(figure, "Response of each sensor")
 

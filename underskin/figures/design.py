@@ -58,7 +58,7 @@ def design_overview(design: Design, own: Mark | None) -> go.Figure:
                     row=1, col=column,
                 )  # fmt: skip
         figure.update_xaxes(title=_TITLES[sweep.axis], row=1, col=column)
-    figure.update_yaxes(title="share of the load, σ or γ", rangemode="tozero", row=1, col=1)
+    figure.update_yaxes(title="σ and γ", rangemode="tozero", row=1, col=1)
     return styled(figure, "What reaches a sensor", 380)
 
 

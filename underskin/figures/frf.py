@@ -1,6 +1,6 @@
 """FRFs over frequency: magnitude, phase and coherence, with the flat zone."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,9 @@ from underskin.figures.style import COLOURS, DASHES, ZONE, label, styled
 from underskin.frf_summary import FrfLines, FrfSpread
 from underskin.units import Floats
 
-_ROWS = (("magnitude_pc_per_n", "|FRF| [pC/N]"), ("phase_deg", "phase [°]"), ("coherence", "coherence"))
+Trace = dict[str, Any]
+
+_AXES = ("", "2", "3")  # of the panels
 _HEIGHT = 640
 _BRIGHTEST = 0.85  # of Viridis, that still shows on white
 _LEAST_PHASE = 10.0  # ° to each side, so that noise looks like noise
@@ -22,68 +24,69 @@ _WIDE = 3.0  # largest magnitude over the median, from which on the axis is loga
 def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | None) -> go.Figure:
     """Of each condition the median magnitude and phase and the lowest coherence; as a band, the magnitudes of all its
     recordings."""
-    figure = _panels()
+    traces: list[Trace] = []
     for number, spread in enumerate(spreads):
         colour, dash = _look(spread, spreads)
         name = f"{spread.indenter_radius_mm:.3g} mm, {spread.preload_n:.3g} N ({spread.recordings})"
         low, middle, high = spread.magnitude_pc_per_n
-        figure.add_scatter(
-            x=_short(np.concatenate([spread.frequency_hz, spread.frequency_hz[::-1]])),
-            y=_short(np.concatenate([high, low[::-1]])),
-            fill="toself",
-            fillcolor=_faint(colour),
-            line={"width": 0},
-            hoverinfo="skip",
-            showlegend=False,
-            legendgroup=str(number),
-            row=1,
-            col=1,
-        )
+        band = {
+            "type": "scatter",
+            "x": _short(np.concatenate([spread.frequency_hz, spread.frequency_hz[::-1]])),
+            "y": _short(np.concatenate([high, low[::-1]])),
+            "fill": "toself",
+            "fillcolor": _faint(colour),
+            "line": {"width": 0},
+            "hoverinfo": "skip",
+            "showlegend": False,
+            "legendgroup": str(number),
+        }
         line = {"color": colour, "width": 1.5, "dash": dash}
-        for row, values in enumerate((middle, spread.phase_deg[1], spread.coherence[0]), start=1):
-            if not np.isnan(values).all():
-                _add(figure, row, name, str(number), spread.frequency_hz, values, line)
-    return _finished(figure, zone_hz, "FRF: median and range of the recordings alike")
+        parts = (middle, spread.phase_deg[1], spread.coherence[0])
+        traces += [band, *_lines(name, str(number), spread.frequency_hz, parts, line)]
+    return _finished(traces, zone_hz, "FRF: median and range of the recordings alike")
 
 
 def frf_recordings(recordings: Sequence[FrfLines], zone_hz: tuple[float, float] | None) -> go.Figure:
     """Each recording's lines."""
-    figure = _panels()
+    traces: list[Trace] = []
     for number, entry in enumerate(recordings):
         line = {
             "color": COLOURS[number % len(COLOURS)],
             "width": 1.2,
             "dash": DASHES[number // len(COLOURS) % len(DASHES)],
         }
-        for row, (field, _) in enumerate(_ROWS, start=1):
-            values = getattr(entry, field)
-            if not np.isnan(values).all():
-                _add(figure, row, label(entry.name), str(number), entry.frequency_hz, values, line)
-    return _finished(figure, zone_hz, "FRF of each recording")
+        parts = (entry.magnitude_pc_per_n, entry.phase_deg, entry.coherence)
+        traces += _lines(label(entry.name), str(number), entry.frequency_hz, parts, line)
+    return _finished(traces, zone_hz, "FRF of each recording")
 
 
-def _panels() -> go.Figure:
-    return make_subplots(3, 1, shared_xaxes=True, vertical_spacing=0.04, row_heights=[0.5, 0.27, 0.23])
+def _lines(
+    name: str, group: str, frequency_hz: Floats, parts: Sequence[Floats], line: dict[str, Any]
+) -> Iterator[Trace]:
+    """Magnitude, phase and coherence, each in its panel; without what was not recorded.
+
+    As dictionaries: plotly checks them once, and traces that are added one by one three times.
+    """
+    for axis, values in zip(_AXES, parts, strict=True):
+        if not np.isnan(values).all():
+            yield {
+                "type": "scatter",
+                "x": _short(frequency_hz),
+                "y": _short(values),
+                "xaxis": f"x{axis}",
+                "yaxis": f"y{axis}",
+                "mode": "lines",
+                "name": name,
+                "legendgroup": group,
+                "showlegend": axis == "",
+                "line": line,
+                "hovertemplate": f"{name}<br>%{{x:.4g}} Hz: %{{y:.4g}}<extra></extra>",
+            }
 
 
-def _add(
-    figure: go.Figure, row: int, name: str, group: str, frequency_hz: Floats, values: Floats, line: dict[str, Any]
-) -> None:
-    figure.add_scatter(
-        x=_short(frequency_hz),
-        y=_short(values),
-        mode="lines",
-        name=name,
-        legendgroup=group,
-        showlegend=row == 1,
-        line=line,
-        hovertemplate=f"{name}<br>%{{x:.4g}} Hz: %{{y:.4g}}<extra></extra>",
-        row=row,
-        col=1,
-    )
-
-
-def _finished(figure: go.Figure, zone_hz: tuple[float, float] | None, title: str) -> go.Figure:
+def _finished(traces: Sequence[Trace], zone_hz: tuple[float, float] | None, title: str) -> go.Figure:
+    figure = make_subplots(3, 1, shared_xaxes=True, vertical_spacing=0.04, row_heights=[0.5, 0.27, 0.23])
+    figure.add_traces(traces)
     if zone_hz is not None:
         figure.add_vrect(x0=zone_hz[0], x1=zone_hz[1], fillcolor=ZONE, line_width=0, layer="below")
         figure.add_annotation(
@@ -92,10 +95,10 @@ def _finished(figure: go.Figure, zone_hz: tuple[float, float] | None, title: str
         )  # fmt: skip
     figure.update_xaxes(type="log", dtick=1)
     figure.update_xaxes(title="frequency [Hz]", row=3, col=1)
-    for row, (_, title_of_axis) in enumerate(_ROWS, start=1):
-        figure.update_yaxes(title=title_of_axis, row=row, col=1)
-    _scale_magnitude(figure)
-    phases = np.concatenate([trace.y for trace in figure.data if trace.yaxis == "y2"])
+    for row, words in enumerate(("|FRF| [pC/N]", "phase [°]", "coherence"), start=1):
+        figure.update_yaxes(title=words, row=row, col=1)
+    figure.update_yaxes(**_magnitude_axis(traces), row=1, col=1)
+    phases = _values(traces, "y2")
     low, high = np.nanmin(phases, initial=-_LEAST_PHASE), np.nanmax(phases, initial=_LEAST_PHASE)
     margin = 0.05 * (high - low)
     figure.update_yaxes(range=[low - margin, high + margin], row=2, col=1)
@@ -103,12 +106,17 @@ def _finished(figure: go.Figure, zone_hz: tuple[float, float] | None, title: str
     return styled(figure, title, _HEIGHT)
 
 
-def _scale_magnitude(figure: go.Figure) -> None:
+def _magnitude_axis(traces: Sequence[Trace]) -> dict[str, Any]:
     """Logarithmic where a resonance would leave the rest a line at the foot."""
-    values = np.concatenate([np.abs(trace.y) for trace in figure.data if trace.yaxis == "y"])
+    values = _values(traces, "y")
     values = values[values > 0]
     wide = len(values) > 0 and values.max() > _WIDE * np.median(values)
-    figure.update_yaxes(**{"type": "log", "dtick": 1} if wide else {"rangemode": "tozero"}, row=1, col=1)
+    return {"type": "log", "dtick": 1} if wide else {"rangemode": "tozero"}
+
+
+def _values(traces: Sequence[Trace], axis: str) -> Floats:
+    """All that lies along an axis."""
+    return np.concatenate([np.zeros(0), *(trace["y"] for trace in traces if trace.get("yaxis") == axis)])
 
 
 def _look(spread: FrfSpread, spreads: Sequence[FrfSpread]) -> tuple[str, str]:

@@ -4,9 +4,10 @@ the preload has been held.
 Law: E(t) = E (1 − g (1 − e^(−t/τ))), with t the time held; a³ ∝ 1/E(t), L ∝ 1/E(t).
 
 Assumptions: quasi-elastic: each instant as an elastic layer of modulus E(t), one Prony pair, the declared E is the
-instantaneous one. (Exact creep under a constant force uses J(t), whose time is τ/(1 − g).) A held oscillation is felt
-through the contact radius alone, since transmission through a linear layer under force control has no modulus in it,
-and a contact's stiffness against an oscillation much faster than τ is the instantaneous modulus' at that radius.
+instantaneous one. (Exact creep under a constant force uses J(t), whose time is τ/(1 − g): fitted to FRFs of a solid
+that creeps so, τ comes out 7 % too long at g 0.2, 15 % at 0.4, 24 % at 0.6.) A held oscillation is felt through the
+contact radius alone, since transmission through a linear layer under force control has no modulus in it, and a
+contact's stiffness against an oscillation much faster than τ is the instantaneous modulus' at that radius.
 Curves: an indentation F(t) = ∫₀^{t1} e(t−s) du(s), with u the elastic force, e = E(t)/E, and t1 = t while the contact
 grows; while it shrinks t1 is when it last was as large, ∫_{t1}^{t} e(t−s) dδ(s) = 0 (Ting's theory, exact for one
 growing and one shrinking of the contact, with holds between). With adhesion the edge lets go where it carries the

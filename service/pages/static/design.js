@@ -19,7 +19,9 @@ async function answer() {
   const query = new URLSearchParams(new FormData(form));
   let found;
   try {
-    found = await (await fetch(`/design/answer?${query}`, { signal: asking.signal })).json();
+    const told = await fetch(`/design/answer?${query}`, { signal: asking.signal });
+    found = await told.json();
+    if (!told.ok) found = { error: `${found.detail} Reload the page.` };
   } catch {
     return; // a later question took this one's place
   }

@@ -11,7 +11,8 @@ for (const time of document.querySelectorAll("time[datetime]")) {
   time.textContent = when.toLocaleString(undefined, { ...date, ...clock });
 }
 
-// A choice takes effect at once; what is chosen empty does not stand in the address.
+// A choice with the pointer takes effect at once; who walks through the choices with keys presses the button. What is
+// chosen empty does not stand in the address.
 function submit(form) {
   for (const field of form.elements) {
     if ("emptyLeftOut" in field.dataset && field.value === "") field.disabled = true;
@@ -19,8 +20,14 @@ function submit(form) {
   form.submit();
 }
 for (const choice of document.querySelectorAll("[data-submit]")) {
-  choice.form.classList.add("at-once");
-  choice.addEventListener("change", () => submit(choice.form));
+  let byKeys = false;
+  choice.addEventListener("keydown", () => (byKeys = true));
+  choice.addEventListener("pointerdown", () => (byKeys = false));
+  choice.addEventListener("change", () => byKeys || submit(choice.form));
+  choice.form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    submit(choice.form);
+  });
 }
 
 for (const button of document.querySelectorAll("[data-copy]")) {

@@ -1,0 +1,40 @@
+"""`python -m docs.tour`: write docs/tour.md and its screenshots."""
+
+import tempfile
+from pathlib import Path
+
+from docs.tour.photographer import browsing, serving
+from docs.tour.steps import STEPS, Step
+
+_HEAD = """# Five minutes with the pages
+
+Written, with its pictures, by `python -m docs.tour`, which starts a server with an empty store and walks through it
+with Chromium. Do the same: `make serve`, then open <http://127.0.0.1:8000>; no network beyond that server is needed.
+"""
+
+
+def main(docs: Path = Path(__file__).parents[1]) -> None:
+    """Walk, photograph each step, and write `docs`/tour.md."""
+    folder = docs / "figures"
+    with tempfile.TemporaryDirectory() as data, serving(Path(data)) as address, browsing(address) as page:
+        for number, step in enumerate(STEPS, start=1):
+            step.walk(page)
+            page.screenshot(path=folder / picture(number, step))
+    (docs / "tour.md").write_text(document(), encoding="utf-8")
+
+
+def document() -> str:
+    """docs/tour.md."""
+    return _HEAD + "".join(_section(number, step) for number, step in enumerate(STEPS, start=1))
+
+
+def picture(number: int, step: Step) -> str:
+    return f"tour-{number}-{step.name}.png"
+
+
+def _section(number: int, step: Step) -> str:
+    return f"\n## {number}. {step.title}\n\n{step.text}\n\n![{step.title}](figures/{picture(number, step)})\n"
+
+
+if __name__ == "__main__":
+    main()
