@@ -3,12 +3,12 @@
 from typing import Annotated, Any
 from urllib.parse import quote
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 
 from service import inverting
 from service.dependencies import CampaignId, Store, Table
 from service.pages import requests
-from service.pages.campaign_figures import figures, inversion, measured, preload_columns
+from service.pages.campaign_figures import band_query, figures, inversion, measured, preload_columns
 from service.pages.figures import csv_answer
 from service.pages.forms import WRITE, Form, see
 from service.pages.html import page
@@ -24,19 +24,40 @@ router = APIRouter(prefix="/campaigns/{campaign_id}")
 _MOST_LISTED = 60
 
 
+def _band(
+    band_low_hz: Annotated[str, Query(max_length=40)] = "", band_high_hz: Annotated[str, Query(max_length=40)] = ""
+) -> inverting.Band | None:
+    """The band that the reader chose; None: the flat zone."""
+    if not band_low_hz and not band_high_hz:
+        return None
+    try:
+        low, high = float(band_low_hz), float(band_high_hz)
+    except ValueError:
+        raise InvalidInput("band_low_hz", band_low_hz, "band_low_hz and band_high_hz must both be numbers") from None
+    return low, high
+
+
+Band = Annotated[inverting.Band | None, Depends(_band)]
+
+
 @router.get("")
 def campaign(
-    request: Request, campaign_id: CampaignId, store: Store, table: Table, show: Annotated[str, Query()] = ""
+    request: Request,
+    campaign_id: CampaignId,
+    store: Store,
+    table: Table,
+    band: Band,
+    show: Annotated[str, Query()] = "",
 ) -> Response:
-    """All at a glance; `show` picks the sensor, or the recording, whose lines are drawn."""
+    """All at a glance; `show` picks the sensor, or the recording, whose lines are drawn, `band` what is averaged."""
     with store.reading() as connection:
         row = campaigns.find(connection, campaign_id)
         kept = campaigns.recordings_of(connection, row.number)
         told = diagnoses.listed(connection, diagnoses.Filters(campaign=campaign_id), None, 5)
-    answer = inverting.answer(store, table, row, None)
+    answer = inverting.answer(store, table, row, band)
     sensors = sorted({entry.sensor for entry in kept if entry.sensor is not None})
     show = show if show in {"", *sensors, *(entry.id for entry in kept)} else ""
-    path = f"/v1/campaigns/{quote(row.id, safe='')}"
+    path = f"/v1/campaigns/{quote(row.id, safe='')}/d33" + (f"?{band_query(band)}" if band else "")
     return page(
         request,
         "campaign.html",
@@ -50,7 +71,8 @@ def campaign(
         diagnoses=told,
         figures=figures(store, table, row, answer, show),
         show=show,
-        same=requests.get(request, f"{path}/d33", f"client.campaigns.d33({row.id!r})"),
+        band=band,
+        same=requests.get(request, path, f"client.campaigns.d33({row.id!r}" + (f", {band})" if band else ")")),
     )
 
 
@@ -71,19 +93,19 @@ def frf_csv(campaign_id: CampaignId, store: Store, show: Annotated[str, Query()]
 
 
 @router.get("/preload.csv")
-def preload_csv(campaign_id: CampaignId, store: Store, table: Table) -> Response:
+def preload_csv(campaign_id: CampaignId, store: Store, table: Table, band: Band) -> Response:
     """The FRF in the flat zone of each recording, and the model's."""
     row, whole = _loaded(store, campaign_id)
-    found = inversion(whole, inverting.answer(store, table, row, None), table)
+    found = inversion(whole, inverting.answer(store, table, row, band), table)
     return csv_answer("frf-against-preload", {} if found is None else preload_columns(whole, found))
 
 
 @router.get("/d33.csv")
-def d33_csv(campaign_id: CampaignId, store: Store, table: Table) -> Response:
+def d33_csv(campaign_id: CampaignId, store: Store, table: Table, band: Band) -> Response:
     """d33 of each sensor, and of each sensor, sphere and preload."""
     with store.reading() as connection:
         row = campaigns.find(connection, campaign_id)
-    answer = inverting.answer(store, table, row, None)
+    answer = inverting.answer(store, table, row, band)
     values = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
     names = ("sensor", "indenter_radius_mm", "preload_n", "recordings", *values)
     entries = [*answer["sensors"], *answer["cells"]]

@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 _MOST_SINGLE = 48  # recordings whose lines are drawn one by one
 _MOST_CURVES = 24
 _MOST_KEPT = 64
-_kept: dict[tuple[str, int, str, str], list[Drawn]] = {}  # by campaign, revision, table and what is shown
+_kept: dict[tuple[str, int, str, str, str], list[Drawn]] = {}  # by campaign, revision, table, band, what is shown
 
 
 def figures(store: Database, table: SigmaTable, row: AnyRow, answer: Mapping[str, Any], show: str) -> list[Drawn]:
     """All that can be drawn of a campaign as it is now; `answer`: its d33, as `/d33` has it. `show` as `measured` has
     it."""
-    basis = (row.id, row.revision, table.sha256)
+    basis = (row.id, row.revision, table.sha256, _chosen(answer))
     makers: dict[str, Callable[[Campaign], list[Drawn]]] = {
         f"lines {show}": lambda campaign: [*_curves(row, campaign), *_frf(row, campaign, answer, show)],
         "d33": lambda campaign: _d33(row, campaign, answer, table),
@@ -47,6 +47,17 @@ def figures(store: Database, table: SigmaTable, row: AnyRow, answer: Mapping[str
 def _loaded(store: Database, row: AnyRow) -> Campaign:
     with store.reading() as connection:
         return campaigns.load(connection, row, with_excluded=False)
+
+
+def band_query(band_hz: tuple[float, float]) -> str:
+    """A band in an address."""
+    return f"band_low_hz={band_hz[0]!r}&band_high_hz={band_hz[1]!r}"
+
+
+def _chosen(answer: Mapping[str, Any]) -> str:
+    """The band in an address, where the reader chose it."""
+    band = answer["band"]
+    return band_query((band["low_hz"], band["high_hz"])) if band is not None and band["chosen_by_user"] else ""
 
 
 def measured(campaign: Campaign, show: str = "") -> list[tuple[FrfRecording, "Frf"]]:
@@ -124,16 +135,17 @@ def _d33(row: AnyRow, campaign: Campaign, answer: Mapping[str, Any], table: Sigm
     if found is None:
         return []
     over_array, versus_preload, response = campaign_figures.figures(campaign, found)
-    place = f"/campaigns/{row.id}"
+    place, chosen = f"/campaigns/{row.id}", _chosen(answer)
+    chosen = f"?{chosen}" if chosen else ""
     return [
         drawn(
             "preload",
             versus_preload,
             "FRF in the flat zone against preload, for each sphere; lines are the model with the array's d33.",
-            f"{place}/preload.csv",
+            f"{place}/preload.csv{chosen}",
         ),
-        drawn("response", response, "d33 of each sensor with its 95 % interval.", f"{place}/d33.csv"),
-        drawn("map", over_array, "Each sensor where it lies, coloured by its d33.", f"{place}/d33.csv"),
+        drawn("response", response, "d33 of each sensor with its 95 % interval.", f"{place}/d33.csv{chosen}"),
+        drawn("map", over_array, "Each sensor where it lies, coloured by its d33.", f"{place}/d33.csv{chosen}"),
     ]
 
 

@@ -31,6 +31,7 @@ SLIDERS = (
     ("indenter_radius_mm", "sphere radius R", "mm", 0.5, 50),
     ("preload_n", "force F", "N", 0.05, 50),
     ("youngs_modulus_mpa", "Young's modulus E", "MPa", 0.1, 100),
+    ("d33_pc_per_n", "d33", "pC/N", 1, 100),
     ("pitch_mm", "pitch of the array", "mm", 0.5, 50),
     ("dip_percent", "dip that can be told", "%", 1, 50),
 )
@@ -41,6 +42,7 @@ _PROTOTYPE = {
     "indenter_radius_mm": 4.0,
     "preload_n": 1.0,
     "youngs_modulus_mpa": 16.0,
+    "d33_pc_per_n": 14.0,
     "pitch_mm": 8.0,
     "dip_percent": 10.0,
 }  # Seminara 2018
@@ -144,6 +146,7 @@ def told(found: DesignAnswer) -> list[Told]:
     anywhere = "wherever the array lies" if apart is not None else "not told apart everywhere at this pitch"
     return [
         Told("sigma", "transmission σ", found.sigma, "", 4, point),
+        Told("frf", "FRF", found.frf_pc_per_n, "pC/N", 4, "what an instrument should show above the sensor"),
         Told("gamma", "γ of a point load", found.gamma, "", 4, "above the sensor, linear layer"),
         Told("stress", "mean stress on the sensor", found.mean_stress_mpa, "MPa", 3,
              f"contact radius {found.contact_radius_mm:.3g} mm"),

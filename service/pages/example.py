@@ -10,6 +10,7 @@ from service import inverting
 from service.accepting import Terms, accept
 from service.dependencies import Store, Table
 from service.pages.forms import WRITE, Form, see
+from service.store import skins
 from service.uploads import Upload
 
 router = APIRouter()
@@ -21,6 +22,9 @@ _FOLDER = Path(__file__).parent / "example"
 @router.post("/example", dependencies=WRITE)
 async def load(request: Request, sent: Form, store: Store, table: Table) -> Response:  # noqa: ARG001 -- checked by it
     """Keeps the example's campaigns, once however often it is asked for."""
+    with store.reading() as connection:
+        if skins.is_known(connection, SKIN):
+            return see(f"/skins/{SKIN}")
     uploads = [_upload(file) for file in sorted(_FOLDER.glob("*.json"))]
     key = request.scope["key"]
     sender = None if key is None else key.name

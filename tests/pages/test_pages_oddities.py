@@ -5,9 +5,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import httpx
 import numpy as np
 import pytest
 
+from tests.pages.test_pages_security import token_of
 from tests.store.server import Server, campaign
 
 Document = dict[str, Any]
@@ -121,3 +123,42 @@ def test_designs_that_cannot_be_are_explained(server: Server, query: str, said: 
     assert answer.status_code == 200
     assert said in answer.text
     assert server.http.get(f"/design/answer?{query}").status_code == 200
+
+
+def test_two_ids_become_one_skin(server: Server) -> None:
+    for name in ("left hand", "left-hand"):
+        assert server.http.post("/v1/campaigns", json=campaign(name, id=name)).status_code == 201
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, follow_redirects=True) as lab:
+        form = {"form_token": token_of(lab.get("/skins/left%20hand").text), "other": "left-hand", "reason": "a slip"}
+        joined = lab.post("/skins/left%20hand/join", data=form)
+        assert "left-hand counts as this skin" in joined.text
+        again = lab.post("/skins/left%20hand/join", data=form)
+        assert again.status_code == 409
+        assert lab.post("/skins/left%20hand/join", data=form | {"reason": " "}).status_code == 422
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "loads=1 2",
+        "loads=a b c d",
+        "thickness_mm=x",
+        "columns=0",
+        "columns=1e9",
+        "poisson_ratio=0.7",
+        "loads=0 0 4 1e9",
+    ],
+)
+def test_loads_that_cannot_be_are_explained(server: Server, query: str) -> None:
+    answer = server.http.get(f"/loads?{query}", headers=BROWSING)
+    assert answer.status_code == 200
+    assert 'role="alert"' in answer.text
+    assert server.http.get(f"/loads/charge.csv?{query}").status_code == 422
+
+
+def test_a_band_without_lines_is_refused_by_name(server: Server) -> None:
+    kept = server.http.post("/v1/campaigns", json=campaign("bands")).json()
+    for query in ("band_low_hz=900&band_high_hz=901", "band_low_hz=5", "band_low_hz=x&band_high_hz=y"):
+        answer = server.http.get(f"/campaigns/{kept['id']}?{query}", headers=BROWSING)
+        assert answer.status_code == 422
+        assert "band" in answer.text

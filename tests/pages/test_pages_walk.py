@@ -101,3 +101,30 @@ def test_a_slider_of_the_design_view_answers_at_once(newcomer: Visit) -> None:
     page.wait_for_url("**thickness_mm=2.*")
     page.locator("#pitch_mm").fill("1")
     page.get_by_role("alert").get_by_text("cannot overlap").wait_for()
+
+
+def test_d33_over_a_band_of_one_s_own(newcomer: Visit) -> None:
+    page = newcomer.page
+    page.get_by_role("link", name="example, as built").click()
+    page.get_by_text("Average over another band").click()
+    page.get_by_label("from").fill("5")
+    page.get_by_label("to", exact=True).fill("50")
+    page.get_by_role("button", name="Average").click()
+    page.get_by_text("Averaged over your own band, 5 to 50").wait_for()
+    newcomer.drawn(4)
+    page.get_by_text("The same by request").click()
+    assert "band_low_hz=5.0&band_high_hz=50.0" in page.get_by_label("Shell").inner_text()
+
+
+def test_loads_on_the_skin_s_array(newcomer: Visit) -> None:
+    page = newcomer.page
+    page.get_by_role("main").get_by_role("link", name="Loads").click()
+    page.get_by_label("Loads, one a line").fill("0 0 4 1\n")
+    page.get_by_role("button", name="Compute").click()
+    newcomer.drawn(1)
+    newcomer.require_accessible()
+    cells = page.get_by_role("row", name="s01").locator("td").all_inner_texts()
+    assert float(cells[2]) == pytest.approx(7.5, abs=0.3)  # the prototype's FRF times 1 N
+    page.get_by_label("Loads, one a line").fill("0 0 4")
+    page.get_by_role("button", name="Compute").click()
+    page.get_by_role("alert").get_by_text("must be x y R F").wait_for()

@@ -9,6 +9,7 @@ from underskin.figures.curves import Curve, force_curves
 from underskin.figures.design import Mark, array_response, design_overview
 from underskin.figures.frf import frf_overview, frf_recordings
 from underskin.figures.history import SensorPoints, array_history, d33_history
+from underskin.figures.loads import loaded_array
 
 __all__ = [
     "Curve",
@@ -24,5 +25,6 @@ __all__ = [
     "frf_overview",
     "frf_recordings",
     "frf_versus_preload",
+    "loaded_array",
     "response_per_sensor",
 ]
