@@ -31,6 +31,7 @@ from service.diagnosing import Runner, Terms
 from service.front import Front
 from service.gate import Gate
 from service.handlers import install_handlers
+from service.pages.upload_shelf import Shelf
 from service.settings import Settings
 from service.store import Database
 from service.uploads import UploadFolder
@@ -42,6 +43,7 @@ from underskin.surrogate import SIGMA_TABLE, SigmaTable
 async def _lifespan(api: FastAPI) -> AsyncIterator[None]:
     state = api.state
     state.uploads = UploadFolder(state.settings.data)
+    state.shelf = Shelf(state.uploads.path, state.settings.max_upload_bytes)
     state.runner.start()
     yield
     await run_in_threadpool(state.runner.stop)

@@ -26,7 +26,7 @@ router = APIRouter(prefix="/v1", tags=["campaigns"])
 
 WRITE = [Security(authorised, scopes=["write"])]
 # Reading a campaign takes memory many times its size: few at a time, the others wait.
-_heavy = asyncio.Semaphore(2)
+heavy = asyncio.Semaphore(2)
 
 _FILE: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
 _EXAMPLE: dict[str, Any] = {
@@ -125,7 +125,7 @@ async def post(
     key = request.scope["key"]
     sender = None if key is None else key.name
     terms = Terms(skin, corrects, reason, all_or_nothing, together, idempotency_key, sender, settings.max_body_bytes)
-    async with received(request, request.app.state.uploads) as uploads, _heavy:
+    async with received(request, request.app.state.uploads) as uploads, heavy:
         answer, repeats = await run_in_threadpool(accept, store, uploads, terms)
         await run_in_threadpool(inverting.derive, store, table, _ids(answer))
     headers = {"Idempotency-Replayed": "true"} if repeats else {}

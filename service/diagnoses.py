@@ -38,7 +38,7 @@ def ask(campaign_id: CampaignId, request: Request, once: IdempotentOnce, store: 
             diagnoses.ask(connection, campaign_id, table.sha256, __version__, once.sender), from_attributes=True
         ).model_dump(),
     )
-    _runner(request).stir()
+    runner_of(request).stir()
     return JSONResponse(answer, status_code=202)
 
 
@@ -76,10 +76,11 @@ def cancel(diagnosis_id: DiagnosisId, request: Request, store: Store) -> models.
     with store.writing() as connection:
         diagnoses.cancel(connection, diagnosis_id)
         row = diagnoses.find(connection, diagnosis_id)
-    _runner(request).stir()
+    runner_of(request).stir()
     return models.DiagnosisEntry(**models.entry(row))
 
 
-def _runner(request: Request) -> Runner:
+def runner_of(request: Request) -> Runner:
+    """What runs them in this server."""
     runner: Runner = request.app.state.runner
     return runner

@@ -10,7 +10,7 @@ from service.problems import Refusal, is_browsing
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 OPEN = frozenset({"/health", "/ready"})
 _OPEN_PAGES = ("/login", "/static/")
-_UPLOADS = frozenset({"/v1/campaigns", "/v1/skins/import"})
+_UPLOADS = frozenset({"/v1/campaigns", "/v1/skins/import", "/upload"})
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
 

@@ -31,14 +31,19 @@ def adopt(skin_id: SkinId, adoption: answers.Adoption, once: IdempotentOnce, sto
     it on request from now on. Adopted already, it is answered as it is."""
 
     def act(connection: Connection) -> dict[str, object]:
-        root = skins.require_root(connection, skin_id)
-        diagnosis = diagnoses.find(connection, adoption.diagnosis_id)
-        if diagnosis.state != "done":
-            raise Conflict(f"Diagnosis {diagnosis.id!r} has no report: its state is {diagnosis.state}.")
-        of_row(connection, diagnosis)  # which refuses what cannot serve
-        return _entry(connection, models.adopt(connection, root, diagnosis, once.sender)).model_dump()
+        return _entry(connection, adopted(connection, skin_id, adoption.diagnosis_id, once.sender)).model_dump()
 
     return JSONResponse(once.answer(store, adoption.diagnosis_id, act), status_code=201)
+
+
+def adopted(connection: Connection, skin_id: str, diagnosis_id: str, sender: str | None) -> AnyRow:
+    """The model that a diagnosis has become; raises Conflict, Missing, and InvalidInput where it cannot serve."""
+    root = skins.require_root(connection, skin_id)
+    diagnosis = diagnoses.find(connection, diagnosis_id)
+    if diagnosis.state != "done":
+        raise Conflict(f"Diagnosis {diagnosis.id!r} has no report: its state is {diagnosis.state}.")
+    of_row(connection, diagnosis)  # which refuses what cannot serve
+    return models.adopt(connection, root, diagnosis, sender)
 
 
 @router.get("/skins/{skin_id}/model", operation_id="skin_model", summary="The model in force")

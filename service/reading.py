@@ -13,7 +13,8 @@ from underskin import InvalidInput
 from underskin.errors import FileError
 from underskin.recordings import formats, join
 from underskin.recordings.campaign import Campaign, from_dict
-from underskin.recordings.reading import Reading, read_file
+from underskin.recordings.channels import Contents
+from underskin.recordings.reading import Reading, read_contents, understood
 from underskin.recordings.rig_description import RigDescription
 
 _BOM = b"\xef\xbb\xbf"
@@ -59,19 +60,37 @@ class Arrived:
 
 def read(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> list[Found]:
     """The campaigns of a file, by its content: JSON may hold one or a list of them."""
+    return look(upload, rig, most_json_bytes).found
+
+
+@dataclass(frozen=True)
+class Look:
+    """A file before anything of it is kept: its format, its channels where it holds such, its campaigns."""
+
+    kind: str
+    contents: Contents | None
+    found: list[Found]
+
+
+def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> Look:
+    """As `read`, with what it was read from."""
     label = upload.label or _UNNAMED
+    kind, contents = "", None
     try:
         with upload.path.open("rb") as stream:
-            if formats.detect(stream, label) == "JSON":
-                return _read_json(upload, most_json_bytes)
-        found = read_file(upload.path, label, rig)
+            kind = formats.detect(stream, label)
+        if kind == "JSON":
+            return Look(kind, None, _read_json(upload, most_json_bytes))
+        held = read_contents(upload.path, label)
+        contents = held if isinstance(held, Contents) else None
+        found = understood(held, label, rig)
         _require_usable(found.campaign)
     except FileError as error:
         allowed = ": ".join(part for part in (error.place, error.reason) if part)
-        return [Found(upload.label, errors=[_error("file", upload.label, allowed)])]
+        return Look(kind, contents, [Found(upload.label, errors=[_error("file", upload.label, allowed)])])
     except InvalidInput as error:
-        return [Found(upload.label, errors=[_invalid(error)])]
-    return [Found(upload.label, found, by_rig=rig is not None)]
+        return Look(kind, contents, [Found(upload.label, errors=[_invalid(error)])])
+    return Look(kind, contents, [Found(upload.label, found, by_rig=rig is not None)])
 
 
 def arrived_as(found: Found) -> Arrived:

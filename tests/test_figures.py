@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from underskin.errors import InvalidInput
-from underskin.figures import array_map, frf_versus_preload, response_per_sensor
+from underskin.figures import Trace, array_map, frf_versus_preload, raw_traces, response_per_sensor
 
 SENSORS = ("s1", "s2", "s3")
 D33 = np.array([14.0, 15.0, 3.0])
@@ -48,3 +48,16 @@ def test_the_response_of_each_sensor_has_its_interval_and_the_arrays() -> None:
 def test_a_column_of_another_length_is_refused_by_name() -> None:
     with pytest.raises(InvalidInput, match="high_pc_per_n"):
         response_per_sensor(SENSORS, D33, D33, D33[:2], (1.0, 2.0), REASONS)
+
+
+def test_a_raw_trace_of_many_samples_keeps_its_extremes() -> None:
+    values = np.sin(np.arange(100_000) / 50)
+    values[[4_321, 77_777]] = 9.0, -8.0
+    figure = raw_traces([Trace("Load cell", "V", values), Trace("<b>", "", np.arange(5.0))], 1000.0)
+    long, short = figure.data
+    assert len(long.x) < 2_000
+    assert dict(zip(long.x.tolist(), long.y.tolist(), strict=True))[4.321] == 9.0
+    assert (long.y.max(), long.y.min()) == (9.0, -8.0)
+    assert short.y.tolist() == [0, 1, 2, 3, 4]
+    assert short.name == "&lt;b&gt;"
+    assert "[V]" in figure.layout.yaxis.title.text

@@ -26,6 +26,7 @@ class Worker:
     def __init__(self, job: Job, campaign: bytes, stderr: BinaryIO) -> None:
         self.progress = 0.0
         self.report: dict[str, Any] | None = None
+        self.figures: dict[str, str] | None = None
         self.error: str | None = None
         self.news = threading.Event()
         self.ended = False
@@ -87,7 +88,9 @@ class Worker:
                 except orjson.JSONDecodeError:  # killed in the midst of a line
                     break
                 self.progress = message.get("progress", self.progress)
-                self.report, self.error = message.get("report"), message.get("error")
+                self.report = message.get("report", self.report)
+                self.figures = message.get("figures", self.figures)
+                self.error = message.get("error", self.error)
         self._process.wait()
         self.ended = True
         self.news.set()

@@ -117,7 +117,7 @@ class Runner:
             if not worker.ended:
                 self._release(row)
             elif worker.report is not None:
-                self._end(row, worker.report, "")
+                self._end(row, worker.report, "", worker.figures)
             else:
                 logger.error("a diagnosis failed", extra={"fields": {"diagnosis": row.id, "said": worker.last_words}})
                 self._end(row, None, worker.failure)
@@ -131,13 +131,15 @@ class Runner:
             logger.warning("a diagnosis could not be kept alive: %s", error)
             return True
 
-    def _end(self, row: AnyRow, report: dict[str, Any] | None, reason: str) -> None:
+    def _end(
+        self, row: AnyRow, report: dict[str, Any] | None, reason: str, figures: dict[str, str] | None = None
+    ) -> None:
         """Keep what came of it; again and again where the store fails, since it was long work."""
         while True:
             try:
                 with self._store.writing() as connection:
                     if report is not None:
-                        diagnoses.finish(connection, row.number, self._server, report)
+                        diagnoses.finish(connection, row.number, self._server, report, figures)
                     else:
                         diagnoses.fail(connection, row.number, self._server, reason)
                 return

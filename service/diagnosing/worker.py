@@ -1,7 +1,8 @@
 """The worker process: one campaign in, its report out, at the lowest priority and within a limit on memory.
 
 Standard input: a line of JSON (`Job`), then the campaign (`campaign/1`), then nothing until the runner ends: a worker
-whose runner is gone ends too. Standard output: a line of JSON for each progress, and a last one with report or error.
+whose runner is gone ends too. Standard output: a line of JSON for each progress, then one with the report and one with
+its figures, or one with the error.
 """
 
 import os
@@ -49,16 +50,18 @@ def main() -> None:
     from underskin.errors import UnderskinError
 
     try:
-        say({"report": _report(job, campaign, lambda share: say({"progress": share}))})
+        _work(job, campaign, say)
     except UnderskinError as error:
         say({"error": str(error)})
     except MemoryError:
         say({"error": f"it takes more than {job.memory_bytes / 1e6:g} MB of memory (UNDERSKIN_DIAGNOSIS_MEMORY_MB)"})
 
 
-def _report(job: Job, campaign: bytes, progress: Callable[[float], None]) -> dict[str, Any]:
-    """The report, with what was left out of it among the findings."""
-    from underskin.diagnosis.diagnose import diagnosis_report
+def _work(job: Job, campaign: bytes, say: Callable[[dict[str, Any]], None]) -> None:
+    """The report, with what was left out of it among the findings; then the figures, without which it is kept too."""
+    from underskin.diagnosis.diagnose import diagnose
+    from underskin.diagnosis.figures import figures
+    from underskin.diagnosis.report import report
     from underskin.errors import TableError
     from underskin.recordings.campaign import parse
     from underskin.surrogate import load_table
@@ -67,12 +70,14 @@ def _report(job: Job, campaign: bytes, progress: Callable[[float], None]) -> dic
     if table.sha256 != job.table_sha256:
         raise TableError(f"{job.table} changed since the server started: restart it")
     _limit(job.memory_bytes)
-    report = diagnosis_report(parse(orjson.loads(campaign)), table, progress=progress)
+    found = diagnose(parse(orjson.loads(campaign)), table, lambda share: say({"progress": share}))
+    document = report(found)
     left_out = [
         {"code": "excluded", "recording": name, "field": "", "statement": f"Left out: {reason}"}
         for name, reason in job.excluded
     ]
-    return {**report, "findings": left_out + list(report["findings"])}
+    say({"report": {**document, "findings": left_out + list(document["findings"])}})
+    say({"figures": {name: figure.to_json() for name, figure in figures(found, document).items()}})
 
 
 def _limit(memory_bytes: int) -> None:

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from service import inverting
 from service.dependencies import CampaignId, Store, Table
 from service.pages import requests
-from service.pages.campaign_figures import band_query, figures, inversion, measured, preload_columns
+from service.pages.campaign_figures import band_query, figures, frf_columns, inversion, preload_columns
 from service.pages.figures import csv_answer
 from service.pages.forms import WRITE, Form, see
 from service.pages.html import page
@@ -17,7 +17,6 @@ from service.store.engine import Database
 from service.store.tables import AnyRow
 from underskin import InvalidInput
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
-from underskin.units import to_lab
 
 router = APIRouter(prefix="/campaigns/{campaign_id}")
 
@@ -79,17 +78,7 @@ def campaign(
 @router.get("/frf.csv")
 def frf_csv(campaign_id: CampaignId, store: Store, show: Annotated[str, Query()] = "") -> Response:
     """Every line of the recordings, or of those of `show`, as they came or were estimated."""
-    names = ("recording", "sensor", "frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n", "coherence")
-    columns: dict[str, list[Any]] = {name: [] for name in names}
-    for recording, frf in measured(_loaded(store, campaign_id)[1], show):
-        count = len(frf.values)
-        columns["recording"] += [recording.id] * count
-        columns["sensor"] += [recording.sensor] * count
-        columns["frequency_hz"] += frf.frequency.tolist()
-        columns["frf_re_pc_per_n"] += to_lab("frf_pc_per_n", frf.values.real).tolist()
-        columns["frf_im_pc_per_n"] += to_lab("frf_pc_per_n", frf.values.imag).tolist()
-        columns["coherence"] += [None] * count if frf.coherence is None else frf.coherence.tolist()
-    return csv_answer("frf", columns)
+    return csv_answer("frf", frf_columns(_loaded(store, campaign_id)[1], show))
 
 
 @router.get("/preload.csv")

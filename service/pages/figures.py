@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+import orjson
 from fastapi import Response
 from markupsafe import Markup
 
@@ -44,6 +45,12 @@ def prepare() -> None:
 
     assert underskin.campaign_figures
     frf_overview([], None).to_json()
+
+
+def drawn_before(name: str, text: str, about: str, numbers: str | None = None) -> Drawn:
+    """The same of a figure's JSON."""
+    layout = orjson.loads(text)["layout"]
+    return Drawn(name, layout["title"]["text"], layout["height"], json_inside(text), numbers, about)
 
 
 def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> Response:

@@ -13,6 +13,7 @@ from service.problems import Refusal
 TOKEN = "form_token"  # noqa: S105 -- the name of the field
 WRITE = [Security(authorised, scopes=["write"])]
 _LARGEST_BYTES = 100_000
+_MOST_FIELDS = 500  # a file of many channels has a row of fields for each
 
 
 async def _fields(request: Request) -> dict[str, str]:
@@ -21,7 +22,7 @@ async def _fields(request: Request) -> dict[str, str]:
     if len(body) > _LARGEST_BYTES:
         raise Refusal(413, "The form is too long.")
     try:
-        values = parse_qs(body.decode("utf-8", "replace"), keep_blank_values=True, max_num_fields=100)
+        values = parse_qs(body.decode("utf-8", "replace"), keep_blank_values=True, max_num_fields=_MOST_FIELDS)
     except ValueError:
         raise Refusal(400, "The form has too many fields.") from None
     found = {name: entries[0] for name, entries in values.items()}

@@ -30,6 +30,11 @@ def post(request: Request, path: str, document: Mapping[str, Any], call: str) ->
     )
 
 
+def files(request: Request, path: str, call: str) -> SameRequest:
+    """POST files as a form, with a rig description."""
+    return SameRequest(f"{_curl(request, path)} \\\n  -F file=@monday.tdms -F rig=@rig.yaml", _python(request, call))
+
+
 def _curl(request: Request, path: str) -> str:
     key = ' -H "Authorization: Bearer $UNDERSKIN_API_KEY"' if request.scope["key"] is not None else ""
     return f"curl -s {shlex.quote(_origin(request) + path)}{key}"

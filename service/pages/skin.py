@@ -15,7 +15,7 @@ from service.pages import requests
 from service.pages.figures import Drawn, csv_answer, drawn
 from service.pages.html import page
 from service.skin_models import History, SensorHistory
-from service.store import campaigns, inversions, models, overview, skins
+from service.store import campaigns, diagnoses, inversions, models, overview, skins
 from service.store.engine import Database
 from service.store.tables import AnyRow
 from underskin.surrogate import SigmaTable
@@ -27,6 +27,7 @@ _MOST_POINTS = 600  # of a history that shows each sensor
 _AT_ONCE = 2  # campaigns whose d33 a page waits for
 
 Shown = Literal["d33", "uncertainty", "trend"]
+By = Literal["paper", "adopted"]
 
 
 @router.get("")
@@ -38,8 +39,9 @@ def skin(
     show: Annotated[Shown, Query()] = "d33",
     sensor: Annotated[str | None, Query()] = None,
     before: Annotated[str | None, Query()] = None,
+    by: Annotated[By, Query(alias="model")] = "paper",
 ) -> Response:
-    """All at a glance; `sensor` picks the one whose history is drawn."""
+    """All at a glance; `sensor` picks the one whose history is drawn, `by` the model that it rests on."""
     root, waiting = _completed(store, table, skin_id)
     with store.reading() as connection:
         filters = campaigns.Filters(skin=root, state=None)
@@ -48,8 +50,10 @@ def skin(
         numbers = [row.number for row in rows]
         medians = overview.medians(connection, numbers, table.sha256)
         diagnosed = overview.latest_diagnoses(connection, numbers)
-        history = histories.history(connection, root, table.sha256)
         model = models.in_force(connection, root)
+        outdated = None if model is None else diagnoses.outdated(model)
+    by = by if model is not None and outdated is None else "paper"
+    history = _told(store, table, root, by)
     last = latest[0] if latest else None
     sensor = sensor if sensor in {entry.sensor for entry in history.sensors} else None
     answer = None if last is None else inverting.answer(store, table, last, None)
@@ -57,7 +61,7 @@ def skin(
     if last is not None and answer is not None and answer["sensors"]:
         figures.append(_map(root, last, answer, history, show))
     if history.sensors:
-        figures.append(_history(root, history, sensor))
+        figures.append(_history(root, history, sensor, by))
     path = f"/v1/skins/{quote(root, safe='')}"
     made = page(
         request,
@@ -72,11 +76,17 @@ def skin(
         following=rows[_ON_A_PAGE - 1].number if len(rows) > _ON_A_PAGE else None,
         history=history,
         model=model,
+        outdated=outdated,
+        by=by,
         figures=figures,
         show=show,
         sensor=sensor,
         waiting=waiting,
-        same=requests.get(request, f"{path}/history", f"client.skins.history({root!r})"),
+        same=requests.get(
+            request,
+            f"{path}/history" + ("?model=adopted" if by == "adopted" else ""),
+            f"client.skins.history({root!r}" + (", model='adopted')" if by == "adopted" else ")"),
+        ),
     )
     if waiting:
         made.background = BackgroundTask(inverting.complete, store, table, root)
@@ -106,11 +116,12 @@ _MAP_COLUMNS = (
 
 
 @router.get("/history.csv")
-def history_csv(skin_id: SkinId, store: Store, table: Table) -> Response:
-    """d33 of every sensor in every current campaign."""
+def history_csv(
+    skin_id: SkinId, store: Store, table: Table, by: Annotated[By, Query(alias="model")] = "paper"
+) -> Response:
+    """d33 of every sensor in every current campaign, and the model that each value rests on."""
     root, _ = _completed(store, table, skin_id)
-    with store.reading() as connection:
-        history = histories.history(connection, root, table.sha256)
+    history = _told(store, table, root, by)
     points = [(entry.sensor, point) for entry in history.sensors for point in entry.points]
     return csv_answer(
         "history",
@@ -121,6 +132,8 @@ def history_csv(skin_id: SkinId, store: Store, table: Table) -> Response:
             "time_is": [point.time_is for _, point in points],
             "d33_pc_per_n": [point.d33_pc_per_n for _, point in points],
             "d33_uncertainty_pc_per_n": [point.d33_uncertainty_pc_per_n for _, point in points],
+            "model": [point.model for _, point in points],
+            "model_id": [point.model_id or "" for _, point in points],
         },
     )
 
@@ -134,6 +147,13 @@ def _completed(store: Database, table: SigmaTable, skin_id: str) -> tuple[str, i
         inverting.complete(store, table, root)
         return root, 0
     return root, missing
+
+
+def _told(store: Database, table: SigmaTable, root: str, by: By) -> History:
+    if by == "adopted":
+        return histories.adopted_history(store, table, root)
+    with store.reading() as connection:
+        return histories.history(connection, root, table.sha256)
 
 
 def _map(root: str, row: AnyRow, answer: Mapping[str, Any], history: History, show: Shown) -> Drawn:
@@ -165,10 +185,11 @@ def _map(root: str, row: AnyRow, answer: Mapping[str, Any], history: History, sh
     return drawn("map", figure, about, f"/skins/{quote(root, safe='')}/map.csv")
 
 
-def _history(root: str, history: History, sensor: str | None) -> Drawn:
+def _history(root: str, history: History, sensor: str | None, by: By) -> Drawn:
     from underskin.figures import SensorPoints, array_history, d33_history
 
-    numbers = f"/skins/{quote(root, safe='')}/history.csv"
+    numbers = f"/skins/{quote(root, safe='')}/history.csv?model={by}"
+    rests = "by the adopted model" if by == "adopted" else "by the paper's model"
     chosen = [entry for entry in history.sensors if sensor in (None, entry.sensor)]
     if sum(len(entry.points) for entry in chosen) > _MOST_POINTS and sensor is None:
         by_time: dict[str, list[float]] = {}
@@ -177,7 +198,7 @@ def _history(root: str, history: History, sensor: str | None) -> Drawn:
                 by_time.setdefault(point.time, []).append(point.d33_pc_per_n)
         times = sorted(by_time)
         levels = [[pick(by_time[time]) for time in times] for pick in (min, median, max)]
-        about = "Median d33 over the sensors in each campaign, and the range from the lowest to the highest sensor."
+        about = f"Median d33 over the sensors in each campaign, {rests}, and the range from the lowest to the highest."
         return drawn("history", array_history(times, *levels), about, numbers)
     points = [
         SensorPoints(
@@ -189,7 +210,8 @@ def _history(root: str, history: History, sensor: str | None) -> Drawn:
         )
         for entry in chosen
     ]
-    return drawn("history", d33_history(points), "d33 of each sensor in every campaign, ± its uncertainty.", numbers)
+    about = f"d33 of each sensor in every campaign, {rests}, ± its uncertainty."
+    return drawn("history", d33_history(points), about, numbers)
 
 
 def trend_in_words(entry: SensorHistory) -> str:

@@ -26,9 +26,9 @@ SILENT_S = 10.0
 _ENDED = ("done", "failed", "cancelled")
 _USABLE = ("queued", "running", "done")
 
-# All but the report, and what is said of its campaign.
+# All but the report and its figures, and what is said of its campaign.
 _LISTED = (
-    *[column for column in diagnoses.c if column.name != "report"],
+    *[column for column in diagnoses.c if column.name not in ("report", "figures")],
     campaigns.c.id.label("campaign_id"),
     campaigns.c.skin_id,
     campaigns.c.withdrawn_at,
@@ -94,6 +94,12 @@ def report_of(connection: Connection, number: int) -> dict[str, Any] | None:
     return None if blob is None else dict(decompressed(blob))
 
 
+def figures_of(connection: Connection, number: int) -> dict[str, str]:
+    """JSON of the figures that were made with its report, by name; none where they were not kept."""
+    blob = connection.execute(select(diagnoses.c.figures).where(diagnoses.c.number == number)).scalar()
+    return {} if blob is None else dict(decompressed(blob))
+
+
 def listed(connection: Connection, filters: Filters, before: int | None, limit: int) -> Sequence[AnyRow]:
     """Rows of diagnoses, the latest first, those asked for before the number `before`."""
     query = rows()
@@ -150,10 +156,13 @@ def keep_alive(connection: Connection, number: int, server: str, progress: float
     return _mine(connection, number, server, progress=progress, alive_at=_clock(connection))
 
 
-def finish(connection: Connection, number: int, server: str, report: dict[str, Any]) -> bool:
-    """Keep the report; False where it is no longer this server's."""
+def finish(
+    connection: Connection, number: int, server: str, report: dict[str, Any], figures: dict[str, str] | None = None
+) -> bool:
+    """Keep the report, and JSON of its figures; False where it is no longer this server's."""
     told = {"verdict": report["verdict"], "probability": report["probability"], "report": compressed(report)}
-    return _end(connection, number, server, state="done", progress=1.0, **told)
+    drawn = None if figures is None else compressed(figures)
+    return _end(connection, number, server, state="done", progress=1.0, figures=drawn, **told)
 
 
 def fail(connection: Connection, number: int, server: str, reason: str) -> bool:

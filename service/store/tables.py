@@ -136,7 +136,8 @@ diagnoses = Table(
     Column("alive_at", Float),  # when that server last said so [s, by the database's clock]
     Column("verdict", String),
     Column("probability", Float),
-    Column("report", LargeBinary),  # report/1, compressed JSON; last, so that lists never read it
+    Column("report", LargeBinary),  # report/1, compressed JSON; it and the next last, so that lists never read them
+    Column("figures", LargeBinary),  # plotly's JSON of each figure by name, compressed; none where made elsewhere
     Index("diagnoses_of_campaign", "campaign", "number"),
     Index("diagnoses_by_state", "state", "number"),
 )

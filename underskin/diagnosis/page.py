@@ -38,17 +38,31 @@ dt { font-weight: 600; margin-top: .6rem; } dd { margin: 0; overflow-wrap: anywh
 """
 
 Report = Mapping[str, Any]
-Figures = Mapping[str, go.Figure]
+Drawn = Mapping[str, str]  # HTML of each figure, by its name
 
 
-def page(report: Report, figures: Figures | None = None) -> str:
+def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
     """The whole page; `figures` as `underskin.diagnosis.figures` makes them: a report alone has but one."""
-    drawn: Figures = figures if figures is not None else _of_report(report)
-    first, _, rest = report["statement"].partition(". ")
+    given = figures if figures is not None else of_report(report)
+    drawn = {name: _plot(figure, name) for name, figure in given.items()}
     title = escape(f"Diagnosis of {report['campaign']}")
+    body = [f"<h1>{title}</h1>", body_of(report, drawn)]
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{title}</title>\n<style>{_STYLE}</style>\n"
+        f"{f'<script>{get_plotlyjs()}</script>' if drawn else ''}\n</head>\n<body>\n"
+        + "\n".join(body)
+        + "\n</body>\n</html>\n"
+    )
+
+
+def body_of(report: Report, drawn: Drawn) -> str:
+    """All below the title, as HTML: the answer in one sentence, where, what, how much better, what to measure next."""
+    first, _, rest = report["statement"].partition(". ")
     verdict = f"{_VERDICTS[report['verdict']]} · probability {_percent(report['probability'])}"
-    body = [
-        f"<h1>{title}</h1>",
+    parts = [
         f'<p class="first">{escape(first.rstrip("."))}.</p>',
         f'<p><span class="verdict">{escape(verdict)}</span></p>',
         _paragraph("" if report["verdict"] == "explained" else rest),  # the laws, which stand under What
@@ -59,22 +73,15 @@ def page(report: Report, figures: Figures | None = None) -> str:
         _section("What to measure next", _next(report)),
         _section("Made with", _provenance(report)),
     ]
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{title}</title>\n<style>{_STYLE}</style>\n"
-        f"{f'<script>{get_plotlyjs()}</script>' if drawn else ''}\n</head>\n<body>\n"
-        + "\n".join(part for part in body if part)
-        + "\n</body>\n</html>\n"
-    )
+    return "\n".join(part for part in parts if part)
 
 
-def _of_report(report: Report) -> Figures:
+def of_report(report: Report) -> dict[str, go.Figure]:
+    """The figures that a report alone can give."""
     return {} if report["fit"] is None else {"explanations": explanations(report)}
 
 
-def _where(report: Report, drawn: Figures) -> str:
+def _where(report: Report, drawn: Drawn) -> str:
     location = report["location"]
     rows = [
         (
@@ -90,7 +97,7 @@ def _where(report: Report, drawn: Figures) -> str:
     return _paragraph(location["statement"]) + _figure(drawn, "where") + table
 
 
-def _what(report: Report, drawn: Figures) -> str:
+def _what(report: Report, drawn: Drawn) -> str:
     parts = [_figure(drawn, "explanations")]
     for entry in report["mechanisms"]:
         name = entry["name"]
@@ -134,7 +141,7 @@ def _what(report: Report, drawn: Figures) -> str:
     return "".join(parts)
 
 
-def _better(report: Report, drawn: Figures) -> str:
+def _better(report: Report, drawn: Drawn) -> str:
     fit = report["fit"]
     if fit is None:
         return ""
@@ -195,11 +202,13 @@ def _provenance(report: Report) -> str:
     return f"<dl>{''.join(rows)}</dl>"
 
 
-def _figure(drawn: Figures, name: str) -> str:
-    if name not in drawn:
-        return ""
+def _figure(drawn: Drawn, name: str) -> str:
+    return drawn.get(name, "")
+
+
+def _plot(figure: go.Figure, name: str) -> str:
     text: str = plotly.io.to_html(
-        drawn[name],
+        figure,
         full_html=False,
         include_plotlyjs=False,
         div_id=f"figure-{name}",
@@ -221,9 +230,9 @@ def _note(text: str) -> str:
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    head = "".join(f"<th>{escape(text)}</th>" for text in heads)
+    head = "".join(f'<th scope="col">{escape(text)}</th>' for text in heads)
     body = "".join(f"<tr>{''.join(f'<td>{escape(str(text))}</td>' for text in row)}</tr>" for row in rows)
-    return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    return f'<div class="wide" tabindex="0"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
 def _words(name: str) -> str:

@@ -10,12 +10,14 @@ from underskin.figures.design import Mark, array_response, design_overview
 from underskin.figures.frf import frf_overview, frf_recordings
 from underskin.figures.history import SensorPoints, array_history, d33_history
 from underskin.figures.loads import loaded_array
+from underskin.figures.traces import Trace, raw_traces
 
 __all__ = [
     "Curve",
     "Mark",
     "Quantity",
     "SensorPoints",
+    "Trace",
     "array_history",
     "array_map",
     "array_response",
@@ -26,5 +28,6 @@ __all__ = [
     "frf_recordings",
     "frf_versus_preload",
     "loaded_array",
+    "raw_traces",
     "response_per_sensor",
 ]

@@ -33,7 +33,11 @@ def read_file(source: Path | str | bytes, name: str, rig: RigDescription | None 
     The format is told by the content. Files that hold channels, not campaigns, need a rig description. Raises FileError
     that names the file and the place, InvalidInput where the campaign itself or its skin cannot be used.
     """
-    contents = read_contents(source, name)
+    return understood(read_contents(source, name), name, rig)
+
+
+def understood(contents: Contents | dict[str, Any], name: str, rig: RigDescription | None = None) -> Reading:
+    """The campaign in what `read_contents` has read; raises as `read_file`."""
     if not isinstance(contents, Contents):
         return Reading(*from_dict(contents), [])
     if rig is None:

@@ -1,0 +1,76 @@
+"""The numbers of a diagnosis' figures, as columns."""
+
+import base64
+from collections.abc import Callable, Mapping, Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+import orjson
+
+Columns = dict[str, list[Any]]
+
+
+def columns(name: str, report: Mapping[str, Any], figures: Mapping[str, str]) -> Columns:
+    """Of the figure `name`; raises KeyError where it has none."""
+    return _OF_REPORT[name](report) if name in _OF_REPORT else _OF_FIGURE[name](orjson.loads(figures[name]))
+
+
+def _explanations(report: Mapping[str, Any]) -> Columns:
+    stated = {"no_mismatch": ["nothing_missing"], "unexplained": ["none_of_these"]}
+    leader = stated.get(report["verdict"]) or [entry["name"] for entry in report["mechanisms"]]
+    rows = [(leader, report["probability"], "")]
+    rows += [(entry["mechanisms"], entry["probability"], entry["why_not"]) for entry in report["alternatives"]]
+    return _by_name(("explanation", "probability", "why_not"), [(" + ".join(names), *more) for names, *more in rows])
+
+
+def _parameters(report: Mapping[str, Any]) -> Columns:
+    names = ("mechanism", "parameter", "unit", "value", "low", "high")
+    rows = [
+        (entry["name"], one["name"], *(one[name] for name in names[2:]))
+        for entry in report["mechanisms"]
+        for one in entry["parameters"]
+    ]
+    return _by_name(names, rows)
+
+
+def _where(figure: Mapping[str, Any]) -> Columns:
+    (trace,) = figure["data"]
+    layout = figure["layout"]
+    heads = [layout[axis]["title"]["text"] or axis for axis in ("xaxis", "yaxis")]
+    places = product(layout["yaxis"]["ticktext"], layout["xaxis"]["ticktext"])
+    values = zip(places, _numbers(trace["z"]), _numbers(trace["customdata"]), strict=True)
+    rows = [(x, y, None if np.isnan(value) else value, int(count)) for (y, x), value, count in values]
+    return _by_name((*heads, f"{trace['colorbar']['title']['text']}, measured above the base model", "points"), rows)
+
+
+def _before_after(figure: Mapping[str, Any]) -> Columns:
+    points = [trace for trace in figure["data"] if trace.get("mode") == "markers"]
+    rows = [
+        (trace["name"], recording, predicted, measured)
+        for trace in points
+        for recording, predicted, measured in zip(
+            trace["text"], _numbers(trace["x"]), _numbers(trace["y"]), strict=True
+        )
+    ]
+    unit = figure["layout"]["xaxis"]["title"]["text"].removeprefix("predicted ")
+    return _by_name(("model", "recording", f"predicted {unit}", f"measured {unit}"), rows)
+
+
+def _by_name(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> Columns:
+    return {name: [row[number] for row in rows] for number, name in enumerate(names)}
+
+
+def _numbers(column: Any) -> list[float]:
+    """A column as plotly writes it: a list, or the bytes of an array; one of two axes row by row."""
+    if isinstance(column, Mapping):
+        found: list[float] = np.frombuffer(base64.b64decode(column["bdata"]), dtype=column["dtype"]).tolist()
+        return found
+    return [float("nan") if value is None else float(value) for value in column]
+
+
+_OF_REPORT: dict[str, Callable[[Mapping[str, Any]], Columns]] = {
+    "explanations": _explanations,
+    "parameters": _parameters,
+}
+_OF_FIGURE: dict[str, Callable[[Mapping[str, Any]], Columns]] = {"where": _where, "before_after": _before_after}

@@ -1,0 +1,24 @@
+"use strict";
+// How far a diagnosis is, until it has ended; then the page that says what it found.
+
+const place = document.querySelector("[data-diagnosis]");
+const far = document.getElementById("far");
+const bar = place.querySelector("progress");
+
+async function look() {
+  let found;
+  try {
+    const answer = await fetch(`/v1/diagnoses/${place.dataset.diagnosis}`, { headers: { Accept: "application/json" } });
+    if (!answer.ok) throw new Error(answer.statusText);
+    found = await answer.json();
+  } catch {
+    far.textContent = "The server does not answer; this page goes on asking.";
+    return void setTimeout(look, 5000);
+  }
+  if (found.state !== "queued" && found.state !== "running") return void location.reload();
+  bar.value = found.progress;
+  const said = found.state === "queued" ? "It waits for its turn." : `It runs: ${Math.round(100 * found.progress)} % done.`;
+  if (far.textContent !== said) far.textContent = said;
+  setTimeout(look, 1000);
+}
+setTimeout(look, 1000);

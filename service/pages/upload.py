@@ -1,0 +1,285 @@
+"""Upload: files are looked at, told of channel by channel, and kept only when somebody says so."""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Annotated, Any
+from urllib.parse import quote
+
+import orjson
+from fastapi import APIRouter, Query, Request, Response
+from starlette.concurrency import run_in_threadpool
+
+from service import inverting, session
+from service.accepting import RIG, Terms, accept
+from service.campaigns import heavy
+from service.dependencies import Store, Table
+from service.pages import requests
+from service.pages.figures import Drawn, csv_answer
+from service.pages.forms import TOKEN, WRITE, Form, require_own, see
+from service.pages.html import page
+from service.pages.upload_figures import figures, lines_columns, trace_columns
+from service.pages.upload_mapping import KINDS, RECORDING, SKIN, document_of, fields_of, guessed, sensors_text
+from service.pages.upload_seen import MOST_LISTED, ChannelSeen, FileSeen, seen
+from service.pages.upload_shelf import Shelf, Shelved
+from service.problems import Refusal
+from service.reading import Look, look, require_few
+from service.store import campaigns, skins
+from service.store.engine import Database
+from service.store.errors import Conflict, Missing
+from service.uploads import Upload, received
+from underskin import InvalidInput
+from underskin.errors import FileError
+from underskin.recordings import rig_description
+from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription
+
+router = APIRouter(prefix="/upload")
+
+_SKIN = "skin"
+_LONGEST_FIELD = 1000  # bytes of a field beside the files
+_MOST_SKINS = 200  # that the form offers
+
+
+@router.get("")
+def form(request: Request, store: Store, skin: Annotated[str, Query(max_length=200)] = "") -> Response:
+    """Asks for files."""
+    with store.reading() as connection:
+        known = [row.id for row in skins.listed(connection, None, None, _MOST_SKINS)]
+    call = "client.campaigns.post_files(['monday.tdms'], rig='rig.yaml')"
+    return page(
+        request,
+        "upload.html",
+        skin=skin,
+        known=known,
+        most_mb=request.app.state.settings.max_upload_mb,
+        same=requests.files(request, "/v1/campaigns", call),
+    )
+
+
+@router.post("", dependencies=WRITE)
+async def send(request: Request, store: Store) -> Response:
+    """Takes files to be looked at; none is kept."""
+    shelf: Shelf = request.app.state.shelf
+    cookie = session.cookie_in(dict(request.scope["headers"]))
+    async with received(request, request.app.state.uploads) as sent:
+        fields = {one.field: _short(one) for one in sent if one.label is None}
+        require_own(request, fields.get(TOKEN, ""))
+        given = [one for one in sent if one.label and one.field != RIG]
+        rig = next((one for one in sent if one.field == RIG and one.label), None)
+        if not given:
+            raise Refusal(422, "No file came. Choose one, or drop it on the page.", title="No file")
+        found = await run_in_threadpool(_rig, store, rig, fields.get(_SKIN, ""))
+        shelved = shelf.put(cookie, given)
+    shelved.skin = fields.get(_SKIN) or None
+    shelved.rig, shelved.refused = found
+    try:
+        async with heavy:
+            await run_in_threadpool(_look, request, shelved)
+    except BaseException:
+        shelf.discard(shelved)
+        raise
+    return see(f"/upload/{shelved.id}")
+
+
+@router.get("/{upload_id}")
+def understood(request: Request, upload_id: str, store: Store, file: Annotated[int, Query(ge=0)] = 0) -> Response:
+    """What was understood, file by file."""
+    shelved = _find(request, upload_id)
+    if shelved.kept_at is not None:
+        return see(shelved.kept_at)
+    file = min(file, len(shelved.files) - 1)
+    if file not in shelved.drawn:
+        _draw(shelved, file, _looked(request, shelved, file))
+    with store.reading() as connection:
+        known = [row.id for row in skins.listed(connection, None, None, _MOST_SKINS)]
+        about = _latest(store, shelved.skin or shelved.seen[file].skin)
+    channels = _channels(shelved)
+    document = shelved.draft or (
+        shelved.rig.document if shelved.rig is not None else guessed(channels, shelved.seen[file].properties, about)
+    )
+    return page(
+        request,
+        "understood.html",
+        shelved=shelved,
+        number=file,
+        file=shelved.seen[file],
+        figures=shelved.drawn[file],
+        good=sum(one.recordings for one in shelved.seen),
+        refused=sum(len(one.refused) or len(one.errors) for one in shelved.seen if not _unsaid(shelved, one)),
+        unsaid=_unsaid(shelved, shelved.seen[file]),
+        most_listed=MOST_LISTED,
+        known=known,
+        skin=shelved.skin or shelved.seen[file].skin or "",
+        channels=channels,
+        document=document,
+        layout=sensors_text(document),
+        kinds=KINDS,
+        fields=sorted({name for kind in KINDS for name in fields_of(kind)}),
+        skin_fields=SKIN,
+        recording_fields=RECORDING,
+    )
+
+
+@router.post("/{upload_id}/mapping", dependencies=WRITE)
+async def mapping(request: Request, upload_id: str, sent: Form) -> Response:
+    """Reads the files again, as a form says what they are."""
+    shelved = _find(request, upload_id)
+    base = shelved.draft or (shelved.rig.document if shelved.rig is not None else {})
+    shelved.skin = sent.get(_SKIN, shelved.skin or "").strip() or None
+    try:
+        shelved.draft = document_of(sent, base)
+        shelved.rig = rig_description.from_dict(shelved.draft)
+        shelved.refused = []
+    except InvalidInput as error:
+        shelved.refused = [_told(error)]
+        return see(f"/upload/{upload_id}#mapping")
+    async with heavy:
+        await run_in_threadpool(_look, request, shelved)
+    return see(f"/upload/{upload_id}")
+
+
+@router.post("/{upload_id}/keep", dependencies=WRITE)
+async def keep(request: Request, upload_id: str, sent: Form, store: Store, table: Table) -> Response:
+    """Keeps what is good of it."""
+    shelved = _find(request, upload_id)
+    async with heavy:
+        kept = await run_in_threadpool(_keep, request, shelved, sent, store)
+        await run_in_threadpool(inverting.derive, store, table, kept)
+    return see(shelved.kept_at or f"/upload/{upload_id}")
+
+
+@router.post("/{upload_id}/discard", dependencies=WRITE)
+def discard(request: Request, upload_id: str, sent: Form) -> Response:  # noqa: ARG001 -- reading it checks the session
+    """Removes it."""
+    request.app.state.shelf.discard(_find(request, upload_id))
+    return see("/upload")
+
+
+@router.get("/{upload_id}/{file}/traces.csv")
+def traces_csv(request: Request, upload_id: str, file: int) -> Response:
+    """The channels of a file's first part."""
+    return csv_answer("traces", trace_columns(_looked(request, _find(request, upload_id), file)))
+
+
+@router.get("/{upload_id}/{file}/frf.csv")
+def frf_csv(request: Request, upload_id: str, file: int) -> Response:
+    """The FRFs of a file."""
+    return csv_answer("frf", lines_columns(_looked(request, _find(request, upload_id), file)))
+
+
+def _find(request: Request, upload_id: str) -> Shelved:
+    shelf: Shelf = request.app.state.shelf
+    return shelf.find(session.cookie_in(dict(request.scope["headers"])), upload_id)
+
+
+def _looked(request: Request, shelved: Shelved, number: int) -> Look:
+    if not 0 <= number < len(shelved.files) or shelved.kept_at is not None:
+        raise Missing("There is no such file in this upload.")
+    return look(shelved.files[number], shelved.rig, request.app.state.settings.max_body_bytes)
+
+
+def _look(request: Request, shelved: Shelved) -> None:
+    """Read every file; the figures of the first one are drawn with it."""
+    summaries: list[FileSeen] = []
+    drawn: list[Drawn] = []
+    recordings = 0
+    for number, upload in enumerate(shelved.files):
+        found = _looked(request, shelved, number)
+        recordings += sum(one.recordings for one in found.found)
+        require_few(len(summaries) + len(found.found), recordings)
+        summaries.append(seen(upload, found))
+        if number == 0:
+            drawn = figures(found, f"/upload/{shelved.id}/0/")
+    shelved.seen, shelved.drawn = summaries, {0: drawn}
+
+
+def _draw(shelved: Shelved, number: int, found: Look) -> None:
+    shelved.draw(number, figures(found, f"/upload/{shelved.id}/{number}/"))
+
+
+def _keep(request: Request, shelved: Shelved, sent: Mapping[str, str], store: Database) -> list[str]:
+    """The ids of what was kept; what kept it from being kept is told on the upload's page. Twice asked, kept once."""
+    with shelved.lock:
+        if shelved.kept_at is not None:
+            return []
+        key = request.scope["key"]
+        sender = None if key is None else key.name
+        together = sent.get("together", "").strip() if sent.get("as") == "one" else None
+        shelved.skin = sent.get(_SKIN, "").strip() or None
+        most = request.app.state.settings.max_body_bytes
+        try:
+            terms = Terms(shelved.skin, None, None, False, together, None, sender, most)
+            answer, _ = accept(store, [*shelved.files, *_rig_upload(shelved)], terms)
+        except (InvalidInput, Conflict, Refusal) as error:
+            shelved.refused = _all_told(error)
+            return []
+        kept = [result for result in answer["campaigns"] if result["id"] is not None]
+        one = f"/campaigns/{kept[0]['id']}"
+        shelved.kept_at = one if len(kept) == 1 else f"/skins/{quote(kept[0]['skin_id'], safe='')}"
+        request.app.state.shelf.empty(shelved)
+        return [result["id"] for result in kept]
+
+
+def _rig_upload(shelved: Shelved) -> list[Upload]:
+    """The rig description that was looked with, as a part of the upload."""
+    if shelved.rig is None:
+        return []
+    path = shelved.folder / RIG
+    path.write_bytes(orjson.dumps(shelved.rig.document))
+    return [Upload(path, None, RIG, "", in_form=True)]
+
+
+def _rig(store: Database, sent: Upload | None, skin: str) -> tuple[RigDescription | None, list[dict[str, Any]]]:
+    """The rig description that was sent, or that is kept with the skin; and what is wrong with the one sent."""
+    if sent is not None:
+        try:
+            with sent.path.open("rb") as file:
+                return rig_description.parse(file.read(LARGEST_BYTES + 1), sent.label or RIG), []
+        except (FileError, InvalidInput) as error:
+            return None, _all_told(error)
+    if skin:
+        with store.reading() as connection:
+            kept = skins.rig_of(connection, skin)
+        if kept is not None:
+            return rig_description.from_dict(orjson.loads(kept)), []
+    return None, []
+
+
+def _latest(store: Database, skin: str | None) -> Mapping[str, Any]:
+    """What the latest campaign of a skin says of it."""
+    if skin is None:
+        return {}
+    with store.reading() as connection, suppress(Missing):
+        root = skins.require_root(connection, skin)
+        rows = campaigns.listed(connection, campaigns.Filters(skin=root, state="current"), None, 1)
+        return dict(rows[0].about["skin"]) if rows else {}
+    return {}
+
+
+def _unsaid(shelved: Shelved, file: FileSeen) -> bool:
+    """Whether nobody has said yet what the channels of a file are."""
+    return shelved.rig is None and bool(file.channels)
+
+
+def _channels(shelved: Shelved) -> list[ChannelSeen]:
+    """Of all files, by name; those that hold the mapping's channels first come first."""
+    found = {channel.name: channel for one in reversed(shelved.seen) for channel in reversed(one.channels)}
+    return list(reversed(found.values()))
+
+
+def _short(field: Upload) -> str:
+    with field.path.open("rb") as file:
+        return file.read(_LONGEST_FIELD).decode("utf-8", "replace").strip()
+
+
+def _told(error: InvalidInput) -> dict[str, Any]:
+    return {"field": error.field, "value": error.value, "allowed": error.allowed}
+
+
+def _all_told(error: Exception) -> list[dict[str, Any]]:
+    if isinstance(error, InvalidInput):
+        return [_told(error)]
+    if isinstance(error, Refusal) and error.errors:
+        return [dict(entry) for entry in error.errors]
+    if isinstance(error, FileError):
+        return [{"field": error.file, "value": None, "allowed": f"{error.place} {error.reason}".strip()}]
+    return [{"field": "upload", "value": None, "allowed": error.detail if isinstance(error, Refusal) else str(error)}]

@@ -1,0 +1,160 @@
+"""A rig description as a form: what each channel of a file is, and what the file does not say."""
+
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from typing import Any
+
+from service.pages.upload_seen import ChannelSeen
+from underskin import InvalidInput
+from underskin.recordings.rig_description import SCHEMA, channel_fields
+from underskin.recordings.unit_labels import lab_field, unit
+
+KINDS = ("frf", "indentation", "compression")
+# Field, words, unit, and the kinds that have it.
+SKIN = (
+    ("thickness_mm", "thickness h", "mm"),
+    ("youngs_modulus_mpa", "Young's modulus E", "MPa"),
+    ("poisson_ratio", "Poisson's ratio ν", ""),
+    ("sensor_radius_mm", "sensor radius rT", "mm"),
+)
+RECORDING = (
+    ("sensor", "sensor that was pressed", "", ("frf", "indentation")),
+    ("indenter_radius_mm", "sphere radius R", "mm", ("frf", "indentation")),
+    ("preload_n", "preload F", "N", ("frf",)),
+    ("dynamic_force_n", "dynamic force, peak", "N", ("frf",)),
+    ("sample_height_mm", "sample's height", "mm", ("compression",)),
+    ("sample_diameter_mm", "sample's diameter", "mm", ("compression",)),
+)
+_TEXTS = ("sensor",)
+_BY_DIMENSION = {
+    "frf": {"force": "force_n", "charge": "charge_pc", "frequency": "frequency_hz", "charge/force": "frf_re_pc_per_n"},
+    "indentation": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
+}
+_BY_WORD = {
+    "force": "force_n",
+    "load": "force_n",
+    "charge": "charge_pc",
+    "amplifier": "charge_pc",
+    "coherence": "coherence",
+}
+
+
+def fields_of(kind: str) -> list[str]:
+    """What a channel can be."""
+    return sorted(channel_fields(kind))
+
+
+def guessed(channels: Sequence[ChannelSeen], properties: Mapping[str, Any], skin: Mapping[str, Any]) -> dict[str, Any]:
+    """A first rig description by units and names of channels and properties, to be looked over; `skin`: what is known
+    of it."""
+    dimensions = [known.dimension if (known := unit(one.unit)) else "" for one in channels]
+    kind = "indentation" if "length" in dimensions and "charge" not in dimensions else "frf"
+    found: dict[str, Any] = {}
+    for one, dimension in zip(channels, dimensions, strict=True):
+        word = next((field for word, field in _BY_WORD.items() if word in one.name.lower()), "")
+        field = _BY_DIMENSION[kind].get(dimension) or word
+        if field and field not in found and field in channel_fields(kind):
+            found[field] = {"channel": one.name}
+    known_skin = {name: skin[name] for name in (*[name for name, *_ in SKIN], "sensors") if skin.get(name) is not None}
+    return {
+        "schema": SCHEMA,
+        "kind": kind,
+        "skin": {"poisson_ratio": 0.5, **known_skin},
+        "recording": _stated(properties, kind),
+        "channels": found,
+    }
+
+
+def _stated(properties: Mapping[str, Any], kind: str) -> dict[str, Any]:
+    """The recording's fields that the file itself states under their own names."""
+    wanted = [name for name, _, _, kinds in RECORDING if kind in kinds]
+    named = {field: one for one in properties for field in (one, *(lab_field(one) or ())[:1])}
+    return {name: {"property": named[name]} for name in wanted if name in named}
+
+
+def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> dict[str, Any]:
+    """The rig description that a form says; what no field of the form is about stays as in `base`.
+
+    Raises InvalidInput for a line of the layout, and for two channels that are to be one field.
+    """
+    kind = form.get("kind", "frf")
+    document: dict[str, Any] = {"schema": SCHEMA, **deepcopy(dict(base)), "kind": kind}
+    document["skin"] = _replaced(base.get("skin", {}), {name: _number(form.get(name, "")) for name, *_ in SKIN})
+    document["skin"] = _replaced(document["skin"], {"sensors": _sensors(form.get("sensors", ""))})
+    said = {name: _said(form, name) if kind in kinds else None for name, _, _, kinds in RECORDING}
+    document["recording"] = _replaced(base.get("recording", {}), said)
+    document["channels"] = _channels(form, base.get("channels", {}))
+    document.pop("units_checked", None)
+    if form.get("units_checked"):
+        document["units_checked"] = True
+    return document
+
+
+def sensors_text(document: Mapping[str, Any]) -> str:
+    """The layout, a line a sensor."""
+    sensors = document.get("skin", {}).get("sensors") or []
+    return "\n".join(f"{one.get('id', '')}, {one.get('x_mm', 0):g}, {one.get('y_mm', 0):g}" for one in sensors)
+
+
+def _replaced(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    kept = {name: value for name, value in base.items() if name not in values}
+    return kept | {name: value for name, value in values.items() if value is not None}
+
+
+def _said(form: Mapping[str, str], name: str) -> Any:
+    """A value, or the property of the file that holds it."""
+    if form.get(f"{name}-from"):
+        return {"property": form[f"{name}-from"]}
+    text = form.get(name, "").strip()
+    return (text or None) if name in _TEXTS else _number(text)
+
+
+def _number(text: str) -> Any:
+    """A number, with a decimal point or comma; what is none is left to the checks, which name it."""
+    text = text.strip()
+    try:
+        return float(text.replace(",", ".")) if text else None
+    except ValueError:
+        return text
+
+
+def _sensors(text: str) -> list[dict[str, Any]] | None:
+    found = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.strip():
+            name, *places = (part.strip() for part in line.replace(";", ",").replace("\t", ",").split(","))
+            if len(places) != 2:
+                raise InvalidInput("skin.sensors", line.strip()[:80], f"line {number} must be: name, x [mm], y [mm]")
+            found.append({"id": name, "x_mm": _number(places[0]), "y_mm": _number(places[1])})
+    return found or None
+
+
+def _channels(form: Mapping[str, str], base: Mapping[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    number = 0
+    while f"channel-{number}" in form:
+        field = form.get(f"is-{number}", "")
+        if field:
+            if field in found:
+                raise InvalidInput(f"channels.{field}", form[f"channel-{number}"][:80], "only one channel can be it")
+            found[field] = _channel(form, number, base.get(field, {}))
+        number += 1
+    return found
+
+
+def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> dict[str, Any]:
+    """One channel; a unit that differs from the file's label says that the label is wrong."""
+    name, label = form[f"channel-{number}"], form.get(f"label-{number}", "")
+    true_unit = form.get(f"unit-{number}", "").strip()
+    wrong = bool(label and true_unit and unit(true_unit) != unit(label))
+    stiffness = base.get("stiffness_n_per_mm") if base.get("channel") == name else None
+    values = {
+        "channel": name,
+        "unit": true_unit if true_unit and (wrong or not label) else None,
+        "labelled": label if wrong else None,
+        "sign": {"1": 1, "-1": -1}.get(form.get(f"sign-{number}", "")),
+        "sensitivity": _number(form.get(f"sensitivity-{number}", "")),
+        "sensitivity_unit": form.get(f"sensitivity_unit-{number}", "").strip() or None,
+        "stiffness_n_per_mm": stiffness,
+    }
+    return {key: value for key, value in values.items() if value is not None}

@@ -1,0 +1,60 @@
+"""Channels as they came, one above another."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from underskin.figures.style import COLOURS, label, styled
+from underskin.units import Floats
+
+_MOST_POINTS = 1200  # of one channel
+_ROW = 130  # pixels
+_EDGES = 110
+_LONGEST = 18  # letters of a name beside its axis
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One channel: its name, its unit as labelled (empty where the file says none), its values, (samples,)."""
+
+    name: str
+    unit: str
+    values: Floats
+
+
+def raw_traces(traces: Sequence[Trace], sample_rate_hz: float | None) -> go.Figure:
+    """Each channel over time, or over the number of the sample; of many samples the extremes are kept."""
+    figure = make_subplots(len(traces), 1, shared_xaxes=True, vertical_spacing=0.12 / len(traces))
+    for row, trace in enumerate(traces, start=1):
+        chosen = _extremes(trace.values)
+        x = chosen if sample_rate_hz is None else chosen / sample_rate_hz
+        name = label(trace.name)
+        figure.add_scatter(
+            x=x,
+            y=trace.values[chosen].astype(np.float32),
+            mode="lines",
+            name=name,
+            line={"color": COLOURS[(row - 1) % len(COLOURS)], "width": 1},
+            hovertemplate=f"{name}<br>%{{x:.6g}}: %{{y:.4g}}<extra></extra>",
+            showlegend=False,
+            row=row,
+            col=1,
+        )
+        short = label(trace.name if len(trace.name) <= _LONGEST else trace.name[: _LONGEST - 1] + "…")
+        figure.update_yaxes(title=f"{short}<br>[{label(trace.unit) or '?'}]", row=row, col=1)
+    figure.update_xaxes(title="sample" if sample_rate_hz is None else "time [s]", row=len(traces), col=1)
+    return styled(figure, "As it came", _EDGES + _ROW * len(traces))
+
+
+def _extremes(values: Floats) -> "np.ndarray[tuple[int], np.dtype[np.intp]]":
+    """Which samples to show: all, or the lowest and the highest of each of as many parts as can be told apart."""
+    count = len(values)
+    if count <= _MOST_POINTS:
+        return np.arange(count)
+    size = -(-2 * count // _MOST_POINTS)
+    whole = values[: count // size * size].reshape(-1, size)
+    start = np.arange(len(whole)) * size
+    return np.unique(np.concatenate([start + whole.argmin(axis=1), start + whole.argmax(axis=1), [count - 1]]))
