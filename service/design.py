@@ -3,10 +3,12 @@
 from typing import Any, Literal
 
 import numpy as np
-from fastapi import APIRouter
-from pydantic import BaseModel, ConfigDict, Field
+from fastapi import APIRouter, Request, Response
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from service.dependencies import Table
+from service.columns import json_document
+from service.dependencies import Table, in_thread
+from service.problems import from_validation
 from underskin import Indenter, InvalidInput, Skin
 from underskin.design import Design, design
 from underskin.surrogate import SigmaTable
@@ -152,14 +154,52 @@ def answer(table: SigmaTable, asked: DesignRequest, found: Design) -> DesignAnsw
     )
 
 
-@router.post("/design", operation_id="design", summary="A skin before it is built")
-def post(asked: DesignRequest, table: Table) -> DesignAnswer:
+EXAMPLE = {
+    "thickness_mm": 2.5,
+    "youngs_modulus_mpa": 16.0,
+    "sensor_radius_mm": 1.5,
+    "indenter_radius_mm": 4.0,
+    "preload_n": 1.0,
+    "pitch_mm": 4.0,
+    "d33_pc_per_n": 14.0,
+}
+
+
+@router.post(
+    "/design",
+    operation_id="design",
+    summary="A skin before it is built",
+    responses={200: {"model": DesignAnswer}},
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {"application/json": {"schema": DesignRequest.model_json_schema(), "example": EXAMPLE}},
+        }
+    },
+)
+async def post(request: Request, table: Table) -> Response:
     """How much of a load reaches a sensor, how finely the array tells where it is, and how far apart two loads must be.
 
     Loads add, as on a linear layer.
     """
-    with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
-        return answer(table, asked, designed(table, asked))
+    body = await request.body()
+    content_type = request.headers.get("content-type", "")
+
+    def work() -> Response:
+        asked = read_design(json_document(body, content_type))
+        with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
+            found = answer(table, asked, designed(table, asked))
+        return Response(found.model_dump_json(), media_type="application/json")
+
+    return await in_thread(work)
+
+
+def read_design(document: Any) -> DesignRequest:
+    """The request that a document makes; raises Refusal with all that is wrong."""
+    try:
+        return DesignRequest.model_validate(document)
+    except ValidationError as error:
+        raise from_validation(error) from None
 
 
 def _number(value: Any) -> float | None:

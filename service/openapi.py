@@ -6,6 +6,7 @@ from fastapi import APIRouter, FastAPI, Request
 from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel, Field
 
+from service import pages
 from service.gate import OPEN
 from service.problems import MEDIA_TYPE, Problem
 from service.stress_models import StressRequest
@@ -45,11 +46,9 @@ async def openapi(request: Request) -> dict[str, Any]:
 
 
 def methods(api: FastAPI, path: str) -> list[str]:
-    """All that `path` takes, as it stands in the document; the router knows those of one of its routes only.
-
-    Pages are not in the document: they are read with GET, and their forms sent with POST.
-    """
-    return [method.upper() for method in _document(api)["paths"].get(path, ("get", "post"))]
+    """All that `path` takes, as it stands in the document; the router knows those of one of its routes only."""
+    known = _document(api)["paths"].get(path)
+    return pages.methods(path) if known is None else [method.upper() for method in known]
 
 
 def _document(api: FastAPI) -> dict[str, Any]:

@@ -33,7 +33,7 @@ def asset(name: str, if_none_match: Annotated[str, Header()] = "") -> Response:
     if tag in if_none_match:
         return Response(status_code=304, headers=headers)
     headers["Content-Encoding"] = "gzip"
-    return Response(_gzipped(name), headers=headers, media_type=_TYPES[Path(name).suffix])
+    return Response(gzipped(name), headers=headers, media_type=_TYPES[Path(name).suffix])
 
 
 @cache
@@ -64,7 +64,8 @@ def library_style_hash() -> str:
 
 
 @cache
-def _gzipped(name: str) -> bytes:
+def gzipped(name: str) -> bytes:
+    """A file as it is sent."""
     packer = zlib.compressobj(6, wbits=31)
     return packer.compress(_content(name)) + packer.flush()
 

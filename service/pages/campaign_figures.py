@@ -1,6 +1,7 @@
 """The figures of a campaign's page, and their numbers."""
 
 from collections.abc import Callable, Mapping, Sequence
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
@@ -20,28 +21,34 @@ if TYPE_CHECKING:
 _MOST_SINGLE = 48  # recordings whose lines are drawn one by one
 _MOST_CURVES = 24
 _MOST_KEPT = 64
-_kept: dict[tuple[str, int, str, str, str], list[Drawn]] = {}  # by campaign, revision, table, band, what is shown
+Which = tuple[str, int, str, str, str]  # campaign, revision, table, band, what is shown
+_kept: dict[Which, list[Drawn]] = {}
+_keeping = Lock()
 
 
 def figures(store: Database, table: SigmaTable, row: AnyRow, answer: Mapping[str, Any], show: str) -> list[Drawn]:
     """All that can be drawn of a campaign as it is now; `answer`: its d33, as `/d33` has it. `show` as `measured` has
-    it."""
+    it. What was drawn lately is kept."""
     basis = (row.id, row.revision, table.sha256, _chosen(answer))
     makers: dict[str, Callable[[Campaign], list[Drawn]]] = {
         f"lines {show}": lambda campaign: [*_curves(row, campaign), *_frf(row, campaign, answer, show)],
         "d33": lambda campaign: _d33(row, campaign, answer, table),
     }
-    campaign: Campaign | None = None
-    found: list[Drawn] = []
-    for name, make in makers.items():
-        which = (*basis, name)
-        if which not in _kept:
-            campaign = campaign or _loaded(store, row)
-            if len(_kept) >= _MOST_KEPT:
-                _kept.pop(next(iter(_kept)), None)
-            _kept[which] = make(campaign)
-        found += _kept[which]
-    return found
+    found = {name: _kept.get((*basis, name)) for name in makers}
+    if None in found.values():
+        campaign = _loaded(store, row)
+        for name, make in makers.items():
+            if found[name] is None:
+                found[name] = _keep((*basis, name), make(campaign))
+    return [figure for some in found.values() for figure in some or ()]
+
+
+def _keep(which: Which, drawn_now: list[Drawn]) -> list[Drawn]:
+    with _keeping:
+        while len(_kept) >= _MOST_KEPT:
+            del _kept[next(iter(_kept))]
+        _kept[which] = drawn_now
+    return drawn_now
 
 
 def _loaded(store: Database, row: AnyRow) -> Campaign:

@@ -11,6 +11,7 @@ import orjson
 from fastapi import Response
 from markupsafe import Markup
 
+from service.pages.assets import LIBRARY, gzipped
 from service.pages.formats import json_inside
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def prepare() -> None:
 
     assert underskin.campaign_figures
     frf_overview([], None).to_json()
+    gzipped(LIBRARY)
 
 
 def drawn_before(name: str, text: str, about: str, numbers: str | None = None) -> Drawn:

@@ -15,9 +15,9 @@ CHROMIUM = shutil.which("chromium")
 SERIOUS = ("serious", "critical")
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
-    """The system's Chromium."""
+    """The system's Chromium, closed after these tests: its driver's event loop keeps others from having theirs."""
     if CHROMIUM is None:
         pytest.skip("Chromium (Debian's package chromium) is not installed")
     with sync_playwright() as playwright:

@@ -43,6 +43,11 @@ def test_behind_tls_the_cookie_goes_through_tls_only(anyone: httpx.Client) -> No
     assert "curl -s https://" in secure.text
 
 
+def test_a_page_says_what_it_takes(anyone: httpx.Client) -> None:
+    assert anyone.delete("/design").headers["allow"] == "GET"
+    assert anyone.get("/example").headers["allow"] == "POST"
+
+
 def test_a_form_of_another_session_is_refused(anyone: httpx.Client, server: Server) -> None:
     token = token_of(anyone.get("/").text)
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING) as other:
