@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from underskin.diagnosis.explanation import Workbench
-from underskin.diagnosis.fit import COVARIANCE_NAMES, Fitter
+from underskin.diagnosis.fit import Fitter
+from underskin.diagnosis.hypothesis import COVARIANCE_NAMES
 from underskin.diagnosis.likelihood import Marginal, Moments, NoiseLevels
 from underskin.diagnosis.search import Answer
 from underskin.diagnosis.smooth_error import TYPICAL

@@ -5,90 +5,32 @@ and a mechanism's spread or pick-up) by Newton steps on the likelihood of the pr
 evaluation. Fisher's information between the two groups is zero for a normal likelihood, so they are taken in turns.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.diagnosis.likelihood import Curvature, Marginal, Moments, NoiseLevels
-from underskin.diagnosis.lines import Lines
-from underskin.diagnosis.scatter import GAIN_PRIOR, POSITION_PRIOR, Plateau, level_prior
-from underskin.diagnosis.smooth_error import USUAL
-from underskin.mechanisms.catalogue import CATALOGUE
-from underskin.mechanisms.composition import SENSOR_SPREAD, parameters_together
-from underskin.mechanisms.mechanism import Normal, Parameter
-from underskin.mechanisms.model import Model, Prediction
+from underskin.diagnosis.hypothesis import (
+    COVARIANCE_NAMES,
+    Hypothesis,
+    curvature_of_prior,
+    is_scale,
+    moves_covariance,
+    own_parameters,
+)
+from underskin.diagnosis.likelihood import Marginal, Moments, NoiseLevels
+from underskin.diagnosis.scatter import GAIN_PRIOR, POSITION_PRIOR
+from underskin.mechanisms.composition import SENSOR_SPREAD
+from underskin.mechanisms.model import Prediction
 from underskin.units import Floats
 
-_LEVELS = (0.1, 100.0)  # bounds of the lines' level
-_CURVE_LEVELS = (0.5, 3.0)  # no cell is more accurate, however smooth; rougher than its neighbours differ is no noise
 _CURVE_SETTLING = 8
 _STEP = 0.05  # of the finite differences in the covariance's logarithms
 _LARGEST_STEP = 1.0
 _CONVERGED = 0.01  # in log posterior
 _MOST_ITERATIONS = 25
-_UNDECLARED = 0.2  # sd of the logarithm of a modulus beyond which it is as good as unknown
 _FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
 _BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
-
-
-@dataclass(frozen=True)
-class CovarianceParameter:
-    """A coordinate that moves the covariance alone: its name, bounds and log prior density."""
-
-    name: str
-    low: float
-    high: float
-    log_density: Callable[[float], float]
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """A model and the lines it is to explain, with or without positioning scatter; of curves, how large η may be."""
-
-    model: Model
-    lines: Lines
-    curvature: Curvature
-    placed: bool  # whether there is positioning scatter
-    smooth: Plateau = USUAL
-
-    @property
-    def mean_places(self) -> list[int]:
-        """The places of the model's parameters that move the mean."""
-        return [index for index, entry in enumerate(self.model.parameters) if not _moves_covariance(entry)]
-
-    @property
-    def covariance(self) -> tuple[CovarianceParameter, ...]:
-        """Gain scatter, line level, position scatter or smooth error where there is one, then the model's own."""
-        low, high = _CURVE_LEVELS if self.lines.curves else _LEVELS
-        level = level_prior(self.lines.noise.log_level_sd)
-        common = [
-            CovarianceParameter("gain", np.log(1e-3), np.log(0.5), GAIN_PRIOR.log_density),
-            CovarianceParameter("level", np.log(low), np.log(high), level.log_density),
-        ]
-        if self.placed:
-            common.append(CovarianceParameter("position", np.log(2e-5), np.log(6e-4), POSITION_PRIOR.log_density))
-        if self.lines.curves:
-            common.append(CovarianceParameter("smooth", np.log(1e-5), np.log(2.0), self.smooth.log_density))
-        own = [
-            CovarianceParameter(entry.name, *entry.bounds, entry.log_prior)
-            for entry in self.model.parameters
-            if _moves_covariance(entry)
-        ]
-        return (*common, *own)
-
-
-def own_parameters(hypothesis: Hypothesis) -> int:
-    """How many of the model's parameters are its mechanisms' own; they come first."""
-    mechanisms = [CATALOGUE[name] for name in hypothesis.model.names]
-    return sum(map(len, parameters_together(mechanisms, hypothesis.lines.campaign, hypothesis.lines.kind).values()))
-
-
-def _moves_covariance(entry: Parameter) -> bool:
-    return entry.name in COVARIANCE_NAMES
-
-
-COVARIANCE_NAMES = ("spread", "pickup_charge")
 
 
 @dataclass(frozen=True)
@@ -123,8 +65,8 @@ class Fitter:
         self.covariance = hypothesis.covariance
         bounds = np.array([entry.bounds for entry in self.parameters]).reshape(-1, 2)
         self.low, self.high = bounds.T
-        self._priors = np.array([_curvature_of_prior(entry) for entry in self.parameters])
-        self._own = [index for index, entry in enumerate(self.parameters) if _moves_covariance(entry)]
+        self._priors = np.array([curvature_of_prior(entry) for entry in self.parameters])
+        self._own = [index for index, entry in enumerate(self.parameters) if moves_covariance(entry)]
         self._common = len(self.covariance) - len(self._own)
         names = [entry.name for entry in self.parameters]
         self._spread, self._pickup = (names.index(name) if name in names else None for name in COVARIANCE_NAMES)
@@ -155,7 +97,7 @@ class Fitter:
         """A point with these coordinates of the mechanisms, E and h of a parent or their centre, d33 as data say."""
         point = self._uncentred(own, parent)
         fit = point.fit
-        place = next((index for index, entry in enumerate(self.parameters) if _is_scale(entry)), None)
+        place = next((index for index, entry in enumerate(self.parameters) if is_scale(entry)), None)
         if place is not None:
             lines = self.hypothesis.lines
             value = (prediction or self.hypothesis.model.predict(fit)).value
@@ -359,17 +301,3 @@ class Fitter:
                 both = cost(steps[a] + steps[b]) - up[a] - up[b] + middle
                 hessian[a, b] = hessian[b, a] = both / _STEP**2
         return gradient + hessian @ (here - centre), hessian
-
-
-def _is_scale(entry: Parameter) -> bool:
-    """Whether the response is proportional to it, and little is known of it: d33, or a modulus that nobody declared."""
-    return entry.name == "d33" or (
-        entry.name == "youngs_modulus" and isinstance(entry.prior, Normal) and entry.prior.sd > _UNDECLARED
-    )
-
-
-def _curvature_of_prior(entry: Parameter) -> tuple[float, float]:
-    """Precision and centre of a parameter's prior; 0 where it is uniform."""
-    if isinstance(entry.prior, Normal):
-        return entry.prior.sd**-2, entry.prior.mean
-    return 0.0, 0.0

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from underskin.diagnosis.explanation import Explanation
-from underskin.diagnosis.fit import COVARIANCE_NAMES
+from underskin.diagnosis.hypothesis import COVARIANCE_NAMES
 
 _QUANTILE = float(ndtri(0.975))
 
