@@ -3,7 +3,7 @@
 import tempfile
 from pathlib import Path
 
-from docs.tour.photographer import browsing, serving
+from docs.tour.photographer import browsing, photograph, serving
 from docs.tour.steps import STEPS, Step
 
 _HEAD = """# Five minutes with the pages
@@ -19,7 +19,7 @@ def main(docs: Path = Path(__file__).parents[1]) -> None:
     with tempfile.TemporaryDirectory() as data, serving(Path(data)) as address, browsing(address) as page:
         for number, step in enumerate(STEPS, start=1):
             step.walk(page)
-            page.screenshot(path=folder / picture(number, step))
+            photograph(page, folder / picture(number, step))
     (docs / "tour.md").write_text(document(), encoding="utf-8")
 
 

@@ -1,5 +1,6 @@
 """A server with an empty store, and a browser that looks at it."""
 
+import io
 import os
 import shutil
 import socket
@@ -11,10 +12,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
+from PIL import Image
 from playwright.sync_api import Page, ViewportSize, sync_playwright
 
 _START_S = 60.0
 _SIZE = ViewportSize(width=1180, height=760)
+_COLOURS = 256
+_EXPERIMENT = Path(__file__).parents[2] / "examples" / "rig" / "time_series.yaml"
 
 
 @contextmanager
@@ -52,6 +56,19 @@ def drawn(page: Page, name: str) -> None:
     figure = page.locator(f"#figure-{name}")
     figure.scroll_into_view_if_needed()
     figure.locator(".main-svg").first.wait_for()
+
+
+def photograph(page: Page, path: Path) -> None:
+    """What the window shows, in as few colours as a drawing needs: under 100 kB."""
+    shot = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    shot.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE).save(path, optimize=True)
+
+
+def raw_recordings(folder: Path) -> tuple[Path, Path]:
+    """A TDMS file as the virtual rig's data acquisition writes it, and its rig description."""
+    command = [sys.executable, "-m", "underskin", "rig", "run", str(_EXPERIMENT), "--output-dir", str(folder), "--tdms"]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return folder / "recordings.tdms", folder / "rig.yaml"
 
 
 def _await(address: str, process: "subprocess.Popen[bytes]") -> None:

@@ -1,11 +1,15 @@
 """What the tour looks at, in order."""
 
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 from playwright.sync_api import Page
 
-from docs.tour.photographer import drawn
+from docs.tour.photographer import drawn, raw_recordings
+
+_DIAGNOSIS_MS = 300_000
 
 
 @dataclass(frozen=True)
@@ -38,7 +42,42 @@ def _response(page: Page) -> None:
     page.locator("#figure-preload").evaluate("figure => figure.scrollIntoView()")
 
 
+def _diagnosis(page: Page) -> None:
+    page.get_by_role("button", name="Diagnose").click()
+    page.get_by_role("heading", name="Where", exact=True).wait_for(timeout=_DIAGNOSIS_MS)
+    drawn(page, "where")
+    page.evaluate("scrollTo(0, 0)")
+
+
+def _better(page: Page) -> None:
+    drawn(page, "before_after")
+    page.get_by_role("heading", name="How much better").evaluate(
+        "heading => heading.scrollIntoView({ behavior: 'instant' })"
+    )
+
+
+def _adopted(page: Page) -> None:
+    page.get_by_role("button", name="Adopt this model").click()
+    page.wait_for_url("**/skins/example?model=adopted")
+    drawn(page, "history")
+    page.evaluate("scrollTo(0, 0)")
+
+
+def _upload(page: Page) -> None:
+    page.get_by_role("link", name="Upload").first.click()
+    with tempfile.TemporaryDirectory() as folder:
+        recordings, rig = raw_recordings(Path(folder))
+        page.get_by_label("Files").set_input_files(recordings)
+        page.get_by_label("Rig description").set_input_files(rig)
+        page.get_by_role("button", name="Look at them").click()
+        page.wait_for_url("**/upload/*")
+    drawn(page, "frf")
+    page.evaluate("scrollTo(0, 0)")
+    page.get_by_text("What the channels are").click()
+
+
 def _design(page: Page) -> None:
+    page.get_by_role("link", name="Skins").first.click()
     page.get_by_role("link", name="example", exact=True).click()
     page.get_by_role("link", name="Design view").click()
     slider = page.get_by_label("pitch of the array, slider")
@@ -79,6 +118,38 @@ STEPS = (
         "Below are the map, the table, every recording, and what was left out and why. A recording is excluded, or the "
         "campaign withdrawn, with a reason; nothing is ever deleted.",
         _response,
+    ),
+    Step(
+        "diagnosis",
+        "A diagnosis",
+        "*Diagnose* asks what the model leaves out; for these 64 recordings the answer takes some seconds. First the "
+        "answer in one sentence, then where recordings and model disagree, the region outlined; then how probable each "
+        "explanation is, its parameters with intervals, the alternatives and why not, and what these recordings cannot "
+        "tell. [How it reasons](diagnosis.md).",
+        _diagnosis,
+    ),
+    Step(
+        "better",
+        "How much better",
+        "The error with the explanation and without, on recordings that it was not fitted to, beside what noise alone "
+        "gives; measured against predicted, before and after. Then what to measure next, where something is left open. "
+        "The whole is printed, or saved as one HTML file that opens anywhere.",
+        _better,
+    ),
+    Step(
+        "adopted",
+        "Adopted",
+        "Adopted, the explanation is the skin's model: its history shows d33 by it, or by the paper's, and every value "
+        "says by which.",
+        _adopted,
+    ),
+    Step(
+        "upload",
+        "Your own files",
+        "*Upload* takes what your instruments wrote, such as this TDMS file of a load cell and a charge amplifier. You "
+        "see what each channel was taken for, which can be put right in the form, then each channel as it came and the "
+        "FRFs, and of a bad recording what is wrong, field by field. Nothing is kept until you say so.",
+        _upload,
     ),
     Step(
         "design",

@@ -59,7 +59,7 @@ def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Resp
         "diagnosis.html",
         row=row,
         campaign_name=campaign.name,
-        body=None if report is None else _body(row, report, figures),
+        shown=None if report is None else _shown(row, report, figures),
         lacks_figures=report is not None and report["fit"] is not None and not figures,
         outdated=diagnoses.outdated(row),
         in_force=model is not None and model.id == row.id,
@@ -129,16 +129,17 @@ def _done(store: Database, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any], d
     return row, report, figures
 
 
-def _body(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> Markup:
-    """The report, worded as the file has it, with the figures of a page."""
+def _shown(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> tuple[Markup, Markup]:
+    """The report, worded as the file has it, with the figures of a page; and with what it was made."""
     from underskin.diagnosis import page as file
 
     try:
         figures = _drawn(row, report, texts)
-        html = file.body_of(report, {name: render("figure.html", drawn=figure) for name, figure in figures.items()})
+        body = file.body_of(report, {name: render("figure.html", drawn=figure) for name, figure in figures.items()})
+        provenance = file.provenance(report)
     except _ODD:
         _cannot_be_shown(row)
-    return Markup(html)  # noqa: S704 -- every text in it is escaped where it is made
+    return Markup(body), Markup(provenance)  # noqa: S704 -- every text in them is escaped where they are made
 
 
 def _drawn(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> dict[str, Drawn]:

@@ -18,7 +18,7 @@ from service.pages.figures import Drawn, csv_answer
 from service.pages.forms import TOKEN, WRITE, Form, require_own, see
 from service.pages.html import page
 from service.pages.upload_figures import figures, lines_columns, trace_columns
-from service.pages.upload_mapping import KINDS, RECORDING, SKIN, document_of, fields_of, guessed, sensors_text
+from service.pages.upload_mapping import CHANNELS, KINDS, RECORDING, SKIN, document_of, guessed, sensors_text
 from service.pages.upload_seen import MOST_LISTED, ChannelSeen, FileSeen, seen
 from service.pages.upload_shelf import Shelf, Shelved
 from service.problems import Refusal
@@ -113,7 +113,7 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
         document=document,
         layout=sensors_text(document),
         kinds=KINDS,
-        fields=sorted({name for kind in KINDS for name in fields_of(kind)}),
+        fields=CHANNELS,
         skin_fields=SKIN,
         recording_fields=RECORDING,
     )

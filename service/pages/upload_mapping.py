@@ -25,6 +25,17 @@ RECORDING = (
     ("sample_height_mm", "sample's height", "mm", ("compression",)),
     ("sample_diameter_mm", "sample's diameter", "mm", ("compression",)),
 )
+CHANNELS = {
+    "force_n": "force",
+    "charge_pc": "charge",
+    "displacement_mm": "displacement",
+    "time_s": "time",
+    "frequency_hz": "frequency",
+    "frf_re_pc_per_n": "FRF, real part",
+    "frf_im_pc_per_n": "FRF, imaginary part",
+    "frf_pc_per_n": "FRF, complex numbers",
+    "coherence": "coherence γ²",
+}  # what a channel can be, of one kind or another
 _TEXTS = ("sensor",)
 _BY_DIMENSION = {
     "frf": {"force": "force_n", "charge": "charge_pc", "frequency": "frequency_hz", "charge/force": "frf_re_pc_per_n"},
@@ -37,11 +48,6 @@ _BY_WORD = {
     "amplifier": "charge_pc",
     "coherence": "coherence",
 }
-
-
-def fields_of(kind: str) -> list[str]:
-    """What a channel can be."""
-    return sorted(channel_fields(kind))
 
 
 def guessed(channels: Sequence[ChannelSeen], properties: Mapping[str, Any], skin: Mapping[str, Any]) -> dict[str, Any]:
@@ -150,7 +156,7 @@ def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> d
     stiffness = base.get("stiffness_n_per_mm") if base.get("channel") == name else None
     values = {
         "channel": name,
-        "unit": true_unit if true_unit and (wrong or not label) else None,
+        "unit": true_unit if true_unit and (wrong or not label or "unit" in base) else None,
         "labelled": label if wrong else None,
         "sign": {"1": 1, "-1": -1}.get(form.get(f"sign-{number}", "")),
         "sensitivity": _number(form.get(f"sensitivity-{number}", "")),

@@ -46,7 +46,7 @@ def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
     given = figures if figures is not None else of_report(report)
     drawn = {name: _plot(figure, name) for name, figure in given.items()}
     title = escape(f"Diagnosis of {report['campaign']}")
-    body = [f"<h1>{title}</h1>", body_of(report, drawn)]
+    body = [f"<h1>{title}</h1>", body_of(report, drawn), provenance(report)]
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
@@ -59,7 +59,7 @@ def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
 
 
 def body_of(report: Report, drawn: Drawn) -> str:
-    """All below the title, as HTML: the answer in one sentence, where, what, how much better, what to measure next."""
+    """What stands below the title, as HTML: one sentence, where, what, how much better, what to measure next."""
     first, _, rest = report["statement"].partition(". ")
     verdict = f"{_VERDICTS[report['verdict']]} · probability {_percent(report['probability'])}"
     parts = [
@@ -71,9 +71,13 @@ def body_of(report: Report, drawn: Drawn) -> str:
         _section("How much better", _better(report, drawn)),
         _section("Look at these recordings", _findings(report)),
         _section("What to measure next", _next(report)),
-        _section("Made with", _provenance(report)),
     ]
     return "\n".join(part for part in parts if part)
+
+
+def provenance(report: Report) -> str:
+    """With what it was made, as HTML."""
+    return _section("Made with", _provenance(report))
 
 
 def of_report(report: Report) -> dict[str, go.Figure]:

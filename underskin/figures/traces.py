@@ -10,7 +10,7 @@ from plotly.subplots import make_subplots
 from underskin.figures.style import COLOURS, label, styled
 from underskin.units import Floats
 
-_MOST_POINTS = 1200  # of one channel
+_MOST_POINTS = 700  # of one channel
 _ROW = 130  # pixels
 _EDGES = 110
 _LONGEST = 18  # letters of a name beside its axis

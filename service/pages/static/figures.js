@@ -42,7 +42,17 @@ for (const plot of document.querySelectorAll(".plot")) {
   plot.style.minHeight = `${plot.dataset.height}px`;
   seen.observe(plot);
 }
-addEventListener("beforeprint", () => document.querySelectorAll(".plot").forEach(draw));
+// On paper a figure is as wide as the sheet, whatever the window's width is.
+const SHEET = 680;
+addEventListener("beforeprint", () => {
+  for (const plot of document.querySelectorAll(".plot")) {
+    draw(plot);
+    Plotly.relayout(plot, { autosize: false, width: Math.min(SHEET, plot.clientWidth) });
+  }
+});
+addEventListener("afterprint", () => {
+  for (const plot of document.querySelectorAll(".plot")) Plotly.relayout(plot, { autosize: true, width: null });
+});
 
 for (const button of document.querySelectorAll("[data-save]")) {
   button.addEventListener("click", async () => {
