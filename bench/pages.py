@@ -39,6 +39,8 @@ def measure() -> list[Figure]:
         address = f"http://127.0.0.1:{server.port}"
         with httpx.Client(base_url=address, headers={"Accept": "text/html"}, timeout=60) as client:
             view = _first_view(client)
+            paths["A diagnosis"] = _diagnosed(client)
+            paths["Upload"] = "/upload"
             found = [Figure("First view: start, style and scripts", view, "s", 1.0, "lower")]
             for name, path in paths.items():
                 times = [_milliseconds(client, path) for _ in range(ROUNDS + 1)]
@@ -56,6 +58,15 @@ def measure() -> list[Figure]:
             )
         )
     return found
+
+
+def _diagnosed(client: httpx.Client) -> str:
+    """The page of a diagnosis that is done, of the campaign that came first."""
+    first = client.get("/v1/campaigns", params={"skin": "palm-0", "limit": 1}).json()["campaigns"][0]["id"]
+    asked = client.post(f"/v1/campaigns/{first}/diagnosis").json()["id"]
+    while client.get(f"/v1/diagnoses/{asked}").json()["state"] in ("queued", "running"):
+        time.sleep(0.2)
+    return f"/diagnoses/{asked}"
 
 
 def _milliseconds(client: httpx.Client, path: str) -> float:

@@ -2,9 +2,10 @@
 
 import json
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+from urllib.parse import quote
 
 from fastapi import Request
 
@@ -30,9 +31,14 @@ def post(request: Request, path: str, document: Mapping[str, Any], call: str) ->
     )
 
 
-def files(request: Request, path: str, call: str) -> SameRequest:
-    """POST files as a form, with a rig description."""
-    return SameRequest(f"{_curl(request, path)} \\\n  -F file=@monday.tdms -F rig=@rig.yaml", _python(request, call))
+def files(request: Request, labels: Sequence[str], rig: str | None, skin: str) -> SameRequest:
+    """POST files as a form, with a rig description where they need one."""
+    query = f"?skin={quote(skin, safe='')}" if skin else ""
+    parts = [f"file=@{label}" for label in labels] + ([] if rig is None else [f"rig=@{rig}"])
+    shown = "".join(f" \\\n  -F {shlex.quote(part)}" for part in parts)
+    told = [repr(list(labels)), *([f"skin={skin!r}"] if skin else []), *([] if rig is None else [f"rig={rig!r}"])]
+    call = f"client.campaigns.post_files({', '.join(told)})"
+    return SameRequest(_curl(request, f"/v1/campaigns{query}") + shown, _python(request, call))
 
 
 def _curl(request: Request, path: str) -> str:

@@ -3,14 +3,13 @@
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Annotated, Any
-from urllib.parse import quote
 
 import orjson
 from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from service import inverting, session
-from service.accepting import RIG, Terms, accept
+from service.accepting import RIG
 from service.campaigns import heavy
 from service.dependencies import Store, Table
 from service.pages import requests
@@ -18,6 +17,7 @@ from service.pages.figures import Drawn, csv_answer
 from service.pages.forms import TOKEN, WRITE, Form, require_own, see
 from service.pages.html import page
 from service.pages.upload_figures import figures, lines_columns, trace_columns
+from service.pages.upload_keeping import SKIN_FIELD, all_told, keep_good
 from service.pages.upload_mapping import CHANNELS, KINDS, RECORDING, SKIN, document_of, guessed, sensors_text
 from service.pages.upload_seen import MOST_LISTED, ChannelSeen, FileSeen, seen
 from service.pages.upload_shelf import Shelf, Shelved
@@ -25,7 +25,7 @@ from service.problems import Refusal
 from service.reading import Look, look, require_few
 from service.store import campaigns, skins
 from service.store.engine import Database
-from service.store.errors import Conflict, Missing
+from service.store.errors import Missing
 from service.uploads import Upload, received
 from underskin import InvalidInput
 from underskin.errors import FileError
@@ -34,9 +34,9 @@ from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription
 
 router = APIRouter(prefix="/upload")
 
-_SKIN = "skin"
 _LONGEST_FIELD = 1000  # bytes of a field beside the files
 _MOST_SKINS = 200  # that the form offers
+_MOST_NAMED = 5  # files in the request that does the same
 
 
 @router.get("")
@@ -44,14 +44,13 @@ def form(request: Request, store: Store, skin: Annotated[str, Query(max_length=2
     """Asks for files."""
     with store.reading() as connection:
         known = [row.id for row in skins.listed(connection, None, None, _MOST_SKINS)]
-    call = "client.campaigns.post_files(['monday.tdms'], rig='rig.yaml')"
     return page(
         request,
         "upload.html",
         skin=skin,
         known=known,
         most_mb=request.app.state.settings.max_upload_mb,
-        same=requests.files(request, "/v1/campaigns", call),
+        same=requests.files(request, ["monday.tdms"], "rig.yaml", skin),
     )
 
 
@@ -67,9 +66,9 @@ async def send(request: Request, store: Store) -> Response:
         rig = next((one for one in sent if one.field == RIG and one.label), None)
         if not given:
             raise Refusal(422, "No file came. Choose one, or drop it on the page.", title="No file")
-        found = await run_in_threadpool(_rig, store, rig, fields.get(_SKIN, ""))
+        found = await run_in_threadpool(_rig, store, rig, fields.get(SKIN_FIELD, ""))
         shelved = shelf.put(cookie, given)
-    shelved.skin = fields.get(_SKIN) or None
+    shelved.skin = fields.get(SKIN_FIELD) or None
     shelved.rig, shelved.refused = found
     try:
         async with heavy:
@@ -116,6 +115,12 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
         fields=CHANNELS,
         skin_fields=SKIN,
         recording_fields=RECORDING,
+        same=requests.files(
+            request,
+            [one.label for one in shelved.seen[:_MOST_NAMED]],
+            None if shelved.rig is None else "rig.json",
+            shelved.skin or "",
+        ),
     )
 
 
@@ -124,13 +129,13 @@ async def mapping(request: Request, upload_id: str, sent: Form) -> Response:
     """Reads the files again, as a form says what they are."""
     shelved = _find(request, upload_id)
     base = shelved.draft or (shelved.rig.document if shelved.rig is not None else {})
-    shelved.skin = sent.get(_SKIN, shelved.skin or "").strip() or None
+    shelved.skin = sent.get(SKIN_FIELD, shelved.skin or "").strip() or None
     try:
         shelved.draft = document_of(sent, base)
         shelved.rig = rig_description.from_dict(shelved.draft)
-        shelved.refused = []
+        shelved.draft, shelved.refused = None, []
     except InvalidInput as error:
-        shelved.refused = [_told(error)]
+        shelved.refused = all_told(error)
         return see(f"/upload/{upload_id}#mapping")
     async with heavy:
         await run_in_threadpool(_look, request, shelved)
@@ -142,7 +147,7 @@ async def keep(request: Request, upload_id: str, sent: Form, store: Store, table
     """Keeps what is good of it."""
     shelved = _find(request, upload_id)
     async with heavy:
-        kept = await run_in_threadpool(_keep, request, shelved, sent, store)
+        kept = await run_in_threadpool(keep_good, request, shelved, sent, store)
         await run_in_threadpool(inverting.derive, store, table, kept)
     return see(shelved.kept_at or f"/upload/{upload_id}")
 
@@ -152,6 +157,17 @@ def discard(request: Request, upload_id: str, sent: Form) -> Response:  # noqa: 
     """Removes it."""
     request.app.state.shelf.discard(_find(request, upload_id))
     return see("/upload")
+
+
+@router.get("/{upload_id}/rig.json")
+def rig_json(request: Request, upload_id: str) -> Response:
+    """The rig description in use."""
+    rig = _find(request, upload_id).rig
+    if rig is None:
+        raise Missing("There is no rig description yet.")
+    content = orjson.dumps(rig.document, option=orjson.OPT_INDENT_2)
+    headers = {"Content-Disposition": 'attachment; filename="rig.json"', "X-Content-Type-Options": "nosniff"}
+    return Response(content, headers=headers, media_type="application/json")
 
 
 @router.get("/{upload_id}/{file}/traces.csv")
@@ -196,38 +212,6 @@ def _draw(shelved: Shelved, number: int, found: Look) -> None:
     shelved.draw(number, figures(found, f"/upload/{shelved.id}/{number}/"))
 
 
-def _keep(request: Request, shelved: Shelved, sent: Mapping[str, str], store: Database) -> list[str]:
-    """The ids of what was kept; what kept it from being kept is told on the upload's page. Twice asked, kept once."""
-    with shelved.lock:
-        if shelved.kept_at is not None:
-            return []
-        key = request.scope["key"]
-        sender = None if key is None else key.name
-        together = sent.get("together", "").strip() if sent.get("as") == "one" else None
-        shelved.skin = sent.get(_SKIN, "").strip() or None
-        most = request.app.state.settings.max_body_bytes
-        try:
-            terms = Terms(shelved.skin, None, None, False, together, None, sender, most)
-            answer, _ = accept(store, [*shelved.files, *_rig_upload(shelved)], terms)
-        except (InvalidInput, Conflict, Refusal) as error:
-            shelved.refused = _all_told(error)
-            return []
-        kept = [result for result in answer["campaigns"] if result["id"] is not None]
-        one = f"/campaigns/{kept[0]['id']}"
-        shelved.kept_at = one if len(kept) == 1 else f"/skins/{quote(kept[0]['skin_id'], safe='')}"
-        request.app.state.shelf.empty(shelved)
-        return [result["id"] for result in kept]
-
-
-def _rig_upload(shelved: Shelved) -> list[Upload]:
-    """The rig description that was looked with, as a part of the upload."""
-    if shelved.rig is None:
-        return []
-    path = shelved.folder / RIG
-    path.write_bytes(orjson.dumps(shelved.rig.document))
-    return [Upload(path, None, RIG, "", in_form=True)]
-
-
 def _rig(store: Database, sent: Upload | None, skin: str) -> tuple[RigDescription | None, list[dict[str, Any]]]:
     """The rig description that was sent, or that is kept with the skin; and what is wrong with the one sent."""
     if sent is not None:
@@ -235,7 +219,7 @@ def _rig(store: Database, sent: Upload | None, skin: str) -> tuple[RigDescriptio
             with sent.path.open("rb") as file:
                 return rig_description.parse(file.read(LARGEST_BYTES + 1), sent.label or RIG), []
         except (FileError, InvalidInput) as error:
-            return None, _all_told(error)
+            return None, all_told(error)
     if skin:
         with store.reading() as connection:
             kept = skins.rig_of(connection, skin)
@@ -269,17 +253,3 @@ def _channels(shelved: Shelved) -> list[ChannelSeen]:
 def _short(field: Upload) -> str:
     with field.path.open("rb") as file:
         return file.read(_LONGEST_FIELD).decode("utf-8", "replace").strip()
-
-
-def _told(error: InvalidInput) -> dict[str, Any]:
-    return {"field": error.field, "value": error.value, "allowed": error.allowed}
-
-
-def _all_told(error: Exception) -> list[dict[str, Any]]:
-    if isinstance(error, InvalidInput):
-        return [_told(error)]
-    if isinstance(error, Refusal) and error.errors:
-        return [dict(entry) for entry in error.errors]
-    if isinstance(error, FileError):
-        return [{"field": error.file, "value": None, "allowed": f"{error.place} {error.reason}".strip()}]
-    return [{"field": "upload", "value": None, "allowed": error.detail if isinstance(error, Refusal) else str(error)}]

@@ -15,6 +15,7 @@ from tests.pages.conftest import Visit
 from tests.pages.lab_files import SHAKER_RIG, shaker_tdms
 from tests.pages.test_pages_security import BROWSING, HOSTILE, token_of
 from tests.store.server import Place, Server, campaign, running
+from underskin.recordings import rig_description
 
 GAIN = 7.4
 
@@ -72,6 +73,11 @@ def test_a_rig_description_reads_a_recording_and_its_form_keeps_what_it_says(vis
     page.get_by_text("1 recording understood").wait_for()
     shown = page.get_by_role("row", name="press").last.inner_text()
     assert float(shown.split()[-1]) == pytest.approx(2 * GAIN, rel=0.02)
+    page.get_by_text("What the channels are").click()
+    with page.expect_download() as saving:
+        page.get_by_role("link", name="Save this as a rig description").click()
+    saved = rig_description.parse(saving.value.path().read_bytes(), "rig.json")
+    assert saved.channels["charge_pc"].sensitivity == 5
     page.get_by_role("button", name="Keep 1 recording").click()
     page.wait_for_url("**/campaigns/*")
     kept = server.http.get("/v1/skins/shaker").json()["rig"]
