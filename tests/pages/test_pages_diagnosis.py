@@ -148,6 +148,15 @@ def test_hostile_names_in_a_report_stay_text(reader: Visit, idle: Server, made: 
     assert HOSTILE.split(".")[0] in reader.page.locator(".first").inner_text()
 
 
+def test_a_report_without_its_figures_says_so(idle: Server, made: Made) -> None:
+    place = f"/diagnoses/{keep(idle, resonant('bare', lines=LINES), Made(made.report, {}), 'bare')}"
+    shown = idle.http.get(place, headers=BROWSING).text
+    assert "were not kept" in shown
+    assert shown.count('class="plot"') == 1  # how probable each explanation is: of the report itself
+    assert idle.http.get(f"{place}/where.csv", headers=BROWSING).status_code == 422
+    assert idle.http.get(f"{place}/parameters.csv").status_code == 200
+
+
 def test_an_imported_report_of_odd_shape_is_said_to_be_one(idle: Server, made: Made) -> None:
     odd = Made({**made.report, "location": None}, {})
     place = f"/diagnoses/{keep(idle, resonant('odd', lines=LINES), odd, 'odd')}"

@@ -84,11 +84,11 @@ def _common(name: str, value: Any | Property, stated: Mapping[str, str | float],
     return number * _factor(label, name, file, f"property {value.property!r}") if label else number
 
 
-def _factor(label: str, field: str, file: str, place: str) -> float:
-    """From a unit to the field's."""
+def _factor(label: str, field: str, file: str, place: str, hint: str = "") -> float:
+    """From a unit to the field's; `hint` goes into the error."""
     known, wanted = unit(label), field_unit(field)
     if known is None or known.dimension != wanted.dimension:
-        raise FileError(file, place, f"its unit {label!r} is none of {wanted.dimension}, which {field} is")
+        raise FileError(file, place, f"its unit {label!r} is none of {wanted.dimension}, which {field} is{hint}")
     return known.to_si / LAB[field].to_si
 
 
@@ -151,7 +151,7 @@ class _Mapped:
     def _scale(self, field: str, label: str, mapping: ChannelMapping, place: str) -> float:
         """From the channel's unit to the field's, through the sensitivity where there is one."""
         if mapping.sensitivity is None or mapping.sensitivity_unit is None:
-            return _factor(label, field, self.file, place)
+            return _factor(label, field, self.file, place, "; a signal needs its sensitivity")
         signal, _, quantity = mapping.sensitivity_unit.rpartition("/")
         given, divided = unit(label), unit(signal)
         if given is None or divided is None or given.dimension != divided.dimension:
