@@ -9,7 +9,6 @@ COPY underskin /app/underskin
 COPY service /app/service
 COPY tablegen /app/tablegen
 COPY rig /app/rig
-COPY proof /app/proof
 COPY tables /app/tables
 RUN /opt/venv/bin/pip install --quiet --no-deps --no-build-isolation -e /app
 # The root is read-only later, so byte code is written now; the packages' own test suites and pip are not needed any more.

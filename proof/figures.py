@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -13,17 +13,7 @@ from matplotlib.figure import Figure
 from proof.judge import Judged, shown
 from proof.statistics import calibration, share
 
-_STYLE = {
-    "axes.grid": True,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "font.size": 9,
-    "grid.alpha": 0.3,
-    "legend.fontsize": 8,
-    "legend.frameon": False,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "underskin",
-}
+_STYLE = Path(__file__).parents[1] / "docs" / "figures.mplstyle"
 SIZES = (0.0, 4.5, 8.0, 16.0, 32.0, 64.0, 128.0, np.inf)  # effect in units of noise; √20 is the threshold of visibility
 
 
@@ -36,7 +26,7 @@ def save(figure: Figure, path: Path) -> Path:
 
 def calibration_and_size(judged: Sequence[Judged], path: Path) -> Path:
     """Stated probability against how often it was right, and accuracy against the effect's size."""
-    with mpl.rc_context(cast(Any, _STYLE)):
+    with mpl.rc_context(fname=_STYLE):
         figure = Figure(figsize=(7.6, 3.4), layout="constrained")
         left, right = figure.subplots(1, 2)
         _calibration(left, judged)
@@ -81,7 +71,7 @@ def _sizes(axes: Axes, judged: Sequence[Judged]) -> None:
 
 def confusion(judged: Sequence[Judged], path: Path) -> Path:
     """What was hidden against what was named, of all but pairs; what no report named has no column."""
-    with mpl.rc_context(cast(Any, {**_STYLE, "axes.grid": False, "font.size": 6.5})):
+    with mpl.rc_context({"axes.grid": False, "font.size": 6.5}, fname=_STYLE):
         rows = [entry for entry in judged if len(entry.truth) < 2]
         truths = sorted({entry.truth for entry in rows}, key=lambda names: (len(names), names))
         answers = [
@@ -107,7 +97,7 @@ def confusion(judged: Sequence[Judged], path: Path) -> Path:
 def before_and_after(campaigns: Sequence[Mapping[str, Any]], path: Path) -> Path:
     """Held-out error of the base model and of the explanation, beside the noise floor, for real recordings."""
     kept = [entry for entry in campaigns if _held_out(entry)]
-    with mpl.rc_context(cast(Any, _STYLE)):
+    with mpl.rc_context(fname=_STYLE):
         figure = Figure(figsize=(7.6, 0.9 + 0.25 * len(kept)), layout="constrained")
         axes = figure.subplots()
         for place, entry in enumerate(reversed(kept)):

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from proof.real import recorded
-from rig.elastomer import campaign_of_curves, record_curves
-from rig.experiment import parse as experiment
+from tests.rig_pads import pressed
 from underskin.diagnosis.diagnose import diagnosis_report
 from underskin.recordings.campaign import parse
 from underskin.surrogate import load_table
@@ -17,23 +16,8 @@ from underskin.surrogate import load_table
 
 def creeping_pad(seed: int) -> dict[str, Any]:
     """A soft pad that creeps and does nothing else, pressed by two spheres at two speeds, only the way in kept."""
-    described = experiment(
-        {
-            "schema": "experiment/1",
-            "name": "creeping pad",
-            "seed": seed,
-            "kind": "indentation",
-            "skin": {"thickness_mm": 8, "youngs_modulus_mpa": 0.5, "sensor_radius_mm": 1.5, "d33_pc_per_n": 14},
-            "curves": {
-                "indenters_mm": [2.5, 5],
-                "largest_displacement_mm": 1.5,
-                "speeds_mm_per_s": [0.1, 1],
-                "samples": 150,
-            },
-            "effects": {"contact_creep": {"fraction": 0.3, "time_s": 4}},
-        }
-    )
-    campaign = campaign_of_curves(described, record_curves(described))
+    curves = {"largest_displacement_mm": 1.5, "speeds_mm_per_s": [0.1, 1], "samples": 150}
+    campaign = pressed("creeping pad", seed, 8, curves, {"contact_creep": {"fraction": 0.3, "time_s": 4}})
     for recording in campaign["recordings"]:
         peak = int(np.argmax(recording["displacement_mm"])) + 1
         for column in ("displacement_mm", "force_n", "time_s"):
@@ -54,23 +38,8 @@ def test_creep_alone_is_named_where_only_the_way_in_is_kept(seed: int) -> None:
 
 def pressed_pad(seed: int, bump: float) -> dict[str, Any]:
     """A pad with nothing missing, but for a bump of so many times the largest force in the middle of each way in."""
-    described = experiment(
-        {
-            "schema": "experiment/1",
-            "name": "pad",
-            "seed": seed,
-            "kind": "indentation",
-            "skin": {"thickness_mm": 100, "youngs_modulus_mpa": 0.5, "sensor_radius_mm": 1.5, "d33_pc_per_n": 14},
-            "curves": {
-                "indenters_mm": [2.5, 5],
-                "largest_displacement_mm": 0.6,
-                "speeds_mm_per_s": [0.1],
-                "samples": 200,
-                "modulus_declared": False,
-            },
-        }
-    )
-    campaign = campaign_of_curves(described, record_curves(described))
+    curves = {"largest_displacement_mm": 0.6, "speeds_mm_per_s": [0.1], "samples": 200, "modulus_declared": False}
+    campaign = pressed("pad", seed, 100, curves)
     for recording in campaign["recordings"]:
         displacement, force = np.array(recording["displacement_mm"]), np.array(recording["force_n"])
         recording["force_n"] = (force + bump * force.max() * np.exp(-(((displacement - 0.4) / 0.06) ** 2))).tolist()

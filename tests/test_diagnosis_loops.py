@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.elastomer import campaign_of_curves, record_curves
-from rig.experiment import parse as experiment
+from tests.rig_pads import pressed
 from underskin.diagnosis.diagnose import diagnosis_report
 from underskin.diagnosis.jumps import jumps
 from underskin.recordings.campaign import parse
@@ -14,25 +13,8 @@ from underskin.surrogate import load_table
 
 
 def loops(effects: dict[str, dict[str, float]], seed: int = 5, **curves: Any) -> dict[str, Any]:
-    described = experiment(
-        {
-            "schema": "experiment/1",
-            "name": "loops",
-            "seed": seed,
-            "kind": "indentation",
-            "skin": {"thickness_mm": 8, "youngs_modulus_mpa": 0.5, "sensor_radius_mm": 1.5, "d33_pc_per_n": 14},
-            "curves": {
-                "indenters_mm": [2.5, 5],
-                "largest_displacement_mm": 0.5,
-                "speeds_mm_per_s": [0.05],
-                "samples": 240,
-                "force_noise_n": 3e-4,
-            }
-            | curves,
-            "effects": effects,
-        }
-    )
-    return campaign_of_curves(described, record_curves(described))
+    usual = {"largest_displacement_mm": 0.5, "speeds_mm_per_s": [0.05], "samples": 240, "force_noise_n": 3e-4}
+    return pressed("loops", seed, 8, usual | curves, effects)
 
 
 def standard_errors(report: dict[str, Any], name: str, truth: float) -> float:

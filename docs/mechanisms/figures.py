@@ -11,23 +11,14 @@ from docs.mechanisms.signatures import panels
 from underskin.mechanisms import CATALOGUE
 from underskin.surrogate import SigmaTable
 
-_STYLE = {
-    "axes.grid": True,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "font.size": 8,
-    "grid.alpha": 0.3,
-    "legend.frameon": False,
-    "path.simplify_threshold": 0.5,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "underskin",
-}
+_STYLE = Path(__file__).parents[1] / "figures.mplstyle"
+_SMALL = {"font.size": 8, "legend.fontsize": "medium", "path.simplify_threshold": 0.5}
 
 
 def draw(table: SigmaTable, folder: Path, names: Iterable[str] = tuple(CATALOGUE)) -> list[Path]:
     """Write mechanism-NAME.svg for each name into `folder`; returns their paths."""
     paths = []
-    with mpl.rc_context(cast(Any, _STYLE)):  # its type lists every known setting
+    with mpl.rc_context(cast(Any, _SMALL), fname=_STYLE):  # its type lists every known setting
         for name in names:
             shown = panels(name, table)
             figure = Figure(figsize=(3.4 * len(shown), 2.3), layout="constrained")

@@ -1,7 +1,6 @@
 """The five figures, drawn from the library alone; the same input gives the same bytes."""
 
 from pathlib import Path
-from typing import Any, cast
 
 import matplotlib as mpl
 import numpy as np
@@ -13,17 +12,7 @@ from underskin import half_space, linear_layer, response
 from underskin.surrogate import SigmaTable
 from underskin.units import Floats
 
-_STYLE = {
-    "axes.grid": True,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "font.size": 9,
-    "grid.alpha": 0.3,
-    "legend.fontsize": 8,
-    "legend.frameon": False,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "underskin",
-}
+_STYLE = Path(__file__).parents[1] / "figures.mplstyle"
 _LOADS = (0.0, 1e-3, 1e-2, 1e-1)
 _RADII = (0.0, 0.2, 0.6, 1.0)
 _FLAT_ZONE_HZ = (1.0, 130.0)
@@ -39,7 +28,7 @@ def draw(table: SigmaTable, folder: Path) -> list[Path]:
         "11": _frf_over_preload,
     }
     paths = []
-    with mpl.rc_context(cast(Any, _STYLE)):  # its type lists every known setting
+    with mpl.rc_context(fname=_STYLE):
         for number, drawing in drawings.items():
             figure = Figure(figsize=(7.6, 3.2), layout="constrained")
             drawing(figure, table)

@@ -12,8 +12,8 @@ import numpy as np
 
 from underskin.diagnosis.curvature import curvature
 from underskin.diagnosis.evidence import Evidence, laplace
-from underskin.diagnosis.fit import Evaluated, Fitter, Point
-from underskin.diagnosis.hypothesis import Hypothesis
+from underskin.diagnosis.fit import Evaluated, Fitter
+from underskin.diagnosis.hypothesis import Hypothesis, Point
 from underskin.diagnosis.likelihood import Curvature
 from underskin.diagnosis.lines import Lines
 from underskin.diagnosis.scatter import GAIN_PRIOR, NO_POSITION, POSITION

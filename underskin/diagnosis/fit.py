@@ -13,6 +13,7 @@ import numpy as np
 from underskin.diagnosis.hypothesis import (
     COVARIANCE_NAMES,
     Hypothesis,
+    Point,
     curvature_of_prior,
     is_scale,
     moves_covariance,
@@ -31,15 +32,6 @@ _CONVERGED = 0.01  # in log posterior
 _MOST_ITERATIONS = 25
 _FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
 _BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
-
-
-@dataclass(frozen=True)
-class Point:
-    """Where a fit stands: the model's coordinates, the covariance's, and each sensor's most probable log gain."""
-
-    fit: Floats
-    covariance: Floats
-    bend: Floats
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from underskin.mechanisms.catalogue import CATALOGUE
 from underskin.mechanisms.composition import parameters_together
 from underskin.mechanisms.mechanism import Normal, Parameter
 from underskin.mechanisms.model import Model
+from underskin.units import Floats
 
 COVARIANCE_NAMES = ("spread", "pickup_charge")
 _LEVELS = (0.1, 100.0)  # bounds of the lines' level
@@ -64,6 +65,15 @@ class Hypothesis:
             if moves_covariance(entry)
         ]
         return (*common, *own)
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where a fit stands: the model's coordinates, the covariance's, and each sensor's most probable log gain."""
+
+    fit: Floats
+    covariance: Floats
+    bend: Floats
 
 
 def own_parameters(hypothesis: Hypothesis) -> int:
