@@ -15,6 +15,7 @@ from service.keys import Key
 from service.pages import formats
 from service.pages.assets import address, library_style_hash
 from service.pages.requests import scheme
+from service.pages.upload_mapping import field_words, what_to_do
 from underskin import __version__
 
 # Of the empty style element that plotly fills through the object model.
@@ -57,6 +58,7 @@ def _templates() -> Environment:
         auto_reload=False,
     )
     environment.filters.update(formats.FILTERS)
+    environment.filters.update(field_words=field_words, what_to_do=what_to_do)
     environment.globals.update(static=address, version=__version__, segment=lambda text: quote(text, safe=""))
     return environment
 

@@ -130,13 +130,15 @@ async def mapping(request: Request, upload_id: str, sent: Form) -> Response:
     shelved = _find(request, upload_id)
     base = shelved.draft or (shelved.rig.document if shelved.rig is not None else {})
     shelved.skin = sent.get(SKIN_FIELD, shelved.skin or "").strip() or None
+    shelved.draft, wrong = document_of(sent, base)
     try:
-        shelved.draft = document_of(sent, base)
-        shelved.rig = rig_description.from_dict(shelved.draft)
-        shelved.draft, shelved.refused = None, []
+        rig = rig_description.from_dict(shelved.draft)
     except InvalidInput as error:
-        shelved.refused = all_told(error)
-        return see(f"/upload/{upload_id}#mapping")
+        wrong.append(error)
+    shelved.refused = [told for error in wrong for told in all_told(error)]
+    if wrong:
+        return see(f"/upload/{upload_id}")
+    shelved.rig, shelved.draft = rig, None
     async with heavy:
         await run_in_threadpool(_look, request, shelved)
     return see(f"/upload/{upload_id}")

@@ -9,7 +9,11 @@ from underskin import InvalidInput
 from underskin.recordings.rig_description import SCHEMA, channel_fields
 from underskin.recordings.unit_labels import lab_field, unit
 
-KINDS = ("frf", "indentation", "compression")
+KINDS = {
+    "frf": "FRF: charge against a shaken force",
+    "indentation": "indentation: force against depth",
+    "compression": "compression of a sample of the elastomer",
+}
 # Field, words, unit, and the kinds that have it.
 SKIN = (
     ("thickness_mm", "thickness h", "mm"),
@@ -36,9 +40,23 @@ CHANNELS = {
     "frf_pc_per_n": "FRF, complex numbers",
     "coherence": "coherence γ²",
 }  # what a channel can be, of one kind or another
+_RATE = "sample_rate_hz"
+_WORDS = {
+    **{name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in (*SKIN, *RECORDING)},
+    "sensors": "layout",
+    _RATE: "sample rate [Hz]",
+}
 _TEXTS = ("sensor",)
+_SEPARATORS = (";", "\t", ",", None)  # of a line of the layout, as tried; None: blanks
+_PARTS = 3  # of it: name, x, y
 _BY_DIMENSION = {
-    "frf": {"force": "force_n", "charge": "charge_pc", "frequency": "frequency_hz", "charge/force": "frf_re_pc_per_n"},
+    "frf": {
+        "force": "force_n",
+        "charge": "charge_pc",
+        "frequency": "frequency_hz",
+        "charge/force": "frf_re_pc_per_n",
+        "time": "time_s",
+    },
     "indentation": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
 }
 _BY_WORD = {
@@ -48,6 +66,20 @@ _BY_WORD = {
     "amplifier": "charge_pc",
     "coherence": "coherence",
 }
+
+
+def field_words(field: str) -> str:
+    """A field as the form calls it; others as they are."""
+    return _WORDS.get(field.removeprefix("skin.").removeprefix("recording."), field)
+
+
+def what_to_do(error: Mapping[str, Any]) -> str:
+    """What is allowed; for what the form asks, where to say it."""
+    if error["allowed"] != "required" or field_words(error["field"]) == error["field"]:
+        return str(error["allowed"])
+    if error["field"] == _RATE:
+        return "required: say below which channel is the time, or see that the instrument writes its sample rate"
+    return "required: fill it in below"
 
 
 def guessed(channels: Sequence[ChannelSeen], properties: Mapping[str, Any], skin: Mapping[str, Any]) -> dict[str, Any]:
@@ -78,28 +110,31 @@ def _stated(properties: Mapping[str, Any], kind: str) -> dict[str, Any]:
     return {name: {"property": named[name]} for name in wanted if name in named}
 
 
-def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> dict[str, Any]:
-    """The rig description that a form says; what no field of the form is about stays as in `base`.
+def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[str, Any], list[InvalidInput]]:
+    """The rig description that a form says, and what in it cannot be: a line of the layout, two channels for one field.
 
-    Raises InvalidInput for a line of the layout, and for two channels that are to be one field.
+    What no field of the form is about stays as in `base`; what was typed and cannot be is kept, to be put right.
     """
     kind = form.get("kind", "frf")
+    sensors, strange = _sensors(form.get("sensors", ""))
+    channels, twice = _channels(form, base.get("channels", {}))
     document: dict[str, Any] = {"schema": SCHEMA, **deepcopy(dict(base)), "kind": kind}
     document["skin"] = _replaced(base.get("skin", {}), {name: _number(form.get(name, "")) for name, *_ in SKIN})
-    document["skin"] = _replaced(document["skin"], {"sensors": _sensors(form.get("sensors", ""))})
+    document["skin"] = _replaced(document["skin"], {"sensors": sensors})
     said = {name: _said(form, name) if kind in kinds else None for name, _, _, kinds in RECORDING}
     document["recording"] = _replaced(base.get("recording", {}), said)
-    document["channels"] = _channels(form, base.get("channels", {}))
+    document["channels"] = channels
     document.pop("units_checked", None)
     if form.get("units_checked"):
         document["units_checked"] = True
-    return document
+    return document, [*strange, *twice]
 
 
 def sensors_text(document: Mapping[str, Any]) -> str:
     """The layout, a line a sensor."""
     sensors = document.get("skin", {}).get("sensors") or []
-    return "\n".join(f"{one.get('id', '')}, {one.get('x_mm', 0):g}, {one.get('y_mm', 0):g}" for one in sensors)
+    told = [[one[name] for name in ("id", "x_mm", "y_mm") if name in one] for one in sensors]
+    return "\n".join(", ".join(f"{part:g}" if isinstance(part, float | int) else part for part in one) for one in told)
 
 
 def _replaced(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -124,28 +159,41 @@ def _number(text: str) -> Any:
         return text
 
 
-def _sensors(text: str) -> list[dict[str, Any]] | None:
-    found = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        if line.strip():
-            name, *places = (part.strip() for part in line.replace(";", ",").replace("\t", ",").split(","))
-            if len(places) != 2:
-                raise InvalidInput("skin.sensors", line.strip()[:80], f"line {number} must be: name, x [mm], y [mm]")
-            found.append({"id": name, "x_mm": _number(places[0]), "y_mm": _number(places[1])})
-    return found or None
+def _sensors(layout: str) -> tuple[list[dict[str, Any]] | None, list[InvalidInput]]:
+    """The sensors, and the lines that are none: these are kept as names without a place."""
+    found: list[dict[str, Any]] = []
+    strange = []
+    for number, line in enumerate(layout.splitlines(), start=1):
+        told = line.strip()
+        if not told:
+            continue
+        # A comma separates, or is a decimal comma between semicolons, tabs or blanks: as three parts come out.
+        parts = next((parts for by in _SEPARATORS if len(parts := told.split(by)) == _PARTS), None)
+        if parts is None:
+            must = f"line {number} must be: name, x [mm], y [mm]; such as s{number}, 8, 0"
+            strange.append(InvalidInput("skin.sensors", told[:80], must))
+            found.append({"id": told})
+        else:
+            name, x, y = parts
+            found.append({"id": name.strip(), "x_mm": _number(x), "y_mm": _number(y)})
+    return found or None, strange
 
 
-def _channels(form: Mapping[str, str], base: Mapping[str, Any]) -> dict[str, Any]:
+def _channels(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[str, Any], list[InvalidInput]]:
+    """What each field's channel is, and the channels that a field has beside its first."""
     found: dict[str, Any] = {}
+    twice = []
     number = 0
     while f"channel-{number}" in form:
         field = form.get(f"is-{number}", "")
-        if field:
-            if field in found:
-                raise InvalidInput(f"channels.{field}", form[f"channel-{number}"][:80], "only one channel can be it")
+        if field in found:
+            twice.append(
+                InvalidInput(f"channels.{field}", form[f"channel-{number}"][:80], "only one channel can be it")
+            )
+        elif field:
             found[field] = _channel(form, number, base.get(field, {}))
         number += 1
-    return found
+    return found, twice
 
 
 def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> dict[str, Any]:

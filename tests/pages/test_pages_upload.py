@@ -97,9 +97,20 @@ def test_a_mapping_that_cannot_be_used_says_why(visitor: Visit) -> None:
     assert "channels.charge_pc.sensitivity" in alert.inner_text()
     visitor.require_accessible()
     page.get_by_label("Unit of the sensitivity of Amplifier").fill("mV/N")
+    page.get_by_label("sphere radius R [mm]", exact=True).fill("5")
+    page.get_by_label("Layout").fill("s01 0")
+    page.get_by_role("button", name="Read it so").click()
+    assert "name, x [mm], y [mm]" in alert.inner_text()
+    assert page.get_by_label("sphere radius R [mm]", exact=True).input_value() == "5"  # what was typed is still there
+    assert page.get_by_label("Layout").input_value() == "s01 0"
+    page.get_by_label("Layout").fill("s01 0 0")
+    page.get_by_label("sphere radius R [mm]", exact=True).fill("")
     page.get_by_role("button", name="Read it so").click()
     page.get_by_role("heading", name="It cannot be read so").wait_for()
     assert "Amplifier" in page.get_by_role("row", name="file").inner_text()
+    page.get_by_label("Unit of the sensitivity of Amplifier").fill("mV/pC")
+    page.get_by_role("button", name="Read it so").click()
+    assert "fill it in below" in page.get_by_role("row", name="sphere radius R [mm]").inner_text()
 
 
 def test_files_that_are_dropped_are_looked_at(visitor: Visit) -> None:

@@ -128,3 +128,13 @@ def test_loads_on_the_skin_s_array(newcomer: Visit) -> None:
     page.get_by_label("Loads, one a line").fill("0 0 4")
     page.get_by_role("button", name="Compute").click()
     page.get_by_role("alert").get_by_text("must be x y R F").wait_for()
+
+
+def test_no_page_is_wider_than_a_phone(newcomer: Visit) -> None:
+    page = newcomer.page
+    page.set_viewport_size({"width": 390, "height": 844})
+    campaign = page.get_by_role("link", name="example, as built").get_attribute("href")
+    for path in ("/", EXAMPLE, str(campaign), "/upload", "/design", "/loads"):
+        newcomer.go(path)
+        newcomer.drawn(page.locator(".plot").count())
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390, path

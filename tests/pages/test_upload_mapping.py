@@ -8,7 +8,6 @@ import yaml
 
 from service.pages.upload_mapping import CHANNELS, KINDS, document_of, guessed, sensors_text
 from service.pages.upload_seen import ChannelSeen
-from underskin import InvalidInput
 from underskin.recordings import rig_description
 
 RIGS = sorted((Path(__file__).parents[2] / "examples" / "formats" / "rigs").glob("*.yaml"))
@@ -35,8 +34,9 @@ def form_of(document: dict[str, Any]) -> dict[str, str]:
 @pytest.mark.parametrize("file", RIGS, ids=lambda file: str(file.stem))
 def test_a_form_that_nobody_changed_says_the_same(file: Path) -> None:
     document = yaml.safe_load(file.read_text())
-    found = document_of(form_of(document), document)
+    found, wrong = document_of(form_of(document), document)
     rig_description.from_dict(found)
+    assert wrong == []
     assert found == document | {"recording": document.get("recording", {})}
 
 
@@ -61,14 +61,31 @@ def test_channels_and_what_a_file_states_are_guessed_by_unit_and_name() -> None:
 
 def test_a_unit_other_than_the_label_says_that_the_label_is_wrong() -> None:
     form = {"kind": "frf", "channel-0": "F", "is-0": "force_n", "label-0": "g", "unit-0": "N"}
-    assert document_of(form, {})["channels"]["force_n"] == {"channel": "F", "labelled": "g", "unit": "N"}
+    assert document_of(form, {})[0]["channels"]["force_n"] == {"channel": "F", "labelled": "g", "unit": "N"}
     same = {**form, "label-0": "N"}
-    assert document_of(same, {})["channels"]["force_n"] == {"channel": "F"}
+    assert document_of(same, {})[0]["channels"]["force_n"] == {"channel": "F"}
 
 
-def test_what_cannot_be_said_is_refused_by_name() -> None:
-    with pytest.raises(InvalidInput, match=r"skin\.sensors.*line 2"):
-        document_of({"sensors": "s1, 0, 0\ns2, 8"}, {})
+def test_what_cannot_be_said_is_named_and_what_was_typed_is_kept() -> None:
+    layout = "s1, 0, 0\ns2, 8\ns3, a, 0"
+    found, (wrong,) = document_of({"sensors": layout, "thickness_mm": "2,5"}, {})
+    assert wrong.field == "skin.sensors"
+    assert "line 2" in wrong.allowed
+    assert found["skin"]["thickness_mm"] == 2.5
+    assert sensors_text(found) == layout
     twice = {"channel-0": "a", "is-0": "force_n", "channel-1": "b", "is-1": "force_n"}
-    with pytest.raises(InvalidInput, match="only one channel"):
-        document_of(twice, {})
+    found, (wrong,) = document_of(twice, {})
+    assert wrong.allowed == "only one channel can be it"
+    assert found["channels"] == {"force_n": {"channel": "a"}}
+
+
+@pytest.mark.parametrize("line", ["s1, 0.5, 8", "s1; 0,5; 8", "s1\t0,5\t8", "s1 0.5 8", "s1   0,5 8"])
+def test_a_layout_is_written_as_people_write_it(line: str) -> None:
+    found, wrong = document_of({"sensors": line}, {})
+    assert wrong == []
+    assert found["skin"]["sensors"] == [{"id": "s1", "x_mm": 0.5, "y_mm": 8.0}]
+
+
+def test_the_time_of_a_table_is_found_so_that_no_sample_rate_is_missing() -> None:
+    found = guessed([channel("Time (s)", "s"), channel("Force (N)", "N"), channel("Charge (pC)", "pC")], {}, {})
+    assert found["channels"]["time_s"] == {"channel": "Time (s)"}
