@@ -10,7 +10,7 @@ import pytest
 from tests.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.diagnose import diagnosis_report
 from underskin.diagnosis.findings import inspect
-from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.campaign import Campaign, FrfRecording, from_dict, to_dict
 from underskin.surrogate import SigmaTable, load_table
 
 MADE = Made(sensors=3, repeats=2, lines=20)
@@ -46,10 +46,13 @@ def times(factor: float, *fields: str) -> Change:
     return change
 
 
-def in_metres(entry: FrfRecording) -> FrfRecording:
-    assert entry.position_mm is not None
-    x, y = entry.position_mm
-    return replace(entry, position_mm=(1e-3 * x, 1e-3 * y))
+def away(times_as_far: float) -> Change:
+    def change(entry: FrfRecording) -> FrfRecording:
+        assert entry.position_mm is not None
+        x, y = entry.position_mm
+        return replace(entry, position_mm=(times_as_far * x, times_as_far * y))
+
+    return change
 
 
 def changed(good: Campaign, change: Change, which: Which) -> Campaign:
@@ -63,6 +66,10 @@ def of_all(entry: FrfRecording) -> bool:
 
 def of_r3(entry: FrfRecording) -> bool:
     return entry.id == "r3"
+
+
+def of_r9(entry: FrfRecording) -> bool:
+    return entry.id == "r9"
 
 
 def of_s1(entry: FrfRecording) -> bool:
@@ -81,6 +88,8 @@ ONE = [
     (times(1000.0, "dynamic_force_n"), of_r3, ("units_off_by_1000", "r3", "dynamic_force_n"), 1),
     (times(1000.0, "frequency_hz"), of_r3, ("units_off_by_1000", "r3", "frequency_hz"), 1),
     (times(1e-3, "indenter_radius_mm"), of_r3, ("units_off_by_1000", "r3", "indenter_radius_mm"), 1),
+    (away(1e-3), of_r9, ("units_off_by_1000", "r9", "position_mm"), 1),
+    (away(1e3), of_r9, ("units_off_by_1000", "r9", "position_mm"), 1),
     (times(1000.0, *LINES), of_s1, ("units_off_by_1000", "r8", "frf_re_pc_per_n"), 16),
     (times(1e-3, "dynamic_force_n"), of_all, ("units_off_by_1000", "", "dynamic_force_n"), 0),
     (times(1e-3, *LINES), of_all, ("units_off_by_1000", "", "frf_re_pc_per_n"), 0),
@@ -108,11 +117,14 @@ ALL = [
     (noise(30.0), "no_response", "frf_re_pc_per_n"),
     (times(np.nan, *LINES), "no_finite_line", "frf_re_pc_per_n"),
     (times(1e-3, "preload_n"), "units_off_by_1000", "preload_n"),
-    (times(1000.0, "preload_n"), "impossible_geometry", "skin.thickness_mm"),
+    (times(1000.0, "preload_n"), "units_off_by_1000", "preload_n"),
     (times(1000.0, "frequency_hz"), "units_off_by_1000", "frequency_hz"),
     (times(1e-3, "frequency_hz"), "units_off_by_1000", "frequency_hz"),
     (times(1000.0, "dynamic_force_n"), "units_off_by_1000", "dynamic_force_n"),
-    (in_metres, "units_off_by_1000", "position_mm"),
+    (away(1e-3), "units_off_by_1000", "position_mm"),
+    (away(1e3), "units_off_by_1000", "position_mm"),
+    (times(600.0, "preload_n"), "units_off_by_1000", "preload_n"),
+    (times(1000.0, "indenter_radius_mm"), "units_off_by_1000", "indenter_radius_mm"),
 ]
 
 
@@ -138,6 +150,71 @@ def test_impossible_geometry_is_named(
     report = diagnosis_report(replace(good, skin=skin), table)
     assert report["verdict"] == "insufficient_data"
     assert ("impossible_geometry", field) in {(entry["code"], entry["field"]) for entry in report["findings"]}
+
+
+SKIN = [
+    ("youngs_modulus_mpa", 1e3),
+    ("youngs_modulus_mpa", 1e-3),
+    ("thickness_mm", 1e3),
+    ("thickness_mm", 1e-3),
+    ("sensor_radius_mm", 1e-3),
+]
+
+
+@pytest.mark.parametrize(("name", "factor"), SKIN)
+def test_a_skin_in_other_units_is_named_and_tells_nothing(
+    name: str, factor: float, good: Campaign, table: SigmaTable
+) -> None:
+    """Also where the units are said to be checked, so that the diagnosis goes on."""
+    wrong = replace(good, skin=replace(good.skin, **{name: factor * getattr(good.skin, name)}))
+    found = ("units_off_by_1000", "", f"skin.{name}")
+    inspected = inspect(wrong, table)
+    assert found in codes(inspected.found)
+    assert "units_checked" in inspected.lacking
+    meant = inspect(replace(wrong, units_checked=True), table)
+    assert found in codes(meant.found)
+    assert "units_checked" not in meant.lacking
+
+
+def test_a_modulus_that_was_checked_is_diagnosed_with_the_suspicion_beside(good: Campaign, table: SigmaTable) -> None:
+    stiff = replace(good, skin=replace(good.skin, youngs_modulus_mpa=3000.0), units_checked=True)
+    report = diagnosis_report(stiff, table)
+    assert report["verdict"] != "insufficient_data"
+    told = {(entry["code"], entry["field"]): entry["statement"] for entry in report["findings"]}
+    assert "kPa" in told["units_off_by_1000", "skin.youngs_modulus_mpa"]
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+def test_sensors_in_other_units_are_named(factor: float, good: Campaign, table: SigmaTable) -> None:
+    sensors = tuple(
+        replace(sensor, x_mm=factor * sensor.x_mm, y_mm=factor * sensor.y_mm) for sensor in good.skin.sensors
+    )
+    inspected = inspect(replace(changed(good, away(factor), of_all), skin=replace(good.skin, sensors=sensors)), table)
+    assert inspected.lacking
+    assert {entry[2] for entry in codes(inspected.found)} <= {"skin.sensors", "skin.sensor_radius_mm"}
+
+
+def test_offsets_in_metres_at_the_only_sensor_are_named(table: SigmaTable) -> None:
+    made = campaign(Made(sensors=1, offsets_mm=(0.0, 1.0, 2.0), lines=8), table)
+    inspected = inspect(changed(made, away(1e-3), of_all), table)
+    assert ("units_off_by_1000", "", "position_mm") in codes(inspected.found)
+    assert inspected.lacking
+
+
+def test_what_would_bring_contacts_into_the_tables_is_named(good: Campaign, table: SigmaTable) -> None:
+    inspected = inspect(replace(changed(good, times(1e3, "indenter_radius_mm"), of_all), units_checked=True), table)
+    named = {entry.field: entry.statement for entry in inspected.found if "within the tables" in entry.statement}
+    assert "µm" in named["indenter_radius_mm"]
+    assert "GPa" in named["skin.youngs_modulus_mpa"]
+    assert inspected.lacking
+
+
+def test_recordings_that_were_all_refused_are_said_to_be(good: Campaign, table: SigmaTable) -> None:
+    document = to_dict(changed(good, times(1e3, "indenter_radius_mm"), of_all))
+    read, refused = from_dict(document)
+    report = diagnosis_report(read, table, refused=refused)
+    assert report["verdict"] == "insufficient_data"
+    assert f"{len(good.recordings)} recording(s) were refused for their indenter_radius_mm" in report["statement"]
 
 
 def test_copies_are_found_through_rounding(good: Campaign, table: SigmaTable) -> None:

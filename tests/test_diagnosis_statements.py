@@ -18,6 +18,8 @@ from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.fit import Fitter
 from underskin.diagnosis.lines import Lines, lines
 from underskin.diagnosis.locate import AxisResult
+from underskin.diagnosis.numbers import in_percent
+from underskin.diagnosis.page import page
 from underskin.diagnosis.report import report
 from underskin.diagnosis.search import Answer
 from underskin.diagnosis.statements import location_statement, why_not
@@ -79,6 +81,31 @@ def test_a_location_has_units_and_leaves_out_what_spans_a_whole_axis() -> None:
     both = location_statement(AXES, ranges, {"preload_n": True, "load_cycles": True}, Effect(12.0, 9.0, 15.0, False))
     assert "spread over all of the recordings" in both
     assert "off by 12 % (root mean square" in both
+
+
+@pytest.mark.parametrize(
+    ("size", "said"),
+    [
+        (Effect(-132.0, -140.0, -125.0, True), "the other sign than the model's, -0.32 times it (95 %: -0.4 to -0.25)"),
+        (Effect(-95.0, -96.0, -94.0, True), "the response is 0.05 times the model's (95 %: 0.04 to 0.06)"),
+        (Effect(2820.0, 2700.0, 2970.0, True), "the response is 29 times the model's (95 %: 28 to 31)"),
+        (Effect(1500.0, 1400.0, 1600.0, False), "off by 1500 % (root mean square"),
+        (Effect(0.5, -0.3, 0.9, True), "0.5 % above the model (95 %: -0.3 to +0.9 %)"),
+    ],
+)
+def test_large_effects_are_factors(size: Effect, said: str) -> None:
+    assert said in location_statement(AXES, {}, {}, size)
+
+
+def test_a_probability_is_never_certain_and_the_same_everywhere(table: SigmaTable) -> None:
+    document = report(diagnose(campaign(Made(("ageing",), (0.3, 300.0, 0.0), sensors=3, repeats=2), table), table))
+    assert document["probability"] == 1.0
+    assert "(probability over 99.9 %)" in document["statement"]
+    assert "probability over 99.9 %" in page(document)
+    assert in_percent(0.9996) == "over 99.9 %"
+    assert in_percent(0.9994) == "99.9 %"
+    assert in_percent(0.0004) == "under 0.1 %"
+    assert in_percent(0.0) == "under 0.1 %"
 
 
 def test_every_axis_has_words() -> None:

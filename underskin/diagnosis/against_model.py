@@ -1,4 +1,4 @@
-"""What single recordings say against the base model before any fit: out of its reach, silent, off by 1000, reversed.
+"""What single recordings say against the base model before any fit: silent, off by 1000, reversed.
 
 All that is compared is each recording's level over what the base model predicts: its apparent d33. Recordings that are
 silent, or where little is predicted (near a crossing of zero), have none.
@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin import hertz
 from underskin.diagnosis.finding import Finding
+from underskin.diagnosis.reach import in_reach
 from underskin.diagnosis.silence import dead, silence
 from underskin.mechanisms.model import Model, compose
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf_estimation import lines_of
 from underskin.surrogate import SigmaTable
-from underskin.units import Floats, to_si
+from underskin.units import Floats
 
 _SLIPS = {1e3: "1000 × too large: pC taken for nC, or N for mN?", 1e-3: "1000 × too small: nC taken for pC?"}
 _SLIP_WIDTH = np.log(12.0)
@@ -37,41 +37,13 @@ def against_model(
         found.append(Finding("no_response", "", "frf_re_pc_per_n", text))
         return [], "no recording shows a response above its own noise"
     model = compose((), replace(campaign, recordings=tuple(entries)), table, "frf")
-    inside = _in_reach(campaign, entries, model, found)
+    inside = in_reach(campaign, entries, model, table, found)
     ratio, expected = _apparent(entries, model, inside & ~silent)
     kept = inside & ~dead(entries, silent & inside, variance, expected, found)
     kept &= ~_off_by_1000(entries, ratio, found)
     signs = _signs(entries, ratio, kept, found)
     entries = [entry if sign > 0 else _reversed(entry) for entry, sign in zip(entries, signs, strict=True)]
     return [entry for entry, chosen in zip(entries, kept, strict=True) if chosen], ""
-
-
-def _in_reach(campaign: Campaign, entries: list[FrfRecording], model: Model, found: list[Finding]) -> Mask:
-    """Which contacts the tables hold as declared; the others are named with what is wrong with them."""
-    inside: Mask = model.valid[np.searchsorted(model.recording, np.arange(len(entries)))]
-    skin = campaign.skin
-    assert skin.thickness_mm is not None
-    assert skin.youngs_modulus_mpa is not None
-    force = np.array([entry.preload_n for entry in entries])
-    sphere = to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in entries])
-    modulus = float(to_si("youngs_modulus_mpa", skin.youngs_modulus_mpa))
-    radius_mm = 1e3 * hertz.contact_radius(force, sphere, modulus, skin.poisson_ratio)
-    if not inside.any():
-        ratios = radius_mm / skin.thickness_mm
-        text = (
-            f"no contact lies within the tables: contact radii would be {ratios.min():.3g} to {ratios.max():.3g} of "
-            "the thickness, or the places lie far from their sensors; are preload, thickness, modulus and places right?"
-        )
-        found.append(Finding("impossible_geometry", "", "skin.thickness_mm", text))
-        return inside
-    for number in np.flatnonzero(~inside):
-        entry = entries[number]
-        text = (
-            f"its contact (radius {radius_mm[number]:.3g} mm on a layer of {skin.thickness_mm:g} mm, at its place "
-            "beside the sensor) lies beyond the tables: left out"
-        )
-        found.append(Finding("out_of_domain", entry.id, "preload_n", text))
-    return inside
 
 
 def _apparent(entries: list[FrfRecording], model: Model, usable: Mask) -> tuple[Floats, Floats]:

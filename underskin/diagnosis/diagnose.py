@@ -121,7 +121,12 @@ def with_refused(found: Diagnosis, refused: Sequence[RecordingProblem]) -> Diagn
         Finding("refused", entry.recording, entry.field, f"{entry.field} = {entry.value!r}: {entry.allowed}; left out")
         for entry in refused
     ]
-    return replace(found, findings=(*problems, *found.findings))
+    lacking = found.lacking
+    if lacking and problems:
+        fields = " and ".join(dict.fromkeys(entry.field for entry in refused))
+        count = len({entry.recording for entry in refused})
+        lacking = f"{count} recording(s) were refused for their {fields} (see findings), which leaves {lacking}"
+    return replace(found, findings=(*problems, *found.findings), lacking=lacking)
 
 
 def _provenance(table: SigmaTable) -> dict[str, Any]:

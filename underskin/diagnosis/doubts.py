@@ -4,6 +4,7 @@ import numpy as np
 
 from underskin.diagnosis.explanation import Explanation, Workbench, at_recording, own_places
 from underskin.diagnosis.finding import Finding
+from underskin.diagnosis.numbers import in_digits
 
 _NOISY = 2.0  # times what the lines' own roughness says
 
@@ -39,7 +40,7 @@ def _noisy(bench: Workbench, explanation: Explanation) -> list[Finding]:
     if bench.lines.curves or level < _NOISY:
         return []
     text = (
-        f"the lines scatter {level:.2g} times more about the stated answer than about their own neighbours: part of "
-        "the misfit along frequency may have been taken for noise"
+        f"the lines scatter {in_digits(level, 2)} times more about the stated answer than about their own neighbours: "
+        "part of the misfit along frequency may have been taken for noise"
     )
     return [Finding("line_noise_level", "", "frf_re_pc_per_n", text)]

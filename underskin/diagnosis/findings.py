@@ -8,12 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.distance import pdist
 
 from underskin.diagnosis.against_model import against_model
 from underskin.diagnosis.axes import recording_axes
+from underskin.diagnosis.declared import overlapping, unlikely
 from underskin.diagnosis.finding import Finding
-from underskin.diagnosis.slips import faint_oscillation, lone_slips, shared_slips
+from underskin.diagnosis.places import huddled, misplaced
+from underskin.diagnosis.slips import faint_oscillation, lone_slips, loose_sphere
 from underskin.mechanisms.frf_design import frf_recordings
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf_estimation import lines_of
@@ -40,14 +41,15 @@ def inspect(campaign: Campaign, table: SigmaTable) -> Inspected:
     recorded = frf_recordings(campaign) if campaign.recordings else ()
     entries = _without_copies(_with_lines(recorded, found), found)
     off = lone_slips(entries, found)
-    entries = [entry for entry, wrong in zip(entries, off, strict=True) if not wrong]
+    astray, misgiven = misplaced(campaign, entries, found)
+    entries = [entry for entry, wrong in zip(entries, off | astray, strict=True) if not wrong]
     if not entries:
         return _inspected(campaign, entries, found)
-    shared = [*shared_slips(campaign, entries), *_impossible(campaign)]
-    found += shared
-    if shared:
-        what = " and ".join(dict.fromkeys(entry.field for entry in shared))
-        return _inspected(campaign, [], found, f"{what} cannot be right as declared (see findings)")
+    contradictory = [*loose_sphere(entries), *overlapping(campaign), *misgiven]
+    doubtful = [*unlikely(campaign, entries), *huddled(campaign, entries)]
+    found += [*doubtful, *contradictory]
+    if contradictory or (doubtful and not campaign.units_checked):
+        return _inspected(campaign, [], found, _cannot_be_right(doubtful, contradictory))
     found += [*_constant_axes(entries), *faint_oscillation(entries)]
     usable, lacking = against_model(campaign, entries, table, found)
     return _inspected(campaign, usable, found, lacking)
@@ -65,6 +67,13 @@ def _inspected(
     elif not lacking and not recording_axes(usable) and max(len(lines_of(entry).values) for entry in entries) < 2:
         lacking = "all recordings were made alike, at one frequency; different preloads, spheres or places are needed"
     return Inspected(usable, found, lacking)
+
+
+def _cannot_be_right(doubtful: Sequence[Finding], contradictory: Sequence[Finding]) -> str:
+    """What is to be corrected before anything can be concluded."""
+    what = " and ".join(dict.fromkeys(entry.field for entry in (*doubtful, *contradictory)))
+    meant = "" if contradictory else "; if it is meant, say units_checked"
+    return f"{what} cannot be right as declared (see findings){meant}"
 
 
 def _with_lines(entries: Sequence[FrfRecording], found: list[Finding]) -> list[FrfRecording]:
@@ -106,21 +115,6 @@ def _without_copies(entries: list[FrfRecording], found: list[Finding]) -> list[F
 
 def _alike(one: Complexes, other: Complexes) -> bool:
     return len(one) == len(other) and bool((np.abs(one - other) <= _SAME * np.abs(one)).all())
-
-
-def _impossible(campaign: Campaign) -> list[Finding]:
-    """Sensors that would overlap."""
-    skin = campaign.skin
-    places = np.array([(sensor.x_mm, sensor.y_mm) for sensor in skin.sensors])
-    if skin.sensor_radius_mm is None or len(places) < 2:
-        return []
-    pitch = float(pdist(places).min())
-    if pitch >= 2 * skin.sensor_radius_mm:
-        return []
-    text = (
-        f"sensors of {skin.sensor_radius_mm:g} mm radius cannot lie {pitch:g} mm apart: is it the diameter, or a slip?"
-    )
-    return [Finding("impossible_geometry", "", "skin.sensor_radius_mm", text)]
 
 
 def _constant_axes(entries: list[FrfRecording]) -> list[Finding]:

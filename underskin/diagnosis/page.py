@@ -13,6 +13,7 @@ import plotly.io
 from plotly.offline import get_plotlyjs
 
 from underskin.diagnosis.figures import AXES, explanations
+from underskin.diagnosis.numbers import in_percent
 from underskin.mechanisms.catalogue import CATALOGUE
 
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
@@ -61,7 +62,7 @@ def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
 def body_of(report: Report, drawn: Drawn) -> str:
     """What stands below the title, as HTML: one sentence, where, what, how much better, what to measure next."""
     first, _, rest = report["statement"].partition(". ")
-    verdict = f"{_VERDICTS[report['verdict']]} · probability {_percent(report['probability'])}"
+    verdict = f"{_VERDICTS[report['verdict']]} · probability {in_percent(report['probability'])}"
     parts = [
         f'<p class="first">{escape(first.rstrip("."))}.</p>',
         f'<p><span class="verdict">{escape(verdict)}</span></p>',
@@ -110,7 +111,7 @@ def _what(report: Report, drawn: Drawn) -> str:
         explains = entry["explains_percent"]
         share = "" if explains is None else f"; takes away {explains:.0f} % of the misfit beyond noise"
         parts.append(f"<h3>{escape(_words(name))}</h3>")
-        parts.append(_paragraph(f"Present with probability {_percent(entry['probability'])}{share}. {law}"))
+        parts.append(_paragraph(f"Present with probability {in_percent(entry['probability'])}{share}. {law}"))
         parts.append(
             _table(
                 ("parameter", "value", "95 % interval", "unit"),
@@ -129,7 +130,7 @@ def _what(report: Report, drawn: Drawn) -> str:
         )
     if report["alternatives"]:
         rows = [
-            (" + ".join(map(_words, entry["mechanisms"])), _percent(entry["probability"]), entry["why_not"])
+            (" + ".join(map(_words, entry["mechanisms"])), in_percent(entry["probability"]), entry["why_not"])
             for entry in report["alternatives"]
         ]
         parts += ["<h3>Alternatives, and why not</h3>", _table(("explanation", "probability", "why not"), rows)]
@@ -192,8 +193,8 @@ def _next(report: Report) -> str:
     heads = list(dict.fromkeys(name for entry in planned["recordings"] for name in entry))
     rows = [[_plain(entry.get(name)) for name in heads] for entry in planned["recordings"]]
     chance = (
-        f"Expected probability that they decide: {_percent(planned['probability_of_deciding'])} "
-        f"(without them {_percent(planned['without_it'])}); about {planned['minutes']:g} minutes."
+        f"Expected probability that they decide: {in_percent(planned['probability_of_deciding'])} "
+        f"(without them {in_percent(planned['without_it'])}); about {planned['minutes']:g} minutes."
     )
     return _paragraph(planned["statement"]) + _table([_axis(name) for name in heads], rows) + _paragraph(chance)
 
@@ -266,13 +267,6 @@ def _interval(entry: Mapping[str, Any]) -> str:
 
 def _unit(unit: str) -> str:
     return "" if unit == "-" else unit
-
-
-def _percent(probability: float) -> str:
-    """Reports round to three decimals, so 0 and 1 are no certainties."""
-    if 0.001 <= probability <= 0.999:
-        return f"{100 * probability:.3g} %"
-    return "under 0.1 %" if probability < 0.5 else "over 99.9 %"
 
 
 def _plain(value: Any) -> str:

@@ -14,6 +14,7 @@ from underskin.diagnosis.discrepancy import frequency_bins
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.finding import Finding
 from underskin.diagnosis.held_out import HeldOut, total
+from underskin.diagnosis.numbers import in_digits
 from underskin.diagnosis.residuals import residuals, whole_prediction
 from underskin.units import Floats
 
@@ -109,7 +110,7 @@ def _best_form(x: Floats, values: Floats, weight: Floats, axis: str) -> tuple[fl
         gain = 0.5 * (plain - square - price * (shapes + basis.shape[1] * values.shape[1]))
         if gain > best[0]:
             size = 100 * float(np.abs(basis @ coefficients[1:]).max() if basis.size else 0.0)
-            best = (gain, f"{words}, up to {size:.2g} %")
+            best = (gain, f"{words}, up to {in_digits(size, 2)} %")
     return best
 
 

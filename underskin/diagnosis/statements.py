@@ -8,10 +8,12 @@ import numpy as np
 from underskin.diagnosis.axes import WORDS
 from underskin.diagnosis.effect import Effect
 from underskin.diagnosis.locate import SIGNIFICANT, AxisResult
+from underskin.diagnosis.numbers import in_digits, in_percent
 from underskin.diagnosis.search import NONE_OF_THESE, NOTHING_MISSING, Answer
 from underskin.mechanisms.catalogue import CATALOGUE
 
 _WORTH_NAMING = 0.02
+_IN_PERCENT = 90.0  # beyond it an effect is said as a factor
 
 
 def answer_statement(
@@ -27,7 +29,7 @@ def answer_statement(
 
 def _answer(answers: Sequence[Answer], verdict: str, shape: str) -> str:
     leader = answers[0]
-    percent = f"{100 * leader.probability:.0f} %"
+    percent = in_percent(leader.probability)
     if verdict == "no_mismatch":
         return f"Recordings and base model agree within the noise (probability {percent}); nothing needs to be added."
     if verdict == "unexplained":
@@ -38,7 +40,7 @@ def _answer(answers: Sequence[Answer], verdict: str, shape: str) -> str:
         plain = " ".join(f"{name}: {_sentence(CATALOGUE[name].plain)}" for name in leader.names)
         return f"The base model lacks {names} (probability {percent}). {plain}"
     rivals = [answer for answer in answers[1:4] if answer.probability > _WORTH_NAMING]
-    listed = "; ".join(f"{in_words(answer.names)} ({100 * answer.probability:.0f} %)" for answer in rivals)
+    listed = "; ".join(f"{in_words(answer.names)} ({in_percent(answer.probability)})" for answer in rivals)
     mentioned = dict.fromkeys(name for answer in (leader, *rivals) for name in answer.names if name in CATALOGUE)
     plain = " ".join(f"{name}: {_sentence(CATALOGUE[name].plain)}" for name in mentioned)
     return f"Best explained by {names} ({percent}), but these rivals remain: {listed}. {plain}"
@@ -92,33 +94,37 @@ def location_statement(
 
 
 def _size(effect: Effect) -> str:
-    if effect.signed:
-        low, high = sorted((abs(effect.low), abs(effect.high)))
-        side = "above" if effect.percent > 0 else "below"
-        span = (
-            f"{effect.low:+.2g} to {effect.high:+.2g}" if effect.low * effect.high < 0 else f"{low:.3g} to {high:.3g}"
+    low, high = sorted((abs(effect.low), abs(effect.high)))
+    if not effect.signed:
+        return (
+            f"the response is off by {in_digits(effect.percent, 3)} % (root mean square: above the model in parts, "
+            f"below it in others; 95 %: {in_digits(low, 3)} to {in_digits(high, 3)} %)"
         )
-        return f"the response is {_percent(effect.percent)} {side} the model (95 %: {span} %)"
-    return (
-        f"the response is off by {_percent(effect.percent)} (root mean square: above the model in parts, below it in "
-        f"others; 95 %: {effect.low:.3g} to {effect.high:.3g} %)"
+    if abs(effect.percent) > _IN_PERCENT:
+        return _times(effect)
+    side = "above" if effect.percent > 0 else "below"
+    span = (
+        f"{effect.low:+.2g} to {effect.high:+.2g}"
+        if effect.low * effect.high < 0
+        else f"{in_digits(low, 3)} to {in_digits(high, 3)}"
     )
+    return f"the response is {in_digits(abs(effect.percent), 3)} % {side} the model (95 %: {span} %)"
 
 
-def _percent(value: float) -> str:
-    return f"{abs(value):.3g} %"
+def _times(effect: Effect) -> str:
+    """A large effect as a factor: nothing is more than 100 % below, unless its sign has turned."""
+    factor, low, high = (1 + percent / 100 for percent in (effect.percent, effect.low, effect.high))
+    span = f"{in_digits(low, 2)} to {in_digits(high, 2)}"
+    if factor >= 0:
+        return f"the response is {in_digits(factor, 2)} times the model's (95 %: {span})"
+    return f"the response has the other sign than the model's, {in_digits(factor, 2)} times it (95 %: {span})"
 
 
 def _range(axis: str, ends: Sequence[float | str]) -> str:
     words, unit = WORDS[axis]
-    values = [value if isinstance(value, str) else _plain(value) for value in ends]
+    values = [value if isinstance(value, str) else in_digits(value) for value in ends]
     text = " to ".join(dict.fromkeys(values))
     return f"{words} {text} {unit}".rstrip()
-
-
-def _plain(value: float) -> str:
-    """Four digits, never as a power of ten."""
-    return np.format_float_positional(float(f"{value:.4g}"), trim="-")
 
 
 def _listed(names: Sequence[str]) -> str:
