@@ -33,13 +33,15 @@ class CovarianceParameter:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A model and the lines it is to explain, with or without positioning scatter; of curves, how large η may be."""
+    """A model and the lines it is to explain, with or without positioning scatter, and how large scatter may be."""
 
     model: Model
     lines: Lines
     curvature: Curvature
     placed: bool  # whether there is positioning scatter
-    smooth: Plateau = USUAL
+    gain: Plateau = GAIN_PRIOR
+    position: Plateau = POSITION_PRIOR
+    smooth: Plateau = USUAL  # η of curves
 
     @property
     def mean_places(self) -> list[int]:
@@ -52,11 +54,12 @@ class Hypothesis:
         low, high = _CURVE_LEVELS if self.lines.curves else _LEVELS
         level = level_prior(self.lines.noise.log_level_sd)
         common = [
-            CovarianceParameter("gain", np.log(1e-3), np.log(0.5), GAIN_PRIOR.log_density),
+            CovarianceParameter("gain", np.log(1e-3), np.log(0.5), self.gain.log_density),
             CovarianceParameter("level", np.log(low), np.log(high), level.log_density),
         ]
         if self.placed:
-            common.append(CovarianceParameter("position", np.log(2e-5), np.log(6e-4), POSITION_PRIOR.log_density))
+            highest = self.position.high + np.log(2.0)
+            common.append(CovarianceParameter("position", np.log(2e-5), highest, self.position.log_density))
         if self.lines.curves:
             common.append(CovarianceParameter("smooth", np.log(1e-5), np.log(2.0), self.smooth.log_density))
         own = [

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.axes import recording_axes
-from underskin.diagnosis.discrepancy import frequency_bins
+from underskin.diagnosis.line_process import frequency_bins
 from underskin.diagnosis.lines import Lines
 from underskin.diagnosis.residuals import Residuals
 from underskin.mechanisms.differentiated import Array

@@ -9,19 +9,23 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from underskin.diagnosis.axes import recording_axes
-from underskin.diagnosis.discrepancy import frequency_bins
+from underskin.diagnosis.axes import order, preload_before, recording_axes
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.finding import Finding
 from underskin.diagnosis.held_out import HeldOut, total
+from underskin.diagnosis.line_process import frequency_bins
 from underskin.diagnosis.numbers import in_digits
-from underskin.diagnosis.residuals import residuals, whole_prediction
+from underskin.diagnosis.recording_process import relative_place_slopes
+from underskin.diagnosis.residuals import Residuals, residuals, whole_prediction
+from underskin.recordings.campaign import Campaign
 from underskin.units import Floats
 
 _GRID = 40
+_LEAST_IN_ORDER = 8  # recordings
 _WORTH_TELLING, _LEAST_TOLD = 2.0, 3e-3  # times the noise, and of the largest force
 _ALONG_CURVES = {"displacement_mm": "mm", "time_s": "s"}
-_LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n", "load_cycles", "dwell_s", "frequency_hz")
+_BEFORE = "the preload of the recording before over its own"
+_LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n", "load_cycles", "dwell_s", "frequency_hz", _BEFORE)
 
 
 def describe(bench: Workbench, explanation: Explanation) -> str:
@@ -74,11 +78,12 @@ def _over_axes(bench: Workbench, explanation: Explanation) -> tuple[float, str]:
     levels = explanation.best.at.marginal.levels
     left = residuals(bench, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
     best: tuple[float, str] = (0.0, "")
-    for name, column in recording_axes(bench.lines.campaign).items():
+    for name, column in _axes(bench.lines.campaign).items():
         for index in range(column.shape[1]):
             gain, text = _best_form(column[:, index], left.gain[:, None], left.gain_deviation**-2, name)
             axis = name if column.shape[1] == 1 else f"{name} ({'xy'[index]})"
             best = max(best, (gain, f"{text} over {axis}"))
+    best = max(best, _wandering(bench, explanation, left))
     line, centres = frequency_bins(bench.lines.frequency)
     if len(centres) >= 6:
         total = np.bincount(line, left.line_weight, len(centres)).astype(float)
@@ -88,6 +93,37 @@ def _over_axes(bench: Workbench, explanation: Explanation) -> tuple[float, str]:
         ]
         gain, text = _best_form(np.log(centres), np.stack(parts, axis=1), total, "frequency_hz")
         best = max(best, (gain, f"{text} over frequency_hz"))
+    return best
+
+
+def _axes(campaign: Campaign) -> dict[str, Floats]:
+    """The campaign's own, the order, and what the preload had been before."""
+    found = recording_axes(campaign)
+    before = preload_before(campaign)
+    if before is not None:
+        found[_BEFORE] = before
+    return {**found, "the order of recordings": order(campaign)[:, None]}
+
+
+def _wandering(bench: Workbench, explanation: Explanation, left: Residuals) -> tuple[float, str]:
+    """A place that runs round while recordings are made, of the period that fits best."""
+    rank = order(bench.lines.campaign)
+    slopes = 1e-3 * relative_place_slopes(explanation.best.at).T  # per mm
+    if not np.abs(slopes).max() > 0 or len(rank) < _LEAST_IN_ORDER:
+        return 0.0, ""
+    root = 1 / left.gain_deviation
+    best: tuple[float, str] = (0.0, "")
+    plain = float((((left.gain - np.average(left.gain, weights=root**2)) * root) ** 2).sum())
+    for period in 2 * len(rank) / np.arange(1, len(rank)):
+        angle = 2 * np.pi * rank / period
+        waves = np.column_stack([np.sin(angle), np.cos(angle)])
+        basis = np.column_stack([np.ones(len(rank)), slopes[:, :1] * waves, slopes[:, 1:] * waves])
+        found = np.linalg.lstsq(basis * root[:, None], left.gain * root, rcond=None)[0]
+        square = float((((left.gain - basis @ found) * root) ** 2).sum())
+        gain = 0.5 * (plain - square - 5 * np.log(len(rank)))
+        if gain > best[0]:
+            size = float(np.hypot(waves @ found[1:3], waves @ found[3:5]).max())
+            best = (gain, f"a place that runs round, up to {size:.2g} mm off, once in {period:.3g} recordings")
     return best
 
 

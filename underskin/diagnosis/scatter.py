@@ -62,6 +62,9 @@ class Bell:
 
 GAIN_PRIOR = Plateau.of(GAIN, GAIN_FALL)
 POSITION_PRIOR = Plateau.of(POSITION, POSITION_FALL)
+# No rig's: something that nobody named moves the recordings
+UNUSUAL_GAIN = Plateau.of((0.08, 0.5), (0.12, 0.12))
+UNUSUAL_POSITION = Plateau.of((0.4e-3, 2e-3), (0.15, 0.15))
 
 
 def level_prior(log_level_sd: float) -> Bell:

@@ -17,7 +17,8 @@ from underskin.mechanisms.catalogue import CATALOGUE
 from underskin.mechanisms.mechanism import Unsupported
 
 NOTHING_MISSING, NONE_OF_THESE = "nothing_missing", "none_of_these"
-PRIORS = {"nothing_missing": 0.32, "one": 0.44, "two": 0.17, "three": 0.02, "none_of_these": 0.05}
+# "Nothing" stands for all that does not show as well, which is every other campaign.
+PRIORS = {"nothing_missing": 0.45, "one": 0.34, "two": 0.14, "three": 0.02, "none_of_these": 0.05}
 _PARENTS = 3
 _SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
