@@ -66,7 +66,8 @@ def _sizes(axes: Axes, judged: Sequence[Judged]) -> None:
         xlabel="√(χ² gained by the truth), units of noise",
         ylim=(-0.05, 1.05),
     )
-    axes.legend()
+    if axes.get_legend_handles_labels()[0]:  # none where nothing was hidden
+        axes.legend()
 
 
 def confusion(judged: Sequence[Judged], path: Path) -> Path:
