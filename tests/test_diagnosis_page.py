@@ -23,7 +23,9 @@ from underskin.diagnosis.diagnose import diagnose
 from underskin.diagnosis.figures import figures
 from underskin.diagnosis.page import page
 from underskin.diagnosis.report import Diagnosis, report
+from underskin.diagnosis.wording import readable
 from underskin.mechanisms import compose
+from underskin.mechanisms.catalogue import CATALOGUE
 from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, to_dict
 from underskin.surrogate import load_table
 
@@ -98,15 +100,26 @@ def text(found: Diagnosis, document: dict[str, Any]) -> str:
 def test_it_says_all_that_the_report_says(text: str, document: dict[str, Any]) -> None:
     tags = Tags(text)
     assert document["verdict"] == "explained"
-    assert tags.text.index("The base model lacks contact_resonance") < tags.text.index("Where")
+    assert tags.text.index("The base model lacks contact resonance (probability over 99.9 %)") < tags.text.index(
+        "Where"
+    )
     headings = re.findall(r"<h2>(.*?)</h2>", text)
-    assert headings == ["Where", "What", "How much better", "Look at these recordings", "Made with"]
-    wanted = [document["location"]["statement"], *(entry["statement"] for entry in document["findings"])]
+    assert headings == [
+        "Where",
+        "What",
+        "How much better",
+        "Look at these recordings",
+        "What to measure next",
+        "Made with",
+    ]
+    wanted = [document["location"]["statement"], *(readable(entry["statement"]) for entry in document["findings"])]
     wanted += [entry["why_not"] for entry in document["alternatives"]]
-    wanted += [entry["reason"] for entry in document["not_identifiable"]]
+    wanted += [readable(entry["reason"]) for entry in document["not_identifiable"]]
     wanted += [f"{entry['value']:.4g}" for entry in document["mechanisms"][0]["parameters"]]
     wanted += [document["provenance"]["tables"]["sigma"], f"{document['fit']['noise_floor_percent']:.3g} %"]
+    wanted += [CATALOGUE["contact_resonance"].plain, "these recordings decide"]
     assert [piece for piece in wanted if piece not in tags.text] == []
+    assert [name for name in CATALOGUE if "_" in name and name in tags.text] == []  # no names of the code
 
 
 def test_markup_in_a_campaign_stays_text(text: str) -> None:
@@ -220,7 +233,7 @@ def test_every_kind_of_report_has_its_page(make: Callable[[], Campaign], verdict
     drawn = figures(found, document)
     assert (document["verdict"], set(drawn)) == (verdict, names)
     tags = Tags(page(document, drawn))
-    assert document["statement"].partition(". ")[0].rstrip(".") in tags.text
+    assert readable(document["statement"]).partition(". ")[0].rstrip(".") in tags.text
     if not names:
         assert tags.count("script") == 0
     for figure in drawn.values():

@@ -3,7 +3,6 @@
 Every text that comes from a campaign is escaped; the page's policy forbids whatever is not in it.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
@@ -12,8 +11,9 @@ import plotly.graph_objects as go
 import plotly.io
 from plotly.offline import get_plotlyjs
 
-from underskin.diagnosis.figures import AXES, explanations
+from underskin.diagnosis.figures import explanations
 from underskin.diagnosis.numbers import in_percent
+from underskin.diagnosis.wording import axis, error, group, interval, number, plain, readable, unit, words
 from underskin.mechanisms.catalogue import CATALOGUE
 
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
@@ -24,6 +24,11 @@ _VERDICTS = {
     "no_mismatch": "no mismatch",
     "insufficient_data": "too little data",
 }
+_NOTHING_NEXT = {
+    "insufficient_data": "Recordings that these lack, as said above.",
+    "unexplained": "No recording can be planned to tell apart laws that are not known here.",
+}
+_DECIDED = "Nothing more is needed: these recordings decide."
 _STYLE = """
 body { font: 17px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.1rem; font-weight: 600; color: #555; margin: 0; }
@@ -36,6 +41,13 @@ th { font-weight: 600; }
 .note { color: #555; font-size: .95rem; }
 .wide { overflow-x: auto; }
 dt { font-weight: 600; margin-top: .6rem; } dd { margin: 0; overflow-wrap: anywhere; }
+@page { margin: 14mm; }
+@media print {
+  body { font-size: 11pt; max-width: none; margin: 0; padding: 0; }
+  h1, h2, h3, thead { break-after: avoid; }
+  tr, .plotly-graph-div { break-inside: avoid; }
+  .wide { overflow: visible; }
+}
 """
 
 Report = Mapping[str, Any]
@@ -62,11 +74,13 @@ def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
 def body_of(report: Report, drawn: Drawn) -> str:
     """What stands below the title, as HTML: one sentence, where, what, how much better, what to measure next."""
     first, _, rest = report["statement"].partition(". ")
-    verdict = f"{_VERDICTS[report['verdict']]} · probability {in_percent(report['probability'])}"
+    verdict = _VERDICTS[report["verdict"]]
+    if report["verdict"] != "insufficient_data":
+        verdict += f" · probability {in_percent(report['probability'])}"
     parts = [
-        f'<p class="first">{escape(first.rstrip("."))}.</p>',
+        f'<p class="first">{escape(readable(first.rstrip(".")))}.</p>',
         f'<p><span class="verdict">{escape(verdict)}</span></p>',
-        _paragraph("" if report["verdict"] == "explained" else rest),  # the laws, which stand under What
+        _paragraph("" if report["verdict"] == "explained" else readable(rest)),  # which stands under What
         _section("Where", _where(report, drawn)),
         _section("What", _what(report, drawn)),
         _section("How much better", _better(report, drawn)),
@@ -90,15 +104,17 @@ def _where(report: Report, drawn: Drawn) -> str:
     location = report["location"]
     rows = [
         (
-            _axis(entry["axis"]),
-            "undecidable" if entry["p_value"] is None else f"{entry['p_value']:.3f}",
-            "" if entry["p_value"] is None else f"{entry['share_percent']:.1f} %",
-            entry.get("undecidable", ""),
+            axis(entry["axis"]),
+            "cannot be told" if entry["p_value"] is None else f"{100 * entry['p_value']:.1f} %",
+            entry.get("undecidable", "") if entry["p_value"] is None else f"{entry['share_percent']:.1f} %",
         )
         for entry in location["axes"]
     ]
-    note = "p is the probability of so strong a dependence by chance, corrected for the number of axes."
-    table = _table(("axis", "p", "share of the misfit", ""), rows) + _note(note) if rows else ""
+    note = (
+        "By chance: how often chance alone would show so strong a dependence, corrected for the number of axes. "
+        "Where that is small, the misfit depends on it."
+    )
+    table = _table(("the misfit against", "by chance", "its share of the misfit"), rows) + _note(note) if rows else ""
     return _paragraph(location["statement"]) + _figure(drawn, "where") + table
 
 
@@ -106,37 +122,35 @@ def _what(report: Report, drawn: Drawn) -> str:
     parts = [_figure(drawn, "explanations")]
     for entry in report["mechanisms"]:
         name = entry["name"]
-        law = CATALOGUE[name].law if name in CATALOGUE else ""
-        source = CATALOGUE[name].source if name in CATALOGUE else ""
+        known = CATALOGUE.get(name)
         explains = entry["explains_percent"]
         share = "" if explains is None else f"; takes away {explains:.0f} % of the misfit beyond noise"
-        parts.append(f"<h3>{escape(_words(name))}</h3>")
-        parts.append(_paragraph(f"Present with probability {in_percent(entry['probability'])}{share}. {law}"))
+        parts.append(f"<h3>{escape(words(name))}</h3>")
+        parts.append(_paragraph("" if known is None else known.plain))
+        parts.append(_paragraph(f"Present with probability {in_percent(entry['probability'])}{share}."))
         parts.append(
             _table(
                 ("parameter", "value", "95 % interval", "unit"),
                 [
-                    (_words(one["name"]), _number(one["value"]), _interval(one), _unit(one["unit"]))
+                    (words(one["name"]), number(one["value"]), interval(one), unit(one["unit"]))
                     for one in entry["parameters"]
                 ],
             )
         )
-        parts.append(_note(f"Source: {source}") if source else "")
+        parts.append("" if known is None else _note(f"Law: {known.law} Source: {known.source}"))
     parts.append(_figure(drawn, "parameters"))
     if report["d33"] is not None:
         one = report["d33"]
-        parts.append(
-            _paragraph(f"d33 under this explanation: {_number(one['value'])} ({_interval(one)}) {one['unit']}.")
-        )
+        parts.append(_paragraph(f"d33 under this explanation: {number(one['value'])} ({interval(one)}) {one['unit']}."))
     if report["alternatives"]:
         rows = [
-            (" + ".join(map(_words, entry["mechanisms"])), in_percent(entry["probability"]), entry["why_not"])
+            (" + ".join(map(words, entry["mechanisms"])), in_percent(entry["probability"]), readable(entry["why_not"]))
             for entry in report["alternatives"]
         ]
         parts += ["<h3>Alternatives, and why not</h3>", _table(("explanation", "probability", "why not"), rows)]
     if report["not_identifiable"]:
         rows = [
-            (_words(entry["mechanism"]), _words(entry["confounded_with"]), entry["reason"])
+            (words(entry["mechanism"]), words(entry["confounded_with"]), readable(entry["reason"]))
             for entry in report["not_identifiable"]
         ]
         parts += [
@@ -150,25 +164,26 @@ def _better(report: Report, drawn: Drawn) -> str:
     fit = report["fit"]
     if fit is None:
         return ""
-    before, after, floor = fit["before"], fit["after"], _error(fit["noise_floor_percent"])
+    before, after, floor = fit["before"], fit["after"], error(fit["noise_floor_percent"])
     rows = [
-        ("recordings held out", _error(before["heldout_rmse_percent"]), _error(after["heldout_rmse_percent"]), floor),
-        ("recordings fitted to", _error(before["rmse_percent"]), _error(after["rmse_percent"]), ""),
+        ("recordings held out", error(before["heldout_rmse_percent"]), error(after["heldout_rmse_percent"]), floor),
+        ("recordings fitted to", error(before["rmse_percent"]), error(after["rmse_percent"]), ""),
     ]
     groups = [
         (
-            _group(entry["group"]),
-            _error(entry["before_rmse_percent"]),
-            _error(entry["after_rmse_percent"]),
-            _error(entry["noise_floor_percent"]),
-            " + ".join(map(_words, entry["chosen"])),
+            group(entry["group"]),
+            error(entry["before_rmse_percent"]),
+            error(entry["after_rmse_percent"]),
+            error(entry["noise_floor_percent"]),
+            " + ".join(map(words, entry["chosen"])),
         )
         for entry in fit["groups"]
     ]
     heads = ("base model", "with it", "noise floor")
     note = (
         "Error: rms of measured less predicted over rms of predicted. Each group was left out whole, everything fitted "
-        "and chosen again without it, and then predicted; the noise floor is what noise alone would give."
+        "and chosen again without it, and then predicted; the noise floor is what noise alone would give. The base "
+        "model is the paper's, with nothing added."
     )
     parts = [_table(("error of", *heads), rows), _figure(drawn, "before_after")]
     if groups:
@@ -178,7 +193,7 @@ def _better(report: Report, drawn: Drawn) -> str:
 
 def _findings(report: Report) -> str:
     rows = [
-        (entry["recording"] or "all", entry["field"], entry["statement"], _words(entry["code"]))
+        (entry["recording"] or "all", axis(entry["field"]), readable(entry["statement"]), words(entry["code"]))
         for entry in report["findings"]
     ]
     return _table(("recording", "field", "finding", "kind"), rows) if rows else ""
@@ -187,16 +202,18 @@ def _findings(report: Report) -> str:
 def _next(report: Report) -> str:
     planned = report["next_experiment"]
     if not planned:
-        return ""
+        return _paragraph(_NOTHING_NEXT.get(report["verdict"], _DECIDED))
     if not planned["recordings"]:
-        return _paragraph(planned["statement"])
+        return _paragraph(readable(planned["statement"]))
     heads = list(dict.fromkeys(name for entry in planned["recordings"] for name in entry))
-    rows = [[_plain(entry.get(name)) for name in heads] for entry in planned["recordings"]]
+    rows = [[plain(entry.get(name)) for name in heads] for entry in planned["recordings"]]
     chance = (
         f"Expected probability that they decide: {in_percent(planned['probability_of_deciding'])} "
         f"(without them {in_percent(planned['without_it'])}); about {planned['minutes']:g} minutes."
     )
-    return _paragraph(planned["statement"]) + _table([_axis(name) for name in heads], rows) + _paragraph(chance)
+    return (
+        _paragraph(readable(planned["statement"])) + _table([axis(name) for name in heads], rows) + _paragraph(chance)
+    )
 
 
 def _provenance(report: Report) -> str:
@@ -238,38 +255,3 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     head = "".join(f'<th scope="col">{escape(text)}</th>' for text in heads)
     body = "".join(f"<tr>{''.join(f'<td>{escape(str(text))}</td>' for text in row)}</tr>" for row in rows)
     return f'<div class="wide" tabindex="0"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
-
-
-def _axis(name: str) -> str:
-    return AXES.get(name, _words(name))
-
-
-def _group(name: str) -> str:
-    axis, _, value = name.partition(" ")
-    return f"{_axis(axis)}: {value}"
-
-
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.4g}"
-
-
-def _error(value: float | None) -> str:
-    return "–" if value is None else f"{value:.3g} %"
-
-
-def _interval(entry: Mapping[str, Any]) -> str:
-    return f"{_number(entry['low'])} to {_number(entry['high'])}"
-
-
-def _unit(unit: str) -> str:
-    return "" if unit == "-" else unit
-
-
-def _plain(value: Any) -> str:
-    if isinstance(value, list):
-        return ", ".join(map(_plain, value))
-    return f"{value:.4g}" if isinstance(value, float) and math.isfinite(value) else "" if value is None else str(value)

@@ -66,7 +66,7 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
             **document,
             "probability": 1.0,
             "statement": f"The recordings cannot tell anything: {diagnosis.lacking}.",
-            "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "nothing was located"},
+            "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "Nothing was located."},
             "mechanisms": [],
             "alternatives": [],
             "not_identifiable": [],
