@@ -95,17 +95,21 @@ def skin(
 
 @router.get("/map.csv")
 def map_csv(skin_id: SkinId, store: Store, table: Table) -> Response:
-    """d33 of each sensor in the latest campaign."""
+    """d33 of each sensor in the latest campaign, and its trend."""
+    root, _ = _completed(store, table, skin_id)
+    trends = {entry.sensor: entry.trend for entry in _told(store, table, root, "paper").sensors}
     with store.reading() as connection:
-        root = skins.require_root(connection, skin_id)
         latest = campaigns.listed(connection, campaigns.Filters(skin=root, state="current"), None, 1)
-    columns: dict[str, list[Any]] = {name: [] for name in _MAP_COLUMNS}
+    columns: dict[str, list[Any]] = {name: [] for name in (*_MAP_COLUMNS, *_TREND_COLUMNS)}
     for row in latest:
         answer = inverting.answer(store, table, row, None)
         places = {entry["id"]: entry for entry in row.about["skin"]["sensors"]}
         for entry in answer["sensors"]:
             values = {**entry, **places[entry["sensor"]]}
-            for name in _MAP_COLUMNS:
+            line = trends.get(entry["sensor"])
+            for name in _TREND_COLUMNS:
+                values[name] = None if line is None else getattr(line, name)
+            for name in (*_MAP_COLUMNS, *_TREND_COLUMNS):
                 columns[name].append(values[name])
     return csv_answer("map", columns)
 
@@ -113,6 +117,7 @@ def map_csv(skin_id: SkinId, store: Store, table: Table) -> Response:
 _MAP_COLUMNS = (
     "sensor", "x_mm", "y_mm", "d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n",
 )  # fmt: skip
+_TREND_COLUMNS = ("slope_pc_per_n_per_year", "slope_uncertainty_pc_per_n_per_year")
 
 
 @router.get("/history.csv")
@@ -181,8 +186,19 @@ def _map(root: str, row: AnyRow, answer: Mapping[str, Any], history: History, sh
         ["; ".join(flag["reason"] for flag in entry["flags"]) for entry in entries],
         quantity,
     )
-    about = f"Each sensor where it lies, coloured by {quantity.name}, in the latest campaign, {row.name}."
+    about = f"Each sensor where it lies, coloured by {quantity.name}, in the latest campaign, {row.name}, "
+    about += "by the paper's model."
+    known = [entry for entry in entries if entry["d33_pc_per_n"] is not None]
+    if show == "d33" and known:
+        about += f" {_range(known)}"
     return drawn("map", figure, about, f"/skins/{quote(root, safe='')}/map.csv")
+
+
+def _range(known: Sequence[Mapping[str, Any]]) -> str:
+    """How far apart the ends of the colours are, and how sure each value is."""
+    values = [entry["d33_pc_per_n"] for entry in known]
+    each = median(entry["d33_uncertainty_pc_per_n"] for entry in known)
+    return f"They go from {min(values):.3g} to {max(values):.3g} pC/N, each ± {each:.2g}."
 
 
 def _history(root: str, history: History, sensor: str | None, by: By) -> Drawn:

@@ -104,6 +104,19 @@ def test_the_saved_file_needs_nothing_else(reader: Visit, idle: Server, made: Ma
     reader.wrong.clear()  # the file itself is not of the server
 
 
+def test_on_paper_there_is_the_report_and_nothing_to_press(reader: Visit, idle: Server, made: Made) -> None:
+    page = reader.page
+    reader.go(f"/diagnoses/{keep(idle, resonant('printed', lines=LINES), made, 'printed')}")
+    reader.drawn(4)
+    assert page.get_by_role("button", name="Print or save as PDF").is_visible()
+    page.emulate_media(media="print")
+    assert [button for button in page.locator("button, .button").all() if button.is_visible()] == []
+    sections = [heading for heading in page.get_by_role("heading", level=2).all() if heading.is_visible()]
+    assert {"Where", "What", "How much better", "What to measure next"} <= {one.inner_text() for one in sections}
+    for plot in page.locator(".plot").all():
+        assert plot.is_visible()
+
+
 def test_a_figure_s_numbers_are_those_of_the_report(idle: Server, made: Made) -> None:
     place = f"/diagnoses/{keep(idle, resonant('numbers', lines=LINES), made, 'numbers')}"
     tables = {

@@ -138,3 +138,24 @@ def test_no_page_is_wider_than_a_phone(newcomer: Visit) -> None:
         newcomer.go(path)
         newcomer.drawn(page.locator(".plot").count())
         assert page.evaluate("document.documentElement.scrollWidth") <= 390, path
+
+
+def test_a_figure_s_times_are_in_the_viewer_s_zone(newcomer: Visit) -> None:
+    page = newcomer.page
+    newcomer.drawn(2)
+    first = page.locator("#figure-history .plot").evaluate("plot => plot.data[0].x[0]")
+    assert first.startswith("2024-05-14T10:30")  # in Rome
+    assert "Europe/Rome" in page.locator("#figure-history .plot").evaluate("plot => plot.layout.xaxis.title.text")
+
+
+def test_who_chose_is_where_he_was(newcomer: Visit) -> None:
+    page = newcomer.page
+    page.get_by_label("Colour by").select_option("trend")
+    page.wait_for_url("**show=trend*")
+    page.wait_for_function("document.activeElement.id === 'show'")
+
+
+def test_the_numbers_of_the_map_hold_what_colours_it(newcomer: Visit) -> None:
+    rows = list(csv.DictReader(newcomer.page.request.get(f"{newcomer.address}{EXAMPLE}/map.csv").text().splitlines()))
+    assert len(rows) == 8
+    assert all(float(row["slope_pc_per_n_per_year"]) < 0 for row in rows)  # the example ages

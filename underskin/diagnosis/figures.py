@@ -63,7 +63,9 @@ def explanations(document: Mapping[str, Any]) -> go.Figure:
         cliponaxis=False,
         hovertemplate="%{y}: %{x:.3f}<extra></extra>",
     )
-    figure.update_layout(title="How probable each explanation is", height=130 + 34 * len(rows), margin={"r": 70})
+    figure.update_layout(
+        title="How probable each explanation is", height=130 + 34 * len(rows), margin={"r": 70, "t": 60}
+    )
     figure.update_xaxes(title="probability", range=[0, 1.0], tickformat=".0%")
     figure.update_yaxes(autorange="reversed")
     return _styled(figure)
@@ -155,7 +157,10 @@ def before_and_after(
     figure.update_xaxes(title=f"predicted {unit}")
     figure.update_yaxes(title=f"measured {unit}", col=1)
     figure.update_layout(
-        title="Measured against predicted", height=470, legend={"orientation": "h", "y": -0.2}, margin={"t": 90}
+        title="Measured against predicted",
+        height=470,
+        margin={"t": 90, "b": 100},
+        legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
     )
     return _styled(figure)
 

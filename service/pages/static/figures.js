@@ -4,7 +4,22 @@
 const CONFIG = { displaylogo: false, responsive: true, displayModeBar: false };
 
 function document_of(plot) {
-  return JSON.parse(plot.parentElement.querySelector('script[type="application/json"]').textContent);
+  return in_zone(JSON.parse(plot.parentElement.querySelector('script[type="application/json"]').textContent));
+}
+
+// Times come in UTC, and plotly draws them as they are written: written here as the viewer's clocks show them.
+function in_zone(figure) {
+  const axis = figure.layout.xaxis;
+  if (axis?.type !== "date") return figure;
+  for (const trace of figure.data) {
+    trace.x = trace.x.map((time) => {
+      const when = new Date(time);
+      return new Date(when - 60_000 * when.getTimezoneOffset()).toISOString().slice(0, -1);
+    });
+    trace.hovertemplate = trace.hovertemplate?.replaceAll(" UTC", "");
+  }
+  axis.title.text += ` (times of ${Intl.DateTimeFormat().resolvedOptions().timeZone})`;
+  return figure;
 }
 
 async function draw(plot) {

@@ -13,20 +13,28 @@ for (const time of document.querySelectorAll("time[datetime]")) {
 
 // A choice with the pointer takes effect at once; who walks through the choices with keys presses the button. What is
 // chosen empty does not stand in the address.
-function submit(form) {
+function submit(choice) {
+  const form = choice.form;
   for (const field of form.elements) {
     if ("emptyLeftOut" in field.dataset && field.value === "") field.disabled = true;
   }
+  sessionStorage.setItem("chosen", choice.id);
   form.submit();
+}
+// Who chose is where he was, on the page that his choice made.
+const chosen = sessionStorage.getItem("chosen");
+if (chosen) {
+  sessionStorage.removeItem("chosen");
+  document.getElementById(chosen)?.focus({ preventScroll: true });
 }
 for (const choice of document.querySelectorAll("[data-submit]")) {
   let byKeys = false;
   choice.addEventListener("keydown", () => (byKeys = true));
   choice.addEventListener("pointerdown", () => (byKeys = false));
-  choice.addEventListener("change", () => byKeys || submit(choice.form));
+  choice.addEventListener("change", () => byKeys || submit(choice));
   choice.form.addEventListener("submit", (event) => {
     event.preventDefault();
-    submit(choice.form);
+    submit(choice);
   });
 }
 
