@@ -7,10 +7,9 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, as_completed
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -18,10 +17,10 @@ import proof
 import rig
 import underskin
 from proof.cases import Case
+from underskin.processes import processes
 
 Item = TypeVar("Item")
 FAILED = "failed"
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -73,10 +72,7 @@ def of_each(
             results.append(make(item))
             tell(f"{number} of {len(items)}")
         return results
-    # A fresh interpreter a process, with one BLAS thread: the same numbers whatever the number of cores.
-    for name in _THREADS:
-        os.environ[name] = "1"
-    with ProcessPoolExecutor(min(work.workers, len(items)), mp_context=get_context("spawn")) as pool:
+    with processes(min(work.workers, len(items))) as pool:
         pending: list[Future[dict[str, Any]]] = [pool.submit(make, item) for item in items]
         for number, _ in enumerate(as_completed(pending), 1):
             tell(f"{number} of {len(items)}")

@@ -7,10 +7,9 @@ campaign a process, so that the reports do not depend on how many there are.
 import json
 import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,11 +17,11 @@ import typer
 
 from underskin.cli_store import LOCAL, Key, Url, connect
 from underskin.errors import UnderskinError
+from underskin.processes import one_blas_thread, processes
 
 if TYPE_CHECKING:
     from underskin.client import Client
 
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 Files = Annotated[list[Path] | None, typer.Argument(help="Campaigns (campaign/1, JSON, or any format that is read).")]
 Workers = Annotated[int, typer.Option(min=0, help="Processes; 0 is one for each core.")]
 
@@ -61,7 +60,7 @@ def diagnose(
     from rich.console import Console
     from rich.progress import Progress
 
-    _one_blas_thread()
+    one_blas_thread()
     files, campaign = files or [], campaign or []
     _refuse_overwriting(files, campaign, output_dir)
     output_dir.mkdir(parents=True, exist_ok=True)
@@ -80,12 +79,6 @@ def diagnose(
                 console.print(line, markup=False, highlight=False, soft_wrap=True)
     if failed:
         raise typer.Exit(2)
-
-
-def _one_blas_thread() -> None:
-    """The same numbers whatever the number of cores; takes effect because NumPy has not been imported yet."""
-    for name in _THREADS:
-        os.environ[name] = "1"
 
 
 def _refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_dir: Path) -> None:
@@ -114,25 +107,44 @@ def _of_files(
         for file in files:
             yield _one(file, output_dir, html)
         return
-    with _executor(min(workers, len(files)), scheduler) as pool:
+    left = list(files)
+    while left:
+        for file, outcome in _of_pool(left, output_dir, html, min(workers, len(left)), scheduler):
+            left.remove(file)
+            yield outcome
+        # A process that dies takes the others' work with it: what can have been at fault goes on alone, one by one
+        suspects = left[:workers]
+        for file in suspects:
+            alone = dict(_of_pool([file], output_dir, html, 1, scheduler))
+            left.remove(file)
+            yield alone.get(file, _Outcome(str(file), f"{file}: the process that worked it out was killed; memory?"))
+
+
+def _of_pool(
+    files: Sequence[Path], output_dir: Path, html: bool, workers: int, scheduler: str | None
+) -> Iterator[tuple[Path, _Outcome]]:
+    """Of those files that were worked out before any process died."""
+    with _executor(workers, scheduler) as pool:
         # Absolute, since a cluster's workers have a working folder of their own
         folder = output_dir.resolve()
         pending: dict[Future[_Outcome], Path] = {
             pool.submit(_one, file if scheduler is None else file.resolve(), folder, html): file for file in files
         }
         for done in as_completed(pending):
+            file = pending[done]
             try:
-                yield done.result()
-            except Exception as error:  # a worker that died must not take the other campaigns with it
-                yield _Outcome(str(pending[done]), f"{pending[done]}: {type(error).__name__}: {error}")
+                yield file, done.result()
+            except BrokenExecutor:
+                continue
+            except Exception as error:  # must not take the other campaigns with it
+                yield file, _Outcome(str(file), f"{file}: {type(error).__name__}: {error}")
 
 
 @contextmanager
 def _executor(workers: int, scheduler: str | None) -> Iterator[Executor]:
     """Processes on this machine, or a Dask cluster through the same interface."""
     if scheduler is None:
-        # A fresh interpreter a process (spawn): it, too, starts with one BLAS thread.
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        with processes(workers) as pool:
             yield pool
         return
     try:
@@ -236,7 +248,7 @@ def plan(
 
     What is left out is as in the campaign; if all is and that separates nothing, what most rigs can do is tried too.
     """
-    _one_blas_thread()
+    one_blas_thread()
     from underskin.diagnosis.diagnose import diagnose as work_out
     from underskin.diagnosis.rig_limits import Limits
     from underskin.recordings import read_file
