@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from underskin.errors import InvalidInput
-from underskin.figures import Trace, array_map, frf_versus_preload, raw_traces, response_per_sensor
+from underskin.figures import Trace, array_map, frf_recordings, frf_versus_preload, raw_traces, response_per_sensor
+from underskin.frf_summary import FrfLines
 
 SENSORS = ("s1", "s2", "s3")
 D33 = np.array([14.0, 15.0, 3.0])
@@ -61,3 +62,14 @@ def test_a_raw_trace_of_many_samples_keeps_its_extremes() -> None:
     assert short.y.tolist() == [0, 1, 2, 3, 4]
     assert short.name == "&lt;b&gt;"
     assert "[V]" in figure.layout.yaxis.title.text
+    assert "s: " in long.hovertemplate
+    assert " V<extra>" in long.hovertemplate
+
+
+def test_the_value_under_the_pointer_has_its_unit() -> None:
+    frequency = np.array([1.0, 10.0])
+    entry = FrfLines("a", frequency, np.array([7.0, 7.1]), np.array([0.0, -1.0]), np.array([1.0, 0.99]))
+    magnitude, phase, coherence = (trace.hovertemplate for trace in frf_recordings([entry], None).data)
+    assert " pC/N<extra>" in magnitude
+    assert "°<extra>" in phase
+    assert "}<extra>" in coherence

@@ -19,7 +19,7 @@ router = APIRouter()
 
 LIBRARY = "plotly.min.js"
 _FOLDER = Path(__file__).parent / "static"
-_TYPES = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+_TYPES = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml", ".csv": "text/csv"}
 _FOR_GOOD = "public, max-age=31536000, immutable"
 
 

@@ -152,7 +152,8 @@ def told(found: DesignAnswer) -> list[Told]:
              f"contact radius {found.contact_radius_mm:.3g} mm"),
         Told("resolution", "spatial resolution", found.resolution_mm, "mm", 3, "width at half maximum of a response"),
         Told("apart", "two-point separation", apart, "mm", 3, f"two equal loads, {anywhere}"),
-        Told("best", "where the array lies best", found.two_point_best_mm, "mm", 3, "two equal loads above the row"),
+        Told("best", "two-point separation at best", found.two_point_best_mm, "mm", 3,
+             "where the sensors lie best under them"),
         Told("amid", "response amid four sensors", found.response_amid_percent, "%", 3,
              "of that above one" + (": blind spots" if blind else "")),
     ]  # fmt: skip

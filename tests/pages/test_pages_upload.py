@@ -18,6 +18,7 @@ from tests.store.server import Place, Server, campaign, running
 from underskin.recordings import rig_description
 
 GAIN = 7.4
+TEMPLATE = Path(__file__).parents[2] / "examples" / "formats" / "template.csv"
 
 
 def file(name: str, content: bytes | str) -> FilePayload:
@@ -111,6 +112,18 @@ def test_a_mapping_that_cannot_be_used_says_why(visitor: Visit) -> None:
     page.get_by_label("Unit of the sensitivity of Amplifier").fill("mV/pC")
     page.get_by_role("button", name="Read it so").click()
     assert "fill it in below" in page.get_by_role("row", name="sphere radius R [mm]").inner_text()
+
+
+def test_the_table_that_is_offered_can_be_sent(visitor: Visit) -> None:
+    page = visitor.page
+    visitor.go("/upload")
+    with page.expect_download() as saving:
+        page.get_by_role("link", name="this table").click()
+    offered = saving.value.path().read_bytes()
+    assert offered == TEMPLATE.read_bytes()
+    look_at(visitor, [file("template.csv", offered)])
+    assert "understood" in page.get_by_role("status").inner_text()
+    assert page.get_by_role("button", name="Keep").count() == 1
 
 
 def test_files_that_are_dropped_are_looked_at(visitor: Visit) -> None:

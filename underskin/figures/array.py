@@ -15,7 +15,7 @@ from underskin.errors import InvalidInput
 from underskin.figures.style import COLOURS, MARKERS, label, styled
 from underskin.units import Floats
 
-_HOVER_INTERVAL = "%{text}<br>d33 %{y:.3g} pC/N<br>%{customdata[0]:.3g} to %{customdata[1]:.3g} (95 %)<extra></extra>"
+_HOVER_INTERVAL = "%{text}<br>d33 %{y:.5g} pC/N<br>%{customdata[0]:.5g} to %{customdata[1]:.5g} (95 %)<extra></extra>"
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def array_map(
     x, y, value, uncertainty = _columns(sensors, x_mm=x_mm, y_mm=y_mm, values=values, uncertainties=uncertainties)
     plain = np.array([not reason for reason in reasons])
     figure = go.Figure()
-    hover = f"%{{text}}<br>{quantity.name} %{{customdata[0]:.3g}} ± %{{customdata[1]:.2g}} {quantity.unit}"
+    hover = f"%{{text}}<br>{quantity.name} %{{customdata[0]:.5g}} ± %{{customdata[1]:.3g}} {quantity.unit}"
     for name, chosen, symbol in (("sensor", plain, "circle"), ("stands out", ~plain, "x")):
         if not chosen.any():
             continue
@@ -118,7 +118,7 @@ def frf_versus_preload(
             mode="markers",
             name=f"{size:.3g} mm, measured",
             text=[label(recordings[row]) for row in np.flatnonzero(chosen).tolist()],
-            hovertemplate=f"%{{text}}<br>sphere {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.3g}} pC/N<extra></extra>",
+            hovertemplate=f"%{{text}}<br>sphere {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.5g}} pC/N<extra></extra>",
             marker={"color": colour, "symbol": marker, "size": 8, "opacity": 0.7},
         )
         at, first = np.unique(preload[chosen], return_index=True)
@@ -127,7 +127,7 @@ def frf_versus_preload(
             y=model[chosen][first],
             mode="lines",
             name=f"{size:.3g} mm, model",
-            hovertemplate=f"model, sphere {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.3g}} pC/N<extra></extra>",
+            hovertemplate=f"model, sphere {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.5g}} pC/N<extra></extra>",
             line={"color": colour, "dash": ("solid", "dash", "dot")[number % 3]},
         )
     figure.update_xaxes(title="preload [N]", rangemode="tozero")

@@ -15,6 +15,7 @@ from underskin.units import Floats
 Trace = dict[str, Any]
 
 _AXES = ("", "2", "3")  # of the panels
+_UNITS = (" pC/N", "°", "")
 _HEIGHT = 640
 _BRIGHTEST = 0.85  # of Viridis, that still shows on white
 _LEAST_PHASE = 10.0  # ° to each side, so that noise looks like noise
@@ -67,7 +68,7 @@ def _lines(
 
     As dictionaries: plotly checks them once, and traces that are added one by one three times.
     """
-    for axis, values in zip(_AXES, parts, strict=True):
+    for axis, unit, values in zip(_AXES, _UNITS, parts, strict=True):
         if not np.isnan(values).all():
             yield {
                 "type": "scatter",
@@ -80,7 +81,7 @@ def _lines(
                 "legendgroup": group,
                 "showlegend": axis == "",
                 "line": line,
-                "hovertemplate": f"{name}<br>%{{x:.4g}} Hz: %{{y:.4g}}<extra></extra>",
+                "hovertemplate": f"{name}<br>%{{x:.4g}} Hz: %{{y:.5g}}{unit}<extra></extra>",
             }
 
 

@@ -34,8 +34,8 @@ def d33_history(sensors: Sequence[SensorPoints]) -> go.Figure:
             name=label(entry.sensor),
             line={"color": colour, "width": 1.5, "dash": DASHES[number // len(COLOURS) % len(DASHES)]},
             marker={"symbol": MARKERS[number % len(MARKERS)], "size": 8},
-            hovertemplate=f"{label(entry.sensor)}, %{{x|%d %b %Y %H:%M}} UTC<br>d33 %{{y:.4g}} "
-            f"± %{{error_y.array:.2g}} pC/N<br>{label(entry.trend)}<extra></extra>",
+            hovertemplate=f"{label(entry.sensor)}, %{{x|%d %b %Y %H:%M}} UTC<br>d33 %{{y:.5g}} "
+            f"± %{{error_y.array:.3g}} pC/N<br>{label(entry.trend)}<extra></extra>",
         )
     return _finished(figure, "d33 of each sensor over time")
 
@@ -54,7 +54,7 @@ def array_history(
     figure.add_scatter(
         x=list(times), y=np.asarray(median_pc_per_n), mode="lines+markers", name="median of the sensors",
         line={"color": COLOURS[0], "width": 1.5}, marker={"size": 6},
-        hovertemplate="%{x|%d %b %Y %H:%M} UTC<br>median d33 %{y:.4g} pC/N<extra></extra>",
+        hovertemplate="%{x|%d %b %Y %H:%M} UTC<br>median d33 %{y:.5g} pC/N<extra></extra>",
     )  # fmt: skip
     return _finished(figure, "d33 of the array over time")
 

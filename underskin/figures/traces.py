@@ -28,6 +28,7 @@ class Trace:
 def raw_traces(traces: Sequence[Trace], sample_rate_hz: float | None) -> go.Figure:
     """Each channel over time, or over the number of the sample; of many samples the extremes are kept."""
     figure = make_subplots(len(traces), 1, shared_xaxes=True, vertical_spacing=0.12 / len(traces))
+    place = "sample %{x}" if sample_rate_hz is None else "%{x:.6g} s"
     for row, trace in enumerate(traces, start=1):
         chosen = _extremes(trace.values)
         x = chosen if sample_rate_hz is None else chosen / sample_rate_hz
@@ -38,7 +39,7 @@ def raw_traces(traces: Sequence[Trace], sample_rate_hz: float | None) -> go.Figu
             mode="lines",
             name=name,
             line={"color": COLOURS[(row - 1) % len(COLOURS)], "width": 1},
-            hovertemplate=f"{name}<br>%{{x:.6g}}: %{{y:.4g}}<extra></extra>",
+            hovertemplate=f"{name}<br>{place}: %{{y:.5g}} {label(trace.unit)}<extra></extra>",
             showlegend=False,
             row=row,
             col=1,

@@ -36,7 +36,11 @@ def read(stream: BinaryIO, file: str) -> Contents:
     lines = text.lines(text.content(stream, file))
     table = _table(lines)
     if table is None:
-        raise FileError(file, "", "holds no table of numbers of at least two columns and two rows")
+        raise FileError(
+            file,
+            "",
+            "holds no table of numbers alone, of at least two columns and two rows; names go into the CSV template",
+        )
     rows, end = _rows(lines, table, file)
     for index in range(end, len(lines)):
         first = text.cells(lines[index], table.separator)[0]
