@@ -12,6 +12,7 @@ import underskin
 from underskin.diagnosis import held_out
 from underskin.diagnosis.confounding import confounding, left_open
 from underskin.diagnosis.curve_findings import without_unusable
+from underskin.diagnosis.curve_slips import without_slips
 from underskin.diagnosis.curves import curve_lines
 from underskin.diagnosis.effect import effect
 from underskin.diagnosis.explanation import Workbench
@@ -46,9 +47,14 @@ def diagnose(
     provenance = _provenance(table)
     left_out: list[Finding] = []
     for kind in () if any(isinstance(entry, FrfRecording) for entry in campaign.recordings) else _CURVES:
-        curves, found = without_unusable(campaign, kind)
-        left_out += found
-        rows = curve_lines(curves, kind)
+        if all(entry.kind != kind for entry in campaign.recordings):
+            continue
+        usable, found = without_unusable(campaign, kind)
+        curves = without_slips(usable, kind)
+        left_out += [*found, *curves.found]
+        if curves.found and curves.lacking:
+            return Diagnosis(campaign.name, left_out, provenance, lacking=curves.lacking)
+        rows = curve_lines(curves.campaign, kind)
         if rows.recordings:
             return _work_out(campaign.name, Workbench(rows, table), left_out, provenance, progress, limits)
     frf = tuple(entry for entry in campaign.recordings if isinstance(entry, FrfRecording))

@@ -1,0 +1,99 @@
+"""Curves with slips of units, reversed forces and copies: named, put right or left out, before any law is tried."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from underskin.diagnosis.curve_slips import without_slips
+from underskin.diagnosis.diagnose import diagnosis_report
+from underskin.recordings.campaign import Campaign, CompressionRecording, SkinDescription
+from underskin.surrogate import load_table
+
+Change = Callable[[CompressionRecording], CompressionRecording]
+MODULUS_MPA = 0.5
+
+
+def pad(name: str, seed: int) -> CompressionRecording:
+    strain = np.concatenate([np.linspace(0, 0.1, 60), np.linspace(0.1, 0, 60)])
+    force = MODULUS_MPA * 100 * np.pi * strain
+    force = force + 2e-3 * force.max() * np.random.default_rng(seed).normal(size=len(force))
+    return CompressionRecording(
+        id=name, sample_height_mm=10.0, sample_diameter_mm=20.0, displacement_mm=10 * strain, force_n=force
+    )
+
+
+@pytest.fixture
+def pads() -> Campaign:
+    recordings = tuple(pad(f"c{number}", number) for number in range(4))
+    return Campaign("pads", SkinDescription(poisson_ratio=0.5, youngs_modulus_mpa=None), recordings)
+
+
+def times(factor: float, field: str) -> Change:
+    return lambda entry: replace(entry, **{field: factor * getattr(entry, field)})
+
+
+def changed(pads: Campaign, change: Change, *names: str) -> Campaign:
+    entries = [entry for entry in pads.recordings if isinstance(entry, CompressionRecording)]
+    return replace(pads, recordings=tuple(change(entry) if entry.id in names else entry for entry in entries))
+
+
+def codes(found: Any) -> set[tuple[str, str, str]]:
+    return {(entry.code, entry.recording, entry.field) for entry in found}
+
+
+ALL = ("c0", "c1", "c2", "c3")
+ONE = [
+    (times(1e3, "force_n"), ("units_off_by_1000", "c1", "force_n"), 3),
+    (times(1e-3, "force_n"), ("units_off_by_1000", "c1", "force_n"), 3),
+    (times(1e3, "displacement_mm"), ("units_off_by_1000", "c1", "displacement_mm"), 3),
+    (times(1e-3, "displacement_mm"), ("units_off_by_1000", "c1", "displacement_mm"), 3),
+    (times(0.0, "displacement_mm"), ("curve_not_usable", "c1", "displacement_mm"), 3),
+    (times(-1.0, "force_n"), ("sign_flipped", "c1", "force_n"), 4),
+]
+
+
+@pytest.mark.parametrize(("change", "finding", "left"), ONE)
+def test_what_is_wrong_with_one_curve_is_named(
+    change: Change, finding: tuple[str, str, str], left: int, pads: Campaign
+) -> None:
+    found = without_slips(changed(pads, change, "c1"), "compression")
+    assert codes(found.found) == {finding}
+    assert len(found.campaign.recordings) == left
+    assert found.lacking == ""
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+@pytest.mark.parametrize("field", ["force_n", "displacement_mm"])
+def test_where_all_curves_are_off_nothing_is_concluded(factor: float, field: str, pads: Campaign) -> None:
+    wrong = changed(pads, times(factor, field), *ALL)
+    report = diagnosis_report(wrong, load_table())
+    assert report["verdict"] == "insufficient_data"
+    assert "units_off_by_1000" in {entry["code"] for entry in report["findings"]}
+    if (field, factor) != ("displacement_mm", 1e3):  # pressed through the sample: nobody can mean that
+        meant = without_slips(replace(wrong, units_checked=True), "compression")
+        assert (meant.lacking, codes(meant.found)) == ("", {("units_off_by_1000", "", "force_n")})
+
+
+def test_curves_far_from_the_declared_modulus_are_named(pads: Campaign) -> None:
+    skin = replace(pads.skin, youngs_modulus_mpa=1000 * MODULUS_MPA)
+    found = without_slips(replace(pads, skin=skin), "compression")
+    assert codes(found.found) == {("units_off_by_1000", "", "force_n")}
+    assert found.lacking
+
+
+def test_reversed_forces_are_put_right_and_invent_nothing(pads: Campaign) -> None:
+    for names in (ALL, ("c2",)):
+        report = diagnosis_report(changed(pads, times(-1.0, "force_n"), *names), load_table())
+        assert report["verdict"] == "no_mismatch"
+        assert {entry["recording"] for entry in report["findings"]} == set(names)
+
+
+def test_a_copy_of_a_curve_is_left_out(pads: Campaign) -> None:
+    whole = replace(pads, recordings=(*pads.recordings, replace(pads.recordings[0], id="copy")))
+    found = without_slips(whole, "compression")
+    assert codes(found.found) == {("duplicated_recording", "copy", "force_n")}
+    assert len(found.campaign.recordings) == len(pads.recordings)
+    assert without_slips(pads, "compression").found == []
