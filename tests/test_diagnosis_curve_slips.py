@@ -50,7 +50,6 @@ ONE = [
     (times(1e-3, "force_n"), ("units_off_by_1000", "c1", "force_n"), 3),
     (times(1e3, "displacement_mm"), ("units_off_by_1000", "c1", "displacement_mm"), 3),
     (times(1e-3, "displacement_mm"), ("units_off_by_1000", "c1", "displacement_mm"), 3),
-    (times(0.0, "displacement_mm"), ("curve_not_usable", "c1", "displacement_mm"), 3),
     (times(-1.0, "force_n"), ("sign_flipped", "c1", "force_n"), 4),
 ]
 
@@ -89,6 +88,14 @@ def test_reversed_forces_are_put_right_and_invent_nothing(pads: Campaign) -> Non
         report = diagnosis_report(changed(pads, times(-1.0, "force_n"), *names), load_table())
         assert report["verdict"] == "no_mismatch"
         assert {entry["recording"] for entry in report["findings"]} == set(names)
+
+
+def test_a_curve_that_does_not_move_is_left_out(pads: Campaign) -> None:
+    report = diagnosis_report(changed(pads, times(0.0, "displacement_mm"), "c1"), load_table())
+    assert report["verdict"] == "no_mismatch"
+    assert [(entry["code"], entry["recording"], entry["field"]) for entry in report["findings"]] == [
+        ("curve_not_usable", "c1", "displacement_mm")
+    ]
 
 
 def test_a_copy_of_a_curve_is_left_out(pads: Campaign) -> None:

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from underskin.diagnosis.curves import curve_lines
 from underskin.diagnosis.finding import Finding
 from underskin.errors import InvalidInput
@@ -26,6 +28,8 @@ def without_unusable(campaign: Campaign, kind: Kind) -> tuple[Campaign, list[Fin
 
 
 def _lacking(entry: object, poisson_ratio: float) -> InvalidInput | None:
+    if isinstance(entry, IndentationRecording | CompressionRecording) and not np.ptp(entry.displacement_mm):
+        return InvalidInput("displacement_mm", float(entry.displacement_mm[0]), "must change")
     try:
         if isinstance(entry, IndentationRecording):
             elastomer.of_indentation(entry, poisson_ratio)

@@ -76,7 +76,7 @@ def _once(curves: Sequence[Curve], found: list[Finding]) -> list[Curve]:
 
 
 def _within_reach(curves: Sequence[Curve], found: list[Finding]) -> list[Curve]:
-    """Those that move, and not through more than the whole sample, or ten times as deep as the sphere is wide."""
+    """Those not pressed through more than the whole sample, or ten times as deep as the sphere is wide."""
     kept = []
     for entry in curves:
         place = entry.displacement_mm[np.isfinite(entry.displacement_mm)]
@@ -85,10 +85,7 @@ def _within_reach(curves: Sequence[Curve], found: list[Finding]) -> list[Curve]:
             if isinstance(entry, IndentationRecording)
             else (entry.sample_height_mm, "its sample's height")
         )
-        if not np.ptp(place):
-            text = "its displacement does not change: left out"
-            found.append(Finding("curve_not_usable", entry.id, "displacement_mm", text))
-        elif place.max() - place[0] > most:
+        if place.max() - place[0] > most:
             text = f"pressed {place.max() - place[0]:.3g} mm, more than {what} ({most:.3g} mm): given in µm? Left out"
             found.append(Finding("units_off_by_1000", entry.id, "displacement_mm", text))
         else:
