@@ -133,7 +133,8 @@ STEPS = (
         "How much better",
         "The error with the explanation and without, on recordings that it was not fitted to, beside what noise alone "
         "gives; measured against predicted, before and after. Then what to measure next, where something is left open. "
-        "The whole is printed, or saved as one HTML file that opens anywhere.",
+        "The whole is printed, saved as PDF from the browser's print dialog, or saved as one HTML file that opens "
+        "anywhere.",
         _better,
     ),
     Step(
