@@ -7,7 +7,19 @@ import time
 from importlib.metadata import version
 from pathlib import Path
 
-from bench import accuracy, batch, diagnosis, mechanisms, newton_step, orderings, pages, single_requests, start, store
+from bench import (
+    accuracy,
+    batch,
+    diagnosis,
+    mechanisms,
+    nested,
+    newton_step,
+    orderings,
+    pages,
+    single_requests,
+    start,
+    store,
+)
 from bench.page import keep, markdown, write
 
 PARTS = {
@@ -19,10 +31,11 @@ PARTS = {
     "accuracy": accuracy.measure,
     "mechanisms": mechanisms.measure,
     "diagnosis": diagnosis.measure,
+    "nested": nested.measure,
     "store": store.measure,
     "pages": pages.measure,
 }
-_PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem")
+_PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem", "dynesty")
 
 
 def main(names: list[str]) -> None:

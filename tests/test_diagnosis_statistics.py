@@ -3,7 +3,6 @@
 import os
 from dataclasses import replace
 
-import dynesty
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
@@ -11,7 +10,8 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal, multivariate_t
 
 from tests.diagnosis_campaigns import Made, campaign
-from underskin.diagnosis.evidence import laplace, log_box
+from tests.nested_sampling import Posterior, nested
+from underskin.diagnosis.evidence import Evidence, laplace, log_box
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.fit import Evaluated, Fitter
 from underskin.diagnosis.lines import Lines, lines
@@ -148,29 +148,13 @@ CASES: list[tuple[tuple[str, ...], tuple[float, ...]]] = [
 ]
 
 
-class Posterior:
-    """One hypothesis' posterior around its most probable point, as a density of all its parameters."""
-
-    def __init__(self, names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable) -> None:
-        made = Made(names, values, sensors=3, offsets_mm=(0.0, 1.0), preloads_n=(0.3, 1.2, 2.4), highest_hz=1000.0)
-        bench = Workbench(lines(campaign(made, table)), table)
-        self.fitter = fitter = Fitter(bench.hypothesis(names, placed=False))
-        own = [entry.to_fit(value) for entry, value in zip(fitter.parameters, values, strict=False)]
-        self.evidence = laplace(fitter, fitter.improve(fitter.start(own)))
-        self.low = np.array([np.log(2e-3), np.log(0.7), *(entry.low for entry in fitter.covariance[2:])])
-        self.high = np.array([np.log(0.2), np.log(1.5), *(entry.high for entry in fitter.covariance[2:])])
-
-    def log_density(self, x: Floats) -> float:
-        """Likelihood times prior at mean and then covariance parameters, −∞ outside the bounds."""
-        fitter, places = self.fitter, self.fitter.places
-        mean, covariance = x[: len(places)], x[len(places) :]
-        if ((mean < fitter.low[places]) | (mean > fitter.high[places])).any():
-            return -np.inf
-        if ((covariance < self.low) | (covariance > self.high)).any():
-            return -np.inf
-        fit = self.evidence.at.point.fit.copy()
-        fit[places] = mean
-        return -fitter.evaluate(fitter.moved(replace(self.evidence.at.point, fit=fit), covariance)).cost
+def laplace_of(names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable) -> Evidence:
+    """By Laplace's method, of the hypothesis with which the campaign was made."""
+    made = Made(names, values, sensors=3, offsets_mm=(0.0, 1.0), preloads_n=(0.3, 1.2, 2.4), highest_hz=1000.0)
+    bench = Workbench(lines(campaign(made, table)), table)
+    fitter = Fitter(bench.hypothesis(names, placed=False))
+    own = [entry.to_fit(value) for entry, value in zip(fitter.parameters, values, strict=False)]
+    return laplace(fitter, fitter.improve(fitter.start(own)))
 
 
 @pytest.mark.parametrize(("names", "values"), [CASES[0], CASES[1], CASES[4]])
@@ -178,16 +162,16 @@ def test_evidence_agrees_with_importance_sampling(
     names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable
 ) -> None:
     """Laplace's method against the mean of density over Student's t around the mode."""
-    posterior = Posterior(names, values, table)
-    fitter, at = posterior.fitter, posterior.evidence.at
-    _, hessian = fitter.covariance_equations(at)
-    scale = block_diag(posterior.evidence.covariance, np.linalg.inv(hessian))
-    centre = np.concatenate([at.point.fit[fitter.places], at.point.covariance])
+    found = laplace_of(names, values, table)
+    fitter, point = found.fitter, found.at.point
+    posterior = Posterior(fitter, point)
+    _, hessian = fitter.covariance_equations(found.at)
+    scale = block_diag(found.covariance, np.linalg.inv(hessian))
+    centre = np.concatenate([point.fit[fitter.places], point.covariance])
     proposal = multivariate_t(centre, 1.5 * scale, df=5, seed=1)
     draws = proposal.rvs(4000)
     weights = np.array([posterior.log_density(x) for x in draws]) - proposal.logpdf(draws)
-    expected = logsumexp(weights) - np.log(len(draws))
-    assert posterior.evidence.log_evidence == pytest.approx(expected, abs=0.5)
+    assert found.log_evidence == pytest.approx(logsumexp(weights) - np.log(len(draws)), abs=0.5)
 
 
 @pytest.mark.soak
@@ -197,25 +181,9 @@ def test_evidence_agrees_with_nested_sampling(
     names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable
 ) -> None:
     """Laplace's method against nested sampling of the same posterior: 0.5 in log evidence, beside its own error."""
-    posterior = Posterior(names, values, table)
-    fitter, low, high = posterior.fitter, posterior.low, posterior.high
-    places, count = fitter.places, len(fitter.places)
-
-    def drawn(unit: Floats) -> Floats:
-        own = [fitter.parameters[place].quantile(u) for place, u in zip(places, unit, strict=False)]
-        return np.concatenate([own, low + (high - low) * unit[count:]])
-
-    def log_likelihood(x: Floats) -> float:
-        prior = sum(fitter.parameters[place].log_prior(value) for place, value in zip(places, x, strict=False))
-        return posterior.log_density(x) - prior + float(np.log(high - low).sum())
-
-    random = np.random.default_rng(1)
-    sampler = dynesty.NestedSampler(
-        log_likelihood, drawn, count + len(low), nlive=250, rstate=random, sample="rwalk", bound="multi"
-    )
-    sampler.run_nested(dlogz=0.1, print_progress=False)
-    expected, error = sampler.results.logz[-1], sampler.results.logzerr[-1]
-    assert posterior.evidence.log_evidence == pytest.approx(expected, abs=0.5 + 2 * error)
+    found = laplace_of(names, values, table)
+    sampled = nested(Posterior(found.fitter, found.at.point))
+    assert found.log_evidence == pytest.approx(sampled.log_evidence, abs=0.5 + 2 * sampled.error)
 
 
 def test_explanations_are_names_in_order_of_composition(table: SigmaTable) -> None:

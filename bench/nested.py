@@ -1,0 +1,147 @@
+"""Evidences by Laplace's method from many starts, as a diagnosis works them out, against nested sampling (dynesty).
+
+Both weigh the same hypotheses on the same lines, with the same priors and the same code for one likelihood, which
+works out derivatives that nested sampling has no use for. Positioning scatter counts in both as the mean of with and
+without it.
+"""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from bench.figures import Figure
+from rig.experiment import parse as experiment
+from rig.recorded import campaign, record_lines
+from tests.nested_sampling import Posterior, Sampled, nested
+from underskin.diagnosis.explanation import Explanation, Workbench
+from underskin.diagnosis.fit import Fitter
+from underskin.diagnosis.lines import lines
+from underskin.diagnosis.scatter import NO_POSITION
+from underskin.diagnosis.search import log_prior
+from underskin.recordings.campaign import parse
+from underskin.surrogate import load_table
+
+Effects = Mapping[str, Mapping[str, float | str]]
+
+HIDDEN: dict[str, Effects] = {
+    "nothing": {},
+    "preload_dependent_d33": {"preload_dependent_d33": {"beta_per_mpa": 1.0, "saturation_mpa": 0.3}},
+    "ageing": {"ageing": {"rate": 0.1, "cycles": 300.0, "law": "exponential"}},
+}
+SINGLES = ("preload_dependent_d33", "ageing", "moving_contact_edge", "strain_stiffening", "contact_resonance")
+HYPOTHESES: tuple[tuple[str, ...], ...] = ((), *((name,) for name in SINGLES))
+ROUNDS = 3  # of ours; nested sampling takes long enough
+WITHIN = 10.0  # nats behind the winner
+
+
+@dataclass(frozen=True)
+class Compared:
+    """The hypotheses' log evidences by both methods, the sampler's standard errors, and both processor times [s]."""
+
+    laplace: list[float]
+    sampled: list[float]
+    errors: list[float]
+    laplace_seconds: float
+    sampled_seconds: float
+
+    @property
+    def same_winner(self) -> bool:
+        """Whether the same hypothesis is the most probable."""
+        return _winner(self.laplace) == _winner(self.sampled)
+
+    @property
+    def rivals(self) -> list[int]:
+        """The hypotheses whose evidence is near the winner's."""
+        best = self.sampled[_winner(self.sampled)]
+        return [index for index, value in enumerate(self.sampled) if value > best - WITHIN]
+
+
+def _winner(evidences: list[float]) -> int:
+    priors = [log_prior(len(names), len(SINGLES)) for names in HYPOTHESES]
+    return int(np.argmax(np.add(evidences, priors)))
+
+
+def measure() -> list[Figure]:
+    """For each campaign the ratio of processor times and the largest difference of the rivals' evidences."""
+    figures = []
+    with threadpool_limits(1):
+        found = {name: _compared(effects) for name, effects in HIDDEN.items()}
+    for name, entry in found.items():
+        apart = max(abs(entry.laplace[index] - entry.sampled[index]) for index in entry.rivals)
+        error = max(entry.errors[index] for index in entry.rivals)
+        figures += [
+            Figure(f"{name} hidden: processor time, ours", entry.laplace_seconds, "s"),
+            Figure(f"{name} hidden: processor time, dynesty", entry.sampled_seconds, "s"),
+            Figure(f"{name} hidden: dynesty's time", entry.sampled_seconds / entry.laplace_seconds, "× ours", 50.0),
+            Figure(f"{name} hidden: hypotheses within {WITHIN:g} nats of the winner", len(entry.rivals), ""),
+            Figure(f"{name} hidden: their log evidences, largest difference", apart, "nats"),
+            Figure(f"{name} hidden: the sampler's own standard error, largest", error, "nats"),
+        ]
+    same = sum(entry.same_winner for entry in found.values())
+    return [*figures, Figure("campaigns with the same winner", same, f"of {len(found)}", float(len(found)))]
+
+
+def _compared(effects: Effects) -> Compared:
+    bench = Workbench(lines(parse(campaign(record_lines(experiment(_experiment(effects)))))), load_table())
+    times = []
+    for _ in range(ROUNDS):
+        start = time.process_time()
+        explained = _explained(bench)
+        times.append(time.process_time() - start)
+    start = time.process_time()
+    sampled = [_sampled(bench, entry) for entry in explained]
+    return Compared(
+        [entry.log_evidence for entry in explained],
+        [entry.log_evidence for entry in sampled],
+        [entry.error for entry in sampled],
+        median(times),
+        time.process_time() - start,
+    )
+
+
+def _explained(bench: Workbench) -> list[Explanation]:
+    found = [bench.explain(names) for names in HYPOTHESES]
+    return [entry for entry in found if entry is not None]  # without a parent none is left out
+
+
+def _sampled(bench: Workbench, explained: Explanation) -> Sampled:
+    """Without positioning scatter and, where the diagnosis looked for it, with it."""
+    plain, placed = (Fitter(bench.hypothesis(explained.names, placed)) for placed in (False, True))
+    without = nested(Posterior(plain, explained.point))
+    if explained.placed == 0:
+        return without
+    beside = nested(Posterior(placed, explained.point))
+    parts = np.add(np.log([NO_POSITION, 1 - NO_POSITION]), [without.log_evidence, beside.log_evidence])
+    total = float(np.logaddexp.reduce(parts))
+    error = float(np.hypot(*(np.exp(parts - total) * [without.error, beside.error])))
+    return Sampled(total, error, without.likelihoods + beside.likelihoods)
+
+
+def _experiment(effects: Effects) -> dict[str, object]:
+    """24 recordings: two sensors, two spheres, six preloads."""
+    return {
+        "schema": "experiment/1",
+        "name": "bench",
+        "seed": 5,
+        "kind": "frf",
+        "skin": {
+            "thickness_mm": 2.5,
+            "youngs_modulus_mpa": 16,
+            "sensor_radius_mm": 1.5,
+            "d33_pc_per_n": 14,
+            "array": {"columns": 2, "rows": 1, "pitch_mm": 8},
+        },
+        "design": {
+            "indenters_mm": [4, 10],
+            "preloads_n": [0.3, 0.6, 1, 1.6, 2.3, 3],
+            "dynamic_forces_n": [0.09],
+            "cycles_per_recording": 50,
+        },
+        "lines": {"low_hz": 1, "high_hz": 1000, "count": 20},
+        "noise": {"gain": 0.02, "line": 0.01, "averages": 16},
+        "effects": effects,
+    }

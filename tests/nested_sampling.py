@@ -1,0 +1,87 @@
+"""One hypothesis' evidence by nested sampling (dynesty), against which Laplace's method is checked: tests and bench.
+
+Likelihood and priors are those of the diagnosis; no density is taken as normal, and no most probable point is sought.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import dynesty
+import numpy as np
+
+from underskin.diagnosis.fit import Fitter
+from underskin.diagnosis.hypothesis import CovarianceParameter, Point
+from underskin.units import Floats
+
+_NODES = 8001  # of the grid on which a covariance parameter's prior is inverted
+
+
+class Posterior:
+    """One hypothesis' likelihood and prior as functions of all its parameters x: the mean's, then the covariance's."""
+
+    def __init__(self, fitter: Fitter, around: Point) -> None:
+        """`around` gives the place where the sensors' gains are linearised first."""
+        self.fitter, self._around = fitter, around
+        self._mean = [fitter.parameters[place] for place in fitter.places]
+        self._covariance = [_quantiles(entry) for entry in fitter.covariance]
+        bounds = [*(entry.bounds for entry in self._mean), *((entry.low, entry.high) for entry in fitter.covariance)]
+        self._low, self._high = np.array(bounds).T
+
+    @property
+    def size(self) -> int:
+        """How many parameters there are."""
+        return len(self._mean) + len(self._covariance)
+
+    def log_density(self, x: Floats) -> float:
+        """Likelihood times prior, up to what all hypotheses share; −∞ outside the bounds."""
+        fitter, count = self.fitter, len(self._mean)
+        if ((x < self._low) | (x > self._high)).any():
+            return -np.inf
+        fit = self._around.fit.copy()
+        fit[fitter.places] = x[:count]
+        return -fitter.evaluate(fitter.moved(replace(self._around, fit=fit), x[count:])).cost
+
+    def log_prior(self, x: Floats) -> float:
+        """The prior's density, within the bounds."""
+        count = len(self._mean)
+        mean = sum(entry.log_prior(value) for entry, value in zip(self._mean, x[:count], strict=True))
+        covariance = zip(self.fitter.covariance, x[count:].tolist(), strict=True)
+        return mean + sum(entry.log_density(value) for entry, value in covariance)
+
+    def log_likelihood(self, x: Floats) -> float:
+        """The likelihood alone, within the bounds."""
+        return self.log_density(x) - self.log_prior(x)
+
+    def drawn(self, unit: Floats) -> Floats:
+        """The parameters at these quantiles of their priors."""
+        count = len(self._mean)
+        mean = [entry.quantile(u) for entry, u in zip(self._mean, unit[:count], strict=True)]
+        covariance = [quantile(u) for quantile, u in zip(self._covariance, unit[count:].tolist(), strict=True)]
+        return np.array([*mean, *covariance])
+
+
+def _quantiles(entry: CovarianceParameter) -> Callable[[float], float]:
+    """The quantile function of a covariance parameter's prior, whose mass is all within its bounds."""
+    x = np.linspace(entry.low, entry.high, _NODES)
+    density = np.exp([entry.log_density(value) for value in x.tolist()])
+    below = np.append(0.0, np.cumsum((density[1:] + density[:-1]) / 2))
+    return lambda probability: float(np.interp(probability * below[-1], below, x))
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """The log evidence, its standard error as the sampler estimates it, and the likelihoods worked out."""
+
+    log_evidence: float
+    error: float
+    likelihoods: int
+
+
+def nested(posterior: Posterior) -> Sampled:
+    """By dynesty as it comes: 500 live points, uniformly from several ellipsoids in fewer than ten dimensions."""
+    sampler = dynesty.NestedSampler(
+        posterior.log_likelihood, posterior.drawn, posterior.size, rstate=np.random.default_rng(1)
+    )
+    sampler.run_nested(print_progress=False)
+    found = sampler.results
+    return Sampled(float(found.logz[-1]), float(found.logzerr[-1]), int(np.sum(found.ncall)))
