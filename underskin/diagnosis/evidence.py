@@ -35,10 +35,11 @@ def laplace(fitter: Fitter, at: Evaluated) -> Evidence:
     """The evidence around a most probable point, which is first brought to where the whole gradient vanishes."""
     places = fitter.places
     low, high = fitter.low[places], fitter.high[places]
+    if fitter.hypothesis.placed and at.growth is None:
+        at = fitter.with_growth(at)
     for _ in range(_POLISHING):
-        information, _ = fitter.posterior_equations(at)
-        information = information + np.diag((_FLAT / (high - low)) ** 2)
-        gradient = _gradient(fitter, at, information)
+        information, ascent = fitter.posterior_equations(at)
+        information, gradient = information + np.diag((_FLAT / (high - low)) ** 2), -ascent
         polished = _polish(fitter, at, information, gradient)
         if polished is None:
             break
@@ -77,28 +78,9 @@ def _polish(fitter: Fitter, at: Evaluated, information: Floats, gradient: Floats
         moved[places] = np.clip(fit + step, low, high)
         tried = fitter.settle(fitter.evaluate(replace(at.point, fit=moved)), 1)
         if tried.cost < at.cost - 0.2 * _POLISHED:
-            return tried
+            return replace(tried, growth=at.growth)
         step = step / 3
     return None
-
-
-def _gradient(fitter: Fitter, at: Evaluated, information: Floats) -> Floats:
-    places = fitter.places
-    steps = 0.1 / np.sqrt(np.diag(information))
-    gradient = np.empty(len(places))
-    for index, place in enumerate(places):
-        room = fitter.high[place] - fitter.low[place]
-        step = min(float(steps[index]), 0.02 * room)
-        ends, costs = [], []
-        for sign in (1, -1):
-            fit = at.point.fit.copy()
-            fit[place] = np.clip(fit[place] + sign * step, fitter.low[place], fitter.high[place])
-            ends.append(fit[place])
-            costs.append(fitter.evaluate(replace(at.point, fit=fit)).cost)
-        gradient[index] = (costs[0] - costs[1]) / (ends[0] - ends[1])
-        if ends[0] - ends[1] < 1.5 * step:  # one-sided, at a bound: back to the bound itself
-            gradient[index] += (0.5 if ends[0] == at.point.fit[place] else -0.5) * information[index, index] * step
-    return gradient
 
 
 def log_box(mean: Floats, covariance: Floats, low: Floats, high: Floats) -> float:

@@ -19,7 +19,7 @@ from underskin.diagnosis.hypothesis import (
     moves_covariance,
     own_parameters,
 )
-from underskin.diagnosis.likelihood import Marginal, Moments, NoiseLevels
+from underskin.diagnosis.likelihood import LogLikelihoods, Marginal, Moments, NoiseLevels, SeveralLevels
 from underskin.diagnosis.scatter import GAIN_PRIOR, POSITION_PRIOR
 from underskin.mechanisms.composition import SENSOR_SPREAD
 from underskin.mechanisms.model import Prediction
@@ -27,6 +27,7 @@ from underskin.units import Floats
 
 _CURVE_SETTLING = 8
 _STEP = 0.05  # of the finite differences in the covariance's logarithms
+_SLOPE_STEP = 1e-4  # of a parameter's range, for differences of the position's slopes
 _LARGEST_STEP = 1.0
 _CONVERGED = 0.01  # in log posterior
 _MOST_ITERATIONS = 25
@@ -36,7 +37,10 @@ _BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that en
 
 @dataclass(frozen=True)
 class Evaluated:
-    """A point with what was worked out there; `cost` is minus the log posterior density (up to what all share)."""
+    """A point with what was worked out there; `cost` is minus the log posterior density (up to what all share).
+
+    `growth` of the position's slopes, once a fit has needed it, near there.
+    """
 
     point: Point
     predicted_at: Floats
@@ -44,6 +48,7 @@ class Evaluated:
     moments: Moments
     marginal: Marginal
     cost: float
+    growth: Floats | None = None
 
 
 class Fitter:
@@ -57,7 +62,13 @@ class Fitter:
         self.covariance = hypothesis.covariance
         bounds = np.array([entry.bounds for entry in self.parameters]).reshape(-1, 2)
         self.low, self.high = bounds.T
+        self._lowest = np.array([entry.low for entry in self.covariance])
+        self._highest = np.array([entry.high for entry in self.covariance])
         self._priors = np.array([curvature_of_prior(entry) for entry in self.parameters])
+        own = [self.parameters[place] for place in self.places]
+        at_start = np.array([entry.start for entry in own]) - self._priors[self.places, 1]
+        densities = sum(entry.log_prior(entry.start) for entry in own)
+        self._log_prior_height = densities + 0.5 * float(self._priors[self.places, 0] @ at_start**2)
         self._own = [index for index, entry in enumerate(self.parameters) if moves_covariance(entry)]
         self._common = len(self.covariance) - len(self._own)
         names = [entry.name for entry in self.parameters]
@@ -144,19 +155,22 @@ class Fitter:
 
     def levels(self, point: Point, predicted_at: Floats) -> NoiseLevels:
         """The noise levels at a point, for a prediction made at other coordinates of the covariance."""
-        position = float(np.exp(point.covariance[2])) if self.hypothesis.placed else 0.0
-        spread = SENSOR_SPREAD if self._spread is None else float(np.exp(point.fit[self._spread]))
-        pickup = 1.0
-        if self._pickup is not None:
-            pickup = float(np.exp(point.fit[self._pickup] - predicted_at[self._pickup]))
-        return NoiseLevels(
-            float(np.exp(point.covariance[0])),
-            float(np.exp(point.covariance[1])),
-            position,
-            spread,
-            pickup,
-            self._smooth(point),
-        )
+        gain, level, *_ = np.exp(point.covariance).tolist()
+        own = self._own_levels(point.covariance, predicted_at)
+        position, spread, pickup = (float(value) for value in own)
+        return NoiseLevels(gain, level, position, spread, pickup, self._smooth(point))
+
+    def _own_levels(self, covariance: Floats, predicted_at: Floats) -> tuple[Floats | float, ...]:
+        """p, τ and the pick-up over the prediction's, where covariance parameters (…, parameters) hold them."""
+        position: Floats | float = np.exp(covariance[..., 2]) if self.hypothesis.placed else 0.0
+        spread: Floats | float = SENSOR_SPREAD
+        pickup: Floats | float = 1.0
+        for place, column in zip(self._own, range(self._common, len(self.covariance)), strict=True):
+            if place == self._spread:
+                spread = np.exp(covariance[..., column])
+            else:
+                pickup = np.exp(covariance[..., column] - predicted_at[place])
+        return position, spread, pickup
 
     def _smooth(self, point: Point) -> float:
         """η, which follows the two that all recordings have."""
@@ -170,10 +184,18 @@ class Fitter:
         return whole
 
     def _log_prior(self, point: Point) -> float:
-        own = sum(self.parameters[place].log_prior(point.fit[place]) for place in self.places)
-        return own + sum(
+        return self._log_mean_prior(point) + sum(
             entry.log_density(value) for entry, value in zip(self.covariance, point.covariance.tolist(), strict=True)
         )
+
+    def _log_mean_prior(self, point: Point) -> float:
+        """Of the parameters that move the mean."""
+        places = self.places
+        fit = point.fit[places]
+        if (fit < self.low[places]).any() or (fit > self.high[places]).any():
+            return -np.inf
+        precision, centre = self._priors[places].T
+        return self._log_prior_height - 0.5 * float(precision @ (fit - centre) ** 2)
 
     def improve(self, start: Point, iterations: int = _MOST_ITERATIONS) -> Evaluated:
         """The most probable point near the start."""
@@ -191,25 +213,46 @@ class Fitter:
         """Steps of the mean parameters, each followed by so many of the covariance's."""
         damping = 1e-3
         for _ in range(iterations):
-            step = self._step(best, damping)
+            step, slope = self._step(best, damping)
+            if slope < _CONVERGED and (best.growth is not None or not self.hypothesis.placed):
+                settled = replace(self.settle(best, settling), growth=best.growth)
+                if best.cost - settled.cost < _CONVERGED:
+                    return settled
+                best = settled
+                continue
             moved = replace(best.point, fit=np.clip(best.point.fit + step, self.low, self.high))
             tried = self.settle(self.evaluate(moved), settling)
             gained = best.cost - tried.cost
             if gained > 0:
-                best = tried
+                best = replace(tried, growth=best.growth)
                 damping = max(damping / 10, 1e-6)
                 if gained < _CONVERGED:
                     break
             elif damping > 1e4 or np.abs(step).max() < 1e-7:
                 break
+            elif self.hypothesis.placed and best.growth is None:
+                best = self.with_growth(best)
             else:
                 damping = max(damping * 10, 1e-2)
                 if gained > -_CONVERGED and damping > 1:
                     break
         return best
 
-    def _step(self, at: Evaluated, damping: float) -> Floats:
-        """A Gauss–Newton step of the mean parameters, damped, within the bounds."""
+    def with_growth(self, at: Evaluated) -> Evaluated:
+        """With ∂ log |t|²/∂θ (recordings, parameters) of the position's slopes t, by differences."""
+        slopes = at.moments.log_slopes
+        found = np.zeros((len(slopes), len(self.parameters)))
+        for place in self.places:
+            step = _SLOPE_STEP * (self.high[place] - self.low[place])
+            moved = at.point.fit.copy()
+            moved[place] += step if moved[place] + step <= self.high[place] else -step
+            found[:, place] = (self.evaluate(replace(at.point, fit=moved)).moments.log_slopes - slopes) / (
+                moved[place] - at.point.fit[place]
+            )
+        return replace(at, growth=found)
+
+    def _step(self, at: Evaluated, damping: float) -> tuple[Floats, float]:
+        """A Gauss–Newton step of the mean parameters, damped, within the bounds, and what the gradient says it gains."""
         information, gradient = self.posterior_equations(at)
         places = np.array(self.places)
         fit = at.point.fit[places]
@@ -232,11 +275,11 @@ class Fitter:
                 break
         whole = np.zeros(len(self.parameters))
         whole[places] = step
-        return whole
+        return whole, float(gradient @ step)
 
     def posterior_equations(self, at: Evaluated) -> tuple[Floats, Floats]:
         """Information and gradient of the log posterior in the mean parameters."""
-        information, gradient = at.marginal.normal_equations()
+        information, gradient = at.marginal.normal_equations(at.growth)
         places = self.places
         information, gradient = information[np.ix_(places, places)], gradient[places]
         precision, centre = self._priors[places].T
@@ -246,8 +289,7 @@ class Fitter:
         """Newton steps of the covariance parameters at a fixed prediction."""
         for _ in range(steps):
             gradient, hessian = self.covariance_equations(at, mixed=False)
-            low = np.array([entry.low for entry in self.covariance])
-            high = np.array([entry.high for entry in self.covariance])
+            low, high = self._lowest, self._highest
             eigenvalues, vectors = np.linalg.eigh(hessian)
             step = -vectors @ ((vectors.T @ gradient) / np.maximum(np.abs(eigenvalues), 1.0))
             outwards = ((at.point.covariance <= low) & (step < 0)) | ((at.point.covariance >= high) & (step > 0))
@@ -260,11 +302,20 @@ class Fitter:
                     break
                 step = step / 4
             else:
-                return at
+                break
             gained, at = at.cost - tried.cost, tried
             if gained < 1e-3:
                 break
-        return at
+        return self._summed_again(at)
+
+    def _summed_again(self, at: Evaluated) -> Evaluated:
+        """With the moments of the same prediction at the positioning scatter that the point has come to."""
+        lines, position = self.hypothesis.lines, at.marginal.levels.position
+        if position == at.moments.position:
+            return at
+        bend = at.point.bend[lines.sensor]
+        moments = Moments(lines, at.prediction, bend, self.hypothesis.curvature, position)
+        return self._weigh(at.point, at.predicted_at, at.prediction, moments)
 
     def moved(self, point: Point, covariance: Floats) -> Point:
         """The point with other covariance parameters, a mechanism's own among the coordinates of the fit."""
@@ -276,20 +327,30 @@ class Fitter:
         count = len(here)
         steps = _STEP * np.eye(count)
         # Far enough inside the bounds for the differences
-        low = np.array([entry.low for entry in self.covariance]) + 2 * _STEP
-        high = np.array([entry.high for entry in self.covariance]) - 2 * _STEP
-        centre = np.clip(here, low, high)
-
-        def cost(change: Floats) -> float:
-            point = self.moved(at.point, centre + change)
-            return self._weigh(point, at.predicted_at, at.prediction, at.moments).cost
-
-        middle = at.cost if (centre == here).all() else cost(np.zeros(count))
-        up, down = [cost(step) for step in steps], [cost(-step) for step in steps]
-        gradient = (np.array(up) - down) / (2 * _STEP)
-        hessian = np.diag((np.array(up) + down - 2 * middle) / _STEP**2)
-        for a in range(count):
-            for b in range(a if mixed else 0):
-                both = cost(steps[a] + steps[b]) - up[a] - up[b] + middle
-                hessian[a, b] = hessian[b, a] = both / _STEP**2
+        centre = np.clip(here, self._lowest + 2 * _STEP, self._highest - 2 * _STEP)
+        pairs = [(a, b) for a in range(count) for b in range(a if mixed else 0)]
+        both = [steps[a] + steps[b] for a, b in pairs]
+        costs = self._costs(at, centre + np.array([np.zeros(count), *steps, *-steps, *both]))
+        middle, up, down = costs[0], costs[1 : count + 1], costs[count + 1 : 2 * count + 1]
+        gradient = (up - down) / (2 * _STEP)
+        hessian = np.diag((up + down - 2 * middle) / _STEP**2)
+        for (a, b), cost in zip(pairs, costs[2 * count + 1 :], strict=True):
+            hessian[a, b] = hessian[b, a] = (cost - up[a] - up[b] + middle) / _STEP**2
         return gradient + hessian @ (here - centre), hessian
+
+    def _costs(self, at: Evaluated, covariances: Floats) -> Floats:
+        """The costs with other covariance parameters (K, parameters) at the same prediction."""
+        if self.hypothesis.lines.curves:  # each of which weighs its rows anew
+            points = [self.moved(at.point, covariance) for covariance in covariances]
+            return np.array([self._weigh(point, at.predicted_at, at.prediction, at.moments).cost for point in points])
+        columns = np.exp(covariances[:, :2]).T[..., None]
+        own = [
+            value if isinstance(value, float) else value[:, None]
+            for value in self._own_levels(covariances, at.predicted_at)
+        ]
+        likelihoods = LogLikelihoods(self.hypothesis.lines, at.moments, SeveralLevels(*columns, *own)).each
+        prior = np.zeros(len(covariances))
+        for entry, column in zip(self.covariance, covariances.T.tolist(), strict=True):
+            density = {value: entry.log_density(value) for value in set(column)}
+            prior += [density[value] for value in column]
+        return -likelihoods - prior - self._log_mean_prior(at.point)

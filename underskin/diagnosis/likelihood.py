@@ -15,6 +15,7 @@ the base model.
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,17 @@ class NoiseLevels:
     smooth: float = 0.0  # of curves
 
 
+@dataclass(frozen=True)
+class SeveralLevels:
+    """K sets of noise levels; each a column (K, 1), or a number that all share."""
+
+    gain: Floats
+    level: Floats
+    position: Floats | float
+    spread: Floats | float
+    pickup: Floats | float
+
+
 class Moments:
     """All inner products over rows that the likelihood of one prediction needs, with 1/d² as the weight.
 
@@ -66,7 +78,7 @@ class Moments:
         """Weigh and sum."""
         self._first = self.lines_first = lines.first
         self._lines = lines
-        self._bend, self._laplacian, self._position = bend, curvature.laplacian, position
+        self._bend, self._laplacian, self.position = bend, curvature.laplacian, position
         factor = np.exp(bend + 0.5 * position**2 * curvature.laplacian)
         self._factor = factor[lines.recording]
         self.ratio = ratio
@@ -76,6 +88,7 @@ class Moments:
         residual = self._weighed(lines.value) - model * (1 - bend[lines.recording])
         direction, self.along = model, np.ones(lines.recordings)
         self.moved = np.zeros(lines.recordings)
+        self.led = np.zeros(lines.recordings, dtype=bool)
         if position > 0 and prediction.position_slopes is not None:
             direction = self._direction(model, self._weighed(prediction.position_slopes * self._factor))
         self._direction_rows = direction
@@ -91,20 +104,25 @@ class Moments:
             self.cu = self._with_pickup(direction)
             self.cr = self._with_pickup(residual)
 
-    def at_position(self, position: float) -> tuple[Array, Array, Array, Array | None]:
+    def at_position(self, position: float | Floats) -> tuple[Array, Array, Array, Array | None]:
         """a, uᵀr, rᵀr and (c + i·ic)ᵀr with the second-order mean at another p than these were summed at."""
-        if position == self._position:
+        if np.all(position == self.position):
             return self.along, self.ur, self.rr, self.cr
-        factor = np.exp(0.5 * (position**2 - self._position**2) * self._laplacian)
+        factor = np.exp(0.5 * (position**2 - self.position**2) * self._laplacian)
         less = (factor - 1) * (1 - self._bend) * self.along
         cr = None if self.cr is None or self.cu is None else self.cr - less * self.cu
         return self.along * factor, self.ur - less * self.uu, self.rr - 2 * less * self.ur + less**2 * self.uu, cr
 
+    @property
+    def log_slopes(self) -> Floats:
+        """log |t|² of each recording's position slopes, without the second-order factor; least where there are none."""
+        return np.asarray(np.log(self.moved * self.uu + 1e-300) - self.position**2 * self._laplacian)
+
     def _direction(self, model: Array, slopes: Array) -> Array:
-        """u, and along it a (`along`) and |t|² (`moved`)."""
+        """u, whether the slopes lead it (`led`), and along it a (`along`) and |t|² (`moved`)."""
         mm = self._sum(model, model)
         sizes = np.stack([self._sum(slope, slope) for slope in slopes])
-        led = _FROM_SLOPES**2 * sizes.sum(axis=0) > mm
+        self.led = led = _FROM_SLOPES**2 * sizes.sum(axis=0) > mm
         direction = model
         if led.any():
             larger = np.where((sizes[0] >= sizes[1])[self._lines.recording], slopes[0], slopes[1]) * _FROM_SLOPES
@@ -167,17 +185,16 @@ class Moments:
         return real @ real.T, uj, jr, summed(self._pickup * rows) if self.picked else None
 
 
-class Marginal:
-    """The likelihood of one prediction at one set of noise levels; what is needed of it is worked out when asked."""
+class LogLikelihoods:
+    """Of one prediction at one set of noise levels (), or at several (K,): `each`."""
 
-    def __init__(self, lines: Lines, moments: Moments, levels: NoiseLevels) -> None:
+    def __init__(self, lines: Lines, moments: Moments, levels: NoiseLevels | SeveralLevels) -> None:
         """Take out pick-up, gain and position, recording by recording, then the sensors."""
-        self._lines, self._moments, self.levels = lines, moments, levels
         self._k2 = k2 = levels.level**2
         along, ur, rr, cr = moments.at_position(levels.position)
         self._along = along
         uu, ur, rr = moments.uu / k2, ur / k2, rr / k2
-        log_determinant = moments.log_determinant
+        log_determinant: Any = moments.log_determinant
         self._cr = cr
         if moments.cu is not None and cr is not None:
             q2 = levels.pickup**2
@@ -186,39 +203,49 @@ class Marginal:
             uu = uu - self._phi * np.abs(moments.cu) ** 2
             ur = ur - self._phi * (moments.cu.conj() * cr).real
             rr = rr - self._phi * np.abs(cr) ** 2
-            log_determinant += 2 * float(np.log(inner).sum())
+            log_determinant = log_determinant + 2 * _over_recordings(np.log(inner))
         self._uu, self._ur = uu, ur
         a2 = along**2
         variance = levels.gain**2 * a2
-        if levels.position > 0:
+        if np.any(levels.position):
             p2 = levels.position**2
             variance = variance + p2 * moments.moved + 0.5 * p2**2 * moments.second_order * a2
-        self._variance = variance
         self._reduced = 1 / (1 + variance * uu)  # 1 − (share of u taken out)
         self._shrink = variance * self._reduced
         self._mm = a2 * uu * self._reduced  # mᵀ C_i⁻¹ m
         self._mr = along * ur * self._reduced
-        sensors = int(lines.sensor.max()) + 1
-        self._sensor_mm = np.bincount(lines.sensor, self._mm, sensors)
-        self._sensor_mr = np.bincount(lines.sensor, self._mr, sensors)
+        self._sensor_mm = _sensor_sums(self._mm, lines.sensor)
+        self._sensor_mr = _sensor_sums(self._mr, lines.sensor)
         tau2 = levels.spread**2
         self._sensor_shrink = tau2 / (1 + tau2 * self._sensor_mm)
         scatter, freedom = lines.scatter
-        chi2 = rr.sum() - (self._shrink * ur**2).sum() - (self._sensor_shrink * self._sensor_mr**2).sum()
-        log_determinant += (2 * len(lines.value) + freedom) * np.log(k2) - np.log(self._reduced).sum()
-        log_determinant += np.log1p(tau2 * self._sensor_mm).sum()
-        self.log_likelihood = -0.5 * float(chi2 + scatter / k2 + log_determinant)
+        chi2 = _over_recordings(rr - self._shrink * ur**2) - _over_recordings(self._sensor_shrink * self._sensor_mr**2)
+        log_determinant = log_determinant + (2 * len(lines.value) + freedom) * np.log(k2)
+        log_determinant = log_determinant - _over_recordings(np.log(self._reduced))
+        log_determinant = log_determinant + _over_recordings(np.log1p(tau2 * self._sensor_mm))
+        self.each: Floats = -0.5 * (chi2 + scatter / k2 + log_determinant)[..., 0]
+
+
+class Marginal(LogLikelihoods):
+    """The likelihood of one prediction at one set of noise levels; what is needed of it is worked out when asked."""
+
+    def __init__(self, lines: Lines, moments: Moments, levels: NoiseLevels) -> None:
+        """Take out the noise."""
+        super().__init__(lines, moments, levels)
+        self._lines, self._moments, self.levels = lines, moments, levels
+        self.log_likelihood = float(self.each)
 
     @property
     def sensor_gains(self) -> Array:
         """The most probable b of each sensor (sensors,), given the model."""
         return self._sensor_shrink * self._sensor_mr
 
-    def normal_equations(self) -> tuple[Array, Array]:
+    def normal_equations(self, growth: Floats | None = None) -> tuple[Array, Array]:
         """Jᵀ C⁻¹ J, the information on the parameters, and the gradient of the log likelihood.
 
-        The gradient is that by the mean and by the gain's and the sensors' columns, which follow the model,
-        ∂/∂θ (−½ log|C| − ½ rᵀC⁻¹r) with dC = s² (J mᵀ + m Jᵀ); what the position's columns add is left out.
+        The gradient is that by the mean and by all columns that follow the model, ∂/∂θ (−½ log|C| − ½ rᵀC⁻¹r) with
+        dC = V_i (J mᵀ + m Jᵀ) + dV_i m mᵀ. dV_i, from how the position's slopes t change, is told by their `growth`
+        ∂ log |t|²/∂θ (recordings, P); without it they are taken to change as m does, or where they lead, not at all.
         """
         moments, k2 = self._moments, self._k2
         jj, uj, jr, cj = moments.slopes
@@ -232,22 +259,40 @@ class Marginal:
         jr = jr - uj * (self._shrink * self._ur)[:, None]
         mj = uj * (self._along * self._reduced)[:, None]
         sensor = self._lines.sensor
-        by_sensor = _by_sensor(mj, sensor, len(self._sensor_shrink))
+        by_sensor = _sensor_sums(mj.T, sensor).T
         information -= by_sensor.T @ (by_sensor * self._sensor_shrink[:, None])
         # From here on with the sensors' columns in C as well
         gains = self.sensor_gains
         jr = jr - mj * gains[sensor, None]
         mr = self._mr - self._mm * gains[sensor]
         left = 1 - self._sensor_shrink[sensor] * self._mm
-        own = self.levels.gain**2 * (jr * mr[:, None] - mj * left[:, None])
+        p2 = self.levels.position**2
+        placed = p2 * moments.moved
+        squares = self.levels.gain**2 + 0.5 * p2**2 * moments.second_order + np.where(moments.led, 0.0, placed)
+        own = squares[:, None] * (jr * mr[:, None] - mj * left[:, None])
         tau2 = self.levels.spread**2
         sensor_mr = self._sensor_mr - self._sensor_mm * gains
         sensor_left = 1 - self._sensor_shrink * self._sensor_mm
-        shared = _by_sensor(jr, sensor, len(gains)) * sensor_mr[:, None] - by_sensor * sensor_left[:, None]
-        return information, jr.sum(axis=0) + own.sum(axis=0) + tau2 * shared.sum(axis=0)
+        shared = _sensor_sums(jr.T, sensor).T * sensor_mr[:, None] - by_sensor * sensor_left[:, None]
+        gradient = jr.sum(axis=0) + own.sum(axis=0) + tau2 * shared.sum(axis=0)
+        if growth is not None:
+            um = self._uu * self._along * self._reduced
+            explained = self._ur * self._reduced - um * gains[sensor]  # uᵀ C⁻¹ r
+            taken = self._uu * self._reduced - self._sensor_shrink[sensor] * um**2  # uᵀ C⁻¹ u
+            as_model = np.where(moments.led, 0.0, 2 / moments.uu)[:, None] * moments.slopes[1]
+            gradient = gradient + 0.5 * (placed * (explained**2 - taken)) @ (growth - as_model)
+        return information, gradient
 
 
-def _by_sensor(rows: Floats, sensor: NDArray[np.intp], sensors: int) -> Floats:
-    total = np.zeros((sensors, rows.shape[1]))
-    np.add.at(total, sensor, rows)
-    return total
+def _over_recordings(values: Floats) -> Floats:
+    return np.asarray(values.sum(axis=-1, keepdims=True))
+
+
+def _sensor_sums(values: Floats, sensor: NDArray[np.intp]) -> Floats:
+    """Over the recordings of each sensor: (…, recordings) to (…, sensors)."""
+    sensors = int(sensor.max()) + 1
+    if values.ndim == 1:
+        return np.asarray(np.bincount(sensor, values, sensors), dtype=float)
+    owner = (np.arange(len(values))[:, None] * sensors + sensor).ravel()
+    sums = np.bincount(owner, values.ravel(), len(values) * sensors)
+    return np.asarray(sums, dtype=float).reshape(-1, sensors)

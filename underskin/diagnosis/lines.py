@@ -48,7 +48,7 @@ class Lines:
         """How many there are."""
         return len(self.sensor)
 
-    @property
+    @cached_property
     def kind(self) -> Kind:
         """Of the recordings; all are of one kind."""
         return kind_of(self.campaign)
@@ -63,7 +63,7 @@ class Lines:
         """The axes along which the rows of a recording run."""
         return ("displacement_mm",) if self.curves else ("frequency_hz", "phase")
 
-    @property
+    @cached_property
     def first(self) -> NDArray[np.intp]:
         """The first row of each recording."""
         return np.searchsorted(self.recording, np.arange(self.recordings))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from inspect import getmodule
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -73,7 +74,7 @@ class Parameter:
     limit: float | None
     reason: str
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest fit coordinate."""
         return self.to_fit(self.low), self.to_fit(self.high)
@@ -99,9 +100,15 @@ class Parameter:
             return -np.inf
         if isinstance(self.prior, Uniform):
             return -float(np.log(high - low))
+        return float(-0.5 * ((fit - self.prior.mean) / self.prior.sd) ** 2 - self._log_area)
+
+    @cached_property
+    def _log_area(self) -> float:
+        """The logarithm of what a normal prior's bell holds between the bounds."""
+        assert isinstance(self.prior, Normal)
         mean, sd = self.prior.mean, self.prior.sd
-        inside = ndtr((high - mean) / sd) - ndtr((low - mean) / sd)
-        return float(-0.5 * ((fit - mean) / sd) ** 2 - np.log(sd * np.sqrt(2 * np.pi) * inside))
+        inside = ndtr((self.bounds[1] - mean) / sd) - ndtr((self.bounds[0] - mean) / sd)
+        return float(np.log(sd * np.sqrt(2 * np.pi) * inside))
 
     def quantile(self, probability: float) -> float:
         """The prior's quantile on the fit coordinate."""
