@@ -26,7 +26,6 @@ _QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7
 _KEPT_STARTS = 3
 _DECIDED = 0.999  # probability beyond which a parent's positioning scatter, or none, is its offspring's
 _POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
-_SHORT = 2  # iterations of a trial
 _LEAST_GAIN = 1.0  # in log posterior density
 _LEAST_SCATTER = 3e-3  # relative effect of positioning scatter on a recording below which it is not looked for
 
@@ -186,15 +185,14 @@ def needs_lines(name: str) -> bool:
 
 
 def _placed_start(fitter: Fitter, at: Evaluated) -> Point:
-    """The best of a few scales of positioning scatter, each after the steps that d33 needs to follow it."""
+    """The best of a few scales of positioning scatter, d33 following each."""
     if fitter.holds(at.point):
         return at.point
     gain, level, *own = at.point.covariance
     # Where positioning scatter is large, what was fitted without it may be far off: also from d33 afresh
-    fresh = replace(at.point, fit=fitter.start(at.point.fit[: len(at.point.fit) - fitter.nuisances]).fit)
-    fresh = replace(fresh, bend=fitter.no_bend)
+    fresh = fitter.begin(at.point.fit[: len(at.point.fit) - fitter.nuisances])
     tried = []
-    for begin, position in itertools.product((at.point, fresh), _POSITION_STARTS):
+    for begin, position in itertools.product((at, fresh), _POSITION_STARTS):
         covariance = np.array([min(gain, GAIN_PRIOR.middle), level, np.log(position), *own])
-        tried.append(fitter.improve(replace(begin, covariance=covariance), _SHORT))
+        tried.append(fitter.rescaled(begin, covariance))
     return min(tried, key=lambda entry: entry.cost).point
