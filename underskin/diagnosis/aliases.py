@@ -7,7 +7,8 @@ mechanism and two, it is what keeps freedom from being free, but where one law a
 the same number of mechanisms does, it would decide between them by no more than how wide each range happens to be.
 
 So no explanation is held to be less probable than the leading one, of as many mechanisms, by Occam's factor alone: its
-odds are at least e^(s − s_leader), at most 1, with s = log L + Σ log(prior/prior at its peak) at the best fit.
+odds are at least e^(s − s_leader), at most 1, with s = log L + Σ log(prior/prior at its peak) at the best fit. Which of
+two leads whose evidences differ by less than these are good for, s decides.
 """
 
 from collections.abc import Sequence
@@ -18,6 +19,7 @@ from underskin.diagnosis.explanation import Explanation, own_places
 from underskin.units import Floats
 
 _BEHIND = 1e-6  # of an equal: the leader stays the leader
+_ACCURACY = 0.1  # of Laplace's method, in nats
 
 
 def fit_and_plausibility(explanation: Explanation) -> float:
@@ -30,10 +32,23 @@ def fit_and_plausibility(explanation: Explanation) -> float:
 def without_occam(explanations: Sequence[Explanation], log_weights: Sequence[float]) -> Floats:
     """The weights, those of the leader's equals in size raised to what fit and plausibility say of them."""
     weights = np.array(log_weights)
-    first = int(np.argmax(weights))
+    first = _leader(explanations, weights)
     leader = explanations[first]
+    weights[first] = weights.max()
     for number, rival in enumerate(explanations):
-        if rival.names and len(rival.names) == len(leader.names):
+        if rival.names and len(rival.names) == len(leader.names) and number != first:
             gap = fit_and_plausibility(rival) - fit_and_plausibility(leader)
-            weights[number] = max(weights[number], weights[first] + min(gap, -_BEHIND))
+            raised = max(weights[number], weights[first] + gap)
+            weights[number] = min(raised, weights[first] - _BEHIND)
     return weights
+
+
+def _leader(explanations: Sequence[Explanation], weights: Floats) -> int:
+    """The place of the one of largest weight, or among its equals in weight and size of the best fit."""
+    first = int(np.argmax(weights))
+    equals = [
+        number
+        for number in np.flatnonzero(weights > weights[first] - _ACCURACY).tolist()
+        if explanations[number].names and len(explanations[number].names) == len(explanations[first].names)
+    ]
+    return max(equals, key=lambda number: fit_and_plausibility(explanations[number]), default=first)
