@@ -13,7 +13,7 @@ from tests.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.diagnose import diagnosis_report
 from underskin.diagnosis.explanation import Workbench
 from underskin.diagnosis.lines import lines
-from underskin.diagnosis.recording_process import GainResidual
+from underskin.diagnosis.recording_process import GainResidual, Scatter
 from underskin.recordings.campaign import from_dict
 from underskin.surrogate import SigmaTable, load_table
 
@@ -79,12 +79,15 @@ def test_the_evidence_of_a_process_is_that_of_the_whole_covariance(table: SigmaT
     sets = np.random.default_rng(1).normal(size=(3, bench.lines.recordings, 4))
     known = residual.fixed @ residual.fixed.T
 
-    def log_density(log_weight: float, variance: np.ndarray, shapes: np.ndarray) -> float:
-        whole = np.diag(variance) + known + shapes @ shapes.T
-        return log_weight + float(multivariate_normal(np.zeros(len(whole)), whole).logpdf(residual.values))
+    def log_density(scatter: Scatter, shapes: np.ndarray) -> float:
+        whole = np.diag(scatter.variance) + known + shapes @ shapes.T
+        density = multivariate_normal(np.zeros(len(whole)), whole).logpdf(scatter.residual)
+        return scatter.log_weight + float(density)
 
-    found = residual.gains(sets, amplitudes, residual.scatter)
-    without = logsumexp([log_density(*entry, np.zeros((bench.lines.recordings, 1))) for entry in residual.scatter])
-    for own, gain in zip(sets, found, strict=True):
-        each = [log_density(*entry, size * own) for entry in residual.scatter for size in amplitudes]
-        assert gain == pytest.approx(logsumexp(each) - np.log(len(amplitudes)) - without, abs=1e-6)
+    found = residual.gains(sets, amplitudes)
+    expected = [
+        logsumexp([log_density(entry, size * own) for entry in residual.usual for size in amplitudes]) for own in sets
+    ]
+    assert found - found[0] == pytest.approx(np.array(expected) - expected[0], abs=1e-6)
+    # With hardly any amplitude nothing is gained, but for the grids of scatter: usual ones, and any.
+    assert residual.gains(sets, np.array([1e-9])) == pytest.approx(0.0, abs=0.3)

@@ -7,6 +7,9 @@ FRF = model · (1 + δ), linear in the model's parameters at their best fit, in 
 Scatter of gain, and beside a wandering place scatter of position too, are marginalised over their priors.
 """
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from scipy.special import logsumexp
 
@@ -23,12 +26,19 @@ _LEAST_RECORDINGS, _LEAST_IN_ORDER = 4, 8
 _WANDERING = np.array([0.1e-3, 0.3e-3, 1.0e-3])  # [m] amplitudes of a place that wanders
 _WANDERING_LANDMARKS = 12
 _SHORTEST_PERIOD, _MOST_PERIODS = 3.0, 100  # recordings
-_GAINS = np.geomspace(0.005, 0.5, 16)
-_USUAL_POSITION = np.geomspace(0.05e-3, 0.3e-3, 3)  # [m], equally probable
+_GAINS = np.geomspace(0.005, 0.5, 9)
+_USUAL_POSITION = np.geomspace(0.05e-3, 0.3e-3, 4)  # [m], beside a process; without one the scatter may be larger
 _ANY_POSITION = np.geomspace(0.03e-3, 0.6e-3, 12)
 _FAINT = 1e-12  # of the largest response, below which a recording has no direction
 
-Variances = list[tuple[float, Floats]]  # log prior density, and each recording's variance
+
+@dataclass(frozen=True)
+class Scatter:
+    """One scatter of gain and one of place: log weight, and under it each recording's residual and variance."""
+
+    log_weight: float
+    residual: Floats
+    variance: Floats
 
 
 def over_recordings(bench: Workbench, explanation: Explanation) -> dict[str, float]:
@@ -46,7 +56,7 @@ def over_recordings(bench: Workbench, explanation: Explanation) -> dict[str, flo
     found = {name: _smooth(residual, column) for name, column in axes.items()}
     rank = order(campaign)
     if len(rank) >= _LEAST_IN_ORDER:
-        found["order"] = mean_of_logs(residual.gains(_sines(rank), AMPLITUDES, residual.scatter))
+        found["order"] = mean_of_logs(residual.gains(_sines(rank), AMPLITUDES))
         found["place"] = mean_of_logs([_smooth_place(residual, rank), _round(residual, rank)])
     return found
 
@@ -58,7 +68,7 @@ def mean_of_logs(log_values: list[float] | Floats) -> float:
 
 def _smooth(residual: "GainResidual", column: Floats) -> float:
     sets = np.stack([features(column, length) for length in _LENGTHS])
-    return mean_of_logs(residual.gains(sets, AMPLITUDES, residual.scatter))
+    return mean_of_logs(residual.gains(sets, AMPLITUDES))
 
 
 def _sines(rank: Floats) -> Floats:
@@ -72,13 +82,11 @@ def _sines(rank: Floats) -> Floats:
 def _smooth_place(residual: "GainResidual", rank: Floats) -> float:
     along = (rank / len(rank))[:, None]
     sets = np.stack([features(along, length, _WANDERING_LANDMARKS) for length in _LENGTHS])
-    return mean_of_logs(residual.gains(residual.moved(sets), _WANDERING, residual.usual_place, residual.any_place))
+    return mean_of_logs(residual.gains(residual.moved(sets), _WANDERING))
 
 
 def _round(residual: "GainResidual", rank: Floats) -> float:
-    return mean_of_logs(
-        residual.gains(residual.moved(_sines(rank)), _WANDERING, residual.usual_place, residual.any_place)
-    )
+    return mean_of_logs(residual.gains(residual.moved(_sines(rank)), _WANDERING))
 
 
 class GainResidual:
@@ -86,63 +94,64 @@ class GainResidual:
 
     def __init__(self, bench: Workbench, explanation: Explanation) -> None:
         at, parameters = explanation.best.at, explanation.best.fitter.parameters
-        moments, levels = at.moments, at.marginal.levels
+        self._moments = moments = at.moments
         _, uj, _, _ = moments.slopes
         size = moments.along * moments.uu
-        least = _FAINT * np.abs(size).max()
-        size = np.where(np.abs(size) > least, size, least)
-        line = moments.uu / size**2
-        slopes = uj / size[:, None]
+        self._least = _FAINT * np.abs(size).max()
+        slopes = uj / self._not_faint(size)[:, None]
         centre = np.array([entry.start for entry in parameters]) - at.point.fit
         scale = np.array([_prior_sd(entry) for entry in parameters])
-        self.values = moments.ur / size - slopes @ centre
+        self._known = slopes @ centre
         sensors = np.eye(int(bench.lines.sensor.max()) + 1)[bench.lines.sensor]
         sensors = sensors[:, sensors.any(axis=0)]
-        self.fixed = np.concatenate([slopes * scale, levels.spread * sensors], axis=1)
+        self.fixed = np.concatenate([slopes * scale, at.marginal.levels.spread * sensors], axis=1)
         self._moving = relative_place_slopes(at)
+        self.usual = self._scatters(_USUAL_POSITION)
 
-        self._line, self._moments, self._fitted = line, moments, levels.position
-        self.scatter = self._variances({levels.position: 1.0}, _GAINS)
-        self.any_place = self._variances(_placed(_ANY_POSITION), _GAINS[::2])
-        self.usual_place = self._variances(_placed(_USUAL_POSITION), _GAINS[::2])
+    def _not_faint(self, size: Floats) -> Floats:
+        return np.where(np.abs(size) > self._least, size, self._least)
 
-    def _variances(self, positions: dict[float, float], gains: Floats) -> Variances:
-        """Of each scatter of position [m] with its share, and each of gain with its density."""
-        found = []
-        for position, share in positions.items():
-            if position == self._fitted:
-                placed = position**2 * self._moments.moved / np.maximum(self._moments.along**2, _FAINT)
-            else:
-                placed = position**2 * (self._moving**2).sum(axis=0)
-            placed = placed + 0.5 * position**4 * self._moments.second_order
-            for gain in gains:
-                log_density = GAIN_PRIOR.log_density(float(np.log(gain))) + np.log(share)
-                found.append((float(log_density), gain**2 + placed + self._line))
+    def _scatters(self, positions: Floats) -> list[Scatter]:
+        """No scatter of position and each of these [m], with each of gain; relative to the model's mean under it."""
+        moments, found = self._moments, []
+        for position, share in _shares(positions).items():
+            along, ur, _, _ = moments.at_position(position)
+            size = self._not_faint(along * moments.uu)
+            placed = position**2 * (self._moving**2).sum(axis=0) + 0.5 * position**4 * moments.second_order
+            for gain in _GAINS:
+                log_weight = GAIN_PRIOR.log_density(float(np.log(gain))) + np.log(share) - np.log(np.abs(size)).sum()
+                variance = gain**2 + placed + moments.uu / size**2
+                found.append(Scatter(float(log_weight), ur / size - self._known, variance))
         return found
 
     def moved(self, sets: Floats) -> Floats:
         """Features of a place's two coordinates, as what the response makes of them (sets, recordings, 2 features)."""
         return np.concatenate([sets * slope[None, :, None] for slope in self._moving], axis=2)
 
-    def gains(self, sets: Floats, amplitudes: Floats, scatter: Variances, plain: Variances | None = None) -> Floats:
-        """What each set of features (sets, recordings, features) gains over none at all, whose scatter may be `plain`.
+    @cached_property
+    def _plain(self) -> float:
+        """log p(residual) without a process."""
+        nothing = np.zeros((1, len(self._known), 1))
+        return float(logsumexp([self._with(nothing, np.ones(1), entry) for entry in self._scatters(_ANY_POSITION)]))
+
+    def gains(self, sets: Floats, amplitudes: Floats) -> Floats:
+        """What each set of features (sets, recordings, features) gains over none at all, in log evidence (sets,).
 
         Over the priors of the scatters, and of the amplitudes, each as probable as the others.
         """
-        each = np.array([self._with(sets, amplitudes, *entry) for entry in scatter])
-        without = [self._with(sets[:1], np.zeros(1), *entry)[0] for entry in plain or scatter]
-        return np.asarray(logsumexp(each, axis=0) - logsumexp(without))
+        each = np.array([self._with(sets, amplitudes, entry) for entry in self.usual])
+        return np.asarray(logsumexp(each, axis=0) - self._plain)
 
-    def _with(self, sets: Floats, amplitudes: Floats, log_weight: float, variance: Floats) -> Floats:
+    def _with(self, sets: Floats, amplitudes: Floats, scatter: Scatter) -> Floats:
         """log p(residual, features) at one scatter (sets,)."""
-        root = 1 / np.sqrt(variance)
-        fixed, z = self.fixed * root[:, None], self.values * root
+        root = 1 / np.sqrt(scatter.variance)
+        fixed, z = self.fixed * root[:, None], scatter.residual * root
         lower = np.linalg.cholesky(fixed.T @ fixed + np.eye(fixed.shape[1]))
         count, rows, size = sets.shape
         shapes = (sets * root[:, None]).transpose(1, 0, 2).reshape(rows, count * size)
         taken = np.linalg.solve(lower, fixed.T @ np.column_stack([z, shapes]))
         chi2 = z @ z - taken[:, 0] @ taken[:, 0]
-        log_determinant = np.log(variance).sum() + 2 * np.log(np.diagonal(lower)).sum()
+        log_determinant = np.log(scatter.variance).sum() + 2 * np.log(np.diagonal(lower)).sum()
         moment = (shapes.T @ z - taken[:, 1:].T @ taken[:, 0]).reshape(count, size)
         gram = _grams(shapes, count) - _grams(taken[:, 1:], count)
         values, vectors = np.linalg.eigh(gram)
@@ -150,7 +159,7 @@ class GainResidual:
         along = (vectors.transpose(0, 2, 1) @ moment[..., None])[..., 0]
         gained = (amplitudes[:, None] ** 2 * along[:, None] ** 2 / (1 + values)).sum(axis=2)
         gained = logsumexp(0.5 * (gained - np.log1p(values).sum(axis=2)), axis=1) - np.log(len(amplitudes))
-        return np.asarray(log_weight - 0.5 * (chi2 + log_determinant) + gained)
+        return np.asarray(scatter.log_weight - 0.5 * (chi2 + log_determinant) + gained)
 
 
 def _grams(columns: Floats, count: int) -> Floats:
@@ -169,7 +178,7 @@ def relative_place_slopes(at: Evaluated) -> Floats:
     return np.asarray((slopes[:, first] / np.where(answers, value, np.inf)).real)
 
 
-def _placed(positions: Floats) -> dict[float, float]:
+def _shares(positions: Floats) -> dict[float, float]:
     """The shares of no scatter of position, and of each of these."""
     shares = np.exp([POSITION_PRIOR.log_density(float(np.log(position))) for position in positions])
     shares *= (1 - NO_POSITION) / shares.sum()
