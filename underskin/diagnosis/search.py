@@ -21,6 +21,7 @@ NOTHING_MISSING, NONE_OF_THESE = "nothing_missing", "none_of_these"
 PRIORS = {"nothing_missing": 0.45, "one": 0.34, "two": 0.14, "three": 0.02, "none_of_these": 0.05}
 _PARENTS = 3
 _SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
+_UNTHOUGHT = 0.015  # probability that none of what was compared is right
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
 
 
@@ -76,7 +77,11 @@ class Search:
 
     @cached_property
     def answers(self) -> list[Answer]:
-        """The rivals, the most probable first; their probabilities sum to 1."""
+        """The rivals, the most probable first; their probabilities sum to 1.
+
+        `none_of_these` is always one of them, with its evidence where a process shows, and at least with the share that
+        stays for what neither laws nor processes here can be.
+        """
         kept = [entry for entry in self.explanations if self.shows(entry)]
         weights = without_occam(kept, [self.log_weight(entry) for entry in kept]).tolist()
         showing = [
@@ -84,11 +89,11 @@ class Search:
             for entry, process in self.discrepancies
             if process.log_evidence > entry.log_evidence + _SHOWS
         ]
-        if showing:
-            weights.append(float(np.logaddexp.reduce(showing)))
-        probabilities = np.exp(np.array(weights) - np.logaddexp.reduce(weights)).tolist()
-        rivals: list[Explanation | None] = [*kept, *([None] if showing else [])]
-        answers = [Answer(entry, value) for entry, value in zip(rivals, probabilities, strict=True)]
+        weights.append(float(np.logaddexp.reduce(showing)) if showing else -math.inf)
+        probabilities = (1 - _UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
+        probabilities[-1] += _UNTHOUGHT
+        rivals: list[Explanation | None] = [*kept, None]
+        answers = [Answer(entry, value) for entry, value in zip(rivals, probabilities.tolist(), strict=True)]
         return sorted(answers, key=lambda answer: -answer.probability)
 
 

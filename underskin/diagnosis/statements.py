@@ -13,6 +13,7 @@ from underskin.diagnosis.search import NONE_OF_THESE, NOTHING_MISSING, Answer
 from underskin.mechanisms.catalogue import CATALOGUE
 
 _WORTH_NAMING = 0.02
+_UNTHOUGHT_AT_MOST = 0.016  # of none_of_these, where no process shows
 _IN_PERCENT = 90.0  # beyond it an effect is said as a factor
 
 
@@ -60,6 +61,8 @@ def why_not(answer: Answer, leader: Answer) -> str:
     """Why an answer is less probable than the leading one."""
     if answer.probability > 0.25 * leader.probability:
         return "the recordings hardly tell it from the leading explanation"
+    if answer.explanation is None and answer.probability < _UNTHOUGHT_AT_MOST:
+        return "nothing in the recordings asks for it; a small share always stays for what nobody thought of"
     if answer.explanation is None:
         return "a smooth discrepancy without a name explains the recordings less well, or no better at a higher price"
     if leader.explanation is None:
