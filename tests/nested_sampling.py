@@ -14,6 +14,7 @@ from underskin.diagnosis.hypothesis import CovarianceParameter, Point
 from underskin.units import Floats
 
 _NODES = 8001  # of the grid on which a covariance parameter's prior is inverted
+_MOST_UNIFORM = 6  # parameters up to which dynesty draws uniformly
 
 
 class Posterior:
@@ -78,10 +79,13 @@ class Sampled:
 
 
 def nested(posterior: Posterior) -> Sampled:
-    """By dynesty as it comes: 500 live points, uniformly from several ellipsoids in fewer than ten dimensions."""
-    sampler = dynesty.NestedSampler(
-        posterior.log_likelihood, posterior.drawn, posterior.size, rstate=np.random.default_rng(1)
-    )
+    """By dynesty as it comes, uniformly from several ellipsoids; in more than six dimensions by random walks.
+
+    There its ellipsoids may hold so little of the posterior that it advises walks.
+    """
+    walks = {"sample": "rwalk", "nlive": 250} if posterior.size > _MOST_UNIFORM else {}
+    random = np.random.default_rng(1)
+    sampler = dynesty.NestedSampler(posterior.log_likelihood, posterior.drawn, posterior.size, rstate=random, **walks)
     sampler.run_nested(print_progress=False)
     found = sampler.results
     return Sampled(float(found.logz[-1]), float(found.logzerr[-1]), int(np.sum(found.ncall)))
