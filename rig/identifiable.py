@@ -2,7 +2,8 @@
 
 Both are fitted by generalised least squares with the rig's own noise levels: line noise, and for each recording a gain
 error along the model's response and an error of position along its derivatives. Both have d33 free, and E, h (2 %, 1 %)
-and the sensors' gains (1 %) near what is declared, or near what they truly are.
+and the sensors' gains (1 %) near what is declared, or near what they truly are. Mains are known by their charge, not by
+their phase in each recording: they belong to the covariance, and what they add to its log determinant counts too.
 """
 
 from dataclasses import dataclass, replace
@@ -42,9 +43,9 @@ def visibility(recorded: RecordedLines, known: tuple[str, ...] = ()) -> Visibili
     effects = {name: values for name, values in bench.on.items() if name in known}
     gains = bench.sensor_gains if "sensor_spread" in known else np.ones_like(bench.sensor_gains)
     plain = replace(aimed, experiment=replace(bench.experiment, effects=effects), sensor_gains=gains)
-    true, _ = _Fit(recorded, aimed, recorded.measured - recorded.pickup).best(_with_nuisances(recorded, aimed))
+    true, _ = _Fit(recorded, aimed).best(_with_nuisances(recorded, aimed))
     pickup = recorded.pickup if "mains_pickup" in known else np.zeros_like(recorded.pickup)
-    base, fitted = _Fit(recorded, plain, recorded.measured - pickup).best(_with_nuisances(recorded, plain))
+    base, fitted = _Fit(recorded, plain).best(_with_nuisances(recorded, plain))
     expected = recorded.exact + recorded.pickup - pickup
     scale = np.vdot(fitted, expected).real / np.vdot(fitted, fitted).real
     misfit = np.sqrt((np.abs(expected - scale * fitted) ** 2).sum() / (np.abs(expected) ** 2).sum())
@@ -73,8 +74,8 @@ def _with_nuisances(recorded: RecordedLines, bench: Bench) -> _Design:
 class _Fit:
     """Least squares of one model on lines (rows, lines), with covariances that follow the model."""
 
-    def __init__(self, recorded: RecordedLines, bench: Bench, measured: Complexes) -> None:
-        self.measured = measured
+    def __init__(self, recorded: RecordedLines, bench: Bench) -> None:
+        self.measured = measured = recorded.measured
         self.variance = recorded.line_variance
         self.noise = bench.experiment.noise
         self.moved = np.zeros((0, *measured.shape), dtype=complex)
@@ -88,8 +89,11 @@ class _Fit:
                 ]
             )
 
+        size = np.abs(recorded.pickup) / np.sqrt(2)  # of any phase: each part has half the square
+        self.mains = np.stack([size, 1j * size]) if "mains_pickup" in bench.on else np.zeros((0, *size.shape))
+
     def best(self, design: _Design) -> tuple[float, Complexes]:
-        """The least χ², priors included, and the response there."""
+        """The least χ², priors and what mains add to log|C| included, and the response there."""
         columns, deviations = design
         amount = np.zeros(len(columns))
         amount[0] = 1.0
@@ -97,13 +101,20 @@ class _Fit:
         for _ in range(_ROUNDS):
             model = np.tensordot(amount, columns, 1)
             penalty = 1 / (amount[0] * deviations) ** 2
-            along = np.stack([self.noise.gain * model, *(amount[0] * self.moved)])
+            along = np.stack([self.noise.gain * model, *(amount[0] * self.moved), *self.mains])
             everything = np.concatenate([columns, (self.measured - model)[None]])
             gram = self._gram(everything, along)
             chi2 = float(gram[-1, -1] + penalty @ amount**2)
             step = np.linalg.solve(gram[:-1, :-1] + np.diag(penalty), gram[:-1, -1] - penalty * amount)
             amount = amount + step
-        return chi2, np.tensordot(amount, columns, 1)
+        return chi2 + self._more_determinant(along), np.tensordot(amount, columns, 1)
+
+    def _more_determinant(self, along: Complexes) -> float:
+        """What mains add to log|C|."""
+        low_rank = _parts(along / np.sqrt(self.variance))
+        inner = np.einsum("arl,brl->rab", low_rank, low_rank) + np.eye(len(along))
+        without = len(along) - len(self.mains)
+        return float((np.linalg.slogdet(inner)[1] - np.linalg.slogdet(inner[:, :without, :without])[1]).sum())
 
     def _gram(self, columns: Complexes, along: Complexes) -> Floats:
         """x^T C⁻¹ y of all pairs, C = line noise + along along^T in each recording (Woodbury)."""
