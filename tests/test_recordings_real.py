@@ -119,7 +119,7 @@ def test_the_hammers_wrong_label_is_not_accepted_silently() -> None:
     assert first.sample_rate_hz == pytest.approx(1 / 0.000977)
     document = example_rig("impact-hammer").document
     for trusting, message in (
-        ({"channel": "F"}, "'g' is none of force"),
+        ({"channel": "F"}, "'g' is one of acceleration; force_n needs one of force, such as N"),
         ({"channel": "F", "unit": "N"}, "add labelled: g"),
     ):
         channels = {**document["channels"], "force_n": trusting}

@@ -102,9 +102,12 @@ def test_what_is_no_rig_description_is_refused(text: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("channel", "message"),
     [
-        ({"channel": "amplifier", "unit": "V"}, "its unit 'V' is none of charge"),
+        (
+            {"channel": "amplifier", "unit": "V"},
+            "its unit 'V' is one of voltage; charge_pc needs one of charge, such as pC; a signal",
+        ),
         ({"channel": "amplifier"}, "has no unit in the file"),
-        ({"channel": "force"}, "its unit 'mN' is none of charge"),
+        ({"channel": "force"}, "its unit 'mN' is one of force; charge_pc needs one of charge"),
         ({"channel": "force", "unit": "pC"}, r"is labelled 'mN', .* says 'pC': .*add labelled: mN"),
         ({"channel": "force", "unit": "pC", "labelled": "g"}, "is labelled 'mN', not 'g'"),
         (

@@ -27,6 +27,8 @@ def short_and_exact(value: float | None, unit: str, digits: int) -> tuple[str, s
     if value is None or not math.isfinite(value):
         return "–", "not known"
     shown = f"{value:#.{digits}g}".rstrip(".") if 1e-4 <= abs(value) < 1e5 else f"{value:.{digits}g}"
+    if "e+0" in shown and abs(value) < 1e5:  # 1.10e+03 is 1100
+        shown = f"{float(shown):.0f}"
     return shown.replace("-", "−"), f"{value!r} {unit}".strip()
 
 

@@ -26,6 +26,7 @@ RECORDING = (
     ("indenter_radius_mm", "sphere radius R", "mm", ("frf", "indentation")),
     ("preload_n", "preload F", "N", ("frf",)),
     ("dynamic_force_n", "dynamic force, peak", "N", ("frf",)),
+    ("sample_rate_hz", "sample rate, if the file does not say", "Hz", ("frf",)),
     ("sample_height_mm", "sample's height", "mm", ("compression",)),
     ("sample_diameter_mm", "sample's diameter", "mm", ("compression",)),
 )
@@ -41,7 +42,9 @@ CHANNELS = {
     "coherence": "coherence γ²",
 }  # what a channel can be, of one kind or another
 _RATE = "sample_rate_hz"
+_RATES = ("fs", "sample_rate", "sampling_rate", "samplerate", "sampling_frequency")  # as files call it
 _WORDS = {
+    **CHANNELS,
     **{name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in (*SKIN, *RECORDING)},
     "sensors": "layout",
     _RATE: "sample rate [Hz]",
@@ -65,6 +68,7 @@ _BY_WORD = {
     "charge": "charge_pc",
     "amplifier": "charge_pc",
     "coherence": "coherence",
+    "frequency": "frequency_hz",
 }
 
 
@@ -78,7 +82,9 @@ def what_to_do(error: Mapping[str, Any]) -> str:
     if error["allowed"] != "required" or field_words(error["field"]) == error["field"]:
         return str(error["allowed"])
     if error["field"] == _RATE:
-        return "required: say below which channel is the time, or see that the instrument writes its sample rate"
+        return "required: fill it in below, or say which channel is the time"
+    if error["field"] in CHANNELS:
+        return "required: say below which channel it is"
     return "required: fill it in below"
 
 
@@ -90,7 +96,9 @@ def guessed(channels: Sequence[ChannelSeen], properties: Mapping[str, Any], skin
     found: dict[str, Any] = {}
     for one, dimension in zip(channels, dimensions, strict=True):
         word = next((field for word, field in _BY_WORD.items() if word in one.name.lower()), "")
-        field = _BY_DIMENSION[kind].get(dimension) or word
+        field = "frf_pc_per_n" if one.is_complex else _BY_DIMENSION[kind].get(dimension) or word
+        if field == "frf_re_pc_per_n" and "imag" in one.name.lower():
+            field = "frf_im_pc_per_n"
         if field and field not in found and field in channel_fields(kind):
             found[field] = {"channel": one.name}
     known_skin = {name: skin[name] for name in (*[name for name, *_ in SKIN], "sensors") if skin.get(name) is not None}
@@ -107,6 +115,9 @@ def _stated(properties: Mapping[str, Any], kind: str) -> dict[str, Any]:
     """The recording's fields that the file itself states under their own names."""
     wanted = [name for name, _, _, kinds in RECORDING if kind in kinds]
     named = {field: one for one in properties for field in (one, *(lab_field(one) or ())[:1])}
+    rate = next((one for one in properties if one.lower().replace(" ", "_") in _RATES), None)
+    if rate is not None:
+        named[_RATE] = rate
     return {name: {"property": named[name]} for name in wanted if name in named}
 
 

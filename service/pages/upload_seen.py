@@ -27,6 +27,7 @@ class ChannelSeen:
     samples: int  # of the first part
     low: float | None
     high: float | None
+    is_complex: bool = False
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,8 @@ def _about(contents: Contents) -> dict[str, Any]:
                         _either(pick, *pair) for pick, pair in ((min, (before.low, low)), (max, (before.high, high)))
                     )
                 samples = len(channel.values) if before is None else before.samples
-                by_name[channel.name] = ChannelSeen(channel.name, channel.unit, samples, low, high)
+                complex_numbers = bool(np.iscomplexobj(channel.values))
+                by_name[channel.name] = ChannelSeen(channel.name, channel.unit, samples, low, high, complex_numbers)
     return {
         "parts": len(contents.blocks),
         "sample_rate_hz": contents.blocks[0].sample_rate_hz if contents.blocks else None,

@@ -6,15 +6,15 @@ from typing import Any
 import pytest
 import yaml
 
-from service.pages.upload_mapping import CHANNELS, KINDS, document_of, guessed, sensors_text
+from service.pages.upload_mapping import CHANNELS, KINDS, document_of, field_words, guessed, sensors_text, what_to_do
 from service.pages.upload_seen import ChannelSeen
 from underskin.recordings import rig_description
 
 RIGS = sorted((Path(__file__).parents[2] / "examples" / "formats" / "rigs").glob("*.yaml"))
 
 
-def channel(name: str, unit: str) -> ChannelSeen:
-    return ChannelSeen(name, unit, 10, 0.0, 1.0)
+def channel(name: str, unit: str, *, is_complex: bool = False) -> ChannelSeen:
+    return ChannelSeen(name, unit, 10, 0.0, 1.0, is_complex)
 
 
 def form_of(document: dict[str, Any]) -> dict[str, str]:
@@ -57,6 +57,21 @@ def test_channels_and_what_a_file_states_are_guessed_by_unit_and_name() -> None:
     curve = guessed([channel("z", "um"), channel("F", "uN"), channel("t", "s")], {}, {})
     assert curve["kind"] == "indentation"
     assert set(curve["channels"]) == {"displacement_mm", "force_n", "time_s"}
+
+
+def test_both_parts_of_an_frf_are_guessed_and_complex_ones_and_the_sample_rate() -> None:
+    parts = [channel("frequency", ""), channel("FRF real", "pC/N"), channel("FRF imaginary", "pC/N")]
+    assert set(guessed(parts, {}, {})["channels"]) == {"frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n"}
+    assert guessed([channel("H1", "pC/N", is_complex=True)], {}, {})["channels"] == {"frf_pc_per_n": {"channel": "H1"}}
+    stated = guessed([channel("force", ""), channel("charge", "")], {"Sampling rate": 1000.0}, {})
+    assert stated["recording"] == {"sample_rate_hz": {"property": "Sampling rate"}}
+
+
+def test_what_is_missing_is_said_in_the_form_s_words() -> None:
+    assert field_words("frf_im_pc_per_n") == "FRF, imaginary part"
+    missing = {"field": "frf_im_pc_per_n", "value": None, "allowed": "required"}
+    assert what_to_do(missing) == "required: say below which channel it is"
+    assert "fill it in below" in what_to_do({**missing, "field": "sample_rate_hz"})
 
 
 def test_a_unit_other_than_the_label_says_that_the_label_is_wrong() -> None:

@@ -64,8 +64,14 @@ def read(stream: BinaryIO, file: str) -> dict[str, Any]:
 
 def _document(source: Any, file: str) -> dict[str, Any]:
     about = _attributes(source)
-    if about.get("schema") != SCHEMA or "skin" not in source or "recordings" not in source:
-        raise FileError(file, "/", f"is no campaign: it needs the attribute schema = {SCHEMA}, /skin and /recordings")
+    schema = about.get("schema")
+    if str(schema).startswith("skin-export/"):
+        raise FileError(
+            file, "/", "is a whole skin as `underskin export` writes it: bring it in by `underskin import FILE`"
+        )
+    if schema != SCHEMA or "skin" not in source or "recordings" not in source:
+        needed = f"it needs the attribute schema = {SCHEMA}, /skin and /recordings"
+        raise FileError(file, "/", f"is HDF5, but no campaign: {needed}; other HDF5 is read from MATLAB 7.3 only")
     skin = _attributes(source["skin"])
     if "sensors" in source["skin"]:
         columns = [_entries(source["skin/sensors"], name) for name in ("id", "x_mm", "y_mm")]

@@ -88,7 +88,9 @@ def _factor(label: str, field: str, file: str, place: str, hint: str = "") -> fl
     """From a unit to the field's; `hint` goes into the error."""
     known, wanted = unit(label), field_unit(field)
     if known is None or known.dimension != wanted.dimension:
-        raise FileError(file, place, f"its unit {label!r} is none of {wanted.dimension}, which {field} is{hint}")
+        what = "is not known here" if known is None else f"is one of {known.dimension}"
+        needs = f"{field} needs one of {wanted.dimension}, such as {LAB[field].unit}"
+        raise FileError(file, place, f"its unit {label!r} {what}; {needs}{hint}")
     return known.to_si / LAB[field].to_si
 
 
@@ -145,13 +147,17 @@ class _Mapped:
             raise FileError(self.file, place, f"{reason}: if the label is wrong, add labelled: {channel.unit}")
         label = mapping.unit or channel.unit
         if not label:
-            raise FileError(self.file, place, "has no unit in the file: say it in the rig description")
+            raise FileError(
+                self.file,
+                place,
+                "has no unit in the file: say it, as `unit` of the rig description or as its true unit",
+            )
         return label
 
     def _scale(self, field: str, label: str, mapping: ChannelMapping, place: str) -> float:
         """From the channel's unit to the field's, through the sensitivity where there is one."""
         if mapping.sensitivity is None or mapping.sensitivity_unit is None:
-            return _factor(label, field, self.file, place, "; a signal needs its sensitivity")
+            return _factor(label, field, self.file, place, "; a signal in volts needs its sensitivity")
         signal, _, quantity = mapping.sensitivity_unit.rpartition("/")
         given, divided = unit(label), unit(signal)
         if given is None or divided is None or given.dimension != divided.dimension:
