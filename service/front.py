@@ -82,7 +82,7 @@ class Front:
     ) -> None:
         """Pass the gate, then a hot route or the API."""
         method, path = scope["method"], scope["path"]
-        scope["key"] = self._gate.check(method, path, scope["query_string"], headers)
+        scope["key"] = self._gate.check(method, path, headers)
         hot = self._hot.get((method, path))
         if hot is None or not _plain(method, headers):
             files = self._gate.takes_files(path, headers)

@@ -11,7 +11,6 @@ LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 OPEN = frozenset({"/health", "/ready"})
 _OPEN_PAGES = ("/login", "/static/")
 _UPLOADS = frozenset({"/v1/campaigns", "/v1/skins/import", "/upload"})
-_IN_A_QUERY = "/?=&%+,;:@"
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
@@ -35,7 +34,7 @@ class Gate:
         self._max_body_bytes = max_body_bytes
         self._max_upload_bytes = max_upload_bytes
 
-    def check(self, method: str, path: str, query: bytes, headers: Mapping[bytes, bytes]) -> Key | None:
+    def check(self, method: str, path: str, headers: Mapping[bytes, bytes]) -> Key | None:
         """The key that came with the request, None where none is needed; raises Refusal."""
         host = headers.get(b"host", b"")
         if _name(host) not in self._hosts:
@@ -45,7 +44,7 @@ class Gate:
         if method not in _SAFE:
             _check_origin(headers.get(b"origin"), host)
             self.check_size(_number(headers.get(b"content-length", b"")), self.takes_files(path, headers))
-        return None if path in OPEN else self._check_key(method, path, query, headers)
+        return None if path in OPEN else self._check_key(method, path, headers)
 
     def keys_needed(self) -> bool:
         """Whether a request without a key is refused."""
@@ -72,14 +71,14 @@ class Gate:
         """The key that somebody typed, None where it is not known."""
         return self._keys.find(token.strip().encode())
 
-    def _check_key(self, method: str, path: str, query: bytes, headers: Mapping[bytes, bytes]) -> Key | None:
+    def _check_key(self, method: str, path: str, headers: Mapping[bytes, bytes]) -> Key | None:
         if not self.keys_needed():
             return None
         authorization = headers.get(b"authorization", b"")
         key = self._key_of_session(method, headers) if not authorization else self._key_of(authorization)
         if key is None and not path.startswith(_OPEN_PAGES):
             browsing = is_browsing(path, headers.get(b"accept", b"").decode("latin-1"))
-            raise _login_first(method, path, query) if browsing else _key_first(authorization)
+            raise _login_first(method, path) if browsing else _key_first(authorization)
         return key
 
     def _key_of(self, authorization: bytes) -> Key | None:
@@ -93,10 +92,9 @@ class Gate:
         return session.key_of(session.cookie_in(headers), self._keys)
 
 
-def _login_first(method: str, path: str, query: bytes) -> Refusal:
-    asked = quote(path) + (f"?{quote(query, safe=_IN_A_QUERY)}" if query else "")
-    back = asked if method == "GET" else "/"
-    return Refusal(303, "Log in with a key first.", headers={"Location": f"/login?next={quote(back)}"})
+def _login_first(method: str, path: str) -> Refusal:
+    back = quote(path) if method == "GET" else "/"
+    return Refusal(303, "Log in with a key first.", headers={"Location": f"/login?next={back}"})
 
 
 def _key_first(authorization: bytes) -> Refusal:

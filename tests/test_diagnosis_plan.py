@@ -65,7 +65,7 @@ def test_the_sentence_names_all_that_it_separates(narrow: Left) -> None:
     planned = narrow.plan()
     assert len(planned["separates"]) >= 2
     for names in planned["separates"]:
-        assert all(name in planned["statement"] or name == "nothing_missing" for name in names)
+        assert all(name.replace("_", " ") in planned["statement"] or name == "nothing_missing" for name in names)
 
 
 def test_where_the_campaign_s_own_settings_tell_nothing_others_are_tried(twins: Left) -> None:

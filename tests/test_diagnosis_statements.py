@@ -22,7 +22,8 @@ from underskin.diagnosis.numbers import in_percent
 from underskin.diagnosis.page import page
 from underskin.diagnosis.report import report
 from underskin.diagnosis.search import Answer
-from underskin.diagnosis.statements import location_statement, why_not
+from underskin.diagnosis.statements import answer_statement, location_statement, why_not
+from underskin.mechanisms.mechanism import Kind
 from underskin.surrogate import SigmaTable, load_table
 from underskin.units import Floats
 
@@ -108,6 +109,36 @@ def test_a_probability_is_never_certain_and_the_same_everywhere(table: SigmaTabl
     assert in_percent(0.9994) == "99.9 %"
     assert in_percent(0.0004) == "under 0.1 %"
     assert in_percent(0.0) == "under 0.1 %"
+
+
+def test_within_the_noise_nothing_is_said_to_lie_anywhere() -> None:
+    said = location_statement(
+        AXES, {"preload_n": [2.0, 3.0]}, {"preload_n": False}, Effect(0.05, -1, 1, True), agrees=True
+    )
+    assert said.startswith("What is left is within the noise, though more of it goes along with preload than chance")
+    assert "above the model" not in said
+
+
+def test_agreement_names_what_it_does_not_rule_out(table: SigmaTable) -> None:
+    adhesion, misalignment = answers_of(table, {("adhesion",): 0.32, ("misalignment",): 0.01})
+    nothing = replace(adhesion.explanation, names=()) if adhesion.explanation is not None else None
+    torn = [Answer(nothing, 0.61), adhesion, misalignment]
+    said = answer_statement(torn, "no_mismatch", "")
+    assert said.startswith(
+        "Recordings and the paper's model agree within the noise (probability 61 %), but they do not rule out: "
+        "adhesion (32 %). Adhesion: The skin sticks"
+    )
+    assert "nothing needs to be added" in answer_statement([Answer(nothing, 0.97), adhesion], "no_mismatch", "")
+
+
+@pytest.mark.parametrize(
+    ("kind", "named"), [("frf", "The paper's model"), ("indentation", "Hertz's law"), ("compression", "Hooke's law")]
+)
+def test_the_model_that_lacks_something_is_called_by_its_name(table: SigmaTable, kind: Kind, named: str) -> None:
+    (only,) = answers_of(table, {("thickness_error",): 0.9})
+    said = answer_statement([only], "explained", "", kind)
+    assert said.startswith(f"{named} lacks thickness error (probability 90 %). Thickness error: ")
+    assert "_" not in said
 
 
 def test_every_axis_has_words() -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 from urllib.parse import urlencode
 
 import numpy as np
@@ -15,16 +15,12 @@ from service.design import DesignAnswer, DesignRequest, answer, designed
 from service.pages import requests
 from service.pages.figures import Drawn, csv_answer, drawn
 from service.pages.formats import short_and_exact
-from service.pages.forms import number
 from service.pages.html import compress, page
 from service.problems import from_validation
 from service.store import campaigns, skins
 from service.store.engine import Database
 from underskin import InvalidInput, UnderskinError
 from underskin.surrogate import SigmaTable
-
-if TYPE_CHECKING:
-    from underskin.figures import Mark
 
 router = APIRouter(prefix="/design")
 
@@ -56,24 +52,26 @@ _PROTOTYPE = {
 def view(request: Request, store: Store, table: Table, skin: Annotated[str | None, Query()] = None) -> Response:
     """With the values of the address, or else those of the skin, or of the paper's prototype."""
     own = _PROTOTYPE if skin is None else _own(store, skin)
-    values = own
+    given = _given(request)
+    values = {**own, **given}
     error: str | None = None
+    found: DesignAnswer | None = None
+    figures: list[Drawn] = []
     try:
-        values = {**own, **_given(request)}
-        found, figures = _answered(table, _asked(values), own, skin)
+        asked = _asked(values)
+        found, figures = _answered(table, asked, own, skin)
     except UnderskinError as refused:
         error = str(refused)
-        found, figures = _answered(table, _asked(_PROTOTYPE), _PROTOTYPE, None)  # not shown until values can be
     return page(
         request,
         "design.html",
         skin_id=skin,
         values=values,
         sliders=SLIDERS,
-        told=told(found),
+        told=[] if found is None else told(found),
         figures=figures,
         error=error,
-        beyond=beyond(table, found, values["preload_n"]),
+        own=own,
         same=requests.post(request, "/v1/design", values, _call(values)),
     )
 
@@ -82,8 +80,8 @@ def view(request: Request, store: Store, table: Table, skin: Annotated[str | Non
 def at_once(request: Request, store: Store, table: Table, skin: Annotated[str | None, Query()] = None) -> Response:
     """What changes in the page when a slider moves, as JSON."""
     own = _PROTOTYPE if skin is None else _own(store, skin)
+    values = {**own, **_given(request)}
     try:
-        values = {**own, **_given(request)}
         found, figures = _answered(table, _asked(values), own, skin)
     except UnderskinError as refused:
         return _json(request, {"error": str(refused)})
@@ -91,8 +89,7 @@ def at_once(request: Request, store: Store, table: Table, skin: Annotated[str | 
     return _json(
         request,
         {
-            "beyond": beyond(table, found, values["preload_n"]),
-            "told": {entry.name: [entry.text, entry.exact, entry.note, entry.warns] for entry in told(found)},
+            "told": {entry.name: [entry.text, entry.exact, entry.note] for entry in told(found)},
             "figures": {figure.name: figure.json for figure in figures},
             "same": [same.curl, same.python],
         },
@@ -120,7 +117,7 @@ def response_csv(request: Request, table: Table) -> Response:
 
 @dataclass(frozen=True)
 class Told:
-    """One thing that a design tells: short, exact, and with a remark, which may be a warning."""
+    """One thing that a design tells: short, exact, and with a remark."""
 
     name: str
     words: str
@@ -128,7 +125,6 @@ class Told:
     unit: str
     digits: int
     note: str
-    warns: bool = False
 
     @property
     def text(self) -> str:
@@ -144,12 +140,10 @@ class Told:
 
 def told(found: DesignAnswer) -> list[Told]:
     """What a design tells, in order."""
-    inside = found.status == "ok"
     apart = found.two_point_separation_mm
-    merge = inside and apart is None
     blind = found.response_amid_percent is not None and found.response_amid_percent < BLIND_PERCENT
     point = f"a/h {found.a_over_h:.3g}, rT/h {found.rt_over_h:.3g}, L {found.load_parameter:.2g}"
-    anywhere = "not told apart everywhere at this pitch" if merge else "wherever the array lies"
+    anywhere = "wherever the array lies" if apart is not None else "not told apart everywhere at this pitch"
     return [
         Told("sigma", "transmission σ", found.sigma, "", 4, point),
         Told("frf", "FRF", found.frf_pc_per_n, "pC/N", 4, "what an instrument should show above the sensor"),
@@ -157,34 +151,21 @@ def told(found: DesignAnswer) -> list[Told]:
         Told("stress", "mean stress on the sensor", found.mean_stress_mpa, "MPa", 3,
              f"contact radius {found.contact_radius_mm:.3g} mm"),
         Told("resolution", "spatial resolution", found.resolution_mm, "mm", 3, "width at half maximum of a response"),
-        Told("apart", "two-point separation", apart, "mm", 3, f"two equal loads, {anywhere}", merge),
+        Told("apart", "two-point separation", apart, "mm", 3, f"two equal loads, {anywhere}"),
         Told("best", "two-point separation at best", found.two_point_best_mm, "mm", 3,
              "where the sensors lie best under them"),
         Told("amid", "response amid four sensors", found.response_amid_percent, "%", 3,
-             "of that above one" + (": blind spots" if blind else ""), blind),
+             "of that above one" + (": blind spots" if blind else "")),
     ]  # fmt: skip
 
 
-def beyond(table: SigmaTable, found: DesignAnswer, preload_n: float) -> str:
-    """Where a design lies outside the table, and which way back; empty inside."""
-    ends = {axis: high for axis, (_, high) in table.domain.items()}
-    most = preload_n * ends["load_parameter"] / found.load_parameter
-    ways = (
-        ("a/h", found.a_over_h, ends["a_over_h"], "a thicker or stiffer layer, a smaller sphere, or less force"),
-        ("rT/h", found.rt_over_h, ends["rt_over_h"], "a thicker layer or smaller sensors"),
-        ("L = F/(R²E)", found.load_parameter, ends["load_parameter"],
-         f"a larger sphere, a stiffer layer, or at most {most:.3g} N"),
-    )  # fmt: skip
-    said = [
-        f"{name} is {value:.3g}, the table ends at {end:g}: take {way}" for name, value, end, way in ways if value > end
-    ]
-    return f"Outside the table, and not extrapolated. {'. '.join(said)}." if said else ""
-
-
 def _given(request: Request) -> dict[str, float]:
-    """The numbers of the address; raises InvalidInput."""
-    sent = request.query_params
-    return {name: number(name, sent[name]) for name, *_ in SLIDERS if name in sent}
+    """The numbers of the address."""
+    names = {name for name, *_ in SLIDERS}
+    try:
+        return {name: float(value) for name, value in request.query_params.items() if name in names}
+    except ValueError:
+        raise InvalidInput("address", request.url.query[:80], "must have numbers") from None
 
 
 def _asked(values: Mapping[str, float]) -> DesignRequest:
@@ -207,11 +188,13 @@ def _computed(request: Request, table: SigmaTable) -> DesignAnswer:
 def _answered(
     table: SigmaTable, asked: DesignRequest, own: Mapping[str, float], skin: str | None
 ) -> tuple[DesignAnswer, list[Drawn]]:
-    from underskin.figures import array_response, design_overview
+    from underskin.figures import Mark, array_response, design_overview
 
     with np.errstate(all="ignore"):
         found = designed(table, asked)
-        mark = _mark(table, own, "the paper's prototype" if skin is None else "the skin as it is")
+        start = designed(table, _asked(own)).contact
+    name = "the paper's prototype" if skin is None else "the skin as it is"
+    mark = Mark(name, float(start.a_over_h), float(start.rt_over_h), float(start.load_parameter), float(start.sigma))
     query = urlencode({name: getattr(asked, name) for name, *_ in SLIDERS})
     return answer(table, asked, found), [
         drawn(
@@ -228,17 +211,6 @@ def _answered(
             f"/design/response.csv?{query}",
         ),
     ]
-
-
-def _mark(table: SigmaTable, own: Mapping[str, float], name: str) -> "Mark | None":
-    """Where one starts from; None where that is no design, such as sensors that overlap."""
-    from underskin.figures import Mark
-
-    try:
-        start = designed(table, _asked(own)).contact
-    except UnderskinError:
-        return None
-    return Mark(name, float(start.a_over_h), float(start.rt_over_h), float(start.load_parameter), float(start.sigma))
 
 
 def _own(store: Database, skin_id: str) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Forms: read, and what changes something refused unless it was made for this session."""
+"""Forms: read, and refused unless they were made for this session."""
 
 from typing import Annotated
 from urllib.parse import parse_qs
@@ -9,7 +9,6 @@ from fastapi.responses import RedirectResponse
 from service import session
 from service.dependencies import authorised
 from service.problems import Refusal
-from underskin import InvalidInput
 
 TOKEN = "form_token"  # noqa: S105 -- the name of the field
 WRITE = [Security(authorised, scopes=["write"])]
@@ -38,14 +37,6 @@ def require_own(request: Request, token: str) -> None:
 
 
 Form = Annotated[dict[str, str], Depends(_fields)]
-
-
-def number(name: str, text: str) -> float:
-    """What stands in a field for a number; raises InvalidInput."""
-    try:
-        return float(text)
-    except ValueError:
-        raise InvalidInput(name, text[:80], "must be a number, its decimals after a point") from None
 
 
 def see(path: str) -> RedirectResponse:

@@ -10,7 +10,6 @@ from service.dependencies import Store
 from service.more_tables import influence_table
 from service.pages import requests
 from service.pages.figures import csv_answer, drawn
-from service.pages.forms import number
 from service.pages.html import page
 from service.store import campaigns, skins
 from service.store.engine import Database
@@ -59,8 +58,7 @@ def view(request: Request, store: Store, skin: Skin = None, loads: Loads = _LOAD
         loads=loads,
         error=error,
         found=found,
-        far=0 if found is None else int((~found.inside).sum()),
-        figures=[_figure(request, document, found)] if found is not None and found.inside.any() else [],
+        figures=[] if found is None else [_figure(request, document, found)],
         same=requests.post(request, "/v1/stress", document, f"client.stress({document!r})"),
     )
 
@@ -105,28 +103,24 @@ def _values(request: Request, store: Database, skin: str | None) -> dict[str, st
 
 def _document(request: Request, store: Database, skin: str | None, loads: str) -> dict[str, Any]:
     """The request of `POST /v1/stress`; raises InvalidInput."""
-    values = {name: number(name, text) for name, text in _values(request, store, skin).items()}
+    values = {name: _number(name, text) for name, text in _values(request, store, skin).items()}
     document: dict[str, Any] = {name: values[name] for name, *_ in FIELDS}
     document["sensors"] = _grid(values) if skin is None else _described(store, skin)["sensors"]
-    lines = [(f"load {place}", line) for place, line in enumerate(loads.splitlines(), 1) if line.strip()]
-    document["contacts"] = [_load(name, line) for name, line in lines]
+    document["contacts"] = [_load(number, line) for number, line in enumerate(loads.splitlines(), 1) if line.strip()]
     return document
 
 
-def _load(name: str, line: str) -> dict[str, Any]:
+def _load(number: int, line: str) -> dict[str, Any]:
     """A line of numbers: x, y, radius and force, and perhaps the tangential force along x and y."""
-    parts = [number(name, part) for part in line.replace(",", " ").split()]
+    parts = [_number(f"load {number}", part) for part in line.replace(",", " ").split()]
     if len(parts) not in (4, 6):
-        raise InvalidInput(name, line[:80], "must be x y R F, or x y R F Fx Fy (mm, N), decimals after a point")
+        raise InvalidInput(f"load {number}", line[:80], "must be x y R F, or x y R F Fx Fy (mm, N)")
     load: dict[str, Any] = dict(zip(_ORDER, parts, strict=False))
     return {**load, "tangential_force_n": parts[4:]} if parts[4:] else load
 
 
 def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:
     columns, rows, pitch = values["columns"], values["rows"], values["pitch_mm"]
-    for name in ("columns", "rows"):
-        if values[name] % 1:
-            raise InvalidInput(name, values[name], "must be a whole number of sensors")
     if not (1 <= columns <= 1000 and 1 <= rows <= 1000 and columns * rows <= _MOST_SENSORS):
         raise InvalidInput("columns", f"{columns:g} × {rows:g}", f"must be 1 to {_MOST_SENSORS} sensors in all")
     return [
@@ -145,3 +139,10 @@ def _described(store: Database, skin_id: str) -> dict[str, Any]:
     if not described["sensors"]:
         raise InvalidInput("skin", skin_id, "must have a current campaign that names its sensors")
     return described
+
+
+def _number(name: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InvalidInput(name, text[:80], "must be a number") from None

@@ -46,4 +46,4 @@ def logout(request: Request, sent: Form) -> Response:  # noqa: ARG001 -- reading
 def _own(path: str) -> str:
     """A path of this server, whatever the form said."""
     plain = path.startswith("/") and not path.startswith("//") and "\\" not in path and path.isprintable()
-    return quote(path, safe="/?=&%+,;:@") if plain else "/"
+    return quote(path, safe="/?=&") if plain else "/"

@@ -3,7 +3,6 @@
 import re
 import time
 from collections.abc import Iterator
-from html import unescape
 
 import httpx
 import pytest
@@ -142,22 +141,6 @@ def test_a_session_ends_with_its_key(locked: tuple[Server, dict[str, str]]) -> N
         server.place.command("key", "revoke", "guest")
         time.sleep(0.6)  # a server reads the keys anew every half second
         assert guest.get("/").status_code == 303
-
-
-def test_after_the_login_one_is_where_one_wanted_to_be(locked: tuple[Server, dict[str, str]]) -> None:
-    server, keys = locked
-    for wanted in (
-        "/design?thickness_mm=2.0&skin=left%20hand",
-        "/skins/50%25%20glycerol?model=adopted",
-        "/?find=a%26b",
-    ):
-        with httpx.Client(base_url=server.http.base_url, headers=BROWSING) as somebody:
-            asked = somebody.get(wanted)
-            form = somebody.get(asked.headers["location"])
-            back = re.search(r'name="next" value="([^"]+)"', form.text)
-            assert back is not None
-            sent = {"form_token": token_of(form.text), "key": keys["read"], "next": unescape(back[1])}
-            assert somebody.post("/login", data=sent).headers["location"] == wanted
 
 
 def test_login_leads_nowhere_else(locked: tuple[Server, dict[str, str]]) -> None:

@@ -101,32 +101,6 @@ def test_a_slider_of_the_design_view_answers_at_once(newcomer: Visit) -> None:
     page.wait_for_url("**thickness_mm=2.*")
     page.locator("#pitch_mm").fill("1")
     page.get_by_role("alert").get_by_text("cannot overlap").wait_for()
-    assert not told.is_visible()  # it would be of another pitch
-    page.locator("#pitch_mm").fill("4")
-    told.wait_for()
-
-
-def test_a_design_recovers_from_an_address_that_cannot_be(visitor: Visit) -> None:
-    page = visitor.page
-    visitor.go("/design?thickness_mm=0")
-    told = page.locator("[data-told=sigma] b")
-    assert "greater than 0" in page.get_by_role("alert").inner_text()
-    assert not told.is_visible()
-    page.locator("#thickness_mm").fill("2.5")
-    told.wait_for()
-    assert told.inner_text() == "0.9783"
-    visitor.drawn(2)
-    page.locator("#preload_n").fill("50")
-    page.get_by_text("or at most 25.6 N").wait_for()
-    assert not page.locator("#figure-row").is_visible()
-    page.context.set_offline(True)
-    page.locator("#preload_n").fill("1")
-    page.get_by_text("The server does not answer").wait_for()
-    assert not told.is_visible()
-    page.context.set_offline(False)
-    page.locator("#preload_n").fill("2")
-    page.locator("#figure-row .main-svg").first.wait_for()
-    visitor.wrong[:] = [said for said in visitor.wrong if "ERR_INTERNET_DISCONNECTED" not in said]
 
 
 def test_d33_over_a_band_of_one_s_own(newcomer: Visit) -> None:

@@ -5,6 +5,7 @@ import numpy as np
 from underskin.diagnosis.explanation import Explanation, Workbench, at_recording, own_places
 from underskin.diagnosis.finding import Finding
 from underskin.diagnosis.numbers import in_digits
+from underskin.diagnosis.statements import SIMPLEST, in_words
 
 _NOISY = 2.0  # times what the lines' own roughness says
 
@@ -29,7 +30,7 @@ def _at_bounds(explanation: Explanation) -> list[Finding]:
 def _beyond_tables(bench: Workbench, explanation: Explanation) -> list[Finding]:
     at = explanation.best.at
     outside = np.unique(at_recording(bench, at)[~at.prediction.inside])
-    named = " and ".join(explanation.names) or "the base model"
+    named = in_words(explanation.names) or SIMPLEST[bench.kind]
     text = f"with the values found for {named} its contact lies beyond the tables: its prediction is the table's edge"
     entries = bench.lines.campaign.recordings
     return [Finding("out_of_domain", entries[number].id, "preload_n", text) for number in outside.tolist()]

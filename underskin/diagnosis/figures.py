@@ -14,8 +14,10 @@ from plotly.subplots import make_subplots
 from underskin.diagnosis.axes import WORDS
 from underskin.diagnosis.explanation import Explanation, Workbench, own_places
 from underskin.diagnosis.locate import SIGNIFICANT
+from underskin.diagnosis.numbers import in_percent
 from underskin.diagnosis.points import Levels, Points, Thinned
 from underskin.diagnosis.report import Diagnosis
+from underskin.diagnosis.statements import SIMPLEST
 from underskin.units import Floats
 
 AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in WORDS.items()}
@@ -58,13 +60,13 @@ def explanations(document: Mapping[str, Any]) -> go.Figure:
         y=names,
         orientation="h",
         marker={"color": [_BLUE, *[_GREY] * (len(rows) - 1)]},
-        text=[f"{100 * value:.1f} %" for value in values],
+        text=[in_percent(value) for value in values],
         textposition="outside",
         cliponaxis=False,
         hovertemplate="%{y}: %{x:.3f}<extra></extra>",
     )
     figure.update_layout(
-        title="How probable each explanation is", height=130 + 34 * len(rows), margin={"r": 70, "t": 60}
+        title="How probable each explanation is", height=130 + 34 * len(rows), margin={"r": 110, "t": 60}
     )
     figure.update_xaxes(title="probability", range=[0, 1.0], tickformat=".0%")
     figure.update_yaxes(autorange="reversed")
@@ -72,7 +74,7 @@ def explanations(document: Mapping[str, Any]) -> go.Figure:
 
 
 def residual_map(diagnosis: Diagnosis, thinned: Thinned, before: Points) -> go.Figure:
-    """Measured less the base model, over the located axes; the region outlined.
+    """Measured less the model to which nothing is added, over the located axes; the region outlined.
 
     A cell is the mean over the points in it; out of phase where the misfit lies in the phase.
     """
@@ -107,7 +109,8 @@ def residual_map(diagnosis: Diagnosis, thinned: Thinned, before: Points) -> go.F
         (x0, x1), (y0, y1) = _outline(diagnosis, x_axis, x), _outline(diagnosis, y_axis, y)
         figure.add_shape(type="rect", x0=x0, x1=x1, y0=y0, y1=y1, line={"color": "#000000", "width": 3})
     figure.update_layout(
-        title="Where: measured above the base model [%]", height=170 + 40 * max(4, min(len(y.names), 12))
+        title=f"Where: measured above {SIMPLEST[thinned.lines.kind]} [%]",
+        height=170 + 40 * max(4, min(len(y.names), 12)),
     )
     return _styled(figure)
 
@@ -115,9 +118,11 @@ def residual_map(diagnosis: Diagnosis, thinned: Thinned, before: Points) -> go.F
 def before_and_after(
     diagnosis: Diagnosis, thinned: Thinned, before: Points, after: Points, shown: Explanation
 ) -> go.Figure:
-    """Measured against predicted, by the base model and by what is stated, each with the band that noise allows."""
+    """Measured against predicted, by the model alone and by what is stated, each with the band that noise allows."""
     named = " + ".join(shown.names).replace("_", " ") or "nothing added"
-    figure = make_subplots(1, 2, subplot_titles=("before: base model", f"after: {named}"), shared_yaxes=True)
+    figure = make_subplots(
+        1, 2, subplot_titles=(f"before: {SIMPLEST[thinned.lines.kind]}", f"after: {named}"), shared_yaxes=True
+    )
     _, name = _part(diagnosis, before.measured)
     ids = [escape(entry.id) for entry in thinned.lines.campaign.recordings]
     for place, (points, colour, marker) in enumerate(((before, _ORANGE, "square"), (after, _BLUE, "circle")), start=1):

@@ -61,7 +61,7 @@ def _inspected(
     usable = replace(campaign, recordings=tuple(entries))
     if not lacking and len(entries) < LEAST_RECORDINGS:
         lacking = (
-            f"{len(entries)} usable recording(s); at least {LEAST_RECORDINGS} are needed, better at different preloads "
+            f"usable recordings: {len(entries)}; at least {LEAST_RECORDINGS} are needed, better at different preloads "
             "or spheres"
         )
     elif not lacking and not recording_axes(usable) and max(len(lines_of(entry).values) for entry in entries) < 2:

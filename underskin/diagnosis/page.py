@@ -25,10 +25,15 @@ _VERDICTS = {
     "insufficient_data": "too little data",
 }
 _NOTHING_NEXT = {
-    "insufficient_data": "Recordings that these lack, as said above.",
-    "unexplained": "No recording can be planned to tell apart laws that are not known here.",
+    "unexplained": "No recording can be planned for a law that is not known here. Repeat one where most of the misfit "
+    "lies, to see that it comes again; then change one thing of the rig at a time.",
 }
-_DECIDED = "Nothing more is needed: these recordings decide."
+_DECIDED = "Nothing more is needed for this answer: these recordings decide."
+_AFTER = {
+    "unexplained": "with the mechanisms that come closest, which are no explanation",
+    "no_mismatch": "the same, since nothing is added",
+}
+_OPEN = " What they cannot tell, as listed above, stays open."
 _STYLE = """
 body { font: 17px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.1rem; font-weight: 600; color: #555; margin: 0; }
@@ -114,7 +119,11 @@ def _where(report: Report, drawn: Drawn) -> str:
         "By chance: how often chance alone would show so strong a dependence, corrected for the number of axes. "
         "Where that is small, the misfit depends on it."
     )
-    table = _table(("the misfit against", "by chance", "its share of the misfit"), rows) + _note(note) if rows else ""
+    table = (
+        _table(("the misfit against", "by chance", "share that no other axis takes up"), rows) + _note(note)
+        if rows
+        else ""
+    )
     return _paragraph(location["statement"]) + _figure(drawn, "where") + table
 
 
@@ -124,7 +133,11 @@ def _what(report: Report, drawn: Drawn) -> str:
         name = entry["name"]
         known = CATALOGUE.get(name)
         explains = entry["explains_percent"]
-        share = "" if explains is None else f"; takes away {explains:.0f} % of the misfit beyond noise"
+        share = (
+            ""
+            if explains is None
+            else f"; takes away {explains:.0f} % of the misfit beyond noise in the recordings fitted to"
+        )
         parts.append(f"<h3>{escape(words(name))}</h3>")
         parts.append(_paragraph("" if known is None else known.plain))
         parts.append(_paragraph(f"Present with probability {in_percent(entry['probability'])}{share}."))
@@ -179,11 +192,11 @@ def _better(report: Report, drawn: Drawn) -> str:
         )
         for entry in fit["groups"]
     ]
-    heads = ("base model", "with it", "noise floor")
+    heads = ("before", "after", "noise floor")
     note = (
         "Error: rms of measured less predicted over rms of predicted. Each group was left out whole, everything fitted "
-        "and chosen again without it, and then predicted; the noise floor is what noise alone would give. The base "
-        "model is the paper's, with nothing added."
+        "and chosen again without it, and then predicted; the noise floor is what noise alone would give. Before: "
+        f"the model with nothing added; after: {_AFTER.get(report['verdict'], 'with what is said above')}."
     )
     parts = [_table(("error of", *heads), rows), _figure(drawn, "before_after")]
     if groups:
@@ -202,7 +215,10 @@ def _findings(report: Report) -> str:
 def _next(report: Report) -> str:
     planned = report["next_experiment"]
     if not planned:
-        return _paragraph(_NOTHING_NEXT.get(report["verdict"], _DECIDED))
+        if report["verdict"] == "insufficient_data":
+            return _paragraph(f"What is lacking: {readable(report['statement'].partition(': ')[2])}")
+        decided = _DECIDED + (_OPEN if report["not_identifiable"] else "")
+        return _paragraph(_NOTHING_NEXT.get(report["verdict"], decided))
     if not planned["recordings"]:
         return _paragraph(readable(planned["statement"]))
     heads = list(dict.fromkeys(name for entry in planned["recordings"] for name in entry))

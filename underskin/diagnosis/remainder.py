@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from underskin.diagnosis.axes import order, preload_before, recording_axes
+from underskin.diagnosis.axes import WORDS, order, preload_before, recording_axes
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.finding import Finding
 from underskin.diagnosis.held_out import HeldOut, total
@@ -17,6 +17,7 @@ from underskin.diagnosis.line_process import frequency_bins
 from underskin.diagnosis.numbers import in_digits
 from underskin.diagnosis.recording_process import relative_place_slopes
 from underskin.diagnosis.residuals import Residuals, residuals, whole_prediction
+from underskin.diagnosis.statements import in_words
 from underskin.recordings.campaign import Campaign
 from underskin.units import Floats
 
@@ -30,7 +31,7 @@ _LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n", "load_cycl
 
 def describe(bench: Workbench, explanation: Explanation) -> str:
     """One or two sentences; the axis is the one where a form takes away most."""
-    beyond = f" beyond {' and '.join(explanation.names)}" if explanation.names else ""
+    beyond = f" beyond {in_words(explanation.names)}" if explanation.names else ""
     gain, text = (_along_curves if bench.lines.curves else _over_axes)(bench, explanation)
     return f"What remains{beyond} {f'looks like {text}' if gain else 'has no simple form over one axis'}."
 
@@ -81,7 +82,8 @@ def _over_axes(bench: Workbench, explanation: Explanation) -> tuple[float, str]:
     for name, column in _axes(bench.lines.campaign).items():
         for index in range(column.shape[1]):
             gain, text = _best_form(column[:, index], left.gain[:, None], left.gain_deviation**-2, name)
-            axis = name if column.shape[1] == 1 else f"{name} ({'xy'[index]})"
+            words = WORDS.get(name, (name,))[0]
+            axis = words if column.shape[1] == 1 else f"{words} ({'xy'[index]})"
             best = max(best, (gain, f"{text} over {axis}"))
     best = max(best, _wandering(bench, explanation, left))
     line, centres = frequency_bins(bench.lines.frequency)
@@ -92,7 +94,7 @@ def _over_axes(bench: Workbench, explanation: Explanation) -> tuple[float, str]:
             for part in (left.line.real, left.line.imag)
         ]
         gain, text = _best_form(np.log(centres), np.stack(parts, axis=1), total, "frequency_hz")
-        best = max(best, (gain, f"{text} over frequency_hz"))
+        best = max(best, (gain, f"{text} over frequency"))
     return best
 
 

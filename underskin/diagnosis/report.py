@@ -18,10 +18,9 @@ from underskin.diagnosis.fit_summary import explains_percent, fit_summary
 from underskin.diagnosis.locate import AxisResult, reaches_all_along
 from underskin.diagnosis.numbers import parameter, place_of, probability, rounded
 from underskin.diagnosis.search import NOTHING_MISSING, Answer, Search
-from underskin.diagnosis.statements import answer_statement, location_statement, why_not
+from underskin.diagnosis.statements import EXPLAINED, answer_statement, location_statement, why_not
 
 SCHEMA = "report/1"
-EXPLAINED = 0.8
 _ALTERNATIVES = 6
 _LEAST_PROBABILITY = 0.005
 
@@ -84,8 +83,10 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         **document,
         "probability": probability(leader.probability),
-        "statement": answer_statement(search.answers, stated, diagnosis.shape, fit["after"].get("youngs_modulus")),
-        "location": _location(diagnosis, bench),
+        "statement": answer_statement(
+            search.answers, stated, diagnosis.shape, bench.kind, fit["after"].get("youngs_modulus")
+        ),
+        "location": _location(diagnosis, bench, stated == "no_mismatch"),
         "mechanisms": [] if named is None else _mechanisms(search, bench, named),
         "alternatives": _alternatives(search.answers),
         "not_identifiable": [
@@ -138,7 +139,7 @@ def _alternatives(answers: Sequence[Answer]) -> list[dict[str, Any]]:
     return found
 
 
-def _location(diagnosis: Diagnosis, bench: Workbench) -> dict[str, Any]:
+def _location(diagnosis: Diagnosis, bench: Workbench, agrees: bool) -> dict[str, Any]:
     assert diagnosis.effect is not None
     effect, region = diagnosis.effect, diagnosis.region
     whole = {name: reaches_all_along(bench.lines, name, ends) for name, ends in region.items()}
@@ -155,5 +156,5 @@ def _location(diagnosis: Diagnosis, bench: Workbench) -> dict[str, Any]:
         "region": {name: [rounded(x) if isinstance(x, float) else x for x in ends] for name, ends in region.items()},
         "effect_percent": rounded(effect.percent, 3),
         "effect_interval_percent": [rounded(effect.low, 3), rounded(effect.high, 3)],
-        "statement": location_statement(diagnosis.axes, region, whole, effect),
+        "statement": location_statement(diagnosis.axes, region, whole, effect, agrees=agrees),
     }

@@ -11,50 +11,59 @@ from underskin.diagnosis.locate import SIGNIFICANT, AxisResult
 from underskin.diagnosis.numbers import in_digits, in_percent
 from underskin.diagnosis.search import NONE_OF_THESE, NOTHING_MISSING, Answer
 from underskin.mechanisms.catalogue import CATALOGUE
+from underskin.mechanisms.mechanism import Kind
 
+EXPLAINED = 0.8  # least probability of an answer that is stated without its rivals
 _WORTH_NAMING = 0.02
 _UNTHOUGHT_AT_MOST = 0.016  # of none_of_these, where no process shows
 _IN_PERCENT = 90.0  # beyond it an effect is said as a factor
+SIMPLEST: Mapping[Kind, str] = {  # what the model to which nothing is added is called, of each kind of recording
+    "frf": "the paper's model",
+    "indentation": "Hertz's law",
+    "compression": "Hooke's law",
+}
 
 
 def answer_statement(
-    answers: Sequence[Answer], verdict: str, shape: str, modulus: Mapping[str, Any] | None = None
+    answers: Sequence[Answer], verdict: str, shape: str, kind: Kind = "frf", modulus: Mapping[str, Any] | None = None
 ) -> str:
     """Some plain sentences on what is missing; of curves also the modulus under the stated answer."""
-    said = _answer(answers, verdict, shape)
+    said = _answer(answers, verdict, shape, SIMPLEST[kind])
     if modulus is None or verdict == "unexplained":
         return said
     interval = f"95 %: {modulus['low']:.3g} to {modulus['high']:.3g}"
     return f"{said} Young's modulus under this answer: {modulus['value']:.3g} {modulus['unit']} ({interval})."
 
 
-def _answer(answers: Sequence[Answer], verdict: str, shape: str) -> str:
+def _answer(answers: Sequence[Answer], verdict: str, shape: str, model: str) -> str:
     leader = answers[0]
     percent = in_percent(leader.probability)
-    if verdict == "no_mismatch":
-        return f"Recordings and base model agree within the noise (probability {percent}); nothing needs to be added."
-    if verdict == "unexplained":
-        described = f" {shape}" if shape else ""
-        return f"Something is missing that none of the known mechanisms describes (probability {percent}).{described}"
-    names = " and ".join(leader.names)
-    if verdict == "explained":
-        plain = " ".join(f"{name}: {_sentence(CATALOGUE[name].plain)}" for name in leader.names)
-        return f"The base model lacks {names} (probability {percent}). {plain}"
     rivals = [answer for answer in answers[1:4] if answer.probability > _WORTH_NAMING]
     listed = "; ".join(f"{in_words(answer.names)} ({in_percent(answer.probability)})" for answer in rivals)
     mentioned = dict.fromkeys(name for answer in (leader, *rivals) for name in answer.names if name in CATALOGUE)
-    plain = " ".join(f"{name}: {_sentence(CATALOGUE[name].plain)}" for name in mentioned)
-    return f"Best explained by {names} ({percent}), but these rivals remain: {listed}. {plain}"
+    if verdict == "no_mismatch":
+        agree = f"Recordings and {model} agree within the noise (probability {percent})"
+        if leader.probability >= EXPLAINED or not rivals:
+            return f"{agree}; nothing needs to be added."
+        return f"{agree}, but they do not rule out: {listed}. {_laws(tuple(mentioned))}".rstrip()
+    if verdict == "unexplained":
+        described = f" {shape}" if shape else ""
+        return f"Something is missing that none of the known mechanisms describes (probability {percent}).{described}"
+    names = in_words(leader.names)
+    if verdict == "explained":
+        return f"{model[0].upper()}{model[1:]} lacks {names} (probability {percent}). {_laws(leader.names)}"
+    return f"Best explained by {names} ({percent}), but these rivals remain: {listed}. {_laws(tuple(mentioned))}"
 
 
-def _sentence(text: str) -> str:
-    return f"{text.rstrip('.')}."
+def _laws(names: Sequence[str]) -> str:
+    """What each mechanism is, a sentence each."""
+    return " ".join(f"{in_words([name]).capitalize()}: {CATALOGUE[name].plain.rstrip('.')}." for name in names)
 
 
 def in_words(names: Sequence[str]) -> str:
     """An answer's names as a sentence has them."""
     special = {NOTHING_MISSING: "nothing missing", NONE_OF_THESE: "something without a name"}
-    return " and ".join(special.get(name, name) for name in names)
+    return " and ".join(special.get(name, name.replace("_", " ")) for name in names)
 
 
 def why_not(answer: Answer, leader: Answer) -> str:
@@ -83,14 +92,21 @@ def location_statement(
     region: Mapping[str, Sequence[float | str]],
     whole: Mapping[str, bool],
     effect: Effect,
+    *,
+    agrees: bool = False,
 ) -> str:
-    """One plain sentence; `whole` says of each axis of the region whether the region reaches all along it."""
+    """One plain sentence; `whole` says of each axis of the region whether the region reaches all along it, `agrees`
+    that recordings and model agree within the noise."""
     telling = [entry for entry in axes if entry.p_value is not None and entry.p_value < SIGNIFICANT]
     undecidable = [WORDS[entry.axis][0] for entry in axes if entry.p_value is None]
     tail = f"; whether it depends on {_listed(undecidable)}, this design cannot tell" if undecidable else ""
     if not telling:
         return f"The misfit depends on none of the axes beyond chance{tail}."
     names = _listed([WORDS[entry.axis][0] for entry in sorted(telling, key=lambda entry: entry.p_value or 0.0)])
+    if agrees:
+        return (
+            f"What is left is within the noise, though more of it goes along with {names} than chance would give{tail}."
+        )
     parts = [_range(name, ends) for name, ends in region.items() if not whole[name]]
     where = f"most of it lies at {_listed(parts)}, where" if parts else "it is spread over all of the recordings, where"
     return f"The misfit depends on {names}; {where} {_size(effect)}{tail}."

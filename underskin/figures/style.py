@@ -33,10 +33,9 @@ _TEMPLATE = go.layout.Template(
         "hoverlabel": {"font": {"size": 13}},
         "xaxis": _AXIS,
         "yaxis": _AXIS,
-        "margin": {"l": 70, "r": 20, "t": 75, "b": 55},
+        "margin": {"l": 70, "r": 20, "t": 50, "b": 55},
         "legend": {"orientation": "h", "yanchor": "bottom", "y": 1.02, "x": 0},
-        # At the top edge, so that the legend has its place below.
-        "title": {"font": {"size": 16}, "x": 0, "xref": "paper", "y": 1, "yanchor": "top", "pad": {"t": 10}},
+        "title": {"font": {"size": 16}, "x": 0},
     }
 )
 

@@ -2,9 +2,7 @@
 // Sliders: each moves its number by the same ratio a step, and the answer comes while they move.
 
 const form = document.getElementById("design");
-const whole = document.getElementById("bench");
 const refused = document.getElementById("refused");
-const beyond = document.getElementById("beyond");
 let asking = null;
 
 function ratio(slider) {
@@ -13,11 +11,6 @@ function ratio(slider) {
 function place(slider) {
   const value = Number(form.elements[slider.dataset.for].value);
   slider.value = String(Math.round((1000 * Math.log(value / slider.dataset.low)) / ratio(slider)));
-}
-
-function say(place, text) {
-  place.hidden = !text;
-  place.textContent = text ?? "";
 }
 
 async function answer() {
@@ -29,23 +22,19 @@ async function answer() {
     const told = await fetch(`/design/answer?${query}`, { signal: asking.signal });
     found = await told.json();
     if (!told.ok) found = { error: `${found.detail} Reload the page.` };
-  } catch (failed) {
-    if (failed.name === "AbortError") return; // a later question took this one's place
-    found = { error: "The server does not answer: what you see would not be of these values." };
+  } catch {
+    return; // a later question took this one's place
   }
-  say(refused, found.error);
-  whole.classList.toggle("without", Boolean(found.error)); // what is shown is of other values
+  refused.hidden = !found.error;
+  refused.textContent = found.error ?? "";
   if (found.error) return;
-  say(beyond, found.beyond);
-  whole.classList.toggle("beyond", Boolean(found.beyond));
   history.replaceState(null, "", `/design?${query}`);
-  for (const [name, [text, exact, note, warns]] of Object.entries(found.told)) {
+  for (const [name, [text, exact, note]] of Object.entries(found.told)) {
     const entry = document.querySelector(`[data-told="${name}"]`);
     const value = entry.querySelector("b");
     value.textContent = text;
     value.title = exact;
     entry.querySelector(".quiet").textContent = note;
-    entry.classList.toggle("warns", warns);
   }
   for (const [name, figure] of Object.entries(found.figures)) {
     const place = document.getElementById(`figure-${name}`);

@@ -73,7 +73,7 @@ for (const button of document.querySelectorAll("[data-save]")) {
   button.addEventListener("click", async () => {
     const plot = button.closest("figure").querySelector(".plot");
     const { data, layout } = document_of(plot);
-    const size = { width: Math.max(plot.clientWidth, 640), height: Number(plot.dataset.height) + 45 };
+    const size = { width: Math.max(plot.clientWidth, 640), height: Number(plot.dataset.height) + 30 };
     await Plotly.downloadImage({ data, layout: { ...layout, ...size } }, {
       format: button.dataset.save, filename: button.dataset.name, scale: button.dataset.save === "png" ? 2 : 1, ...size,
     });
