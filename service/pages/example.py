@@ -4,34 +4,47 @@ import hashlib
 from pathlib import Path
 
 from fastapi import APIRouter, Request, Response
+from sqlalchemy import Connection
 from starlette.concurrency import run_in_threadpool
 
 from service import inverting
 from service.accepting import Terms, accept
 from service.dependencies import Store, Table
 from service.pages.forms import WRITE, Form, see
-from service.store import skins
+from service.store import campaigns, skins
 from service.uploads import Upload
 
 router = APIRouter()
 
 SKIN = "example"
 _FOLDER = Path(__file__).parent / "example"
+_MOST = 1000  # campaigns of it that are looked at
 
 
 @router.post("/example", dependencies=WRITE)
 async def load(request: Request, sent: Form, store: Store, table: Table) -> Response:  # noqa: ARG001 -- checked by it
-    """Keeps the example's campaigns, once however often it is asked for."""
+    """Keeps the example's campaigns, once however often it is asked for; afresh where all were withdrawn."""
     with store.reading() as connection:
-        if skins.is_known(connection, SKIN):
-            return see(f"/skins/{SKIN}")
+        withdrawn = _withdrawn(connection)
+    if withdrawn is None:
+        return see(f"/skins/{SKIN}")
     uploads = [_upload(file) for file in sorted(_FOLDER.glob("*.json"))]
     key = request.scope["key"]
     sender = None if key is None else key.name
-    terms = Terms(SKIN, None, None, False, None, "the example skin", sender, request.app.state.settings.max_body_bytes)
+    asked = f"the example skin, {withdrawn} withdrawn" if withdrawn else "the example skin"
+    terms = Terms(SKIN, None, None, False, None, asked, sender, request.app.state.settings.max_body_bytes)
     answer, _ = await run_in_threadpool(accept, store, uploads, terms)
     await run_in_threadpool(inverting.derive, store, table, [entry["id"] for entry in answer["campaigns"]])
     return see(f"/skins/{SKIN}")
+
+
+def _withdrawn(connection: Connection) -> int | None:
+    """How many campaigns the skin had, all of which were withdrawn; None where one is in use."""
+    if not skins.is_known(connection, SKIN):
+        return 0
+    filters = campaigns.Filters(skin=skins.require_root(connection, SKIN))
+    found = campaigns.listed(connection, filters, None, _MOST)
+    return None if any(campaigns.state(row) == "current" for row in found) else len(found)
 
 
 def _upload(file: Path) -> Upload:

@@ -162,3 +162,21 @@ def test_a_band_without_lines_is_refused_by_name(server: Server) -> None:
         answer = server.http.get(f"/campaigns/{kept['id']}?{query}", headers=BROWSING)
         assert answer.status_code == 422
         assert "band" in answer.text
+
+
+def test_the_example_comes_back_once_all_of_it_was_withdrawn(server: Server) -> None:
+    def kept(state: str) -> list[str]:
+        found = server.http.get("/v1/campaigns", params={"skin": "example", "state": state}).json()["campaigns"]
+        return [entry["id"] for entry in found]
+
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as anyone:
+        form = {"form_token": token_of(anyone.get("/").text)}
+        anyone.post("/example", data=form)
+        loaded = kept("current")
+        for number in loaded:
+            server.http.post(f"/v1/campaigns/{number}/withdraw", json={"reason": "tried"}).raise_for_status()
+        assert kept("current") == []
+        for _ in range(2):  # once, however often it is asked for
+            assert anyone.post("/example", data=form).headers["location"] == "/skins/example"
+        assert len(kept("current")) == len(loaded)
+        assert set(kept("current")).isdisjoint(loaded)
