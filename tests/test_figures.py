@@ -1,10 +1,20 @@
 """Figures: every sensor and recording is in them, in lab units, told apart by more than colour."""
 
 import numpy as np
+import plotly.graph_objects as go
 import pytest
 
 from underskin.errors import InvalidInput
-from underskin.figures import Trace, array_map, frf_recordings, frf_versus_preload, raw_traces, response_per_sensor
+from underskin.figures import (
+    SensorPoints,
+    Trace,
+    array_map,
+    d33_history,
+    frf_recordings,
+    frf_versus_preload,
+    raw_traces,
+    response_per_sensor,
+)
 from underskin.frf_summary import FrfLines
 
 SENSORS = ("s1", "s2", "s3")
@@ -73,3 +83,13 @@ def test_the_value_under_the_pointer_has_its_unit() -> None:
     assert " pC/N<extra>" in magnitude
     assert "°<extra>" in phase
     assert "}<extra>" in coherence
+
+
+def test_the_axis_of_a_single_campaign_spans_days() -> None:
+    def history(*times: str) -> go.Figure:
+        return d33_history([SensorPoints("s01", times, [14.0] * len(times), [0.1] * len(times), "")])
+
+    low, high = history("2026-05-03T09:00:00.000000Z").layout.xaxis.range
+    assert (high - low).days == 2
+    assert history("2026-05-03T09:00:00Z", "2026-07-03T09:00:00Z").layout.xaxis.range is None
+    assert history().layout.xaxis.range is None

@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
 from underskin.figures.style import COLOURS, DASHES, MARKERS, label, styled
+
+_DAY = timedelta(days=1)
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ def d33_history(sensors: Sequence[SensorPoints]) -> go.Figure:
             hovertemplate=f"{label(entry.sensor)}, %{{x|%d %b %Y %H:%M}} UTC<br>d33 %{{y:.5g}} "
             f"± %{{error_y.array:.3g}} pC/N<br>{label(entry.trend)}<extra></extra>",
         )
-    return _finished(figure, "d33 of each sensor over time")
+    return _finished(figure, "d33 of each sensor over time", [time for entry in sensors for time in entry.times])
 
 
 def array_history(
@@ -56,10 +59,13 @@ def array_history(
         line={"color": COLOURS[0], "width": 1.5}, marker={"size": 6},
         hovertemplate="%{x|%d %b %Y %H:%M} UTC<br>median d33 %{y:.5g} pC/N<extra></extra>",
     )  # fmt: skip
-    return _finished(figure, "d33 of the array over time")
+    return _finished(figure, "d33 of the array over time", times)
 
 
-def _finished(figure: go.Figure, title: str) -> go.Figure:
+def _finished(figure: go.Figure, title: str, times: Sequence[str]) -> go.Figure:
     figure.update_xaxes(title="recorded", type="date")
+    moments = sorted(datetime.fromisoformat(time) for time in times)
+    if moments and moments[-1] - moments[0] < _DAY:  # else the axis of a single campaign would count milliseconds
+        figure.update_xaxes(range=[moments[0] - _DAY, moments[-1] + _DAY])
     figure.update_yaxes(title="d33 [pC/N]")
     return styled(figure, title)
