@@ -137,7 +137,7 @@ On the array every recording at 1 N is a late one and every recording at 3 N an 
 preload, in age and, in part, in sensors, so the numbers alone cannot tell a d33 that grows with preload from one
 that falls with age: any weight between the two comes from the mechanisms' priors, not from the recordings. That
 something is missing from the base model on the array is not in doubt. Axes that the report calls undecidable there:
-{", ".join(undecidable) or "none"}. Next experiment in that report: {planned}. {_too_sure(array)}
+{", ".join(undecidable) or "none"}. Next experiment in that report: {planned.rstrip(".")}. {_too_sure(array)}
 
 What settles it: press the twelve sensors of the latest runs at 1 N *and* 3 N on the same day. The last two rows are
 that experiment in both worlds, diagnosed together with the array's recordings.
