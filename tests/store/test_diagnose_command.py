@@ -23,7 +23,7 @@ def test_reports_of_kept_campaigns_are_those_of_the_service(tmp_path: Path) -> N
     assert f"{kept}: explained" in result.stderr
     assert "nowhere: 404" in result.stderr
     assert json.loads((reports / f"{kept}.json").read_text(encoding="utf-8")) == report()
-    assert "contact_resonance" in (reports / f"{kept}.html").read_text(encoding="utf-8")
+    assert "contact resonance" in (reports / f"{kept}.html").read_text(encoding="utf-8")
     assert len(list(reports.iterdir())) == 2
 
 
