@@ -141,7 +141,7 @@ CASES: list[tuple[tuple[str, ...], tuple[float, ...]]] = [
     (("preload_dependent_d33",), (2.0, 1.0)),
     (("modulus_error",), (1.4,)),
     (("thickness_error",), (1.1,)),
-    (("crosstalk",), (0.1,)),
+    (("timing_delay",), (20.0,)),
     (("sensor_relaxation",), (0.03, 0.0, 20.0)),
     (("contact_resonance",), (3.0, 0.05)),
     (("moving_contact_edge", "ageing"), (0.7, 0.2, 500.0, 0.0)),

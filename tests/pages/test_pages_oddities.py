@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.pages.test_pages_security import token_of
-from tests.store.server import Server, campaign
+from tests.store.server import Place, Server, campaign, running
 
 Document = dict[str, Any]
 FILES = Path(__file__).parents[2] / "examples" / "campaigns"
@@ -164,19 +164,23 @@ def test_a_band_without_lines_is_refused_by_name(server: Server) -> None:
         assert "band" in answer.text
 
 
-def test_the_example_comes_back_once_all_of_it_was_withdrawn(server: Server) -> None:
-    def kept(state: str) -> list[str]:
-        found = server.http.get("/v1/campaigns", params={"skin": "example", "state": state}).json()["campaigns"]
-        return [entry["id"] for entry in found]
-
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as anyone:
+def test_the_example_comes_back_once_all_of_it_was_withdrawn(tmp_path: Path) -> None:
+    with (  # a server of its own: withdrawn campaigns stay
+        running(Place(tmp_path)) as server,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as anyone,
+    ):
         form = {"form_token": token_of(anyone.get("/").text)}
         anyone.post("/example", data=form)
-        loaded = kept("current")
+        loaded = _in_use(server)
         for number in loaded:
             server.http.post(f"/v1/campaigns/{number}/withdraw", json={"reason": "tried"}).raise_for_status()
-        assert kept("current") == []
+        assert _in_use(server) == []
         for _ in range(2):  # once, however often it is asked for
             assert anyone.post("/example", data=form).headers["location"] == "/skins/example"
-        assert len(kept("current")) == len(loaded)
-        assert set(kept("current")).isdisjoint(loaded)
+        assert len(_in_use(server)) == len(loaded)
+        assert set(_in_use(server)).isdisjoint(loaded)
+
+
+def _in_use(server: Server) -> list[str]:
+    found = server.http.get("/v1/campaigns", params={"skin": "example", "state": "current"}).json()["campaigns"]
+    return [entry["id"] for entry in found]
