@@ -13,6 +13,7 @@ from tests.mechanism_campaigns import indentation_campaign
 from underskin.diagnosis.diagnose import diagnose
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.lines import lines
+from underskin.diagnosis.numbers import in_percent
 from underskin.diagnosis.plan import DECIDED, plan
 from underskin.diagnosis.rig_limits import Limits
 from underskin.diagnosis.search import Answer, Search, search
@@ -66,6 +67,7 @@ def test_the_sentence_names_all_that_it_separates(narrow: Left) -> None:
     assert len(planned["separates"]) >= 2
     for names in planned["separates"]:
         assert all(name.replace("_", " ") in planned["statement"] or name == "nothing_missing" for name in names)
+    assert f"probability of {in_percent(planned['probability_of_deciding'])}." in planned["statement"]
 
 
 def test_where_the_campaign_s_own_settings_tell_nothing_others_are_tried(twins: Left) -> None:

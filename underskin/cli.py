@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from underskin.units import Floats
 
 COMMAND_GROUP = "underskin.commands"
-_ELSEWHERE = "runs from a checkout or the image"
+_NOT_IN_IMAGE = ("prove",)
 
 app = typer.Typer(
     add_completion=False,
@@ -219,13 +219,17 @@ def _forward(entry: EntryPoint) -> Callable[[typer.Context], None]:
         try:
             loaded = entry.load()
         except ImportError as error:
-            raise UnderskinError(f"this command {_ELSEWHERE} ({error})") from error
+            raise UnderskinError(f"this command {_elsewhere(entry)} ({error})") from error
         if not isinstance(loaded, typer.Typer):
             function, loaded = loaded, typer.Typer(add_completion=False)
             loaded.command(entry.name)(function)
         raise typer.Exit(_run(loaded, context.args, context.command_path))
 
     return command
+
+
+def _elsewhere(entry: EntryPoint) -> str:
+    return "runs from a checkout" + ("" if entry.name in _NOT_IN_IMAGE else " or the image")
 
 
 def _summary(entry: EntryPoint) -> str:
@@ -235,7 +239,7 @@ def _summary(entry: EntryPoint) -> str:
     except ModuleNotFoundError:
         specification = None
     if specification is None or specification.origin is None:
-        return f"({_ELSEWHERE})"
+        return f"({_elsewhere(entry)})"
     for node in ast.parse(Path(specification.origin).read_text(encoding="utf-8")).body:
         if isinstance(node, ast.FunctionDef) and node.name == entry.attr:
             return (ast.get_docstring(node) or "").partition("\n")[0]

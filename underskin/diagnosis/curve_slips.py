@@ -5,11 +5,11 @@ What is compared is the apparent modulus at the largest displacement u from the 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from underskin.diagnosis.finding import Finding
+from underskin.diagnosis.finding import Finding, Inspected
 from underskin.mechanisms.mechanism import Kind
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
 from underskin.units import Floats
@@ -21,16 +21,7 @@ _REVERSED = -0.5  # correlation of force and displacement
 Curve = IndentationRecording | CompressionRecording
 
 
-@dataclass(frozen=True)
-class Sorted:
-    """A campaign with the curves of one kind that can be used, what was found, and what is lacking where none can."""
-
-    campaign: Campaign
-    found: Sequence[Finding]
-    lacking: str = ""
-
-
-def without_slips(campaign: Campaign, kind: Kind) -> Sorted:
+def without_slips(campaign: Campaign, kind: Kind) -> Inspected:
     """Reversed forces put right; copies and slips of single curves left out; slips of all named."""
     found: list[Finding] = []
     curves = [
@@ -44,13 +35,13 @@ def without_slips(campaign: Campaign, kind: Kind) -> Sorted:
     shared = _shared(campaign, curves)
     found += shared
     if shared and not campaign.units_checked:
-        return Sorted(
+        return Inspected(
             replace(left, recordings=()),
             found,
             "force, displacement and modulus cannot all be right as declared (see findings); if they are meant, say "
             "units_checked",
         )
-    return Sorted(left, found, "" if curves else "no curve can be used (see findings)")
+    return Inspected(left, found, "" if curves else "no curve can be used (see findings)")
 
 
 def _upright(entry: Curve, found: list[Finding]) -> Curve:

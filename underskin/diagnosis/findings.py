@@ -5,14 +5,14 @@ reported, and left out of the diagnosis, or put right where that is plain (a sen
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from underskin.diagnosis.against_model import against_model
 from underskin.diagnosis.axes import recording_axes
 from underskin.diagnosis.declared import overlapping, unlikely
-from underskin.diagnosis.finding import Finding
+from underskin.diagnosis.finding import Finding, Inspected
 from underskin.diagnosis.places import huddled, misplaced
 from underskin.diagnosis.slips import faint_oscillation, lone_slips, loose_sphere
 from underskin.mechanisms.frf_design import frf_recordings
@@ -24,15 +24,6 @@ from underskin.units import Complexes
 LEAST_RECORDINGS = 2
 _SAME = 1e-4  # relative difference of copies: files round numbers to some digits
 _AXES = ("preload_n", "indenter_radius_mm", "dynamic_force_n")
-
-
-@dataclass(frozen=True)
-class Inspected:
-    """The recordings that can be used, what was found, and what is lacking where nothing can be told from them."""
-
-    campaign: Campaign
-    found: Sequence[Finding]
-    lacking: str = ""
 
 
 def inspect(campaign: Campaign, table: SigmaTable) -> Inspected:

@@ -18,6 +18,7 @@ import numpy as np
 
 from underskin.diagnosis.axes import WORDS
 from underskin.diagnosis.explanation import Workbench
+from underskin.diagnosis.numbers import in_percent
 from underskin.diagnosis.rig_limits import Limits, candidates, inferred, wider
 from underskin.diagnosis.search import Answer, Search
 from underskin.diagnosis.statements import in_words
@@ -230,5 +231,5 @@ def _statement(
     rivals = _together([in_words(rival) for rival in names])
     return (
         f"{count} with the {entry.indenter_radius_mm:g} mm sphere at {entry.preload_n:g} N, should tell which of "
-        f"{rivals} it is, with a probability of {100 * chance:.0f} %.{wider_than}"
+        f"{rivals} it is, with a probability of {in_percent(chance)}.{wider_than}"
     )
