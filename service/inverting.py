@@ -2,14 +2,17 @@
 
 import logging
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import orjson
 
-from service.adopted import Serving
+from service.adopted import Serving, serving
 from service.d33_models import D33, of_inversion, of_moduli
+from service.problems import Refusal
 from service.store import campaigns, inversions
 from service.store.engine import Database, StorageFull
+from service.store.errors import Conflict
 from service.store.tables import AnyRow
 from underskin import InvalidInput
 from underskin.recordings.campaign import Campaign
@@ -77,8 +80,15 @@ def derive(store: Database, table: SigmaTable, campaign_ids: Sequence[str]) -> N
             with store.reading() as connection:
                 row = campaigns.find(connection, campaign_id)
             answer(store, table, row, None)
+            _derive_adopted(store, table, row)
         except Exception:  # the campaign itself is kept, and that is what was promised
             logger.exception("no d33 from a campaign", extra={"fields": {"campaign": campaign_id}})
+
+
+def _derive_adopted(store: Database, table: SigmaTable, row: AnyRow) -> None:
+    """The same by the model in force of its skin, where there is one that can tell it."""
+    with suppress(Refusal, Conflict, InvalidInput):
+        adopted_answer(store, table, row, serving(store, row.skin_id), None)
 
 
 def complete(store: Database, table: SigmaTable, root: str) -> None:

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 
 from service import inverting
 from service.dependencies import CampaignId, Store, Table
-from service.pages import requests
+from service.pages import requests, verdicts
 from service.pages.campaign_figures import band_query, figures, frf_columns, inversion, preload_columns
 from service.pages.figures import csv_answer
 from service.pages.forms import WRITE, Form, see
@@ -21,6 +21,7 @@ from underskin.recordings.campaign import Campaign, CompressionRecording, Indent
 router = APIRouter(prefix="/campaigns/{campaign_id}")
 
 _MOST_LISTED = 60
+_MOST_DIAGNOSES = 5
 
 
 def _band(
@@ -52,7 +53,8 @@ def campaign(
     with store.reading() as connection:
         row = campaigns.find(connection, campaign_id)
         kept = campaigns.recordings_of(connection, row.number)
-        told = diagnoses.listed(connection, diagnoses.Filters(campaign=campaign_id), None, 5)
+        told = diagnoses.listed(connection, diagnoses.Filters(campaign=campaign_id), None, _MOST_DIAGNOSES)
+        told_of = verdicts.of_rows(connection, told)
     answer = inverting.answer(store, table, row, band)
     sensors = sorted({entry.sensor for entry in kept if entry.sensor is not None})
     show = show if show in {"", *sensors, *(entry.id for entry in kept)} else ""
@@ -67,7 +69,7 @@ def campaign(
         recordings=kept,
         most_listed=_MOST_LISTED,
         sensors=sensors,
-        diagnoses=told,
+        diagnoses=list(told_of.values()),
         figures=figures(store, table, row, answer, show),
         show=show,
         band=band,

@@ -6,16 +6,19 @@ from typing import Annotated, Any, Literal
 from urllib.parse import quote
 
 from fastapi import APIRouter, Query, Request, Response
+from sqlalchemy import Connection
 from starlette.background import BackgroundTask
 
 from service import histories, inverting
+from service.adopted import serving
 from service.campaigns import before as number_of
 from service.dependencies import SkinId, Store, Table
-from service.pages import requests
+from service.pages import requests, verdicts
+from service.pages.adoption import Adoption, answer_by_it, change_percent, of_rows
 from service.pages.figures import Drawn, csv_answer, drawn
 from service.pages.html import page
 from service.skin_models import History, SensorHistory
-from service.store import campaigns, diagnoses, inversions, models, overview, skins
+from service.store import campaigns, inversions, models, overview, skins
 from service.store.engine import Database
 from service.store.tables import AnyRow
 from underskin.surrogate import SigmaTable
@@ -50,16 +53,20 @@ def skin(
         numbers = [row.number for row in rows]
         medians = overview.medians(connection, numbers, table.sha256)
         diagnosed = overview.latest_diagnoses(connection, numbers)
-        model = models.in_force(connection, root)
-        outdated = None if model is None else diagnoses.outdated(model)
-    by = by if model is not None and outdated is None else "paper"
+        told = list(diagnosed.values())
+        verdict = verdicts.of_rows(connection, told, [row.id for row in told if row.model_id is not None])
+        model = _in_force(connection, root)
+    serves = model is not None and model.outdated is None
+    by = by if serves else "paper"
     history = _told(store, table, root, by)
     last = latest[0] if latest else None
     sensor = sensor if sensor in {entry.sensor for entry in history.sensors} else None
     answer = None if last is None else inverting.answer(store, table, last, None)
+    by_model, why_not = (None, None) if last is None or not serves else answer_by_it(store, table, root, last)
+    mapped = by_model if by == "adopted" else answer
     figures = []
-    if last is not None and answer is not None and answer["sensors"]:
-        figures.append(_map(root, last, answer, history, show))
+    if last is not None and mapped is not None and mapped["sensors"]:
+        figures.append(_map(root, last, mapped, history, show, by))
     if history.sensors:
         figures.append(_history(root, history, sensor, by))
     path = f"/v1/skins/{quote(root, safe='')}"
@@ -71,12 +78,15 @@ def skin(
         answer=answer,
         described=None if last is None else last.about["skin"],
         rows=[
-            (row, campaigns.state(row), medians.get(row.number), diagnosed.get(row.number)) for row in rows[:_ON_A_PAGE]
+            (row, campaigns.state(row), medians.get(row.number), _verdict(verdict, diagnosed.get(row.number)))
+            for row in rows[:_ON_A_PAGE]
         ],
         following=rows[_ON_A_PAGE - 1].number if len(rows) > _ON_A_PAGE else None,
         history=history,
         model=model,
-        outdated=outdated,
+        by_model=by_model,
+        why_not=why_not,
+        change=None if by_model is None or answer is None else change_percent(_array(answer), _array(by_model)),
         by=by,
         figures=figures,
         show=show,
@@ -94,15 +104,19 @@ def skin(
 
 
 @router.get("/map.csv")
-def map_csv(skin_id: SkinId, store: Store, table: Table) -> Response:
+def map_csv(skin_id: SkinId, store: Store, table: Table, by: Annotated[By, Query(alias="model")] = "paper") -> Response:
     """d33 of each sensor in the latest campaign, and its trend."""
     root, _ = _completed(store, table, skin_id)
-    trends = {entry.sensor: entry.trend for entry in _told(store, table, root, "paper").sensors}
+    trends = {entry.sensor: entry.trend for entry in _told(store, table, root, by).sensors}
     with store.reading() as connection:
         latest = campaigns.listed(connection, campaigns.Filters(skin=root, state="current"), None, 1)
     columns: dict[str, list[Any]] = {name: [] for name in (*_MAP_COLUMNS, *_TREND_COLUMNS)}
     for row in latest:
-        answer = inverting.answer(store, table, row, None)
+        answer = (
+            inverting.answer(store, table, row, None)
+            if by == "paper"
+            else inverting.adopted_answer(store, table, row, serving(store, root), None)
+        )
         places = {entry["id"]: entry for entry in row.about["skin"]["sensors"]}
         for entry in answer["sensors"]:
             values = {**entry, **places[entry["sensor"]]}
@@ -143,6 +157,19 @@ def history_csv(
     )
 
 
+def _in_force(connection: Connection, root: str) -> Adoption | None:
+    row = models.in_force(connection, root)
+    return None if row is None else of_rows(connection, [row])[0]
+
+
+def _verdict(verdict: Mapping[str, verdicts.Verdict], row: AnyRow | None) -> verdicts.Verdict | None:
+    return None if row is None else verdict[row.id]
+
+
+def _array(answer: Mapping[str, Any]) -> float | None:
+    return None if answer["array"] is None else answer["array"]["d33_pc_per_n"]
+
+
 def _completed(store: Database, table: SigmaTable, skin_id: str) -> tuple[str, int]:
     """The skin's own id, and of how many campaigns d33 is still to be computed; a few are computed at once."""
     with store.reading() as connection:
@@ -161,7 +188,7 @@ def _told(store: Database, table: SigmaTable, root: str, by: By) -> History:
         return histories.history(connection, root, table.sha256)
 
 
-def _map(root: str, row: AnyRow, answer: Mapping[str, Any], history: History, show: Shown) -> Drawn:
+def _map(root: str, row: AnyRow, answer: Mapping[str, Any], history: History, show: Shown, by: By) -> Drawn:
     from underskin.figures import Quantity, array_map
 
     places = {entry["id"]: entry for entry in row.about["skin"]["sensors"]}
@@ -187,11 +214,11 @@ def _map(root: str, row: AnyRow, answer: Mapping[str, Any], history: History, sh
         quantity,
     )
     about = f"Each sensor where it lies, coloured by {quantity.name}, in the latest campaign, {row.name}, "
-    about += "by the paper's model."
+    about += "by the adopted model." if by == "adopted" else "by the paper's model."
     known = [entry for entry in entries if entry["d33_pc_per_n"] is not None]
     if show == "d33" and known:
         about += f" {_range(known)}"
-    return drawn("map", figure, about, f"/skins/{quote(root, safe='')}/map.csv")
+    return drawn("map", figure, about, f"/skins/{quote(root, safe='')}/map.csv?model={by}")
 
 
 def _range(known: Sequence[Mapping[str, Any]]) -> str:

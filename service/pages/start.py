@@ -7,7 +7,7 @@ from starlette.background import BackgroundTask
 
 from service.campaigns import before as number_of
 from service.dependencies import Store, Table
-from service.pages import requests
+from service.pages import adoption, requests, verdicts
 from service.pages.figures import prepare
 from service.pages.html import page
 from service.pages.sparkline import sparkline
@@ -29,11 +29,24 @@ def start(
     """The skins whose campaigns came last, first."""
     with store.reading() as connection:
         found = overview.glances(connection, find or None, number_of(before), _ON_A_PAGE + 1, table.sha256)
-    shown = found[:_ON_A_PAGE]
+        shown = found[:_ON_A_PAGE]
+        told = [glance.diagnosis for glance in shown if glance.diagnosis is not None]
+        verdict = verdicts.of_rows(connection, told, [row.id for row in told if row.model_id is not None])
+        models = [glance.model for glance in shown if glance.model is not None]
+        adoptions = {one.diagnosis_id: one for one in adoption.of_rows(connection, models)}
     answer = page(
         request,
         "start.html",
-        glances=[(glance, sparkline(glance.d33)) for glance in shown],
+        glances=[
+            (
+                glance,
+                sparkline(glance.d33),
+                None if glance.diagnosis is None else verdict[glance.diagnosis.id],
+                None if glance.model is None else adoptions[glance.model.id],
+                adoption.change_percent(glance.d33[-1][1] if glance.d33 else None, glance.adopted_d33),
+            )
+            for glance in shown
+        ],
         find=find,
         following=shown[-1].cursor if len(found) > _ON_A_PAGE else None,
         first=before is None,

@@ -94,6 +94,13 @@ def report_of(connection: Connection, number: int) -> dict[str, Any] | None:
     return None if blob is None else dict(decompressed(blob))
 
 
+def reports_of(connection: Connection, numbers: Sequence[int]) -> dict[int, dict[str, Any]]:
+    """The reports of those diagnoses that are done."""
+    query = select(diagnoses.c.number, diagnoses.c.report).where(diagnoses.c.number.in_(numbers))
+    found = connection.execute(query.where(diagnoses.c.report.is_not(None))).all()
+    return {row.number: dict(decompressed(row.report)) for row in found}
+
+
 def figures_of(connection: Connection, number: int) -> dict[str, str]:
     """JSON of the figures that were made with its report, by name; none where they were not kept."""
     blob = connection.execute(select(diagnoses.c.figures).where(diagnoses.c.number == number)).scalar()

@@ -48,6 +48,11 @@ class _Mechanism(BaseModel):
     parameters: list[_Parameter]
 
 
+class _Alternative(BaseModel):
+    mechanisms: list[str]
+    probability: Share
+
+
 class _D33(BaseModel):
     low: Positive
     high: Positive
@@ -61,6 +66,7 @@ class _Report(BaseModel):
     probability: Share
     statement: str
     mechanisms: list[_Mechanism]
+    alternatives: list[_Alternative]
     fit: dict[str, Any] | None
     d33: _D33 | None
     provenance: dict[str, Any]

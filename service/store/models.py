@@ -10,6 +10,7 @@ from service.store import diagnoses as kept
 from service.store import skins
 from service.store.errors import Conflict
 from service.store.tables import AnyRow, diagnoses, models
+from service.store.tables import skins as skin_rows
 from service.store.times import now
 
 _OWN = (
@@ -54,6 +55,14 @@ def adopt(connection: Connection, root: str, diagnosis: AnyRow, adopted_from: st
 def in_force(connection: Connection, root: str) -> AnyRow | None:
     """The model adopted last for a skin or for one joined to it; None where there is none."""
     return connection.execute(_rows(root).limit(1)).first()
+
+
+def in_force_of(connection: Connection, roots: Sequence[str]) -> dict[str, AnyRow]:
+    """As `in_force`, of each of these skins that has one."""
+    query = kept.rows().add_columns(*_OWN, skin_rows.c.root_id).join(models, models.c.diagnosis == diagnoses.c.number)
+    query = query.join(skin_rows, skin_rows.c.id == models.c.skin_id).where(skin_rows.c.root_id.in_(roots))
+    found = connection.execute(query.order_by(models.c.adopted_at, models.c.number))
+    return {row.root_id: row for row in found}  # the last one stays
 
 
 def of_skin(connection: Connection, root: str) -> Sequence[AnyRow]:

@@ -9,9 +9,12 @@ from sqlalchemy import ColumnElement, Connection, func, select
 
 from service.store import campaigns as kept
 from service.store import inversions
+from service.store import models as adopted_models
 from service.store.tables import AnyRow, campaigns, diagnoses, models, sensor_d33, skins
 from service.store.tables import inversions as derived
 
+_OF_CAMPAIGNS = ("id", "number", "name", "recordings", "excluded", "revision")
+_OF_DIAGNOSES = ("number", "id", "campaign", "state", "verdict", "probability", "asked_at", "ended_at")
 _LATELY = 12  # campaigns of a trend
 
 
@@ -25,6 +28,8 @@ class Glance:
     cursor: int
     d33: list[tuple[str, float]] = field(default_factory=list)
     diagnosis: AnyRow | None = None  # the latest of the last campaign
+    model: AnyRow | None = None  # in force
+    adopted_d33: float | None = None  # as the last of `d33`, by that model; None where it is not kept
 
 
 def glances(
@@ -47,9 +52,13 @@ def glances(
         if row.number in values:
             glance.d33.append((row.time, values[row.number]))
     diagnosed = latest_diagnoses(connection, [row.number for row in recent])
+    adopted = adopted_models.in_force_of(connection, list(found))
     for glance in found.values():
         if glance.last is not None:
             glance.diagnosis = diagnosed.get(glance.last.number)
+        glance.model = adopted.get(glance.skin_id)
+        if glance.model is not None and glance.last is not None:
+            glance.adopted_d33 = _adopted_median(connection, glance.last, glance.model.model_id, table_sha256)
     return list(found.values())
 
 
@@ -57,7 +66,11 @@ def _recent(connection: Connection, roots: Sequence[str]) -> Sequence[AnyRow]:
     """The last few current campaigns of each skin, the oldest first."""
     time = func.coalesce(campaigns.c.recorded_at, campaigns.c.received_at)
     place = func.row_number().over(partition_by=skins.c.root_id, order_by=(time.desc(), campaigns.c.number.desc()))
-    columns = [column for column in campaigns.c if column.name in ("id", "number", "name", "recordings", "excluded")]
+    columns = [
+        column
+        for column in campaigns.c
+        if column.name in ("id", "number", "name", "recordings", "excluded", "revision")
+    ]
     ranked = (
         select(skins.c.root_id, time.label("time"), place.label("place"), *columns)
         .join(skins, skins.c.id == campaigns.c.skin_id)
@@ -82,11 +95,17 @@ def medians(connection: Connection, numbers: Sequence[int], table_sha256: str) -
     return {number: median(values) for number, values in by_campaign.items()}
 
 
+def _adopted_median(connection: Connection, row: AnyRow, model_id: str, table_sha256: str) -> float | None:
+    """Median over the sensors of d33 [pC/N] by an adopted model, where it is kept."""
+    answer = inversions.find_adopted(connection, row, model_id, table_sha256)
+    values = [] if answer is None else [entry["d33_pc_per_n"] for entry in answer["sensors"]]
+    known = [value for value in values if value is not None]
+    return median(known) if known else None
+
+
 def latest_diagnoses(connection: Connection, numbers: Sequence[int]) -> dict[int, AnyRow]:
     """The latest diagnosis of each of these campaigns that has one; `model_id`: of the model it was adopted as."""
-    columns: list[ColumnElement[Any]] = [
-        column for column in diagnoses.c if column.name in ("id", "campaign", "state", "verdict", "probability")
-    ]
+    columns: list[ColumnElement[Any]] = [column for column in diagnoses.c if column.name in _OF_DIAGNOSES]
     query = (
         select(*columns, models.c.id.label("model_id"))
         .outerjoin(models, models.c.diagnosis == diagnoses.c.number)

@@ -1,0 +1,58 @@
+"""The model in force of a skin, as pages head it: what it adds, since when, and d33 by it beside the paper's."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection
+
+from service import adopted, inverting
+from service.pages.verdicts import in_words, mechanisms_of
+from service.problems import Refusal
+from service.store import diagnoses
+from service.store.engine import Database
+from service.store.errors import Conflict
+from service.store.tables import AnyRow
+from underskin import InvalidInput
+from underskin.surrogate import SigmaTable
+
+
+@dataclass(frozen=True)
+class Adoption:
+    """A model in force; `outdated`: why it serves no figures, None where it does."""
+
+    diagnosis_id: str
+    version: int
+    at: str
+    mechanisms: str
+    outdated: str | None
+
+
+def of_rows(connection: Connection, rows: Sequence[AnyRow]) -> list[Adoption]:
+    """Of rows of models in force."""
+    reports = diagnoses.reports_of(connection, [row.number for row in rows])
+    return [
+        Adoption(
+            row.id,
+            row.model_version,
+            row.adopted_at,
+            in_words(mechanisms_of(reports[row.number])),
+            diagnoses.outdated(row),
+        )
+        for row in rows
+    ]
+
+
+def answer_by_it(
+    store: Database, table: SigmaTable, root: str, row: AnyRow
+) -> tuple[Mapping[str, Any] | None, str | None]:
+    """d33 of a campaign by the model in force, or why there is none."""
+    try:
+        return inverting.adopted_answer(store, table, row, adopted.serving(store, root), None), None
+    except (InvalidInput, Conflict, Refusal) as error:
+        return None, str(error)
+
+
+def change_percent(by_paper: float | None, by_model: float | None) -> float | None:
+    """How far d33 by the adopted model lies above the paper's [%]."""
+    return None if not by_paper or by_model is None else 100 * (by_model / by_paper - 1)
