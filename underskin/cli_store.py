@@ -13,8 +13,6 @@ from underskin.errors import UnderskinError
 if TYPE_CHECKING:
     from underskin.client import Client
 
-_HDF5 = b"\x89HDF\r\n\x1a\n"
-
 Url = Annotated[str, typer.Option(envvar="UNDERSKIN_URL", help="Where the service is.")]
 Key = Annotated[
     str | None, typer.Option(envvar="UNDERSKIN_API_KEY", help="API key of scope write, where keys are needed.")
@@ -111,15 +109,10 @@ def _content_key(files: Sequence[Path], terms: Mapping[str, Any]) -> str:
 
 def _is_export(file: Path) -> bool:
     """Whether a file is what `export` writes, by its content."""
+    from underskin.recordings.skin_export import is_export
+
     with file.open("rb") as opened:
-        if opened.read(len(_HDF5)) != _HDF5:
-            return False
-    import h5py
-
-    from underskin.recordings.skin_export import SCHEMA
-
-    with h5py.File(file, "r") as source:
-        return bool(source.attrs.get("schema") == SCHEMA)
+        return is_export(opened, str(file))
 
 
 def _told(client: "Client", result: dict[str, Any]) -> list[tuple[bool, str]]:

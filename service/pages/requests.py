@@ -41,6 +41,12 @@ def files(request: Request, labels: Sequence[str], rig: str | None, skin: str) -
     return SameRequest(_curl(request, f"/v1/campaigns{query}") + shown, _python(request, call))
 
 
+def exported_skin(request: Request, label: str) -> SameRequest:
+    """POST a file that holds an exported skin."""
+    send = f" \\\n  -H 'Content-Type: application/x-hdf5' --data-binary {shlex.quote('@' + label)}"
+    return SameRequest(_curl(request, "/v1/skins/import") + send, _python(request, f"client.skins.load({label!r})"))
+
+
 def _curl(request: Request, path: str) -> str:
     key = ' -H "Authorization: Bearer $UNDERSKIN_API_KEY"' if request.scope["key"] is not None else ""
     return f"curl -s {shlex.quote(_origin(request) + path)}{key}"

@@ -12,7 +12,7 @@ from service import inverting, session
 from service.accepting import RIG
 from service.campaigns import heavy
 from service.dependencies import Store, Table
-from service.pages import requests
+from service.pages import requests, upload_skin
 from service.pages.figures import Drawn, csv_answer
 from service.pages.forms import TOKEN, WRITE, Form, require_own, see
 from service.pages.html import page
@@ -71,8 +71,11 @@ async def send(request: Request, store: Store) -> Response:
     shelved.skin = fields.get(SKIN_FIELD) or None
     shelved.rig, shelved.refused = found
     try:
-        async with heavy:
-            await run_in_threadpool(_look, request, shelved)
+        if await run_in_threadpool(upload_skin.holds_skin, shelved):
+            await upload_skin.look(store, shelved)
+        else:
+            async with heavy:
+                await run_in_threadpool(_look, request, shelved)
     except BaseException:
         shelf.discard(shelved)
         raise
@@ -85,6 +88,8 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
     shelved = _find(request, upload_id)
     if shelved.kept_at is not None:
         return see(shelved.kept_at)
+    if shelved.skin_seen is not None:
+        return upload_skin.shown(request, shelved)
     file = min(file, len(shelved.files) - 1)
     if file not in shelved.drawn:
         _draw(shelved, file, _looked(request, shelved, file))
@@ -151,6 +156,16 @@ async def keep(request: Request, upload_id: str, sent: Form, store: Store, table
     async with heavy:
         kept = await run_in_threadpool(keep_good, request, shelved, sent, store)
         await run_in_threadpool(inverting.derive, store, table, kept)
+    return see(shelved.kept_at or f"/upload/{upload_id}")
+
+
+@router.post("/{upload_id}/skin", dependencies=WRITE)
+async def bring_in(request: Request, upload_id: str, sent: Form, store: Store) -> Response:  # noqa: ARG001 -- as below
+    """Brings in an exported skin."""
+    shelved = _find(request, upload_id)
+    if shelved.skin_seen is None:
+        raise Missing("There is no exported skin in this upload.")
+    await upload_skin.bring_in(request, store, shelved)
     return see(shelved.kept_at or f"/upload/{upload_id}")
 
 

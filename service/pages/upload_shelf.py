@@ -16,6 +16,7 @@ from typing import Any
 
 from service.pages.figures import Drawn
 from service.pages.upload_seen import FileSeen
+from service.pages.upload_skin_seen import SkinSeen
 from service.store.errors import Missing
 from service.uploads import Upload
 from underskin.recordings.rig_description import RigDescription
@@ -43,6 +44,7 @@ class Shelved:
     )  # what is wrong with the form, or kept it from being kept
     seen: list[FileSeen] = field(default_factory=list)
     drawn: dict[int, list[Drawn]] = field(default_factory=dict)
+    skin_seen: SkinSeen | None = None  # where it is an exported skin
     kept_at: str | None = None  # the page of what was kept
     lock: threading.Lock = field(default_factory=threading.Lock)
 

@@ -13,7 +13,6 @@ from sqlalchemy import Connection, insert, select
 from service.store import skins
 from service.store.codec import compressed, decompressed
 from service.store.engine import Database
-from service.store.errors import Conflict
 from service.store.tables import AnyRow, campaigns, diagnoses, models
 
 Text = Annotated[str, StringConstraints(max_length=4000)]
@@ -142,21 +141,30 @@ def checked(
     return Checked(rows, model_rows)
 
 
-def require_same(connection: Connection, file: Checked) -> None:
-    """Raises Conflict where a diagnosis or a version of a model is there already and differs."""
+def known(connection: Connection, file: Checked) -> set[str]:
+    """Ids of those diagnoses and models that are in the store, the same or not."""
+    found: set[str] = set()
+    for table, rows in ((diagnoses, file.diagnoses), (models, file.models)):
+        for row in rows:
+            found.update(connection.execute(select(table.c.id).where(table.c.id == row.id)).scalars())
+    return found
+
+
+def clashes(connection: Connection, file: Checked) -> list[str]:
+    """Which diagnoses and versions of models are there already and differ."""
+    found = []
     for row in file.diagnoses:
-        found = connection.execute(
+        there = connection.execute(
             select(diagnoses, campaigns.c.id.label("campaign_id")).join(campaigns).where(diagnoses.c.id == row.id)
         ).first()
-        if found is not None and _diagnosis(found) != row.model_dump():
-            raise Conflict(f"Diagnosis {row.id!r} is there already and differs; nothing was imported.")
+        if there is not None and _diagnosis(there) != row.model_dump():
+            found.append(f"Diagnosis {row.id!r} is there already and differs")
     for model in file.models:
         same = (models.c.id == model.id) | ((models.c.skin_id == model.skin_id) & (models.c.version == model.version))
         query = select(models, diagnoses.c.id.label("diagnosis_id")).join(diagnoses).where(same)
-        for found in connection.execute(query):
-            if _model(found) != model.model_dump():
-                text = f"Model {model.version} of skin {model.skin_id!r} is there already and differs"
-                raise Conflict(f"{text}; nothing was imported.")
+        if any(_model(there) != model.model_dump() for there in connection.execute(query)):
+            found.append(f"Model {model.version} of skin {model.skin_id!r} is there already and differs")
+    return found
 
 
 def add(store: Database, file: Checked) -> None:

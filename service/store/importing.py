@@ -8,46 +8,49 @@ from collections.abc import Sequence
 
 from sqlalchemy import Connection, insert, select, update
 
-from service.store.campaigns import find, rows_of
+from service.store.campaigns import rows_of
 from service.store.engine import Database
 from service.store.errors import Conflict
 from service.store.export import exported
 from service.store.import_checks import CheckedCampaign, CheckedOverview, SkinRow
+from service.store.tables import AnyRow, recordings, rigs
 from service.store.tables import campaigns as campaigns_table
-from service.store.tables import recordings, rigs
 from service.store.tables import skins as skins_table
 from underskin.recordings.skin_export import ExportedCampaign
 
 _AT_A_TIME = 1000  # names in one query: databases limit their number
 
 
-def require_joined_alike(connection: Connection, skins: Sequence[SkinRow]) -> None:
-    """Raises Conflict where a skin is there already and was joined otherwise."""
+def otherwise_joined(connection: Connection, skins: Sequence[SkinRow]) -> list[str]:
+    """What clashes: skins that are there already and were joined otherwise."""
+    clashes = []
     for row in skins:
         found = connection.execute(select(skins_table).where(skins_table.c.id == row.id)).first()
         if found is not None and (found.root_id, found.joined_to) != (row.root_id, row.joined_to):
-            raise Conflict(f"Skin {row.id!r} is there already and was joined otherwise; nothing was imported.")
+            clashes.append(f"Skin {row.id!r} is there already and was joined otherwise")
+    return clashes
 
 
-def known(connection: Connection, names: Sequence[str]) -> set[str]:
-    """Those of the file's campaigns that the store has."""
-    found: set[str] = set()
+def known(connection: Connection, names: Sequence[str]) -> dict[str, AnyRow]:
+    """Rows, by id, of those of the file's campaigns that the store has."""
+    found: dict[str, AnyRow] = {}
     for start in range(0, len(names), _AT_A_TIME):
         these = campaigns_table.c.id.in_(names[start : start + _AT_A_TIME])
-        found.update(connection.execute(select(campaigns_table.c.id).where(these)).scalars())
+        found.update((row.id, row) for row in connection.execute(select(campaigns_table).where(these)))
     return found
 
 
-def require_same(connection: Connection, name: str, campaign: ExportedCampaign) -> None:
-    """Raises Conflict where a campaign that is there already says something else."""
-    if not exported(connection, find(connection, name)).same_as(campaign):
-        raise Conflict(f"Campaign {name!r} is there already and differs; nothing was imported.")
+def differs(connection: Connection, row: AnyRow, campaign: ExportedCampaign) -> bool:
+    """Whether a campaign of the store, by its row, says something else."""
+    return not exported(connection, row).same_as(campaign)
 
 
 def add_skins(store: Database, checked: CheckedOverview) -> None:
-    """Keep the skins, joined as they were, and their rigs."""
+    """Keep the skins, joined as they were, and their rigs; raises Conflict as others may have joined them meanwhile."""
     with store.writing() as connection:
-        require_joined_alike(connection, checked.skins)
+        clashes = otherwise_joined(connection, checked.skins)
+        if clashes:
+            raise Conflict(f"{clashes[0]}; nothing was imported.")
         for row in sorted(checked.skins, key=lambda row: row.id != row.root_id):  # the root first: others refer to it
             if connection.execute(select(skins_table.c.id).where(skins_table.c.id == row.id)).first() is None:
                 connection.execute(insert(skins_table), {**row.model_dump(), "joined_to": None})

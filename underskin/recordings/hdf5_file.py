@@ -16,6 +16,7 @@ import numpy as np
 from underskin.errors import FileError
 from underskin.recordings import hdf5_links
 from underskin.recordings.campaign import COLUMNS, SCHEMA, Campaign, to_dict
+from underskin.recordings.hdf5_damage import damage
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 
@@ -58,17 +59,16 @@ def read(stream: BinaryIO, file: str) -> dict[str, Any]:
             return _document(source, file)
     except (MemoryError, FileError):
         raise
-    except Exception as error:  # h5py lets any exception of a damaged file through
-        raise FileError(file, "", f"the HDF5 file is damaged: {type(error).__name__}: {error}") from None
+    except Exception as error:
+        raise FileError(file, "", f"the HDF5 file {damage(error)}") from None
 
 
 def _document(source: Any, file: str) -> dict[str, Any]:
     about = _attributes(source)
     schema = about.get("schema")
     if str(schema).startswith("skin-export/"):
-        raise FileError(
-            file, "/", "is a whole skin as `underskin export` writes it: bring it in by `underskin import FILE`"
-        )
+        how = "it comes in alone, on the upload page or by `underskin import FILE`"
+        raise FileError(file, "/", f"is a whole skin as `underskin export` writes it: {how}")
     if schema != SCHEMA or "skin" not in source or "recordings" not in source:
         needed = f"it needs the attribute schema = {SCHEMA}, /skin and /recordings"
         raise FileError(file, "/", f"is HDF5, but no campaign: {needed}; other HDF5 is read from MATLAB 7.3 only")

@@ -19,11 +19,14 @@ import numpy as np
 import orjson
 
 from underskin.errors import FileError
+from underskin.recordings.hdf5_damage import damage
+from underskin.recordings.hdf5_file import MAGIC
 from underskin.recordings.hdf5_links import refuse_outside
 from underskin.recordings.sandbox import Limits, call_apart
 from underskin.units import Floats
 
 SCHEMA = "skin-export/1"
+_ANY_SCHEMA = "skin-export/"
 _NOTHING = np.empty(0)
 _LIMITS = Limits(unfolding=1000.0)  # a column of a simulated campaign may hold one value, and its gzip next to nothing
 
@@ -80,6 +83,17 @@ def write_campaign(target: Any, name: str, campaign: ExportedCampaign) -> None:
         group.create_dataset(f"arrays/{column}", data=np.concatenate(parts), compression="gzip", shuffle=True)
 
 
+def is_export(stream: BinaryIO, file: str) -> bool:
+    """Whether a file is an export, of whatever version, by its content; one that cannot be read is none."""
+    stream.seek(0)
+    if stream.read(len(MAGIC)) != MAGIC:
+        return False
+    try:
+        return bool(call_apart(f"{__name__}:_is_export", stream, file, what="HDF5", limits=_LIMITS)["is_export"])
+    except FileError:
+        return False
+
+
 def read_overview(stream: BinaryIO, file: str) -> Overview:
     """What an export holds, read in a child process; raises FileError where it is none, or damaged."""
     return Overview(**call_apart(f"{__name__}:_overview", stream, file, what=SCHEMA, limits=_LIMITS))
@@ -89,6 +103,14 @@ def read_campaigns(stream: BinaryIO, file: str, names: Sequence[str]) -> list[Ex
     """Some campaigns of an export, read in a child process; raises FileError."""
     told = call_apart(f"{__name__}:_campaigns", stream, file, orjson.dumps(names).decode(), what=SCHEMA, limits=_LIMITS)
     return [ExportedCampaign(**campaign) for campaign in told["campaigns"]]
+
+
+def _is_export(stream: BinaryIO) -> dict[str, Any]:
+    try:
+        with h5py.File(stream, "r") as source:
+            return {"is_export": str(source.attrs.get("schema")).startswith(_ANY_SCHEMA)}
+    except OSError as error:
+        raise FileError("", "", damage(error)) from None
 
 
 def _overview(stream: BinaryIO) -> dict[str, Any]:
@@ -108,13 +130,16 @@ def _opened(stream: BinaryIO) -> Iterator[Any]:
     try:
         with h5py.File(stream, "r") as source:
             refuse_outside(source, "")
-            if source.attrs.get("schema") != SCHEMA:
+            schema = str(source.attrs.get("schema"))
+            if schema.startswith(_ANY_SCHEMA) and schema != SCHEMA:
+                raise FileError("", "/", f"is an export of another underskin: {schema}; this one reads {SCHEMA}")
+            if schema != SCHEMA:
                 raise FileError("", "/", f"is no export of a skin: it needs the attribute schema = {SCHEMA}")
             yield source
     except (MemoryError, FileError):
         raise
-    except Exception as error:  # h5py lets any exception of a damaged file through
-        raise FileError("", "", f"the export is damaged: {type(error).__name__}: {error}") from None
+    except Exception as error:
+        raise FileError("", "", f"the export {damage(error)}") from None
 
 
 def _campaign(group: Any) -> dict[str, Any]:
