@@ -83,6 +83,21 @@ def test_curves_far_from_the_declared_modulus_are_named(pads: Campaign) -> None:
     assert found.lacking
 
 
+@pytest.mark.parametrize("change", [change for change, (code, *_), _ in ONE if code == "units_off_by_1000"])
+def test_of_two_curves_the_declared_modulus_tells_which_is_off(change: Change, pads: Campaign) -> None:
+    two = replace(pads, recordings=pads.recordings[:2])
+    wrong = changed(two, change, "c1")
+    found = without_slips(wrong, "compression")
+    assert {entry.code for entry in found.found} == {"units_off_by_1000"}
+    by_reach = {entry.id for entry in found.campaign.recordings} == {"c0"}  # pressed through its own height
+    assert by_reach or found.lacking
+    declared = replace(wrong, skin=replace(pads.skin, youngs_modulus_mpa=1.2 * MODULUS_MPA))
+    told = without_slips(declared, "compression")
+    assert {(entry.code, entry.recording) for entry in told.found} == {("units_off_by_1000", "c1")}
+    assert (told.lacking, [entry.id for entry in told.campaign.recordings]) == ("", ["c0"])
+    assert without_slips(two, "compression").found == []
+
+
 def test_reversed_forces_are_put_right_and_invent_nothing(pads: Campaign) -> None:
     for names in (ALL, ("c2",)):
         report = diagnosis_report(changed(pads, times(-1.0, "force_n"), *names), load_table())

@@ -235,6 +235,46 @@ def test_recordings_made_alike_at_one_frequency_tell_nothing(table: SigmaTable) 
     assert "made alike" in report["statement"]
 
 
+@pytest.mark.parametrize("factor", [1e3, 1e-3, -1.0])
+def test_of_three_recordings_the_one_that_is_off_is_named_and_of_two_neither(factor: float, table: SigmaTable) -> None:
+    made = campaign(Made(sensors=1, spheres_mm=(4.0,), preloads_n=(0.5, 1.0, 2.0)), table)
+    wrong = changed(made, times(factor, *LINES), lambda entry: entry.id == "r1")
+    code = "units_off_by_1000" if factor > 0 else "sign_flipped"
+    of_three = inspect(wrong, table)
+    assert codes(of_three.found) == {(code, "r1", "frf_re_pc_per_n")}
+    assert of_three.lacking == ""
+    of_two = inspect(replace(wrong, recordings=wrong.recordings[:2]), table)
+    assert codes(of_two.found) == {(code, "", "frf_re_pc_per_n")}
+    assert "a third" in of_two.lacking
+
+
+@pytest.mark.parametrize(("factor", "word"), [(1e3, "large"), (1e-3, "small")])
+def test_a_d33_far_from_the_declared_one_is_named(factor: float, word: str, table: SigmaTable) -> None:
+    """A thousandth of a ceramic's d33, or a weak polymer's times 1000, could be a sensor's."""
+    d33 = 0.5 if factor > 1 else 450.0
+    weak = campaign(replace(MADE, d33_pc_per_n=d33), table)
+    wrong = changed(weak, times(factor, *LINES), of_all)
+    assert codes(inspect(wrong, table).found) == set()
+    told = inspect(replace(wrong, skin=replace(weak.skin, d33_pc_per_n=-d33)), table).found
+    assert codes(told) == {("units_off_by_1000", "", "frf_re_pc_per_n")}
+    assert any(f"1000 × too {word}" in entry.statement for entry in told)
+
+
+def test_a_period_that_does_not_fit_between_recordings_is_named(good: Campaign, table: SigmaTable) -> None:
+    """From 0.03 to 3.9 Hz is no impossible sweep, but not one in 20 s."""
+
+    def dated(entry: FrfRecording) -> FrfRecording:
+        number = int(entry.id[1:])
+        return replace(entry, recorded_at=f"2020-01-01T10:{number // 3:02d}:{20 * (number % 3):02d}Z")
+
+    slow = changed(good, times(0.03, "frequency_hz"), of_all)
+    assert inspect(slow, table).found == inspect(good, table).found
+    found = inspect(changed(slow, dated, of_all), table)
+    assert codes(found.found) == {("units_off_by_1000", "", "frequency_hz")}
+    assert "20 s" in " ".join(entry.statement for entry in found.found)
+    assert found.lacking
+
+
 def test_units_that_were_checked_are_believed(good: Campaign, table: SigmaTable) -> None:
     slow = replace(changed(good, times(1e-3, "frequency_hz"), of_all), units_checked=True)
     assert inspect(slow, table).lacking == ""

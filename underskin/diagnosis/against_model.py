@@ -20,7 +20,7 @@ from underskin.units import Floats
 
 _SLIPS = {1e3: "1000 × too large: pC taken for nC, or N for mN?", 1e-3: "1000 × too small: nC taken for pC?"}
 _SLIP_WIDTH = np.log(12.0)
-_LIKELY_D33 = (0.3, 3000.0)  # pC/N
+_LIKELY_D33 = (0.3, 1000.0)  # pC/N; polymers have 5 to 40, ceramics up to some hundred
 _LEAST_RESPONSE = 0.2  # of the campaign's largest prediction: below it, near a crossing of zero, a sign says nothing
 _D33 = 15.0  # pC/N: the prior's centre is what the prediction is made with
 
@@ -40,7 +40,10 @@ def against_model(
     inside = in_reach(campaign, entries, model, table, found)
     ratio, expected = _apparent(entries, model, inside & ~silent)
     kept = inside & ~dead(entries, silent & inside, variance, expected, found)
+    if len(entries) == 2 and _contradict(ratio, found):
+        return [], "two recordings that contradict each other (see findings); a third would tell which is off"
     kept &= ~_off_by_1000(entries, ratio, found)
+    _of_all(ratio, campaign.skin.d33_pc_per_n, found)
     signs = _signs(entries, ratio, kept, found)
     entries = [entry if sign > 0 else _reversed(entry) for entry, sign in zip(entries, signs, strict=True)]
     return [entry for entry, chosen in zip(entries, kept, strict=True) if chosen], ""
@@ -58,7 +61,7 @@ def _apparent(entries: list[FrfRecording], model: Model, usable: Mask) -> tuple[
 
 
 def _off_by_1000(entries: list[FrfRecording], ratio: Floats, found: list[Finding]) -> Mask:
-    """Which recordings' levels are about 1000 × off all others; and whether all of them are."""
+    """Which recordings' levels are about 1000 × off all others."""
     off = np.zeros(len(entries), dtype=bool)
     if not np.isfinite(ratio).any():
         return off
@@ -66,16 +69,43 @@ def _off_by_1000(entries: list[FrfRecording], ratio: Floats, found: list[Finding
     slip = np.log(np.abs(ratio) / usual) if usual > 0 else np.full(len(ratio), np.nan)
     for number in np.flatnonzero(np.isfinite(slip)):
         for factor, guess in _SLIPS.items():
-            if len(entries) > 2 and abs(slip[number] - np.log(factor)) < _SLIP_WIDTH:
+            if abs(slip[number] - np.log(factor)) < _SLIP_WIDTH:
                 text = f"the response looks {guess} Left out"
                 found.append(Finding("units_off_by_1000", entries[number].id, "frf_re_pc_per_n", text))
                 off[number] = True
-    d33 = usual * _D33
-    if usual > 0 and not _LIKELY_D33[0] <= d33 <= _LIKELY_D33[1]:
-        guess = _SLIPS[1e3] if d33 > _LIKELY_D33[1] else _SLIPS[1e-3]
-        text = f"charge over force would need a d33 of {d33:.3g} pC/N; it looks {guess}"
-        found.append(Finding("units_off_by_1000", "", "frf_re_pc_per_n", text))
     return off
+
+
+def _contradict(ratio: Floats, found: list[Finding]) -> bool:
+    """Whether two recordings' levels are about 1000 × apart, or of opposite signs; which of them is off, they hide."""
+    low, high = sorted(np.abs(ratio).tolist())
+    if not low > 0:
+        return False
+    if np.prod(ratio) < 0:
+        text = "the two recordings answer with opposite signs: one of them is reversed"
+        found.append(Finding("sign_flipped", "", "frf_re_pc_per_n", text))
+        return True
+    if abs(np.log(high / low) - np.log(1e3)) < _SLIP_WIDTH:
+        text = f"the two recordings' responses are {high / low:.3g} times as far apart as expected: a slip of units?"
+        found.append(Finding("units_off_by_1000", "", "frf_re_pc_per_n", text))
+        return True
+    return False
+
+
+def _of_all(ratio: Floats, declared: float | None, found: list[Finding]) -> None:
+    """Name a d33 that no sensor has, or that is 1000 × off the declared one."""
+    d33 = float(np.nanmedian(np.abs(ratio))) * _D33 if np.isfinite(ratio).any() else 0.0
+    if d33 <= 0:
+        return
+    low, high = _LIKELY_D33
+    known = ""
+    if declared:
+        low, high = (abs(declared) * factor / np.exp(_SLIP_WIDTH) ** side for factor, side in ((1e-3, -1), (1e3, 1)))
+        known = f", where {declared:g} is declared"
+    if not low <= d33 <= high:
+        guess = _SLIPS[1e3] if d33 > high else _SLIPS[1e-3]
+        text = f"charge over force would need a d33 of {d33:.3g} pC/N{known}; it looks {guess}"
+        found.append(Finding("units_off_by_1000", "", "frf_re_pc_per_n", text))
 
 
 def _signs(entries: list[FrfRecording], ratio: Floats, kept: Mask, found: list[Finding]) -> Floats:
@@ -96,7 +126,7 @@ def _signs(entries: list[FrfRecording], ratio: Floats, kept: Mask, found: list[F
             found.append(Finding("sign_flipped", entries[int(np.flatnonzero(own)[0])].id, "frf_re_pc_per_n", text))
             signs[own] *= -1.0
             negative = negative & ~own
-    if negative.sum() <= 0.2 * max(positive.sum(), 1):
+    if negative.sum() <= max(0.2 * positive.sum(), 1) and positive.sum() > 1:
         for number in np.flatnonzero(negative):
             text = "its sign is the opposite of the others of its sensor: reversed"
             found.append(Finding("sign_flipped", entries[number].id, "frf_re_pc_per_n", text))
@@ -105,8 +135,6 @@ def _signs(entries: list[FrfRecording], ratio: Floats, kept: Mask, found: list[F
 
 
 def _reversed(entry: FrfRecording) -> FrfRecording:
-    if entry.charge_pc is not None:
-        return replace(entry, charge_pc=-entry.charge_pc)
     assert entry.frf_re_pc_per_n is not None
     assert entry.frf_im_pc_per_n is not None
     return replace(entry, frf_re_pc_per_n=-entry.frf_re_pc_per_n, frf_im_pc_per_n=-entry.frf_im_pc_per_n)

@@ -11,7 +11,7 @@ import numpy as np
 
 from underskin.diagnosis.finding import Finding, Inspected
 from underskin.mechanisms.mechanism import Kind
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, SkinDescription
 from underskin.units import Floats
 
 _SOFTEST_MPA, _HARDEST_MPA = 0.003, 300.0
@@ -30,7 +30,7 @@ def without_slips(campaign: Campaign, kind: Kind) -> Inspected:
         if isinstance(entry, IndentationRecording | CompressionRecording) and entry.kind == kind
     ]
     curves = _within_reach(_once(curves, found), found)
-    curves = _with_others(curves, campaign.skin.poisson_ratio, found)
+    curves = _with_others(curves, campaign.skin, found)
     left = replace(campaign, recordings=tuple(curves))
     shared = _shared(campaign, curves)
     found += shared
@@ -84,12 +84,19 @@ def _within_reach(curves: Sequence[Curve], found: list[Finding]) -> list[Curve]:
     return kept
 
 
-def _with_others(curves: Sequence[Curve], poisson_ratio: float, found: list[Finding]) -> list[Curve]:
-    """Those whose apparent modulus is of the others' magnitude."""
-    modulus = np.array([_apparent_mpa(entry, poisson_ratio) for entry in curves])
-    if len(curves) < 3 or not np.isfinite(modulus).any():
+def _with_others(curves: Sequence[Curve], skin: SkinDescription, found: list[Finding]) -> list[Curve]:
+    """Those whose apparent modulus is of the others' magnitude; of two, the one that is of the declared one's."""
+    modulus = np.array([_apparent_mpa(entry, skin.poisson_ratio) for entry in curves])
+    if len(curves) < 2 or not np.isfinite(modulus).any():
         return list(curves)
     usual = float(np.nanmedian(modulus))
+    if len(curves) == 2:
+        if not np.nanmax(modulus) > _FAR * np.nanmin(modulus):
+            return list(curves)
+        near = [own for own in modulus if skin.youngs_modulus_mpa and 1 / _FAR < own / skin.youngs_modulus_mpa < _FAR]
+        if len(near) != 1:
+            return list(curves)
+        usual = float(near[0])
     reach = np.array([float(np.nanmax(np.abs(entry.displacement_mm))) for entry in curves])
     kept = []
     for entry, own, farthest in zip(curves, modulus, reach, strict=True):
@@ -106,12 +113,18 @@ def _with_others(curves: Sequence[Curve], poisson_ratio: float, found: list[Find
 
 
 def _shared(campaign: Campaign, curves: Sequence[Curve]) -> list[Finding]:
-    """All curves far from the declared modulus, or from what rubber can be."""
+    """All curves far from the declared modulus, or from what rubber can be; two far from each other."""
     modulus = np.array([_apparent_mpa(entry, campaign.skin.poisson_ratio) for entry in curves])
     if not np.isfinite(modulus).any():
         return []
     usual, declared = float(np.nanmedian(modulus)), campaign.skin.youngs_modulus_mpa
     low, high = (_SOFTEST_MPA, _HARDEST_MPA) if declared is None else (declared / _FAR, declared * _FAR)
+    if len(curves) == 2 and modulus.max() > _FAR * modulus.min():
+        text = (
+            f"the two curves' apparent moduli of {modulus[0]:.2g} and {modulus[1]:.2g} MPa contradict each other: is "
+            "force or displacement of one of them off by 1000?"
+        )
+        return [Finding("units_off_by_1000", "", "force_n", text)]
     if low <= usual <= high:
         return []
     against = "rubber has 0.003 to 300 MPa" if declared is None else f"{declared:g} MPa is declared"

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial.distance import pdist
 
 from underskin import units
+from underskin.diagnosis.axes import hours
 from underskin.diagnosis.finding import Finding
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf_estimation import lines_of
@@ -76,7 +77,23 @@ def _of_frequencies(entries: Sequence[FrfRecording]) -> list[Finding]:
                 f"frequencies are {lowest:g} to {highest:g} Hz: they look 1000 × too {word}; were they given in {unit}?"
             )
             return [_slip("frequency_hz", text)]
+    pause = _pause_s(entries)
+    if pause is not None and pause * lowest < 1:
+        text = (
+            f"no period of {lowest:g} Hz fits into the {pause:.3g} s after which, by recorded_at, the next recording "
+            "follows: are they 1000 × too small, given in kHz?"
+        )
+        return [_slip("frequency_hz", text)]
     return []
+
+
+def _pause_s(entries: Sequence[FrfRecording]) -> float | None:
+    """From one recording to the next, as a rule; those made at one time were made together."""
+    times = [entry.recorded_at for entry in entries]
+    if None in times:
+        return None
+    steps = np.diff(np.unique(hours(times)))
+    return 3600 * float(np.median(steps)) if len(steps) else None
 
 
 def _slip(field: str, text: str) -> Finding:

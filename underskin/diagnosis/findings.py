@@ -14,6 +14,7 @@ from underskin.diagnosis.axes import recording_axes
 from underskin.diagnosis.declared import overlapping, unlikely
 from underskin.diagnosis.finding import Finding, Inspected
 from underskin.diagnosis.places import huddled, misplaced
+from underskin.diagnosis.series import as_given, as_lines
 from underskin.diagnosis.slips import faint_oscillation, lone_slips, loose_sphere
 from underskin.mechanisms.frf_design import frf_recordings
 from underskin.recordings.campaign import Campaign, FrfRecording
@@ -30,6 +31,16 @@ def inspect(campaign: Campaign, table: SigmaTable) -> Inspected:
     """The campaign without what cannot be used, reversed sensors put right, and what was found."""
     found: list[Finding] = []
     recorded = frf_recordings(campaign) if campaign.recordings else ()
+    estimated, contradictory = as_lines(recorded, found)
+    if contradictory:
+        return _inspected(campaign, [], contradictory, _cannot_be_right([], contradictory))
+    inspected = _inspect_lines(campaign, estimated, found, table)
+    return replace(inspected, found=as_given(recorded, inspected.found))
+
+
+def _inspect_lines(
+    campaign: Campaign, recorded: Sequence[FrfRecording], found: list[Finding], table: SigmaTable
+) -> Inspected:
     entries = _without_copies(_with_lines(recorded, found), found)
     off = lone_slips(entries, found)
     astray, misgiven = misplaced(campaign, entries, found)

@@ -14,7 +14,7 @@ from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf_estimation import lines_of
 
 _SLIP, _WITHIN = 1000.0, 3.0  # a value is back among the others, within this factor, once the slip is undone
-_ALONE = 0.25  # of the recordings at most
+_ALONE = 0.25  # of the recordings at most, or one of three
 _FAINT = 5e-4  # dynamic force over preload
 
 
@@ -46,7 +46,7 @@ def lone_slips(entries: Sequence[FrfRecording], found: list[Finding]) -> NDArray
         usual = float(np.median(values))
         for factor, unit, word in ((_SLIP, field.too_large, "large"), (1 / _SLIP, field.too_small, "small")):
             far = values / usual > _SLIP / 30 if factor > 1 else values / usual < 30 / _SLIP
-            if not far.any() or far.sum() > _ALONE * len(entries):
+            if not far.any() or far.sum() > max(_ALONE * len(entries), 1.0) or len(entries) < 3:
                 continue
             others = values[~far]
             meant = values / factor

@@ -1,0 +1,123 @@
+"""Recordings given as time series: slips of units in what they hold, and lines that say nothing."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rig.experiment import parse
+from rig.output import campaign_of_series
+from rig.time_domain import record_series
+from tests.rig_experiments import described
+from underskin.diagnosis.diagnose import diagnosis_report
+from underskin.diagnosis.findings import inspect
+from underskin.recordings.campaign import Campaign, FrfRecording, from_dict
+from underskin.surrogate import SigmaTable, load_table
+
+
+@pytest.fixture(scope="module")
+def table() -> SigmaTable:
+    return load_table()
+
+
+def recorded(**changes: Any) -> Campaign:
+    """A quiet rig's campaign of time series, 8 recordings."""
+    drive = {"kind": "random", "sample_rate_hz": 512.0, "duration_s": 4.0, "charge_noise_pc": 0.02}
+    drive |= changes.pop("drive", {})
+    design = {"preloads_n": [0.5, 1.0, 2.0, 3.0], "indenters_mm": [4.0], "offsets_mm": [[0.0, 0.0]]}
+    skin = {"array": {"columns": 2, "rows": 1, "pitch_mm": 4.0}}
+    experiment = parse(described(drive=drive, lines=None, design=design, skin=skin, noise={"gain": 0.02}, **changes))
+    campaign, refused = from_dict(campaign_of_series(*record_series(experiment)))
+    assert not refused
+    return campaign
+
+
+@pytest.fixture(scope="module")
+def quiet() -> Campaign:
+    return recorded()
+
+
+def times(campaign: Campaign, field: str, factor: float, *names: str) -> Campaign:
+    """A field of some recordings, or of all, times a factor."""
+    return replace(
+        campaign,
+        recordings=tuple(
+            replace(entry, **{field: factor * getattr(entry, field)}) if entry.id in names or not names else entry
+            for entry in campaign.recordings
+        ),
+    )
+
+
+def codes(found: Any) -> set[tuple[str, str, str]]:
+    return {(entry.code, entry.recording, entry.field) for entry in found if entry.code != "constant_axis"}
+
+
+FIELDS = ("sample_rate_hz", "force_n", "charge_pc", "preload_n", "dynamic_force_n")
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+@pytest.mark.parametrize("field", FIELDS)
+def test_a_slip_of_one_recording_is_named_and_left_out(
+    field: str, factor: float, quiet: Campaign, table: SigmaTable
+) -> None:
+    found = inspect(times(quiet, field, factor, "r003"), table)
+    assert codes(found.found) == {("units_off_by_1000", "r003", field)}
+    assert [entry.id for entry in found.campaign.recordings] == [
+        entry.id for entry in quiet.recordings if entry.id != "r003"
+    ]
+    assert found.lacking == ""
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+@pytest.mark.parametrize("field", FIELDS)
+def test_a_slip_of_all_is_named(field: str, factor: float, quiet: Campaign, table: SigmaTable) -> None:
+    """A charge in other units only scales d33; on other fields nothing is concluded."""
+    found = inspect(times(quiet, field, factor), table)
+    assert codes(found.found) == {("units_off_by_1000", "", field)}
+    assert (found.lacking == "") == (field == "charge_pc")
+
+
+def test_a_force_without_its_mean_is_told_by_its_oscillation(quiet: Campaign, table: SigmaTable) -> None:
+    """A piezoelectric force cell shows no preload."""
+    entries = []
+    for entry in quiet.recordings:
+        assert isinstance(entry, FrfRecording)
+        assert entry.force_n is not None
+        entries.append(replace(entry, force_n=entry.force_n - entry.force_n.mean()))
+    coupled = replace(quiet, recordings=tuple(entries))
+    assert codes(inspect(coupled, table).found) == set()
+    found = inspect(times(coupled, "force_n", 1e3), table)
+    assert codes(found.found) == {("units_off_by_1000", "", "force_n")}
+    assert found.lacking
+
+
+@pytest.mark.parametrize("sample_rate_hz", [512.0, 2048.0])
+def test_lines_without_force_are_no_misfit(sample_rate_hz: float, table: SigmaTable) -> None:
+    """Beside the excited band a line's noise is unlike the others'; mains were found there."""
+    campaign = recorded(drive={"kind": "sweep", "sample_rate_hz": sample_rate_hz, "duration_s": 8.0})
+    report = diagnosis_report(campaign, table)
+    assert report["verdict"] == "no_mismatch"
+    assert {entry["code"] for entry in report["findings"]} <= {"constant_axis", "damaged_samples"}
+
+
+def test_what_a_time_series_hides_is_still_found(table: SigmaTable) -> None:
+    campaign = recorded(effects={"amplifier_high_pass": {"corner_hz": 1.0}}, drive={"duration_s": 8.0})
+    report = diagnosis_report(campaign, table)
+    assert (report["verdict"], [entry["name"] for entry in report["mechanisms"]]) == (
+        "explained",
+        ["amplifier_high_pass"],
+    )
+
+
+def test_series_that_make_no_frf_are_left_out(quiet: Campaign, table: SigmaTable) -> None:
+    first, second, *others = quiet.recordings
+    assert isinstance(first, FrfRecording)
+    assert isinstance(second, FrfRecording)
+    assert first.force_n is not None
+    assert first.charge_pc is not None
+    short = replace(first, force_n=first.force_n[:5], charge_pc=first.charge_pc[:5])
+    silent = replace(second, charge_pc=0.02 * np.random.default_rng(3).normal(size=len(first.force_n)))
+    found = inspect(replace(quiet, recordings=(short, silent, *others)), table)
+    assert codes(found.found) == {("series_not_usable", "r001", "force_n"), ("no_response", "r002", "charge_pc")}
+    assert len(found.campaign.recordings) == len(others)
