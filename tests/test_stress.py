@@ -221,16 +221,23 @@ def test_the_command_takes_a_map_from_csv(tmp_path: Path) -> None:
     assert [(row["sensor"], float(row["charge_pc"])) for row in rows] == list(
         zip(["s0", "s1", "s2", "s3", "s4"], expected, strict=True)
     )
+    pressed.write_bytes("mm;7;8;9;\r\n-1;0;0,1;0;\r\n0;0,1;0,3;0,1;\r\n1;0;0,1;0;\r\n;;;;\r\n".encode("utf-16"))
+    spreadsheet = csv.DictReader(
+        io.StringIO(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    )
+    assert [float(row["charge_pc"]) for row in spreadsheet] == expected
     skin.write_text(json.dumps({**SKIN, "pressure_map": drawn}))
     refused = subprocess.run(command, capture_output=True, text=True)
     assert (refused.returncode, "give it once" in refused.stderr) == (2, True), refused.stderr
     skin.write_text(json.dumps(SKIN))
     for content, says in (
-        ("a;b;c\n1;2;3\n2;3;4\n", "separated by commas"),
+        ("a|b|c\n1|2|3\n2|3|4\n", "must be CSV: x_mm in the first line"),
+        ("", "must be CSV"),
         (",1,2\n0,1,x\n1,1,1\n", "must be a number (line 2, cell 3"),
-        (",1,2\n0,1\n1,1,1\n", "must have as many as row 0"),
+        (",1,2\n0,1\n1,1,1\n", "must have as many as line 1 has (3) (line 2 of"),
+        (",1,2\n0,1,1\n\n1,-1,1\n", "a pressure does not pull (line 4, cell 2 of"),
         (",1,2\n1,1,1\n0,1,1\n", "pressure_map.y_mm[1] = 0: must be greater than the entry before"),
-        (",1,2\n0,1,1\n1,nan,1\n", "pressure_map.pressure_mpa[1][0] = 'nan': must be finite"),
+        (",1,2\n0,1,1\n1,nan,1\n", "pressure_map = 'nan': must be a finite number (line 3, cell 2 of"),
     ):
         pressed.write_text(content)
         refused = subprocess.run(command, capture_output=True, text=True)

@@ -173,6 +173,10 @@ def test_doubtful_answers_say_why(http: httpx.Client, tmp_path: Path) -> None:
     drawn["pressure_mpa"] = [[0, 0], [0, 20e3]]
     (found,) = posted(http, {**SKIN, "pressure_map": drawn, "youngs_modulus_mpa": None})["findings"]
     assert "was it given in Pa?" in found["statement"] or "was it given in kPa?" in found["statement"]
+    narrow = {"x_mm": [0.0, 0.005, 0.01], "y_mm": [0, 5, 10], "pressure_mpa": [[0.1] * 3] * 3}
+    (found,) = posted(http, {**SKIN, "pressure_map": narrow})["findings"]
+    assert found["field"] == "pressure_map.x_mm"
+    assert "spans 0.01 mm, on sensors 3 mm across: is it in mm?" in found["statement"]
     file = tmp_path / "load.json"
     file.write_text(json.dumps(document(hard)))
     written = subprocess.run([COMMAND, "stress", file], capture_output=True, text=True, check=True)

@@ -16,6 +16,7 @@ from underskin.units import findings as unusual
 
 MOST_PAIRS = 50_000_000  # of a sensor and a point force: about ten seconds
 _WIDEST_CELL = 12.0  # thicknesses; no sensor is influenced from further away
+_NARROW = 0.1  # sensor radii; a finger, or a sphere, is wider
 _LINEAR = 0.01  # of L; there finite strain adds up to 1.3 % beneath a sphere
 _ROUNDING = 1e-9
 
@@ -83,7 +84,11 @@ def refuse_overlap(places: Floats, radii: Floats) -> None:
 def findings(request: StressRequest) -> list[Finding]:
     """What the answer is right for, but hardly the skin."""
     if request.pressure_map is not None:
-        return [*_about_sensors(request), *_about_map(request.pressure_map, request.youngs_modulus_mpa)]
+        return [
+            *_about_sensors(request),
+            *_about_places(request.pressure_map, request.sensor_radius_mm),
+            *_about_map(request.pressure_map, request.youngs_modulus_mpa),
+        ]
     modulus = request.youngs_modulus_mpa or np.nan
     strained = [(_load_parameter(contact, modulus), i) for i, contact in enumerate(request.contacts)]
     slipping = [(_shear(contact) / contact.normal_force_n, i) for i, contact in enumerate(request.contacts)]
@@ -122,6 +127,14 @@ def _worst(found: Iterable[tuple[float, int]], statement: str) -> Iterator[Findi
         value, index = several[0]
         others = f" ({len(several) - 1} more contacts like it)" if len(several) > 1 else ""
         yield Finding(f"contacts[{index}]", None, statement.format(value) + others)
+
+
+def _about_places(given: PressureMap, sensor_radius_mm: float) -> Iterator[Finding]:
+    for name, places in (("x_mm", given.x_mm), ("y_mm", given.y_mm)):
+        span = float(np.ptp(places))
+        if span < _NARROW * sensor_radius_mm:
+            statement = f"the map spans {span:g} mm, on sensors {2 * sensor_radius_mm:g} mm across: is it in mm?"
+            yield Finding(f"pressure_map.{name}", None, statement)
 
 
 def _about_map(given: PressureMap, modulus: float | None) -> Iterator[Finding]:

@@ -3,7 +3,6 @@
 The skin's fields are named as in a campaign; x runs along its length, y along its width.
 """
 
-import csv
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from underskin import pressure_map_file
 from underskin.errors import InvalidInput
 from underskin.recordings import fields as field
 from underskin.recordings import json_file
@@ -113,32 +113,11 @@ def read_file(path: str, map_path: str | None = None) -> StressRequest:
 
 
 def _map_in_file(path: str) -> dict[str, Any]:
-    """A pressure map from CSV: x_mm in the first line, from its second cell; then y_mm and the row's pressure_mpa."""
     try:
-        with Path(path).open(encoding="utf-8-sig", newline="") as file:
-            lines = [line for line in csv.reader(file, strict=True) if any(cell.strip() for cell in line)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise InvalidInput("pressure_map", path, f"must be a readable CSV file ({reason})") from error
-    if len(lines) < 3 or len(lines[0]) < 3:
-        allowed = (
-            "must be CSV, separated by commas: x_mm in the first line, from its second cell; then y_mm and pressure_mpa"
-        )
-        raise InvalidInput("pressure_map", path, allowed)
-    numbers = [
-        [_map_number(path, row, column, cell) for column, cell in enumerate(line) if row or column]
-        for row, line in enumerate(lines)
-    ]
-    x, *rows = numbers
-    return {"x_mm": x, "y_mm": [row[0] for row in rows], "pressure_mpa": [row[1:] for row in rows]}
-
-
-def _map_number(path: str, row: int, column: int, cell: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        place = f"line {row + 1}, cell {column + 1} of {path}"
-        raise InvalidInput("pressure_map", cell, f"must be a number ({place})") from None
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise InvalidInput("pressure_map", path, f"must be a readable CSV file ({error.strerror})") from error
+    return pressure_map_file.parse(content, path)
 
 
 def read_request(document: Any) -> StressRequest:

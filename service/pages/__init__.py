@@ -3,9 +3,22 @@
 from fastapi import APIRouter
 from fastapi.routing import APIRoute
 
-from service.pages import assets, campaign, design, diagnosis, example, joining, loads, login, skin, start, upload
+from service.pages import (
+    assets,
+    campaign,
+    design,
+    diagnosis,
+    example,
+    joining,
+    loads,
+    login,
+    pressure_map,
+    skin,
+    start,
+    upload,
+)
 
-_PAGES = (start, skin, campaign, diagnosis, upload, design, example, joining, loads, login, assets)
+_PAGES = (start, skin, campaign, diagnosis, upload, design, example, joining, loads, pressure_map, login, assets)
 
 router = APIRouter(include_in_schema=False)
 for page in _PAGES:

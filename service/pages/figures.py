@@ -57,12 +57,17 @@ def drawn_before(name: str, text: str, about: str, numbers: str | None = None) -
 
 def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> Response:
     """Columns as a CSV file to be saved."""
+    headers = {"Content-Disposition": f'attachment; filename="{name}.csv"', "X-Content-Type-Options": "nosniff"}
+    return Response(csv_text(columns), headers=headers, media_type="text/csv; charset=utf-8")
+
+
+def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
+    """Columns as CSV."""
     text = io.StringIO()
     writer = csv.writer(text)
     writer.writerow(columns)
     writer.writerows([_cell(value) for value in row] for row in zip(*columns.values(), strict=True))
-    headers = {"Content-Disposition": f'attachment; filename="{name}.csv"', "X-Content-Type-Options": "nosniff"}
-    return Response(text.getvalue(), headers=headers, media_type="text/csv; charset=utf-8")
+    return text.getvalue()
 
 
 def _cell(value: Any) -> Any:

@@ -31,6 +31,14 @@ def post(request: Request, path: str, document: Mapping[str, Any], call: str) ->
     )
 
 
+def from_file(request: Request, path: str, file: str, call: str) -> SameRequest:
+    """POST a JSON document that is in a file; `call` has {} for the document."""
+    send = f" \\\n  -H 'Content-Type: application/json' -d @{file}"
+    document = f"json.loads(pathlib.Path({file!r}).read_text())"
+    told = _python(request, call.format(document))
+    return SameRequest(_curl(request, path) + send, f"import json\nimport pathlib\n{told}")
+
+
 def files(request: Request, labels: Sequence[str], rig: str | None, skin: str) -> SameRequest:
     """POST files as a form, with a rig description where they need one."""
     query = f"?skin={quote(skin, safe='')}" if skin else ""

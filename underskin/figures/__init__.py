@@ -9,7 +9,7 @@ from underskin.figures.curves import Curve, force_curves
 from underskin.figures.design import Mark, array_response, design_overview
 from underskin.figures.frf import frf_overview, frf_recordings
 from underskin.figures.history import SensorPoints, array_history, d33_history
-from underskin.figures.loads import loaded_array
+from underskin.figures.loads import loaded_array, pressure_on_array
 from underskin.figures.traces import Trace, raw_traces
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "frf_recordings",
     "frf_versus_preload",
     "loaded_array",
+    "pressure_on_array",
     "raw_traces",
     "response_per_sensor",
 ]

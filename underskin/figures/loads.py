@@ -1,12 +1,14 @@
-"""The charge on the sensors of an array under several loads."""
+"""Several loads, or a map of pressure, on an array, and the charge on its sensors."""
 
 from collections.abc import Sequence
 
+import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
 from underskin.figures.array import Quantity, array_map
 from underskin.figures.style import styled
+from underskin.units import Floats
 
 _CHARGE = Quantity("charge", "pC")
 
@@ -19,18 +21,58 @@ def loaded_array(
     charge_error_pc: ArrayLike,
     loads_mm: Sequence[tuple[float, float]],
 ) -> go.Figure:
-    """Each sensor coloured by its charge, and where the loads are.
+    """Each sensor coloured by its charge, and where the loads are, if they are at places.
 
     Raises InvalidInput where a column's length differs from that of `sensors`.
     """
     figure = array_map(sensors, x_mm, y_mm, charge_pc, charge_error_pc, [""] * len(sensors), _CHARGE)
-    figure.add_scatter(
-        x=[x for x, _ in loads_mm],
-        y=[y for _, y in loads_mm],
-        mode="markers",
-        name="load",
-        text=[f"load {number}" for number in range(1, len(loads_mm) + 1)],
-        hovertemplate="%{text}: x %{x:.4g} mm, y %{y:.4g} mm<extra></extra>",
-        marker={"symbol": "x-thin", "size": 14, "line": {"width": 3, "color": "#D55E00"}},
-    )
+    if loads_mm:
+        figure.add_scatter(
+            x=[x for x, _ in loads_mm],
+            y=[y for _, y in loads_mm],
+            mode="markers",
+            name="load",
+            text=[f"load {number}" for number in range(1, len(loads_mm) + 1)],
+            hovertemplate="%{text}: x %{x:.4g} mm, y %{y:.4g} mm<extra></extra>",
+            marker={"symbol": "x-thin", "size": 14, "line": {"width": 3, "color": "#D55E00"}},
+        )
     return styled(figure, "Charge on the array")
+
+
+def pressure_on_array(
+    x_mm: ArrayLike,
+    y_mm: ArrayLike,
+    pressure_mpa: ArrayLike,
+    sensors_mm: Sequence[tuple[float, float]],
+    sensor_radius_mm: float,
+) -> go.Figure:
+    """The pressure (y, x) over the skin, with the outlines of the sensors."""
+    figure = go.Figure(
+        go.Heatmap(
+            x=np.asarray(x_mm),
+            y=np.asarray(y_mm),
+            z=np.asarray(pressure_mpa),
+            colorscale="Cividis",
+            colorbar={"title": {"text": "pressure [MPa]", "side": "right"}},
+            hovertemplate="x %{x:.4g} mm, y %{y:.4g} mm<br>%{z:.5g} MPa<extra></extra>",
+        )
+    )
+    outlines = [_circle(place, sensor_radius_mm) for place in sensors_mm]
+    figure.add_scatter(
+        x=np.concatenate([x for x, _ in outlines]),
+        y=np.concatenate([y for _, y in outlines]),
+        mode="lines",
+        name="sensor",
+        hoverinfo="skip",
+        showlegend=True,
+        line={"color": "#D55E00", "width": 2},
+    )
+    figure.update_xaxes(title="x [mm]", showgrid=False, zeroline=False)
+    figure.update_yaxes(title="y [mm]", showgrid=False, zeroline=False, scaleanchor="x", scaleratio=1)
+    return styled(figure, "Pressure on the array")
+
+
+def _circle(centre: tuple[float, float], radius: float) -> tuple[Floats, Floats]:
+    """Its outline, ended by a gap."""
+    angle = np.append(np.linspace(0, 2 * np.pi, 33), np.nan)
+    return centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)

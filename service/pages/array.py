@@ -1,0 +1,103 @@
+"""An array under loads: the fields of the forms that ask for one, and the request of `POST /v1/stress` in them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from fastapi import Request
+
+from service.more_tables import influence_table
+from service.store import campaigns, skins
+from service.store.engine import Database
+from underskin import InvalidInput
+from underskin.stress_answer import StressAnswer, answer
+from underskin.stress_request import read_request
+
+_MOST_SENSORS = 10_000
+# Field, words, unit, the paper's prototype.
+FIELDS = (
+    ("thickness_mm", "thickness h", "mm", 2.5),
+    ("youngs_modulus_mpa", "Young's modulus E", "MPa", 16.0),
+    ("sensor_radius_mm", "sensor radius rT", "mm", 1.5),
+    ("d33_pc_per_n", "d33", "pC/N", 14.0),
+    ("poisson_ratio", "Poisson's ratio ν", "", 0.5),
+)
+GRID = (("columns", "sensors along x", "", 4), ("rows", "sensors along y", "", 4), ("pitch_mm", "pitch", "mm", 8.0))
+GLUE, UNITS = "glue_stiffness", "units_checked"
+
+
+@dataclass(frozen=True)
+class Described:
+    """What a form says of the array: as it was sent, or else as the skin's latest campaign or the prototype has it."""
+
+    skin_id: str | None
+    values: Mapping[str, str]
+    glue: str
+    units_checked: bool
+    sensors: Sequence[Mapping[str, Any]] | None  # the skin's; None: a grid of the form's
+
+    @property
+    def fields(self) -> Sequence[tuple[str, str, str, float]]:
+        """Those that the form asks for."""
+        return FIELDS if self.sensors is not None else (*FIELDS, *GRID)
+
+    def document(self) -> dict[str, Any]:
+        """The request without its loads; raises InvalidInput."""
+        numbers = {name: number(name, self.values[name]) for name, *_ in self.fields}
+        document: dict[str, Any] = {name: numbers[name] for name, *_ in FIELDS}
+        if self.glue.strip():
+            document[GLUE] = number(GLUE, self.glue)
+        if self.units_checked:
+            document[UNITS] = True
+        document["sensors"] = list(_grid(numbers) if self.sensors is None else self.sensors)
+        return document
+
+
+def described(store: Database, given: Mapping[str, str], skin_id: str | None) -> Described:
+    """The array of a form's fields; raises InvalidInput where the skin has no campaign with sensors."""
+    known = {} if skin_id is None else _latest(store, skin_id)
+    values = {name: given.get(name) or f"{known.get(name) or default:g}" for name, _, _, default in (*FIELDS, *GRID)}
+    return Described(skin_id, values, given.get(GLUE, ""), UNITS in given, known.get("sensors"))
+
+
+def answered(request: Request, document: Mapping[str, Any]) -> StressAnswer:
+    """What `POST /v1/stress` answers; raises UnderskinError."""
+    table = influence_table(request.app.state.settings.tables)
+    with np.errstate(all="ignore"):  # what overflows is out of reach
+        return answer(table, read_request(document))
+
+
+def charge_columns(found: StressAnswer) -> dict[str, list[Any]]:
+    """Charge and stress on each sensor."""
+    return {"sensor": list(found.sensors), **{name: column.tolist() for name, column in found.columns.items()}}
+
+
+def number(name: str, text: str) -> float:
+    """A number that somebody typed; raises InvalidInput."""
+    try:
+        return float(text)
+    except ValueError:
+        raise InvalidInput(name, text[:80], "must be a number") from None
+
+
+def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:
+    columns, rows, pitch = values["columns"], values["rows"], values["pitch_mm"]
+    if not (1 <= columns <= 1000 and 1 <= rows <= 1000 and columns * rows <= _MOST_SENSORS):
+        raise InvalidInput("columns", f"{columns:g} × {rows:g}", f"must be 1 to {_MOST_SENSORS} sensors in all")
+    return [
+        {"id": f"s{1 + row * int(columns) + column:02d}", "x_mm": pitch * column, "y_mm": pitch * row}
+        for row in range(int(rows))
+        for column in range(int(columns))
+    ]
+
+
+def _latest(store: Database, skin_id: str) -> Mapping[str, Any]:
+    """The skin as its latest campaign declares it."""
+    with store.reading() as connection:
+        root = skins.require_root(connection, skin_id)
+        latest = campaigns.listed(connection, campaigns.Filters(skin=root, state="current"), None, 1)
+    found: dict[str, Any] = latest[0].about["skin"] if latest else {"sensors": []}
+    if not found["sensors"]:
+        raise InvalidInput("skin", skin_id, "must have a current campaign that names its sensors")
+    return found
