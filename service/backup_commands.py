@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from service import data_folder
 from service.commands import read_settings
 from service.store import StoreError, database
 from service.store import backup as backups
@@ -31,6 +32,7 @@ def restore(
     """Put a backup in place of the store, while servers run; what was there is backed up first."""
     settings = read_settings()
     try:
+        data_folder.make(settings.data)
         store = database(settings.database_url, settings.data)
         stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
         before = settings.data / "backups" / f"before-restore-{stamp}{backups.suffix(store)}"

@@ -10,6 +10,7 @@ import typer
 import uvicorn
 from pydantic import ValidationError
 
+from service import data_folder
 from service.app import create_app
 from service.gate import LOOPBACK_NAMES, Gate
 from service.keys import KeyStore, Scope
@@ -114,7 +115,7 @@ def _keys() -> KeyStore:
 
 def _require_writable(folder: Path) -> None:
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        data_folder.make(folder)
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:

@@ -56,13 +56,16 @@ class Front:
         request_id = self._request_id(headers.get(b"x-request-id"))
         scope["request_id"] = request_id
         scope["key"] = None
+        scope["why"] = None
         exchange = _Exchange(send, request_id, scope["path"], headers.get(b"accept", b"").decode("latin-1"))
         try:
             await self._answer(scope, headers, receive, exchange)
         except Refusal as refusal:
+            scope["why"] = refusal.in_log()
             await exchange.refuse(refusal)
         except ClientDisconnect:
             exchange.status = 499
+            scope["why"] = "the client left"
         except Exception:
             logger.exception("request failed", extra={"fields": {"request_id": request_id}})
             if not exchange.status:
@@ -70,7 +73,7 @@ class Front:
         seconds = time.perf_counter() - start
         method, path = scope["method"], scope["path"]
         route = path if exchange.hot else getattr(scope.get("route"), "path", "none")
-        record(request_id, method, route, path, exchange.status, seconds, scope["key"])
+        record(request_id, method, route, path, exchange.status, seconds, scope["key"], scope["why"])
 
     def _request_id(self, sent: bytes | None) -> str:
         if sent is not None and _SANE_ID.fullmatch(sent):

@@ -31,6 +31,7 @@ def install_handlers(api: FastAPI) -> None:
 
 async def _handle(request: Request, error: Exception) -> Response:
     refusal = _as_refusal(request, error)
+    request.scope["why"] = refusal.in_log()
     path = request.scope["path"]
     if is_browsing(path, request.headers.get("accept", "")):
         return problem_page(refusal, request.scope["request_id"])

@@ -15,6 +15,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Literal
 
+from service import data_folder
 from underskin import InvalidInput
 
 # Looking at the file takes longer than checking a key.
@@ -97,7 +98,7 @@ class KeyStore:
     @contextmanager
     def _changing(self) -> Iterator[list[Key]]:
         """The keys, to be changed in place by one process at a time; written whole or not at all."""
-        self.path.parent.mkdir(parents=True, exist_ok=True)
+        data_folder.make(self.path.parent)
         with self.path.with_suffix(".lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             self._refresh()

@@ -11,6 +11,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from underskin import InvalidInput
 
+_MOST_LOGGED = 3
 MEDIA_TYPE = "application/problem+json"
 
 
@@ -56,6 +57,16 @@ class Refusal(Exception):
     def status_for(self, path: str) -> int:
         """Status of the answer to `path`: UM-Bridge knows 400 only for what is wrong with a request's content."""
         return 400 if self.status == 422 and _is_umbridge(path) else self.status
+
+    def in_log(self) -> str | None:
+        """What the log says of it: the refused fields and what is allowed, never what came, which may be a secret."""
+        if self.status < HTTPStatus.BAD_REQUEST:
+            return None
+        if not self.errors:
+            return self.detail
+        told = [f"{error['field']}: {error['allowed']}" for error in self.errors[:_MOST_LOGGED]]
+        more = len(self.errors) - len(told)
+        return "; ".join([*told, *([f"and {more} more"] if more > 0 else [])])
 
     def media_type(self, path: str) -> str:
         """Content-Type of the answer to `path`."""

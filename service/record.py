@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import re
 import time
 from contextlib import suppress
 from datetime import UTC, datetime
@@ -14,7 +15,9 @@ from service.keys import Key
 
 # Requests are written and counted together: one by one, that would cost as much as to answer them.
 _DELAY_S = 0.2
-_waiting: list[tuple[float, str, str, str, str, int, float, Key | None]] = []
+_waiting: list[tuple[float, str, str, str, str, int, float, Key | None, str | None]] = []
+_LONGEST_WHY = 300
+_KEY = re.compile(r"us_[\w-]{16,}")  # what looks like one, wherever somebody put it
 
 _seconds = Histogram(
     "underskin_request_seconds",
@@ -24,17 +27,19 @@ _seconds = Histogram(
 )
 
 
-def record(request_id: str, method: str, route: str, path: str, status: int, seconds: float, key: Key | None) -> None:
-    """Keep what is to be said of a request; `route` is its path as documented."""
+def record(
+    request_id: str, method: str, route: str, path: str, status: int, seconds: float, key: Key | None, why: str | None
+) -> None:
+    """Keep what is to be said of a request; `route` is its path as documented, `why` the reason of an error."""
     if not _waiting:
         asyncio.get_running_loop().call_later(_DELAY_S, flush)
-    _waiting.append((time.time(), request_id, method, route, path, status, seconds, key))
+    _waiting.append((time.time(), request_id, method, route, path, status, seconds, key, why))
 
 
 def flush() -> None:
     """Count and write the requests that wait."""
     text = b"".join(_line(*entry) for entry in _waiting)
-    for _, _, method, route, _, status, seconds, _ in _waiting:
+    for _, _, method, route, _, status, seconds, *_ in _waiting:
         _series(method, route, status).observe(seconds)
     _waiting.clear()
     with suppress(OSError):  # a log that nobody reads, or a full disk, must not stop the answers
@@ -48,7 +53,15 @@ def _series(method: str, route: str, status: int) -> Histogram:
 
 
 def _line(
-    ended: float, request_id: str, method: str, route: str, path: str, status: int, seconds: float, key: Key | None
+    ended: float,
+    request_id: str,
+    method: str,
+    route: str,
+    path: str,
+    status: int,
+    seconds: float,
+    key: Key | None,
+    why: str | None,
 ) -> bytes:
     fields = {
         "time": datetime.fromtimestamp(ended, UTC),
@@ -63,4 +76,6 @@ def _line(
         "milliseconds": round(1e3 * seconds, 3),
         "key": key.name if key else None,
     }
+    if why is not None:
+        fields["error"] = _KEY.sub("us_…", why)[:_LONGEST_WHY]
     return orjson.dumps(fields, option=orjson.OPT_APPEND_NEWLINE)

@@ -3,6 +3,7 @@
 import io
 import struct
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -90,6 +91,20 @@ def time_datasets() -> list[dict[str, Any]]:
     common |= {"x": np.arange(4) / 1000}
     force = {"id1": "force", "data": FORCE * 1000, "ordinate_axis_units_lab": "mN"}
     return [{**common, **force}, {**common, "id1": "amplifier", "data": -CHARGE * 0.01, "ordinate_axis_units_lab": "V"}]
+
+
+def frf_datasets(names: Sequence[str], unit: str = "pC") -> list[dict[str, Any]]:
+    """FRFs on one axis, of the responses 1, 2, ...; after them the coherence of each."""
+    common: dict[str, Any] = {"abscissa_spec_data_type": 18, "abscissa_inc": 10.0, "num_pts": 3}
+    common |= {"x": np.array([10.0, 20.0, 30.0]), "abscissa_axis_units_lab": "Hz"}
+    made = []
+    for number, name in enumerate(names, start=1):
+        frf = {"func_type": 4, "ord_data_type": 6, "rsp_node": number, "id1": name, "orddenom_axis_units_lab": "N"}
+        made.append({**common, **frf, "ordinate_axis_units_lab": unit, "data": number * np.array([7 - 1j, 7.1, 7.2])})
+    for number in range(1, len(names) + 1):
+        coherence = {"func_type": 6, "ord_data_type": 4, "rsp_node": number, "id1": "coherence"}
+        made.append({**common, **coherence, "data": 1 - 0.01 * number * np.ones(3)})
+    return made
 
 
 def matlab_variables() -> dict[str, Any]:

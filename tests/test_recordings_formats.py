@@ -13,6 +13,7 @@ from tests.instrument_files import (
     EXAMPLES,
     FORCE,
     SKIN,
+    frf_datasets,
     hdf5,
     lvm,
     matlab_5,
@@ -236,6 +237,42 @@ def test_a_spectrum_in_uff58_is_an_frf() -> None:
         assert recording["frf_re_pc_per_n"] == pytest.approx([7000.0, 7100.0])
         assert recording["frf_im_pc_per_n"] == pytest.approx([-500.0, -600.0])
         assert reading.warnings == ["the line at 0 Hz is left out"]
+
+
+SEVERAL = {"frequency_hz": {"channel": "frequency"}, "frf_pc_per_n": {"channel": "FRF"}}
+
+
+@leaky_writer
+def test_of_several_frfs_in_uff58_each_is_a_recording() -> None:
+    recording = {**COMMON, "sensor": {"property": "block"}}
+    places = {"s1": 0.0, "s2": 8.0, "s3": 16.0}
+    skin = {**SKIN, "sensors": [{"id": name, "x_mm": x, "y_mm": 0.0} for name, x in places.items()]}
+    channels = {**SEVERAL, "coherence": {"channel": "coherence"}}
+    for binary in (0, 1):
+        data = uff(binary, frf_datasets(["s1", "s2", "s3"]))
+        reading = read_file(data, "run.uff", rig(skin=skin, recording=recording, channels=channels))
+        assert not reading.problems
+        found = to_dict(reading.campaign)["recordings"]
+        assert [(one["id"], one["sensor"]) for one in found] == [(f"run {name}", name) for name in ("s1", "s2", "s3")]
+        for number, one in enumerate(found, start=1):
+            assert one["frf_re_pc_per_n"] == pytest.approx(number * np.array([7.0, 7.1, 7.2]))
+            assert one["coherence"] == pytest.approx([1 - 0.01 * number] * 3)
+        assert reading.warnings == ["holds 3 FRFs, each a part of its own: s1, s2, s3"]
+
+
+@leaky_writer
+def test_frfs_of_one_name_or_of_other_units_are_told_apart() -> None:
+    responses = {"H1": "1", "H1 (dataset 2)": "2"}
+    found = contents(uff(0, frf_datasets(["H1", "H1"])), "run.uff")
+    assert {block.name: found.properties[f"{block.name}.response"] for block in found.blocks} == responses
+    charge, *_ = frf_datasets(["charge"])
+    stage, *_ = frf_datasets(["stage"], unit="m/s2")
+    mixed = uff(0, [charge, stage])
+    assert [block.channels[1].name for block in contents(mixed, "run.uff").blocks] == ["FRF pC/N", "FRF m/s2/N"]
+    channels = {**SEVERAL, "frf_pc_per_n": {"channel": "FRF pC/N"}}
+    reading = read_file(mixed, "run.uff", rig(channels=channels))
+    assert [one.id for one in reading.campaign.recordings] == ["run"]
+    assert "1 parts without the rig's channels are left out" in reading.warnings
 
 
 def test_a_universal_file_that_is_cut_off_is_said() -> None:

@@ -65,6 +65,32 @@ def test_each_request_is_one_line_of_json(own: Server, path: str, status: int) -
     assert line["key"] is None
 
 
+def test_a_refusal_s_line_says_why_and_not_what_came(own: Server) -> None:
+    row = {"thickness_mm": 2.5, "sensor_radius_mm": 1.5, "youngs_modulus_mpa": 16, "indenter_radius_mm": 4}
+    secret = "us_" + 40 * "a"
+    asked = [
+        ("POST", "/v1/frf", {**row, "preload_n": -77.25, "d33_pc_per_n": 14}, 422, ["preload_n", "greater than 0"]),
+        ("POST", "/v1/frf", {**row, "preload_n": secret, "d33_pc_per_n": 14}, 422, ["preload_n", "number"]),
+        ("GET", "/v1/sigma?a_over_h=0.3", None, 422, ["rt_over_h", "is required"]),
+        ("GET", "/nowhere", None, 404, ["There is nothing at /nowhere"]),
+        ("GET", f"/v1/skins/{secret}/history", None, 404, ["There is no skin"]),
+    ]
+    for method, path, body, status, said in asked:
+        answer = httpx.request(method, own.url + path, json=body)
+        (line,) = lines_of(own.log, answer.headers["x-request-id"])
+        assert (answer.status_code, line["status"]) == (status, status)
+        assert all(part in line["error"] for part in said), line
+        assert not any(part in line["error"] for part in (secret, "77.25"))
+    (good,) = lines_of(own.log, httpx.get(own.url + SIGMA).headers["x-request-id"])
+    assert "error" not in good
+
+
+def test_the_gate_s_refusals_say_why_too(own: Server) -> None:
+    answer = httpx.get(own.url + SIGMA, headers={"Host": "elsewhere.example"})
+    (line,) = lines_of(own.log, answer.headers["x-request-id"])
+    assert (line["status"], "elsewhere.example" in line["error"]) == (421, True)
+
+
 def test_the_whole_log_is_json_and_says_where_the_server_listens(own: Server) -> None:
     httpx.get(own.url + SIGMA)
     errors = [line for line in own.log.read_text().splitlines() if not line.startswith(("{", "underskin serves on "))]

@@ -45,6 +45,18 @@ def test_a_data_folder_that_cannot_be_written_is_named(tmp_path: Path, place: st
     assert f"the data folder {data} (UNDERSKIN_DATA) is not writable: " in refusal(tmp_path, UNDERSKIN_DATA=str(data))
 
 
+def test_a_data_folder_is_made_for_its_owner_alone_and_one_that_is_there_stays_as_it_is(tmp_path: Path) -> None:
+    with running(tmp_path):
+        assert (tmp_path / "data").stat().st_mode & 0o777 == 0o700
+    own, shared = tmp_path / "own", tmp_path / "shared"
+    shared.mkdir(mode=0o755)
+    for folder, mode in ((own, 0o700), (shared, 0o755)):
+        subprocess.run(
+            [UNDERSKIN, "key", "create", "lab"], env=os.environ | {"UNDERSKIN_DATA": str(folder)}, check=True
+        )
+        assert folder.stat().st_mode & 0o777 == mode
+
+
 def test_a_data_folder_lost_later_makes_the_server_not_ready(tmp_path: Path) -> None:
     with running(tmp_path) as started:
         (tmp_path / "data").rename(tmp_path / "moved")

@@ -8,23 +8,33 @@ import numpy as np
 from fastapi import Request
 
 from service.more_tables import influence_table
+from service.pages.form_words import said
+from service.pages.skin_values import start
 from service.store import campaigns, skins
 from service.store.engine import Database
-from underskin import InvalidInput
+from underskin import InvalidInput, UnderskinError
 from underskin.stress_answer import StressAnswer, answer
 from underskin.stress_request import read_request
+from underskin.surrogate import SigmaTable
 
 _MOST_SENSORS = 10_000
-# Field, words, unit, the paper's prototype.
+# Field, words, unit.
 FIELDS = (
-    ("thickness_mm", "thickness h", "mm", 2.5),
-    ("youngs_modulus_mpa", "Young's modulus E", "MPa", 16.0),
-    ("sensor_radius_mm", "sensor radius rT", "mm", 1.5),
-    ("d33_pc_per_n", "d33", "pC/N", 14.0),
-    ("poisson_ratio", "Poisson's ratio ν", "", 0.5),
+    ("thickness_mm", "thickness h", "mm"),
+    ("youngs_modulus_mpa", "Young's modulus E", "MPa"),
+    ("sensor_radius_mm", "sensor radius rT", "mm"),
+    ("d33_pc_per_n", "d33", "pC/N"),
+    ("poisson_ratio", "Poisson's ratio ν", ""),
 )
+# Field, words, unit, default.
 GRID = (("columns", "sensors along x", "", 4), ("rows", "sensors along y", "", 4), ("pitch_mm", "pitch", "mm", 8.0))
 GLUE, UNITS = "glue_stiffness", "units_checked"
+_LABELS = {
+    **{name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in (*FIELDS, *GRID)},
+    GLUE: "glue line, κ",
+    "contacts": "loads",
+    "pressure_map": "the map",
+}
 
 
 @dataclass(frozen=True)
@@ -36,11 +46,14 @@ class Described:
     glue: str
     units_checked: bool
     sensors: Sequence[Mapping[str, Any]] | None  # the skin's; None: a grid of the form's
+    taken: Sequence[str]  # in sentences, which values nobody declared
 
     @property
-    def fields(self) -> Sequence[tuple[str, str, str, float]]:
+    def fields(self) -> Sequence[tuple[str, str, str]]:
         """Those that the form asks for."""
-        return FIELDS if self.sensors is not None else (*FIELDS, *GRID)
+        return (
+            FIELDS if self.sensors is not None else (*FIELDS, *[(name, words, unit) for name, words, unit, _ in GRID])
+        )
 
     def document(self) -> dict[str, Any]:
         """The request without its loads; raises InvalidInput."""
@@ -54,11 +67,19 @@ class Described:
         return document
 
 
-def described(store: Database, given: Mapping[str, str], skin_id: str | None) -> Described:
+def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin_id: str | None) -> Described:
     """The array of a form's fields; raises InvalidInput where the skin has no campaign with sensors."""
-    known = {} if skin_id is None else _latest(store, skin_id)
-    values = {name: given.get(name) or f"{known.get(name) or default:g}" for name, _, _, default in (*FIELDS, *GRID)}
-    return Described(skin_id, values, given.get(GLUE, ""), UNITS in given, known.get("sensors"))
+    sensors = None if skin_id is None else _latest(store, skin_id)["sensors"]
+    missing = {name: (words, unit) for name, words, unit in FIELDS if not given.get(name)}
+    known, taken = start(store, table, skin_id, missing)
+    defaults = {name: known[name] for name, *_ in FIELDS} | {name: default for name, _, _, default in GRID}
+    values = {name: given.get(name) or f"{default:g}" for name, default in defaults.items()}
+    return Described(skin_id, values, given.get(GLUE, ""), UNITS in given, sensors, taken)
+
+
+def refused(error: UnderskinError, lines: Sequence[int] = ()) -> str:
+    """An error in the words of these forms; `lines`: of the loads in their text."""
+    return said(error, _LABELS, lines, "or tick “Take unlikely magnitudes as they are”")
 
 
 def answered(request: Request, document: Mapping[str, Any]) -> StressAnswer:

@@ -14,11 +14,11 @@ from service.dependencies import Store, Table
 from service.design import DesignAnswer, DesignRequest, answer, designed
 from service.pages import requests
 from service.pages.figures import Drawn, csv_answer, drawn
+from service.pages.form_words import said
 from service.pages.formats import short_and_exact
 from service.pages.html import compress, page
+from service.pages.skin_values import PROTOTYPE, start
 from service.problems import from_validation
-from service.store import campaigns, skins
-from service.store.engine import Database
 from underskin import InvalidInput, UnderskinError
 from underskin.surrogate import SigmaTable
 
@@ -35,24 +35,16 @@ SLIDERS = (
     ("pitch_mm", "pitch of the array", "mm", 0.5, 50),
     ("dip_percent", "dip that can be told", "%", 1, 50),
 )
+_LABELS = {name: f"{words} [{unit}]" for name, words, unit, *_ in SLIDERS}
+_WORDS = {name: (words, unit) for name, words, unit, *_ in SLIDERS if name != "dip_percent"}
 BLIND_PERCENT = 10.0  # of the response above a sensor: what lies below goes unseen
-_PROTOTYPE = {
-    "thickness_mm": 2.5,
-    "sensor_radius_mm": 1.5,
-    "indenter_radius_mm": 4.0,
-    "preload_n": 1.0,
-    "youngs_modulus_mpa": 16.0,
-    "d33_pc_per_n": 14.0,
-    "pitch_mm": 8.0,
-    "dip_percent": 10.0,
-}  # Seminara 2018
 
 
 @router.get("")
 def view(request: Request, store: Store, table: Table, skin: Annotated[str | None, Query()] = None) -> Response:
     """With the values of the address, or else those of the skin, or of the paper's prototype."""
-    own = _PROTOTYPE if skin is None else _own(store, skin)
     given = _given(request)
+    own, taken = _start(store, table, skin, given)
     values = {**own, **given}
     error: str | None = None
     found: DesignAnswer | None = None
@@ -61,7 +53,7 @@ def view(request: Request, store: Store, table: Table, skin: Annotated[str | Non
         asked = _asked(values)
         found, figures = _answered(table, asked, own, skin)
     except UnderskinError as refused:
-        error = str(refused)
+        error = said(refused, _LABELS)
     return page(
         request,
         "design.html",
@@ -71,7 +63,7 @@ def view(request: Request, store: Store, table: Table, skin: Annotated[str | Non
         told=[] if found is None else told(found),
         figures=figures,
         error=error,
-        own=own,
+        taken=taken,
         same=requests.post(request, "/v1/design", values, _call(values)),
     )
 
@@ -79,12 +71,13 @@ def view(request: Request, store: Store, table: Table, skin: Annotated[str | Non
 @router.get("/answer")
 def at_once(request: Request, store: Store, table: Table, skin: Annotated[str | None, Query()] = None) -> Response:
     """What changes in the page when a slider moves, as JSON."""
-    own = _PROTOTYPE if skin is None else _own(store, skin)
-    values = {**own, **_given(request)}
+    given = _given(request)
+    own, _ = _start(store, table, skin, given)
+    values = {**own, **given}
     try:
         found, figures = _answered(table, _asked(values), own, skin)
     except UnderskinError as refused:
-        return _json(request, {"error": str(refused)})
+        return _json(request, {"error": said(refused, _LABELS)})
     same = requests.post(request, "/v1/design", values, _call(values))
     return _json(
         request,
@@ -159,6 +152,14 @@ def told(found: DesignAnswer) -> list[Told]:
     ]  # fmt: skip
 
 
+def _start(
+    store: Store, table: Table, skin: str | None, given: Mapping[str, float]
+) -> tuple[dict[str, float], list[str]]:
+    """Where the sliders start, and what of it, beyond what is given, nobody declared."""
+    own, taken = start(store, table, skin, {name: words for name, words in _WORDS.items() if name not in given})
+    return {name: own[name] for name, *_ in SLIDERS}, taken
+
+
 def _given(request: Request) -> dict[str, float]:
     """The numbers of the address."""
     names = {name for name, *_ in SLIDERS}
@@ -181,7 +182,7 @@ def _first(error: ValidationError) -> tuple[str, Any, str]:
 
 
 def _computed(request: Request, table: SigmaTable) -> DesignAnswer:
-    asked = _asked({**_PROTOTYPE, **_given(request)})
+    asked = _asked({**{name: PROTOTYPE[name] for name, *_ in SLIDERS}, **_given(request)})
     return answer(table, asked, designed(table, asked))
 
 
@@ -211,27 +212,6 @@ def _answered(
             f"/design/response.csv?{query}",
         ),
     ]
-
-
-def _own(store: Database, skin_id: str) -> dict[str, float]:
-    """What the latest campaign says of the skin and of the sphere that pressed it most often; else the prototype's."""
-    with store.reading() as connection:
-        root = skins.require_root(connection, skin_id)
-        latest = campaigns.listed(connection, campaigns.Filters(skin=root, state="current"), None, 1)
-        if not latest:
-            return dict(_PROTOTYPE)
-        recordings = campaigns.recordings_of(connection, latest[0].number)
-    described = latest[0].about["skin"]
-    known = {name: described[name] for name in _PROTOTYPE if described.get(name) is not None}
-    scalars = [entry.scalars for entry in recordings if "preload_n" in entry.scalars]
-    if scalars:
-        known["indenter_radius_mm"] = float(np.min([one["indenter_radius_mm"] for one in scalars]))
-        known["preload_n"] = float(np.median([one["preload_n"] for one in scalars]))
-    places = np.array([[sensor["x_mm"], sensor["y_mm"]] for sensor in described["sensors"]], dtype=float)
-    if len(places) > 1:
-        apart = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
-        known["pitch_mm"] = float(apart[apart > 0].min())
-    return {**_PROTOTYPE, **{name: float(value) for name, value in known.items()}}
 
 
 def _call(values: Mapping[str, float]) -> str:

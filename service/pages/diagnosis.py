@@ -65,6 +65,7 @@ def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Resp
         outdated=diagnoses.outdated(row),
         in_force=model is not None and model.id == row.id,
         may_be_adopted=row.verdict == "explained" and report is not None and report["d33"] is not None,
+        not_adopted=None if report is None else _not_adopted(report),
         same=requests.get(request, place, f"client.diagnoses.get({row.id!r})"),
     )
 
@@ -118,6 +119,15 @@ def adopt(request: Request, diagnosis_id: DiagnosisId, sent: Form, store: Store)
         skin = diagnoses.find(connection, diagnosis_id).skin_id
         model = adopted(connection, skin, diagnosis_id, _sender(request))
     return see(f"/skins/{quote(model.model_skin, safe='')}?model=adopted")
+
+
+def _not_adopted(report: Mapping[str, Any]) -> str | None:
+    """Why a report cannot become a model, and what to do; None where it can."""
+    from underskin.adopted import NOT_ADOPTED
+
+    if report["verdict"] == "explained":
+        return None if report["d33"] is not None else "it is of curves, which have no d33: a model of a skin is of FRFs"
+    return NOT_ADOPTED[report["verdict"]].removeprefix("must be explained: ")
 
 
 def _done(store: Database, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any], dict[str, str]]:

@@ -5,9 +5,9 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
 
-from service.dependencies import Store
+from service.dependencies import Store, Table
 from service.pages import requests
-from service.pages.array import Described, answered, charge_columns, described, number
+from service.pages.array import Described, answered, charge_columns, described, number, refused
 from service.pages.figures import csv_answer, drawn
 from service.pages.html import page
 from underskin import InvalidInput, UnderskinError
@@ -24,17 +24,17 @@ Skin = Annotated[str | None, Query()]
 
 
 @router.get("")
-def view(request: Request, store: Store, skin: Skin = None, loads: Loads = _LOADS) -> Response:
+def view(request: Request, store: Store, table: Table, skin: Skin = None, loads: Loads = _LOADS) -> Response:
     """With the skin and the loads of the address, or else the paper's prototype under two spheres."""
-    array = described(store, request.query_params, skin)
+    array = described(store, table, request.query_params, skin)
     error: str | None = None
     document: dict[str, Any] = {}
     found: StressAnswer | None = None
     try:
         document = _document(array, loads)
         found = answered(request, document)
-    except UnderskinError as refused:
-        error = str(refused)
+    except UnderskinError as found_wrong:
+        error = refused(found_wrong, [place for place, line in enumerate(loads.splitlines(), 1) if line.strip()])
     return page(
         request,
         "loads.html",
@@ -48,9 +48,9 @@ def view(request: Request, store: Store, skin: Skin = None, loads: Loads = _LOAD
 
 
 @router.get("/charge.csv")
-def charge_csv(request: Request, store: Store, skin: Skin = None, loads: Loads = _LOADS) -> Response:
+def charge_csv(request: Request, store: Store, table: Table, skin: Skin = None, loads: Loads = _LOADS) -> Response:
     """Charge and stress on each sensor."""
-    found = answered(request, _document(described(store, request.query_params, skin), loads))
+    found = answered(request, _document(described(store, table, request.query_params, skin), loads))
     return csv_answer("charge", charge_columns(found))
 
 
@@ -78,8 +78,8 @@ def _document(array: Described, loads: str) -> dict[str, Any]:
 
 def _load(place: int, line: str) -> dict[str, Any]:
     """A line of numbers: x, y, radius and force, and perhaps the tangential force along x and y."""
-    parts = [number(f"load {place}", part) for part in line.replace(",", " ").split()]
+    parts = [number(f"load in line {place}", part) for part in line.replace(",", " ").split()]
     if len(parts) not in (4, 6):
-        raise InvalidInput(f"load {place}", line[:80], "must be x y R F, or x y R F Fx Fy (mm, N)")
+        raise InvalidInput(f"load in line {place}", line[:80], "must be x y R F, or x y R F Fx Fy (mm, N)")
     load: dict[str, Any] = dict(zip(_ORDER, parts, strict=False))
     return {**load, "tangential_force_n": parts[4:]} if parts[4:] else load

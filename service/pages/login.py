@@ -29,6 +29,7 @@ def login(request: Request, sent: Form) -> Response:
     key = gate.key_of_login(sent.get("key", ""))
     back = sent.get("next", "/")
     if key is None:
+        request.scope["why"] = "the key that was typed is not known"
         return page(request, "login.html", status=401, back=back, refused=True)
     answer = see(_own(back))
     set_session(request, answer, session.logged_in(key))

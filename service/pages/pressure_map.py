@@ -56,7 +56,7 @@ async def send(request: Request, store: Store) -> Response:
 
 
 def _shown(request: Request, store: Database, given: Mapping[str, str], content: bytes, name: str) -> Response:
-    described = array.described(store, given, given.get(_SKIN))
+    described = array.described(store, request.app.state.table, given, given.get(_SKIN))
     error: str | None = None
     document: dict[str, Any] = {}
     found: StressAnswer | None = None
@@ -67,7 +67,7 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
         document = {**described.document(), "pressure_map": pressure}
         found = array.answered(request, document)
     except UnderskinError as refused:
-        error = str(refused)
+        error = array.refused(refused)
     return page(
         request,
         "pressure_map.html",

@@ -1,6 +1,7 @@
 """Campaigns that have little, or nonsense, have their pages and numbers all the same."""
 
 import csv
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -111,10 +112,10 @@ def test_texts_in_csv_are_no_formulas(server: Server) -> None:
     ("query", "said"),
     [
         ("thickness_mm=0.0025", "was it given in m"),
-        ("thickness_mm=nan", "thickness_mm"),
+        ("thickness_mm=nan", "thickness h [mm]"),
         ("youngs_modulus_mpa=-1", "greater than 0"),
         ("pitch_mm=1", "cannot overlap"),
-        ("dip_percent=0", "dip_percent"),
+        ("dip_percent=0", "dip that can be told [%]"),
         ("preload_n=500", "–"),
     ],
 )
@@ -122,7 +123,38 @@ def test_designs_that_cannot_be_are_explained(server: Server, query: str, said: 
     answer = server.http.get(f"/design?{query}", headers=BROWSING)
     assert answer.status_code == 200
     assert said in answer.text
+    assert "units_checked" not in answer.text.partition("<main")[2].partition("The same by request")[0]
     assert server.http.get(f"/design/answer?{query}").status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("declared", "said", "value"),
+    [
+        (9.5, None, "9.5"),
+        (None, "d33 {found} pC/N is the median of the sensors in the newest, by the paper&#39;s model", "{found}"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("page", ["design", "loads"])
+def test_a_view_says_which_d33_it_starts_from(
+    server: Server, declared: float | None, said: str | None, value: str, page: str
+) -> None:
+    skin = f"{page} {declared}"
+    kept = server.http.post("/v1/campaigns", json=campaign("the newest", id=skin, d33_pc_per_n=declared)).json()
+    told = server.http.get(f"/v1/campaigns/{kept['id']}/d33").json()
+    found = f"{np.median([entry['d33_pc_per_n'] for entry in told['sensors']]):.4g}"
+    text = server.http.get(f"/{page}?skin={skin}", headers=BROWSING).text
+    assert re.search(rf'id="d33_pc_per_n" name="d33_pc_per_n" value="{value.format(found=found)}"', text)
+    assert ("the skin declares none" in text) == (said is not None)
+    assert said is None or said.format(found=found) in text
+    again = server.http.get(f"/{page}?skin={skin}&d33_pc_per_n=12", headers=BROWSING).text
+    assert "the skin declares none" not in again
+
+
+def test_what_nobody_declared_is_the_prototype_s_and_said(server: Server) -> None:
+    document = campaign("alone", id="alone", sensors=1)
+    assert server.http.post("/v1/campaigns", json=document).status_code == 201
+    text = server.http.get("/design?skin=alone", headers=BROWSING).text
+    assert "Not declared, so taken from the paper&#39;s prototype: pitch of the array 8 mm." in text
 
 
 def test_two_ids_become_one_skin(server: Server) -> None:
@@ -138,21 +170,28 @@ def test_two_ids_become_one_skin(server: Server) -> None:
 
 
 @pytest.mark.parametrize(
-    "query",
+    ("query", "said"),
     [
-        "loads=1 2",
-        "loads=a b c d",
-        "thickness_mm=x",
-        "columns=0",
-        "columns=1e9",
-        "poisson_ratio=0.7",
-        "loads=0 0 4 1e9",
+        ("loads=1 2", "load in line 1: 1 2"),
+        ("loads=a b c d", "load in line 1: a"),
+        ("thickness_mm=x", "thickness h [mm]: x"),
+        ("columns=0", "sensors along x"),
+        ("columns=1e9", "sensors along x"),
+        ("poisson_ratio=0.7", "Poisson&#39;s ratio ν: 0.7"),
+        ("loads=0 0 4 1e9", "load in line 1, F"),
+        ("loads=0 0 4 1%0A%0A9 0 -4 1", "load in line 3, R: -4"),
+        ("loads=0 0 4 1 0 nan", "load in line 1, Fy"),
+        ("loads=%0A0 0 4 1%0A0 0 4 1", "must not overlap load in line 2"),
+        ("loads=", "loads"),
+        ("youngs_modulus_mpa=16000000", "Young&#39;s modulus E [MPa]"),
     ],
 )
-def test_loads_that_cannot_be_are_explained(server: Server, query: str) -> None:
+def test_loads_that_cannot_be_are_explained(server: Server, query: str, said: str) -> None:
     answer = server.http.get(f"/loads?{query}", headers=BROWSING)
     assert answer.status_code == 200
-    assert 'role="alert"' in answer.text
+    alert = answer.text.partition('role="alert">')[2].partition("</p>")[0]
+    assert said in alert
+    assert not any(name in alert for name in ("contacts", "_mm", "_n", "units_checked")), alert
     assert server.http.get(f"/loads/charge.csv?{query}").status_code == 422
 
 

@@ -8,6 +8,8 @@ import httpx
 import pytest
 from playwright.sync_api import Browser
 
+from service import session
+from service.keys import KeyStore
 from tests.pages.conftest import Visit, visit
 from tests.store.server import Server, campaign
 
@@ -141,6 +143,21 @@ def test_a_session_ends_with_its_key(locked: tuple[Server, dict[str, str]]) -> N
         server.place.command("key", "revoke", "guest")
         time.sleep(0.6)  # a server reads the keys anew every half second
         assert guest.get("/").status_code == 303
+
+
+def test_a_session_ends_with_its_time_which_nobody_can_move(
+    locked: tuple[Server, dict[str, str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server, _ = locked
+    (key,) = [one for one in KeyStore(server.place.folder).entries() if one.scope == "read"]
+    good = session.logged_in(key)
+    monkeypatch.setattr(session, "LASTS_S", -1)
+    over = session.logged_in(key)
+    nonce, of_key, end, signature = over.split(".")
+    later = f"{nonce}.{of_key}.{int(end) + 3600}.{signature}"
+    for cookie, status in ((good, 200), (over, 303), (later, 303)):
+        headers = {**BROWSING, "Cookie": f"{session.COOKIE}={cookie}"}
+        assert httpx.get(f"{server.http.base_url}", headers=headers).status_code == status
 
 
 def test_login_leads_nowhere_else(locked: tuple[Server, dict[str, str]]) -> None:

@@ -155,10 +155,18 @@ def test_histories_say_which_model_each_value_used(server: Server, client: Clien
         client.campaigns.d33(other, model="adopted")
 
 
-@pytest.mark.parametrize("verdict", ["no_mismatch", "ambiguous", "unexplained", "insufficient_data"])
-def test_only_what_is_explained_is_adopted(server: Server, client: Client, verdict: str) -> None:
+@pytest.mark.parametrize(
+    ("verdict", "what_to_do"),
+    [
+        ("no_mismatch", "nothing to adopt; the paper's model serves"),
+        ("ambiguous", r"several explanations remain.*next_experiment"),
+        ("unexplained", "Look at the rig"),
+        ("insufficient_data", r"too little was recorded.*next_experiment"),
+    ],
+)
+def test_only_what_is_explained_is_adopted(server: Server, client: Client, verdict: str, what_to_do: str) -> None:
     _, diagnosis_id = diagnosed(server, resonant("array"), {**report(), "verdict": verdict})
-    with pytest.raises(ServiceError, match=f"{verdict}.*must be of the verdict explained"):
+    with pytest.raises(ServiceError, match=f"a diagnosis of verdict {verdict}.*must be explained: .*{what_to_do}"):
         client.skins.adopt("palm", diagnosis_id)
     assert client.skins.models("palm") == []
 

@@ -44,7 +44,6 @@ def test_a_backup_moves_to_another_machine(server: Server, tmp_path: Path) -> No
     send(server, "moved")
     assert server.place.command("backup", str(tmp_path / "b")).returncode == 0
     other = Place(tmp_path / "other")
-    other.folder.mkdir()
     assert other.command("restore", str(tmp_path / "b")).returncode == 0
     with running(other) as there:
         assert names(there) == {"moved"}

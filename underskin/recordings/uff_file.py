@@ -2,6 +2,10 @@
 
 Each dataset is a channel, named by its first description line; those on one abscissa are a block. Even spacing in time
 gives the block's sample rate; any other abscissa is a channel of its own (`frequency` for spectra).
+
+Of several FRFs each is a block of its own, named by that line, with the channels `frequency`, `FRF` and, where there is
+one of the same degrees of freedom, `coherence`: each is a recording, and all are mapped alike. Where their units
+differ, the channel is called by its own, `FRF pC/N`.
 """
 
 import os
@@ -16,7 +20,10 @@ from underskin.recordings.channels import Block, Channel, Contents, with_distinc
 from underskin.units import Floats
 
 _FUNCTION = 58
+_FRF, _COHERENCE = 4, 6  # function types
+_FREEDOM = ("rsp_node", "rsp_dir", "ref_node", "ref_dir")
 _TIME, _FREQUENCY = 17, 18  # specific data types of the abscissa
+_MOST_NAMED = 5
 _END = b"-1"
 
 
@@ -35,7 +42,16 @@ def read(stream: BinaryIO, file: str) -> Contents:
         raise FileError(file, "", f"holds no whole dataset {_FUNCTION}; its datasets: {types or 'none'}")
     if len(functions) < len(types):
         notes.append(f"datasets other than {_FUNCTION} are left out: {sorted(set(types) - {_FUNCTION})}")
-    return Contents(_blocks(functions), {}, tuple(notes))
+    frfs = [function for function in functions if _is_frf(function)]
+    if len(frfs) < 2:
+        return Contents(_blocks(functions), {}, tuple(notes))
+    blocks, used = _each_alone(frfs, functions)
+    others = [function for function in functions if function["number"] not in used]
+    notes.append(f"holds {len(frfs)} FRFs, each a part of its own: {_some([name for name, _ in blocks])}")
+    properties = {f"{name}.{key}": value for name, frf in blocks for key, value in _about(frf).items()}
+    alike = len({_unit(frf) for frf in frfs}) == 1
+    alone = tuple(_frf_block(name, frf, "FRF" if alike else f"FRF {_unit(frf)}") for name, frf in blocks)
+    return Contents((*alone, *_blocks(others)), properties, tuple(notes))
 
 
 def _cut_off(stream: BinaryIO) -> list[str]:
@@ -61,6 +77,61 @@ def _function(universal: Any, index: int, file: str) -> dict[str, Any]:
     if found < announced or len(function["x"]) < announced or announced < 1:
         raise FileError(file, place, f"holds {found} of the {announced} points that it announces")
     return {**function, "x": function["x"][:announced], "data": function["data"][:announced], "number": index + 1}
+
+
+def _is_frf(function: dict[str, Any]) -> bool:
+    return int(function["func_type"]) == _FRF and np.iscomplexobj(function["data"])
+
+
+def _each_alone(
+    frfs: list[dict[str, Any]], functions: list[dict[str, Any]]
+) -> tuple[list[tuple[str, dict[str, Any]]], set[int]]:
+    """The FRFs, each by a name of its own and with its coherence, and the numbers of the datasets in them."""
+    waiting = [function for function in functions if int(function["func_type"]) == _COHERENCE]
+    named: dict[str, dict[str, Any]] = {}
+    used = set()
+    for frf in frfs:
+        mate = next((one for one in waiting if _freedom(one) == _freedom(frf) and _same_abscissa(one, frf)), None)
+        if mate is not None:
+            waiting.remove(mate)
+            used.add(mate["number"])
+        used.add(frf["number"])
+        name = _name(frf)
+        named[name if name not in named else f"{name} (dataset {frf['number']})"] = {**frf, "coherence": mate}
+    return list(named.items()), used
+
+
+def _freedom(function: dict[str, Any]) -> tuple[int, ...]:
+    return tuple(int(function[name]) for name in _FREEDOM)
+
+
+def _about(frf: dict[str, Any]) -> dict[str, str]:
+    """What the dataset says of itself, for a rig description to take fields from."""
+    lines = {f"description {number}": _text(frf[f"id{number}"]) for number in range(1, 6)}
+    places = {"response": _place(frf, "rsp"), "reference": _place(frf, "ref")}
+    return {name: text for name, text in (lines | places).items() if text}
+
+
+def _place(frf: dict[str, Any], of: str) -> str:
+    """A node with its entity's name, where it has one."""
+    entity = _text(frf[f"{of}_ent_name"])
+    return entity if entity else str(int(frf[f"{of}_node"]))
+
+
+def _frf_block(name: str, frf: dict[str, Any], channel: str) -> Block:
+    channels = [
+        Channel("frequency", _text(frf["abscissa_axis_units_lab"]), np.asarray(frf["x"], dtype=np.float64)),
+        Channel(channel, _unit(frf), np.asarray(frf["data"])),
+    ]
+    if frf["coherence"] is not None:
+        channels.append(Channel("coherence", "", np.asarray(frf["coherence"]["data"])))
+    return Block(name, tuple(channels))
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:_MOST_NAMED]) + (
+        f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+    )
 
 
 def _blocks(functions: list[dict[str, Any]]) -> tuple[Block, ...]:

@@ -1,0 +1,72 @@
+"""The numbers that a view starts from: a skin's own, and which of them nobody declared."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from service.store import campaigns, overview, skins
+from service.store.engine import Database
+from underskin.surrogate import SigmaTable
+
+PROTOTYPE = {
+    "thickness_mm": 2.5,
+    "sensor_radius_mm": 1.5,
+    "indenter_radius_mm": 4.0,
+    "preload_n": 1.0,
+    "youngs_modulus_mpa": 16.0,
+    "d33_pc_per_n": 14.0,
+    "poisson_ratio": 0.5,
+    "pitch_mm": 8.0,
+    "dip_percent": 10.0,
+}  # Seminara 2018
+
+
+def start(
+    store: Database, table: SigmaTable, skin_id: str | None, words: Mapping[str, tuple[str, str]]
+) -> tuple[dict[str, float], list[str]]:
+    """Where the view starts: what the latest campaign says of the skin, of the sphere that pressed it and, where no d33
+    is declared, its measured one; else the paper's prototype.
+
+    And in sentences, of the fields in `words` (each with its words and unit), what nobody declared.
+    """
+    if skin_id is None:
+        return dict(PROTOTYPE), []
+    with store.reading() as connection:
+        root = skins.require_root(connection, skin_id)
+        latest = campaigns.listed(connection, campaigns.Filters(skin=root, state="current"), None, 1)
+        if not latest:
+            return dict(PROTOTYPE), ["The skin has no campaign in use: all values are those of the paper's prototype"]
+        recordings = campaigns.recordings_of(connection, latest[0].number)
+        measured = overview.medians(connection, [latest[0].number], table.sha256).get(latest[0].number)
+    described = latest[0].about["skin"]
+    known = {name: float(described[name]) for name in PROTOTYPE if described.get(name) is not None}
+    known |= _pressed([entry.scalars for entry in recordings if "preload_n" in entry.scalars])
+    known |= _pitch(described["sensors"])
+    taken = []
+    if "d33_pc_per_n" not in known and measured is not None and measured > 0:
+        known["d33_pc_per_n"] = float(f"{measured:.4g}")
+        told = f"d33 {measured:.4g} pC/N is the median of the sensors in {latest[0].name[:60]}, by the paper's model"
+        taken += [f"{told}; the skin declares none"] if "d33_pc_per_n" in words else []
+    lacking = [name for name in words if name in PROTOTYPE and name not in known]
+    told = ", ".join(f"{words[name][0]} {PROTOTYPE[name]:g} {words[name][1]}".strip() for name in lacking)
+    if lacking:
+        taken.append(f"Not declared, so taken from the paper's prototype: {told}")
+    return {**PROTOTYPE, **known}, taken
+
+
+def _pressed(scalars: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """The smallest sphere and the median preload."""
+    if not scalars:
+        return {}
+    smallest = float(np.min([one["indenter_radius_mm"] for one in scalars]))
+    return {"indenter_radius_mm": smallest, "preload_n": float(np.median([one["preload_n"] for one in scalars]))}
+
+
+def _pitch(sensors: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """The least distance of two sensors."""
+    places = np.array([[sensor["x_mm"], sensor["y_mm"]] for sensor in sensors], dtype=float)
+    if len(places) < 2:
+        return {}
+    apart = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
+    return {"pitch_mm": float(apart[apart > 0].min())}
