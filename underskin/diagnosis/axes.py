@@ -1,6 +1,6 @@
 """The campaign's axes as numbers: what each recording was made at, on a scale where like distances mean alike."""
 
-from datetime import datetime
+from datetime import UTC, datetime
 
 import numpy as np
 
@@ -76,6 +76,8 @@ def preload_before(campaign: Campaign) -> Floats | None:
 
 
 def hours(times: list[str | None]) -> Floats:
-    """Hours since the first of these times (ISO 8601, UTC)."""
-    seconds = np.array([datetime.fromisoformat(str(time).replace("Z", "+00:00")).timestamp() for time in times])
-    return (seconds - seconds.min()) / 3600
+    """Hours since the first of these times (ISO 8601; UTC where they do not say)."""
+    read = [datetime.fromisoformat(str(time).replace("Z", "+00:00")) for time in times]
+    known = [time if time.tzinfo else time.replace(tzinfo=UTC) for time in read]
+    since = np.array([(time - known[0]).total_seconds() for time in known])
+    return (since - since.min()) / 3600

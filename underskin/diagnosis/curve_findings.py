@@ -32,11 +32,11 @@ def _lacking(entry: object, poisson_ratio: float) -> InvalidInput | None:
         return InvalidInput("displacement_mm", float(entry.displacement_mm[0]), "must change")
     try:
         if isinstance(entry, IndentationRecording):
-            elastomer.of_indentation(entry, poisson_ratio)
+            modulus = elastomer.of_indentation(entry, poisson_ratio).modulus
         elif isinstance(entry, CompressionRecording):
-            elastomer.of_compression(entry)
+            modulus = elastomer.of_compression(entry).modulus
         else:
             return InvalidInput("force_n", "too few finite samples", "must have at least 5")
     except InvalidInput as refusal:
         return refusal
-    return None
+    return None if modulus > 0 else InvalidInput("force_n", "does not rise as it is pressed", "must rise")

@@ -15,6 +15,8 @@ from underskin.recordings.campaign import Campaign, CompressionRecording, Indent
 from underskin.units import Floats
 
 _SOFTEST_MPA, _HARDEST_MPA = 0.003, 300.0
+_IMPOSSIBLE_MPA = 1e-6, 1e6  # from foam's to diamond's
+_DEEPEST = 0.85  # of a cylinder's height: there the true stress is tens of moduli
 _FAR = 100.0  # times the declared modulus, or the other curves'
 _REVERSED = -0.5  # correlation of force and displacement
 
@@ -34,7 +36,7 @@ def without_slips(campaign: Campaign, kind: Kind) -> Inspected:
     left = replace(campaign, recordings=tuple(curves))
     shared = _shared(campaign, curves)
     found += shared
-    if shared and not campaign.units_checked:
+    if shared and (not campaign.units_checked or not _possible(campaign, curves)):
         return Inspected(
             replace(left, recordings=()),
             found,
@@ -67,14 +69,14 @@ def _once(curves: Sequence[Curve], found: list[Finding]) -> list[Curve]:
 
 
 def _within_reach(curves: Sequence[Curve], found: list[Finding]) -> list[Curve]:
-    """Those not pressed through more than the whole sample, or ten times as deep as the sphere is wide."""
+    """Those not pressed through nearly the whole sample, or ten times as deep as the sphere is wide."""
     kept = []
     for entry in curves:
         place = entry.displacement_mm[np.isfinite(entry.displacement_mm)]
         most, what = (  # a sphere may come a long way through the air
             (20 * entry.indenter_radius_mm, "ten times the sphere's width")
             if isinstance(entry, IndentationRecording)
-            else (entry.sample_height_mm, "its sample's height")
+            else (_DEEPEST * entry.sample_height_mm, f"{_DEEPEST:g} of its sample's height")
         )
         if place.max() - place[0] > most:
             text = f"pressed {place.max() - place[0]:.3g} mm, more than {what} ({most:.3g} mm): given in µm? Left out"
@@ -133,6 +135,13 @@ def _shared(campaign: Campaign, curves: Sequence[Curve]) -> list[Finding]:
         f"force and displacement would need a modulus of about {usual:.2g} MPa, where {against}: off by 1000 ({guess})?"
     )
     return [Finding("units_off_by_1000", "", "force_n", text)]
+
+
+def _possible(campaign: Campaign, curves: Sequence[Curve]) -> bool:
+    """Whether all apparent moduli are of a solid's magnitude."""
+    modulus = np.array([_apparent_mpa(entry, campaign.skin.poisson_ratio) for entry in curves])
+    known = modulus[np.isfinite(modulus)]
+    return bool(((known > _IMPOSSIBLE_MPA[0]) & (known < _IMPOSSIBLE_MPA[1])).all())
 
 
 def _apparent_mpa(entry: Curve, poisson_ratio: float) -> float:

@@ -16,6 +16,7 @@ from underskin.diagnosis.curve_slips import without_slips
 from underskin.diagnosis.curves import curve_lines
 from underskin.diagnosis.effect import effect
 from underskin.diagnosis.explanation import Workbench
+from underskin.diagnosis.extremes import without_extremes
 from underskin.diagnosis.finding import Finding
 from underskin.diagnosis.findings import inspect
 from underskin.diagnosis.lines import lines
@@ -45,7 +46,10 @@ def diagnose(
     Raises InvalidInput where the campaign has no FRF recording.
     """
     provenance = _provenance(table)
-    left_out: list[Finding] = []
+    possible = without_extremes(campaign)
+    if possible.found and possible.lacking:
+        return Diagnosis(campaign.name, possible.found, provenance, lacking=possible.lacking)
+    campaign, left_out = possible.campaign, list(possible.found)
     for kind in () if any(isinstance(entry, FrfRecording) for entry in campaign.recordings) else _CURVES:
         if all(entry.kind != kind for entry in campaign.recordings):
             continue

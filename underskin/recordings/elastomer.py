@@ -165,7 +165,7 @@ def indentation_modulus(displacement: Floats, force: Floats, radius: float, pois
     variance = float(residual @ residual) / freedom * _correlation_factor(residual)
     size = np.linalg.norm(jacobian, axis=0)
     shape = jacobian / size
-    deviation = float(np.sqrt(variance * np.linalg.inv(shape.T @ shape)[0, 0]) / size[0])
+    deviation = float(np.sqrt(variance * np.linalg.pinv(shape.T @ shape)[0, 0]) / size[0])
     per_stiffness = 0.75 * (1 - poisson_ratio**2) / np.sqrt(radius)
     return IndentationModulus(
         modulus=float(stiffness * per_stiffness),
