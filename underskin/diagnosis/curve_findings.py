@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from underskin.diagnosis.curve_slips import is_reversed
 from underskin.diagnosis.curves import curve_lines
 from underskin.diagnosis.finding import Finding
 from underskin.errors import InvalidInput
@@ -39,4 +40,6 @@ def _lacking(entry: object, poisson_ratio: float) -> InvalidInput | None:
             return InvalidInput("force_n", "too few finite samples", "must have at least 5")
     except InvalidInput as refusal:
         return refusal
-    return None if modulus > 0 else InvalidInput("force_n", "does not rise as it is pressed", "must rise")
+    if modulus > 0 or is_reversed(entry):
+        return None
+    return InvalidInput("force_n", "does not rise as it is pressed", "must rise")

@@ -46,12 +46,17 @@ def without_slips(campaign: Campaign, kind: Kind) -> Inspected:
     return Inspected(left, found, "" if curves else "no curve can be used (see findings)")
 
 
-def _upright(entry: Curve, found: list[Finding]) -> Curve:
+def is_reversed(entry: Curve) -> bool:
+    """Whether the force falls as it is pressed."""
     finite = np.isfinite(entry.displacement_mm) & np.isfinite(entry.force_n)
     place, force = entry.displacement_mm[finite], entry.force_n[finite]
     if len(place) < 2 or not np.ptp(place) or not np.ptp(force):
-        return entry
-    if float(np.corrcoef(place, force)[0, 1]) > _REVERSED:
+        return False
+    return float(np.corrcoef(place, force)[0, 1]) <= _REVERSED
+
+
+def _upright(entry: Curve, found: list[Finding]) -> Curve:
+    if not is_reversed(entry):
         return entry
     text = "its force falls as it is pressed, where compression counts positive: reversed"
     found.append(Finding("sign_flipped", entry.id, "force_n", text))
