@@ -1,6 +1,6 @@
 """Upload: files are looked at, told of channel by channel, and kept only when somebody says so."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Annotated, Any
 
@@ -12,13 +12,22 @@ from service import inverting, session
 from service.accepting import RIG
 from service.campaigns import heavy
 from service.dependencies import Store, Table
-from service.pages import requests, upload_skin
+from service.pages import requests, upload_alike, upload_skin
 from service.pages.figures import Drawn, csv_answer
 from service.pages.forms import TOKEN, WRITE, Form, require_own, see
 from service.pages.html import page
 from service.pages.upload_figures import figures, lines_columns, trace_columns
 from service.pages.upload_keeping import SKIN_FIELD, all_told, keep_good
-from service.pages.upload_mapping import CHANNELS, KINDS, RECORDING, SKIN, document_of, guessed, sensors_text
+from service.pages.upload_mapping import (
+    CHANNELS,
+    KINDS,
+    RECORDING,
+    SKIN,
+    document_of,
+    guessed,
+    passed_over,
+    sensors_text,
+)
 from service.pages.upload_seen import MOST_LISTED, ChannelSeen, FileSeen, seen
 from service.pages.upload_shelf import Shelf, Shelved
 from service.problems import Refusal
@@ -70,6 +79,7 @@ async def send(request: Request, store: Store) -> Response:
         shelved = shelf.put(cookie, given)
     shelved.skin = fields.get(SKIN_FIELD) or None
     shelved.rig, shelved.refused = found
+    shelved.rig_label = None if rig is None or shelved.rig is None else rig.label
     try:
         if await run_in_threadpool(upload_skin.holds_skin, shelved):
             await upload_skin.look(store, shelved)
@@ -97,15 +107,16 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
         known = [row.id for row in skins.listed(connection, None, None, _MOST_SKINS)]
         about = _latest(store, shelved.skin or shelved.seen[file].skin)
     channels = _channels(shelved)
-    document = shelved.draft or (
-        shelved.rig.document if shelved.rig is not None else guessed(channels, shelved.seen[file].properties, about)
-    )
+    said = shelved.draft or (shelved.rig.document if shelved.rig is not None else None)
+    document = said or guessed(channels, shelved.seen[file].properties, about)
     return page(
         request,
         "understood.html",
         shelved=shelved,
         number=file,
         file=shelved.seen[file],
+        groups=upload_alike.of_files(shelved.seen),
+        refusals=upload_alike.of_recordings(shelved.seen[file]),
         figures=shelved.drawn[file],
         good=sum(one.recordings for one in shelved.seen),
         refused=sum(len(one.refused) or len(one.errors) for one in shelved.seen if not _unsaid(shelved, one)),
@@ -114,6 +125,8 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
         known=known,
         skin=shelved.skin or shelved.seen[file].skin or "",
         channels=channels,
+        passed_over=[] if said else passed_over(channels),
+        twice=_twice(shelved, channels),
         document=document,
         layout=sensors_text(document),
         kinds=KINDS,
@@ -123,7 +136,7 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
         same=requests.files(
             request,
             [one.label for one in shelved.seen[:_MOST_NAMED]],
-            None if shelved.rig is None else "rig.json",
+            shelved.rig_label,
             shelved.skin or "",
         ),
     )
@@ -143,7 +156,7 @@ async def mapping(request: Request, upload_id: str, sent: Form) -> Response:
     shelved.refused = [told for error in wrong for told in all_told(error)]
     if wrong:
         return see(f"/upload/{upload_id}")
-    shelved.rig, shelved.draft = rig, None
+    shelved.rig, shelved.draft, shelved.rig_label = rig, None, "rig.json"  # as the page saves it
     async with heavy:
         await run_in_threadpool(_look, request, shelved)
     return see(f"/upload/{upload_id}")
@@ -265,6 +278,13 @@ def _channels(shelved: Shelved) -> list[ChannelSeen]:
     """Of all files, by name; those that hold the mapping's channels first come first."""
     found = {channel.name: channel for one in reversed(shelved.seen) for channel in reversed(one.channels)}
     return list(reversed(found.values()))
+
+
+def _twice(shelved: Shelved, channels: Sequence[ChannelSeen]) -> dict[str, str]:
+    """Channels that the form took for what another one is already, and that."""
+    names = {channel.name for channel in channels}
+    told = [(str(error["value"]), error["field"].removeprefix("channels.")) for error in shelved.refused]
+    return {name: field for name, field in told if name in names and field in CHANNELS}
 
 
 def _short(field: Upload) -> str:

@@ -74,7 +74,7 @@ _BY_WORD = {
 
 def field_words(field: str) -> str:
     """A field as the form calls it; others as they are."""
-    return _WORDS.get(field.removeprefix("skin.").removeprefix("recording."), field)
+    return _WORDS.get(field.removeprefix("skin.").removeprefix("recording.").removeprefix("channels."), field)
 
 
 def what_to_do(error: Mapping[str, Any]) -> str:
@@ -91,15 +91,10 @@ def what_to_do(error: Mapping[str, Any]) -> str:
 def guessed(channels: Sequence[ChannelSeen], properties: Mapping[str, Any], skin: Mapping[str, Any]) -> dict[str, Any]:
     """A first rig description by units and names of channels and properties, to be looked over; `skin`: what is known
     of it."""
-    dimensions = [known.dimension if (known := unit(one.unit)) else "" for one in channels]
-    kind = "indentation" if "length" in dimensions and "charge" not in dimensions else "frf"
+    kind, fields = _likely(channels)
     found: dict[str, Any] = {}
-    for one, dimension in zip(channels, dimensions, strict=True):
-        word = next((field for word, field in _BY_WORD.items() if word in one.name.lower()), "")
-        field = "frf_pc_per_n" if one.is_complex else _BY_DIMENSION[kind].get(dimension) or word
-        if field == "frf_re_pc_per_n" and "imag" in one.name.lower():
-            field = "frf_im_pc_per_n"
-        if field and field not in found and field in channel_fields(kind):
+    for one, field in zip(channels, fields, strict=True):
+        if field and field not in found:
             found[field] = {"channel": one.name}
     known_skin = {name: skin[name] for name in (*[name for name, *_ in SKIN], "sensors") if skin.get(name) is not None}
     return {
@@ -109,6 +104,33 @@ def guessed(channels: Sequence[ChannelSeen], properties: Mapping[str, Any], skin
         "recording": _stated(properties, kind),
         "channels": found,
     }
+
+
+def passed_over(channels: Sequence[ChannelSeen]) -> list[str]:
+    """In words, which channels `guessed` left unused although they may be what another one was taken for."""
+    by_field: dict[str, list[str]] = {}
+    for one, field in zip(channels, _likely(channels)[1], strict=True):
+        by_field.setdefault(field, []).append(one.name)
+    return [
+        f"{', '.join(names[1:])} may be {CHANNELS[field]} as well as {names[0]}, which was taken for it: "
+        "choose the one that is meant"
+        for field, names in by_field.items()
+        if field and len(names) > 1
+    ]
+
+
+def _likely(channels: Sequence[ChannelSeen]) -> tuple[str, list[str]]:
+    """The kind of recording, and of each channel the field that it may be; empty where nothing speaks for one."""
+    dimensions = [known.dimension if (known := unit(one.unit)) else "" for one in channels]
+    kind = "indentation" if "length" in dimensions and "charge" not in dimensions else "frf"
+    found = []
+    for one, dimension in zip(channels, dimensions, strict=True):
+        word = next((field for word, field in _BY_WORD.items() if word in one.name.lower()), "")
+        field = "frf_pc_per_n" if one.is_complex else _BY_DIMENSION[kind].get(dimension) or word
+        if field == "frf_re_pc_per_n" and "imag" in one.name.lower():
+            field = "frf_im_pc_per_n"
+        found.append(field if field in channel_fields(kind) else "")
+    return kind, found
 
 
 def _stated(properties: Mapping[str, Any], kind: str) -> dict[str, Any]:
@@ -198,9 +220,9 @@ def _channels(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[st
     while f"channel-{number}" in form:
         field = form.get(f"is-{number}", "")
         if field in found:
-            twice.append(
-                InvalidInput(f"channels.{field}", form[f"channel-{number}"][:80], "only one channel can be it")
-            )
+            first = found[field]["channel"]
+            allowed = f"{first[:80]} is {CHANNELS.get(field, field)} already: set one of the two to “not used”"
+            twice.append(InvalidInput(f"channels.{field}", form[f"channel-{number}"], allowed))
         elif field:
             found[field] = _channel(form, number, base.get(field, {}))
         number += 1

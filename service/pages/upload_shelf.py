@@ -38,6 +38,7 @@ class Shelved:
     used: float
     skin: str | None = None
     rig: RigDescription | None = None
+    rig_label: str | None = None  # the file that a request would send it as; None where none need be sent
     draft: dict[str, Any] | None = None  # the rig description as the form had it, usable or not
     refused: list[dict[str, Any]] = field(
         default_factory=list

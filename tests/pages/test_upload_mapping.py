@@ -90,7 +90,7 @@ def test_what_cannot_be_said_is_named_and_what_was_typed_is_kept() -> None:
     assert sensors_text(found) == layout
     twice = {"channel-0": "a", "is-0": "force_n", "channel-1": "b", "is-1": "force_n"}
     found, (wrong,) = document_of(twice, {})
-    assert wrong.allowed == "only one channel can be it"
+    assert wrong.allowed == "a is force already: set one of the two to “not used”"
     assert found["channels"] == {"force_n": {"channel": "a"}}
 
 

@@ -31,6 +31,28 @@ if (form) {
   });
 }
 
+// The request that would do the same, with the files that were chosen.
+function inShell(text) {
+  return /^[\w@%+=:,./-]+$/.test(text) ? text : `'${text.replaceAll("'", `'"'"'`)}'`;
+}
+if (form) {
+  const codes = [...document.querySelectorAll(".same code")];
+  const first = codes.map((code) => code.textContent);
+  const named = (text, files, rig) => [
+    text[0]
+      .replace("-F file=@monday.tdms", () => files.map((name) => `-F ${inShell(`file=@${name}`)}`).join(" \\\n  "))
+      .replace(" \\\n  -F rig=@rig.yaml", () => (rig ? ` \\\n  -F ${inShell(`rig=@${rig}`)}` : "")),
+    text[1]
+      .replace("['monday.tdms']", () => `[${files.map((name) => JSON.stringify(name)).join(", ")}]`)
+      .replace(", rig='rig.yaml'", () => (rig ? `, rig=${JSON.stringify(rig)}` : "")),
+  ];
+  form.addEventListener("change", () => {
+    const files = [...form.elements.file.files].map((file) => file.name);
+    if (files.length === 0) return;
+    named(first, files, form.elements.rig.files[0]?.name).forEach((text, index) => (codes[index].textContent = text));
+  });
+}
+
 // Of the mapping, what the kind of recording has.
 const kind = document.getElementById("kind");
 function fit() {
