@@ -3,10 +3,11 @@
 import logging
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import orjson
 
+from service import campaign_numbers
 from service.adopted import Serving, serving
 from service.d33_models import D33, of_inversion, of_moduli
 from service.problems import Refusal
@@ -17,6 +18,9 @@ from service.store.tables import AnyRow
 from underskin import InvalidInput
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate import SigmaTable
+
+if TYPE_CHECKING:
+    from underskin.inversion import Inversion
 
 logger = logging.getLogger("underskin")
 
@@ -32,17 +36,18 @@ def answer(store: Database, table: SigmaTable, row: AnyRow, band_hz: Band | None
     """The d33 of a campaign as it is now (fields of D33), over its flat zone or a band of the user's own."""
     with store.reading() as connection:
         kept = inversions.find(connection, row, table.sha256) if band_hz is None else None
-        if kept is not None:
-            return dict(kept)
-        campaign = campaigns.load(connection, row, with_excluded=False)
-        excluded = campaigns.excluded_of(connection, row.number)
-    model = {"model": "paper", "model_id": None, "model_percent": None}
-    document = {"campaign_id": row.id, "table_sha256": table.sha256, **model}
-    left_out = [(left.recording, left.reason) for left in excluded]
-    document, computed = _computed(document, campaign, table, band_hz, left_out)
-    if band_hz is None and computed:
-        _keep(store, row, document)
-    return document
+    return dict(kept) if kept is not None else _derived(store, table, row, band_hz)[0]
+
+
+def with_numbers(
+    store: Database, table: SigmaTable, row: AnyRow, band_hz: Band | None
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The same, and the numbers that its figures show (service.campaign_numbers)."""
+    with store.reading() as connection:
+        kept = inversions.find_with_numbers(connection, row, table.sha256)
+    if kept is not None and band_hz is None:
+        return kept
+    return _derived(store, table, row, band_hz, None if kept is None else kept[1]["spreads"])
 
 
 def adopted_answer(
@@ -63,8 +68,8 @@ def adopted_answer(
     left_out += [(name, "beyond the table under the adopted model") for name in beyond]
     model = {"model": "adopted", "model_id": serving.model_id, "model_percent": 100 * serving.model.unsure}
     document = {"campaign_id": row.id, "table_sha256": table.sha256, **model}
-    document, computed = _computed(document, translated, table, band_hz, left_out)
-    if band_hz is None and computed:
+    document, _, failed = _computed(document, translated, table, band_hz, left_out)
+    if band_hz is None and not failed:
         try:
             with store.writing() as connection:
                 inversions.keep_adopted(connection, row, serving.model_id, table.sha256, document)
@@ -98,32 +103,50 @@ def complete(store: Database, table: SigmaTable, root: str) -> None:
     derive(store, table, [row.id for row in missing])
 
 
+def _derived(
+    store: Database, table: SigmaTable, row: AnyRow, band_hz: Band | None, spreads: list[dict[str, Any]] | None = None
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Answer and numbers, computed, and kept where they are of the flat zone; `spreads`: where these are known."""
+    with store.reading() as connection:
+        campaign = campaigns.load(connection, row, with_excluded=False)
+        excluded = campaigns.excluded_of(connection, row.number)
+    model = {"model": "paper", "model_id": None, "model_percent": None}
+    document = {"campaign_id": row.id, "table_sha256": table.sha256, **model}
+    left_out = [(left.recording, left.reason) for left in excluded]
+    document, found, failed = _computed(document, campaign, table, band_hz, left_out)
+    numbers = campaign_numbers.numbers(campaign, found, spreads)
+    if band_hz is None and not failed:
+        _keep(store, row, document, numbers)
+    return document, numbers
+
+
 def _computed(
     document: dict[str, Any],
     campaign: Campaign,
     table: SigmaTable,
     band_hz: Band | None,
     left_out: Sequence[tuple[str, str]],
-) -> tuple[dict[str, Any], bool]:
-    """The document with the campaign's figures, and whether they could be computed; `left_out`: recordings, reasons.
+) -> "tuple[dict[str, Any], Inversion | None, bool]":
+    """The document with the campaign's figures, the inversion that they are of, where there is one, and whether they
+    failed to be computed; `left_out`: recordings, reasons.
 
     Raises InvalidInput where the band is refused.
     """
     entries = [{"recording": recording, "reason": reason} for recording, reason in left_out]
     try:
-        found = _inverted(campaign, table, band_hz)
-        whole = {**document, **found, "left_out": entries + found["left_out"]}
+        fields, found = _inverted(campaign, table, band_hz)
+        whole = {**document, **fields, "left_out": entries + fields["left_out"]}
         D33.model_validate(orjson.loads(orjson.dumps(whole)))  # what is kept can be answered
     except InvalidInput:  # of the band
         raise
     except Exception as error:
         logger.exception("no d33 from a campaign", extra={"fields": {"campaign": document["campaign_id"]}})
         reason = f"the figures cannot be computed ({type(error).__name__}: {error}); the server's log says more"
-        return {**document, **_none(reason), "moduli": [], "left_out": entries}, False
-    return whole, True
+        return {**document, **_none(reason), "moduli": [], "left_out": entries}, None, True
+    return whole, found, False
 
 
-def _inverted(campaign: Campaign, table: SigmaTable, band_hz: Band | None) -> dict[str, Any]:
+def _inverted(campaign: Campaign, table: SigmaTable, band_hz: Band | None) -> "tuple[dict[str, Any], Inversion | None]":
     # Imported here: statistics take half a second to load, which a start need not wait for.
     from underskin.inversion import invert
     from underskin.recordings import elastomer
@@ -134,16 +157,16 @@ def _inverted(campaign: Campaign, table: SigmaTable, band_hz: Band | None) -> di
     except InvalidInput as error:
         if band_hz is not None and error.field == "band_hz":
             raise
-        return {**_none(str(error)), "moduli": moduli, "left_out": silent}
+        return {**_none(str(error)), "moduli": moduli, "left_out": silent}, None
     left_out = [{"recording": None, "reason": reason} for reason in found.left_out]
-    return {**of_inversion(found), "moduli": moduli, "left_out": left_out + silent}
+    return {**of_inversion(found), "moduli": moduli, "left_out": left_out + silent}, found
 
 
 def _none(reason: str) -> dict[str, Any]:
     return {**_NOTHING, "status": "none", "reason": reason, **_EMPTY}
 
 
-def _keep(store: Database, row: AnyRow, document: dict[str, Any]) -> None:
+def _keep(store: Database, row: AnyRow, document: dict[str, Any], numbers: dict[str, Any]) -> None:
     sensors = {
         entry["sensor"]: (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"])
         for entry in document["sensors"]
@@ -151,6 +174,6 @@ def _keep(store: Database, row: AnyRow, document: dict[str, Any]) -> None:
     }
     try:
         with store.writing() as connection:
-            inversions.keep(connection, row, document["table_sha256"], document, sensors)
+            inversions.keep(connection, row, document["table_sha256"], document, numbers, sensors)
     except StorageFull:
         logger.warning("no room to keep the d33 of a campaign", extra={"fields": {"campaign": row.id}})

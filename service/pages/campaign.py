@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from service import inverting
 from service.dependencies import CampaignId, Store, Table
 from service.pages import requests, verdicts
-from service.pages.campaign_figures import band_query, figures, frf_columns, inversion, preload_columns
+from service.pages.campaign_figures import band_query, figures, frf_columns
 from service.pages.figures import csv_answer
 from service.pages.forms import WRITE, Form, see
 from service.pages.html import page
@@ -55,7 +55,7 @@ def campaign(
         kept = campaigns.recordings_of(connection, row.number)
         told = diagnoses.listed(connection, diagnoses.Filters(campaign=campaign_id), None, _MOST_DIAGNOSES)
         told_of = verdicts.of_rows(connection, told)
-    answer = inverting.answer(store, table, row, band)
+    answer, numbers = inverting.with_numbers(store, table, row, band)
     sensors = sorted({entry.sensor for entry in kept if entry.sensor is not None})
     show = show if show in {"", *sensors, *(entry.id for entry in kept)} else ""
     path = f"/v1/campaigns/{quote(row.id, safe='')}/d33" + (f"?{band_query(band)}" if band else "")
@@ -70,7 +70,7 @@ def campaign(
         most_listed=_MOST_LISTED,
         sensors=sensors,
         diagnoses=list(told_of.values()),
-        figures=figures(store, table, row, answer, show),
+        figures=figures(store, row, answer, numbers, show, curves=any(entry.kind != "frf" for entry in kept)),
         show=show,
         band=band,
         same=requests.get(request, path, f"client.campaigns.d33({row.id!r}" + (f", {band})" if band else ")")),
@@ -86,9 +86,9 @@ def frf_csv(campaign_id: CampaignId, store: Store, show: Annotated[str, Query()]
 @router.get("/preload.csv")
 def preload_csv(campaign_id: CampaignId, store: Store, table: Table, band: Band) -> Response:
     """The FRF in the flat zone of each recording, and the model's."""
-    row, whole = _loaded(store, campaign_id)
-    found = inversion(whole, inverting.answer(store, table, row, band), table)
-    return csv_answer("frf-against-preload", {} if found is None else preload_columns(whole, found))
+    with store.reading() as connection:
+        row = campaigns.find(connection, campaign_id)
+    return csv_answer("frf-against-preload", inverting.with_numbers(store, table, row, band)[1]["recordings"])
 
 
 @router.get("/d33.csv")

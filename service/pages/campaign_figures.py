@@ -1,24 +1,23 @@
 """The figures of a campaign's page, and their numbers."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from functools import cache
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
+from service.campaign_numbers import MOST_SINGLE, measured, spreads, spreads_of
 from service.pages.figures import Drawn, drawn
 from service.store import campaigns
 from service.store.engine import Database
 from service.store.tables import AnyRow
-from underskin import InvalidInput
 from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
-from underskin.surrogate import SigmaTable
 from underskin.units import to_lab
 
-if TYPE_CHECKING:
-    from underskin.inversion import Inversion
-    from underskin.recordings.frf_estimation import Frf
-
-_MOST_SINGLE = 48  # recordings whose lines are drawn one by one
+_D33 = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
+_AGAINST_PRELOAD = (
+    "indenter_radius_mm", "preload_n", "frf_pc_per_n", "frf_uncertainty_pc_per_n", "model_frf_pc_per_n",
+)  # fmt: skip
 _MOST_CURVES = 24
 _MOST_KEPT = 64
 Which = tuple[str, int, str, str, str]  # campaign, revision, table, band, what is shown
@@ -26,21 +25,23 @@ _kept: dict[Which, list[Drawn]] = {}
 _keeping = Lock()
 
 
-def figures(store: Database, table: SigmaTable, row: AnyRow, answer: Mapping[str, Any], show: str) -> list[Drawn]:
-    """All that can be drawn of a campaign as it is now; `answer`: its d33, as `/d33` has it. `show` as `measured` has
-    it. What was drawn lately is kept."""
-    basis = (row.id, row.revision, table.sha256, _chosen(answer))
-    makers: dict[str, Callable[[Campaign], list[Drawn]]] = {
-        f"lines {show}": lambda campaign: [*_curves(row, campaign), *_frf(row, campaign, answer, show)],
-        "d33": lambda campaign: _d33(row, campaign, answer, table),
+def figures(
+    store: Database, row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str, *, curves: bool
+) -> list[Drawn]:
+    """All that can be drawn of a campaign as it is now; `answer`: its d33, as `/d33` has it, with its `numbers`. `show`
+    as `measured` has it; `curves`: whether it has recordings of other kinds. What was drawn lately is kept."""
+    basis = (row.id, row.revision, answer["table_sha256"], _chosen(answer))
+    loaded = cache(lambda: _loaded(store, row))
+    makers: dict[str, Callable[[], list[Drawn]]] = {
+        **({"curves": lambda: _curves(row, loaded())} if curves else {}),
+        f"lines {show}": lambda: _frf(row, loaded, answer, numbers, show),
+        "d33": lambda: _d33(row, answer, numbers),
     }
-    found = {name: _kept.get((*basis, name)) for name in makers}
-    if None in found.values():
-        campaign = _loaded(store, row)
-        for name, make in makers.items():
-            if found[name] is None:
-                found[name] = _keep((*basis, name), make(campaign))
-    return [figure for some in found.values() for figure in some or ()]
+    found = []
+    for name, make in makers.items():
+        before = _kept.get((*basis, name))
+        found += before if before is not None else _keep((*basis, name), make())
+    return found
 
 
 def _keep(which: Which, drawn_now: list[Drawn]) -> list[Drawn]:
@@ -67,20 +68,6 @@ def _chosen(answer: Mapping[str, Any]) -> str:
     return band_query((band["low_hz"], band["high_hz"])) if band is not None and band["chosen_by_user"] else ""
 
 
-def measured(campaign: Campaign, show: str = "") -> list[tuple[FrfRecording, "Frf"]]:
-    """The FRF recordings that have an FRF, or those of them that are called `show` or of the sensor of that name."""
-    from underskin.recordings.frf_estimation import lines_of
-
-    found = []
-    for recording in campaign.recordings:
-        if isinstance(recording, FrfRecording) and show in ("", recording.sensor, recording.id):
-            try:
-                found.append((recording, lines_of(recording)))
-            except InvalidInput:
-                continue
-    return found
-
-
 def frf_columns(campaign: Campaign, show: str = "") -> dict[str, list[Any]]:
     """Every line of the recordings, or of those of `show`."""
     names = ("recording", "sensor", "frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n", "coherence")
@@ -96,53 +83,31 @@ def frf_columns(campaign: Campaign, show: str = "") -> dict[str, list[Any]]:
     return columns
 
 
-def inversion(campaign: Campaign, answer: Mapping[str, Any], table: SigmaTable) -> "Inversion | None":
-    """The campaign's d33 recording by recording, over the band of its answer; None where it has none."""
-    from underskin.inversion import invert
-    from underskin.recordings.flat_zone import FlatZone
-
-    if answer["band"] is None:
-        return None
-    band = {**answer["band"], "left_out_hz": tuple(answer["band"]["left_out_hz"])}
-    return invert(campaign, table, zone=FlatZone(**band))
-
-
-def preload_columns(campaign: Campaign, found: "Inversion") -> dict[str, Sequence[Any]]:
-    """What the figure of FRF against preload shows, a row a recording."""
-    from underskin.campaign_figures import model_frf
-
-    rows = found.recordings
-    return {
-        "recording": rows.ids,
-        "sensor": [found.sensor_ids[number] for number in rows.sensor.tolist()],
-        "indenter_radius_mm": to_lab("indenter_radius_mm", rows.indenter_radius).tolist(),
-        "preload_n": rows.preload.tolist(),
-        "frf_pc_per_n": to_lab("frf_pc_per_n", rows.frf).tolist(),
-        "frf_uncertainty_pc_per_n": to_lab("frf_pc_per_n", rows.frf_uncertainty).tolist(),
-        "model_frf_pc_per_n": to_lab("frf_pc_per_n", model_frf(campaign, found)).tolist(),
-    }
-
-
-def _frf(row: AnyRow, campaign: Campaign, answer: Mapping[str, Any], show: str) -> list[Drawn]:
+def _frf(
+    row: AnyRow, loaded: Callable[[], Campaign], answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str
+) -> list[Drawn]:
     from underskin import frf_summary
     from underskin.figures import frf_overview, frf_recordings
 
-    chosen = measured(campaign, show)
-    if not chosen:
-        return []
     band = answer["band"]
     zone = None if band is None else (band["low_hz"], band["high_hz"])
-    numbers = f"/campaigns/{row.id}/frf.csv?show={quote(show, safe='')}"
-    if len(chosen) <= _MOST_SINGLE:
-        lines = [frf_summary.lines_of(_title(recording, show), frf) for recording, frf in chosen]
-        return [drawn("frf", frf_recordings(lines, zone), "Magnitude, phase and coherence of each recording.", numbers)]
-    conditions = [(recording.indenter_radius_mm, recording.preload_n) for recording, _ in chosen]
-    spreads = frf_summary.spreads([frf for _, frf in chosen], conditions)
+    place = f"/campaigns/{row.id}/frf.csv?show={quote(show, safe='')}"
+    if show or numbers["spreads"] is None:
+        chosen = measured(loaded(), show)
+        if not chosen:
+            return []
+        if len(chosen) <= MOST_SINGLE:
+            lines = [frf_summary.lines_of(_title(recording, show), frf) for recording, frf in chosen]
+            about = "Magnitude, phase and coherence of each recording."
+            return [drawn("frf", frf_recordings(lines, zone), about, place)]
+        found = spreads_of(chosen)
+    else:
+        found = spreads(numbers["spreads"])
     about = (
-        f"{len(chosen)} recordings: for each sphere and preload the median magnitude and phase and the lowest "
-        "coherence; as a band, the magnitudes of all its recordings."
+        f"{sum(spread.recordings for spread in found)} recordings: for each sphere and preload the median magnitude "
+        "and phase and the lowest coherence; as a band, the magnitudes of all its recordings."
     )
-    return [drawn("frf", frf_overview(spreads, zone), about, numbers)]
+    return [drawn("frf", frf_overview(found, zone), about, place)]
 
 
 def _title(recording: FrfRecording, show: str) -> str:
@@ -150,24 +115,42 @@ def _title(recording: FrfRecording, show: str) -> str:
     return f"{where}{recording.indenter_radius_mm:.3g} mm, {recording.preload_n:.3g} N"
 
 
-def _d33(row: AnyRow, campaign: Campaign, answer: Mapping[str, Any], table: SigmaTable) -> list[Drawn]:
-    from underskin import campaign_figures
+def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any]) -> list[Drawn]:
+    from underskin.figures import array_map, frf_versus_preload, response_per_sensor
 
-    found = inversion(campaign, answer, table)
-    if found is None:
+    if answer["band"] is None:
         return []
-    over_array, versus_preload, response = campaign_figures.figures(campaign, found)
+    places = {sensor["id"]: sensor for sensor in row.about["skin"]["sensors"]}
+    sensors = answer["sensors"]
+    names = [entry["sensor"] for entry in sensors]
+    reasons = ["; ".join(flag["reason"] for flag in entry["flags"]) for entry in sensors]
+    d33, uncertainty, low, high = ([entry[name] for entry in sensors] for name in _D33)
+    x_mm, y_mm = ([places[name][axis] for name in names] for axis in ("x_mm", "y_mm"))
+    array = answer["array"]
+    limits = None if array is None else (array["d33_low_pc_per_n"], array["d33_high_pc_per_n"])
+    rows = numbers["recordings"]
+    titles = [f"{name}, sensor {sensor}" for name, sensor in zip(rows["recording"], rows["sensor"], strict=True)]
     place, chosen = f"/campaigns/{row.id}", _chosen(answer)
     chosen = f"?{chosen}" if chosen else ""
     return [
         drawn(
             "preload",
-            versus_preload,
+            frf_versus_preload(titles, *(rows[name] for name in _AGAINST_PRELOAD)),
             "FRF in the flat zone against preload, for each sphere; lines are the model with the array's d33.",
             f"{place}/preload.csv{chosen}",
         ),
-        drawn("response", response, "d33 of each sensor with its 95 % interval.", f"{place}/d33.csv{chosen}"),
-        drawn("map", over_array, "Each sensor where it lies, coloured by its d33.", f"{place}/d33.csv{chosen}"),
+        drawn(
+            "response",
+            response_per_sensor(names, d33, low, high, limits, reasons),
+            "d33 of each sensor with its 95 % interval.",
+            f"{place}/d33.csv{chosen}",
+        ),
+        drawn(
+            "map",
+            array_map(names, x_mm, y_mm, d33, uncertainty, reasons),
+            "Each sensor where it lies, coloured by its d33.",
+            f"{place}/d33.csv{chosen}",
+        ),
     ]
 
 

@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from service.pages.campaign_figures import frf_columns, measured
+from service.campaign_numbers import measured
+from service.pages.campaign_figures import frf_columns
 from service.pages.figures import Drawn, drawn
 from service.reading import Look
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording

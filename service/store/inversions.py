@@ -13,14 +13,25 @@ from service.store.tables import AnyRow, adopted_inversions, campaigns, inversio
 
 def find(connection: Connection, campaign: AnyRow, table_sha256: str) -> Any | None:
     """The answer kept for a campaign as it is now, with this table, by this software; None where there is none."""
-    query = select(inversions.c.document).where(
+    query = select(inversions.c.document).where(*_now(campaign, table_sha256))
+    blob = connection.execute(query).scalar()
+    return None if blob is None else decompressed(blob)
+
+
+def find_with_numbers(connection: Connection, campaign: AnyRow, table_sha256: str) -> tuple[Any, Any] | None:
+    """The same, with the numbers that the figures show; None where either is missing."""
+    query = select(inversions.c.document, inversions.c.numbers).where(*_now(campaign, table_sha256))
+    row = connection.execute(query.where(inversions.c.numbers.is_not(None))).first()
+    return None if row is None else (decompressed(row.document), decompressed(row.numbers))
+
+
+def _now(campaign: AnyRow, table_sha256: str) -> tuple[ColumnElement[bool], ...]:
+    return (
         inversions.c.campaign == campaign.number,
         inversions.c.revision == campaign.revision,
         inversions.c.table_sha256 == table_sha256,
         inversions.c.answer_version == ANSWER_VERSION,
     )
-    blob = connection.execute(query).scalar()
-    return None if blob is None else decompressed(blob)
 
 
 def keep(
@@ -28,9 +39,11 @@ def keep(
     campaign: AnyRow,
     table_sha256: str,
     document: Any,
+    numbers: Any,
     sensors: Mapping[str, tuple[float, float]],
 ) -> None:
-    """Keep an answer and d33 with its standard uncertainty [pC/N] by sensor, unless the campaign changed since."""
+    """Keep an answer, the numbers of its figures, and d33 with its standard uncertainty [pC/N] by sensor, unless the
+    campaign changed since."""
     # The id too: after a restore, a number may be another campaign's.
     same = (campaigns.c.number == campaign.number) & (campaigns.c.id == campaign.id)
     query = select(campaigns.c.revision).where(same).with_for_update()
@@ -39,7 +52,8 @@ def keep(
     for table in (inversions, sensor_d33):
         connection.execute(delete(table).where(table.c.campaign == campaign.number))
     basis = {"revision": campaign.revision, "table_sha256": table_sha256, "answer_version": ANSWER_VERSION}
-    connection.execute(insert(inversions), {"campaign": campaign.number, **basis, "document": compressed(document)})
+    derived = {"document": compressed(document), "numbers": compressed(numbers)}
+    connection.execute(insert(inversions), {"campaign": campaign.number, **basis, **derived})
     values = [
         {"campaign": campaign.number, "sensor": name, "d33_pc_per_n": value, "d33_uncertainty_pc_per_n": uncertainty}
         for name, (value, uncertainty) in sensors.items()

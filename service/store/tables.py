@@ -102,6 +102,9 @@ inversions = Table(
     Column("table_sha256", String, nullable=False),
     Column("document", LargeBinary, nullable=False),  # the answer of /v1/campaigns/{id}/d33, compressed JSON
     Column("answer_version", Integer, nullable=False, server_default="0"),  # service.d33_models.ANSWER_VERSION
+    Column(
+        "numbers", LargeBinary
+    ),  # service.campaign_numbers, compressed JSON; null where an earlier underskin kept it
 )
 
 sensor_d33 = Table(

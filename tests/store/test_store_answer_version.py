@@ -1,6 +1,7 @@
 """What an earlier underskin derived and kept is computed anew, not shown, whatever its shape was."""
 
 import hashlib
+import re
 from typing import Any
 
 import orjson
@@ -12,7 +13,7 @@ from service.d33_models import ANSWER_VERSION, D33
 from service.store import campaigns, database, migrate, open_store
 from service.store.codec import compressed, decompressed
 from service.store.tables import inversions, sensor_d33
-from tests.store.server import Place, Server, campaign
+from tests.store.server import Place, Server, campaign, running
 from underskin import load_table
 from underskin.inversion import invert
 from underskin.recordings.campaign import parse
@@ -38,6 +39,36 @@ def test_an_answer_of_an_earlier_version_is_computed_anew(server: Server) -> Non
         kept = connection.execute(select(inversions.c.answer_version, inversions.c.document)).one()
     assert (kept.answer_version, decompressed(kept.document)) == (ANSWER_VERSION, answer)
     store.close()
+
+
+def test_figures_are_drawn_alike_from_kept_numbers_and_from_recordings(place: Place) -> None:
+    many = campaign("many", sensors=25, lines=5)
+    del many["recordings"][7]["coherence"]  # a gap in what is kept
+    seen = []
+    for kept in (True, False, True):
+        with running(place) as server:
+            campaign_id = server.http.post(
+                "/v1/campaigns?skin=palm", json=many, headers={"Idempotency-Key": "once"}
+            ).json()["id"]
+            if not kept:
+                store = database(server.place.database_url, server.place.folder)
+                with store.writing() as connection:
+                    connection.execute(update(inversions).values(numbers=None))
+                store.close()
+            pages = [f"/campaigns/{campaign_id}", f"/campaigns/{campaign_id}/preload.csv"]
+            seen.append([server.http.get(path, headers={"Accept": "text/html"}).text for path in pages])
+    figures = [[_figures(page), columns] for page, columns in seen]
+    assert len(figures[0][0]) == 4
+    assert "50 recordings" in seen[0][0]
+    assert figures[0] == figures[1] == figures[2]
+    store = database(place.database_url, place.folder)
+    with store.reading() as connection:
+        assert connection.execute(select(inversions.c.numbers)).scalar() is not None
+    store.close()
+
+
+def _figures(page: str) -> list[str]:
+    return re.findall(r'<script type="application/json">(.*?)</script>', page, re.DOTALL)
 
 
 def test_what_a_store_of_the_first_schema_kept_is_computed_anew(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:

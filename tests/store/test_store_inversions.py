@@ -34,7 +34,7 @@ def kept(store: Database, name: str) -> AnyRow:
 
 def derive(store: Database, row: AnyRow) -> None:
     with store.writing() as connection:
-        inversions.keep(connection, row, TABLE, {"campaign_id": row.id}, {"s0": (14.0, 0.1)})
+        inversions.keep(connection, row, TABLE, {"campaign_id": row.id}, {}, {"s0": (14.0, 0.1)})
 
 
 def test_a_history_shows_nothing_of_an_earlier_revision(store: Database) -> None:

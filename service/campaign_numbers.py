@@ -1,0 +1,93 @@
+"""What the figures of a campaign show, in numbers of a size that hardly grows with it: kept beside its d33, so that
+they are drawn without reading its recordings.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from underskin import InvalidInput
+from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.units import to_lab
+
+if TYPE_CHECKING:
+    from underskin.frf_summary import FrfSpread
+    from underskin.inversion import Inversion
+    from underskin.recordings.frf_estimation import Frf
+
+MOST_SINGLE = 48  # recordings whose lines are drawn one by one, from the recordings
+_RANGES = ("magnitude_pc_per_n", "phase_deg", "coherence")
+
+
+def numbers(campaign: Campaign, found: "Inversion | None", known: list[dict[str, Any]] | None = None) -> dict[str, Any]:
+    """`recordings`: columns of FRF against preload; `spreads`: FRFs of recordings alike, over all lines, whatever the
+    band, and so perhaps `known`; None where they are few."""
+    return {
+        "recordings": {} if found is None else _preload_columns(campaign, found),
+        "spreads": known or _kept_spreads(measured(campaign)),
+    }
+
+
+def measured(campaign: Campaign, show: str = "") -> list[tuple[FrfRecording, "Frf"]]:
+    """The FRF recordings that have an FRF, or those of them that are called `show` or of the sensor of that name."""
+    from underskin.recordings.frf_estimation import lines_of
+
+    found = []
+    for recording in campaign.recordings:
+        if isinstance(recording, FrfRecording) and show in ("", recording.sensor, recording.id):
+            try:
+                found.append((recording, lines_of(recording)))
+            except InvalidInput:
+                continue
+    return found
+
+
+def spreads(kept: Sequence[Mapping[str, Any]]) -> "list[FrfSpread]":
+    """Those of `numbers` again."""
+    from underskin.frf_summary import FrfSpread
+
+    return [
+        FrfSpread(
+            **{
+                **entry,
+                "frequency_hz": np.array(entry["frequency_hz"], dtype=float),
+                **{name: tuple(np.array(values, dtype=float) for values in entry[name]) for name in _RANGES},
+            }
+        )
+        for entry in kept
+    ]
+
+
+def _preload_columns(campaign: Campaign, found: "Inversion") -> dict[str, list[Any]]:
+    """FRF in the flat zone against preload, a row a recording."""
+    from underskin.campaign_figures import model_frf
+
+    rows = found.recordings
+    return {
+        "recording": list(rows.ids),
+        "sensor": [found.sensor_ids[number] for number in rows.sensor.tolist()],
+        "indenter_radius_mm": to_lab("indenter_radius_mm", rows.indenter_radius).tolist(),
+        "preload_n": rows.preload.tolist(),
+        "frf_pc_per_n": to_lab("frf_pc_per_n", rows.frf).tolist(),
+        "frf_uncertainty_pc_per_n": to_lab("frf_pc_per_n", rows.frf_uncertainty).tolist(),
+        "model_frf_pc_per_n": to_lab("frf_pc_per_n", model_frf(campaign, found)).tolist(),
+    }
+
+
+def spreads_of(found: "Sequence[tuple[FrfRecording, Frf]]") -> "list[FrfSpread]":
+    """FRFs of recordings alike."""
+    from underskin import frf_summary
+
+    conditions = [(recording.indenter_radius_mm, recording.preload_n) for recording, _ in found]
+    return frf_summary.spreads([frf for _, frf in found], conditions)
+
+
+def _kept_spreads(lines: "Sequence[tuple[FrfRecording, Frf]]") -> list[dict[str, Any]] | None:
+    return None if len(lines) <= MOST_SINGLE else [_plain(spread) for spread in spreads_of(lines)]
+
+
+def _plain(spread: "FrfSpread") -> dict[str, Any]:
+    ranges = {name: [values.tolist() for values in getattr(spread, name)] for name in _RANGES}
+    return {**asdict(spread), "frequency_hz": spread.frequency_hz.tolist(), **ranges}
