@@ -26,7 +26,8 @@ from underskin.diagnosis.remainder import describe, worth_telling
 from underskin.diagnosis.report import Diagnosis, report
 from underskin.diagnosis.residuals import residuals, whole_prediction
 from underskin.diagnosis.rig_limits import Limits
-from underskin.diagnosis.search import search
+from underskin.diagnosis.search import Search, search
+from underskin.diagnosis.seating import without_seating
 from underskin.mechanisms.mechanism import Kind
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
 from underskin.surrogate import SigmaTable
@@ -46,6 +47,7 @@ def diagnose(
     Raises InvalidInput where the campaign has no FRF recording.
     """
     provenance = _provenance(table)
+    progress(0.05)
     possible = without_extremes(campaign)
     if possible.found and possible.lacking:
         return Diagnosis(campaign.name, possible.found, provenance, lacking=possible.lacking)
@@ -60,28 +62,34 @@ def diagnose(
             return Diagnosis(campaign.name, left_out, provenance, lacking=curves.lacking)
         rows = curve_lines(curves.campaign, kind)
         if rows.recordings:
-            return _work_out(campaign.name, Workbench(rows, table), left_out, provenance, progress, limits)
+            bench = Workbench(rows, table)
+            result = search(bench)
+            seated = without_seating(curves.campaign, result.answers[0].names, table) if kind == "compression" else None
+            if seated is not None:
+                bench, said = seated
+                left_out, result = [*left_out, said], search(bench)
+            return _work_out(campaign.name, bench, result, left_out, provenance, progress, limits)
     frf = tuple(entry for entry in campaign.recordings if isinstance(entry, FrfRecording))
     inspected = inspect(replace(campaign, recordings=frf), table)
     found = [*left_out, *inspected.found]
     if inspected.lacking:
         return Diagnosis(campaign.name, found, provenance, lacking=inspected.lacking)
     bench = Workbench(lines(inspected.campaign), table)
-    return _work_out(campaign.name, bench, found, provenance, progress, limits)
+    return _work_out(campaign.name, bench, search(bench), found, provenance, progress, limits)
 
 
 def _work_out(
     name: str,
     bench: Workbench,
+    result: Search,
     found: Sequence[Finding],
     provenance: dict[str, Any],
     progress: Progress,
     limits: Limits,
 ) -> Diagnosis:
-    """All steps after the rows are known."""
-    progress(0.05)
+    """All steps after the search."""
+    progress(0.65)
     confounded = confounding(bench)
-    result = search(bench)
     progress(0.7)
     leader = result.answers[0]
     nothing = next(entry for entry in result.explanations if not entry.names)

@@ -20,7 +20,7 @@ NOTHING_MISSING, NONE_OF_THESE = "nothing_missing", "none_of_these"
 # "Nothing" stands for all that does not show as well, which is every other campaign.
 PRIORS = {"nothing_missing": 0.45, "one": 0.34, "two": 0.14, "three": 0.02, "none_of_these": 0.05}
 _PARENTS = 3
-_SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
+SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
 _UNTHOUGHT = 0.015  # probability that none of what was compared is right
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
 
@@ -63,7 +63,7 @@ class Search:
         evidence = {frozenset(entry.names): entry.log_evidence for entry in self.explanations}
         whole = frozenset(explanation.names)
         smaller = [evidence.get(whole - {name}, -math.inf) for name in whole]
-        return all(explanation.log_evidence > without + _SHOWS for without in smaller)
+        return all(explanation.log_evidence > without + SHOWS for without in smaller)
 
     def shown_or_nothing(self, answer: Answer) -> Explanation:
         """The explanation that an answer stands on: for `none_of_these`, the one beneath its best process."""
@@ -87,7 +87,7 @@ class Search:
         showing = [
             self._log_weight_beneath(entry, process)
             for entry, process in self.discrepancies
-            if process.log_evidence > entry.log_evidence + _SHOWS
+            if process.log_evidence > entry.log_evidence + SHOWS
         ]
         weights.append(float(np.logaddexp.reduce(showing)) if showing else -math.inf)
         probabilities = (1 - _UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
