@@ -157,7 +157,7 @@ def laplace_of(names: tuple[str, ...], values: tuple[float, ...], table: SigmaTa
     return laplace(fitter, fitter.improve(fitter.start(own)))
 
 
-@pytest.mark.parametrize(("names", "values"), [CASES[0], CASES[1], CASES[4]])
+@pytest.mark.parametrize(("names", "values"), [CASES[index] for index in (0, 1, 4, 10, 17)])
 def test_evidence_agrees_with_importance_sampling(
     names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable
 ) -> None:
@@ -168,7 +168,7 @@ def test_evidence_agrees_with_importance_sampling(
     _, hessian = fitter.covariance_equations(found.at)
     scale = block_diag(found.covariance, np.linalg.inv(hessian))
     centre = np.concatenate([point.fit[fitter.places], point.covariance])
-    proposal = multivariate_t(centre, 1.5 * scale, df=5, seed=1)
+    proposal = multivariate_t(centre, 2 * scale, df=4, seed=1)
     draws = proposal.rvs(4000)
     weights = np.array([posterior.log_density(x) for x in draws]) - proposal.logpdf(draws)
     assert found.log_evidence == pytest.approx(logsumexp(weights) - np.log(len(draws)), abs=0.5)

@@ -45,11 +45,11 @@ class Evaluated:
 class Evaluator:
     """Evaluates points of one hypothesis, and settles their noise levels."""
 
-    def __init__(self, hypothesis: Hypothesis) -> None:
-        """Prepare the names and bounds."""
+    def __init__(self, hypothesis: Hypothesis, held: int | None = None) -> None:
+        """Prepare the names and bounds; the parameter at `held` is fixed where a point has it, and has no prior."""
         self.hypothesis = hypothesis
         self.parameters = hypothesis.model.parameters
-        self.places = hypothesis.mean_places
+        self.places = [place for place in hypothesis.mean_places if place != held]
         self.covariance = hypothesis.covariance
         bounds = np.array([entry.bounds for entry in self.parameters]).reshape(-1, 2)
         self.low, self.high = bounds.T

@@ -4,6 +4,10 @@ log Z = −cost* + (n/2) log 2π − ½ log|H| + log P(box). The cost is that of
 outside the bounds), H the information on the mean parameters and the Hessian in the covariance's, P(box) the
 probability that a normal with this mean and H⁻¹ gives to the bounds: one bound after another, each with the moments
 left by the ones before (exact for one bound; Mendell and Elston 1974).
+
+A parameter on a logarithmic scale that the lines leave loose (the time of a small step, the onset of a small loss) has
+no bell for a posterior: the others follow it along a bend, and where the effect is small it is free. There Z is the
+integral over that parameter, by the trapezoidal rule, of the evidence that the method above gives with it held.
 """
 
 from dataclasses import dataclass, replace
@@ -12,12 +16,16 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from underskin.diagnosis.fit import Evaluated, Fitter
+from underskin.diagnosis.hypothesis import own_parameters
 from underskin.units import Floats
 
 _NEAR = 4.0  # standard deviations from a bound within which it counts
 _POLISHING, _POLISHED = 4, 0.05  # steps at most, and the gain in log posterior below which it stops
 _LEAST_COVARIANCE_CURVATURE = 0.3  # of logarithms of noise levels: their priors are not wider
 _TRUSTED = 1.0  # gain in log posterior that polishing may leave
+_LOOSE = 0.3  # standard deviation beyond which a logarithmic parameter is integrated over: a factor of 1.35
+_FEWEST_STRIDES = 8  # from one bound to the other
+_GONE = 4.0  # nats below the greatest of the walk at which it ends
 _FLAT = 1e-3  # least standard deviations of the quadratic within a parameter's bounds: keeps H invertible
 
 
@@ -32,7 +40,61 @@ class Evidence:
 
 
 def laplace(fitter: Fitter, at: Evaluated) -> Evidence:
-    """The evidence around a most probable point, which is first brought to where the whole gradient vanishes."""
+    """The evidence around a most probable point, over all values of a parameter that the lines leave loose."""
+    found = _around(fitter, at)
+    place = _loosest(found)
+    return found if place is None else _integrated(found, place)
+
+
+def _loosest(found: Evidence) -> int | None:
+    """The place of the mechanisms' logarithmic parameter whose standard deviation is the largest, where that counts."""
+    own = own_parameters(found.fitter.hypothesis)
+    deviations = {
+        place: float(np.sqrt(variance))
+        for place, variance in zip(found.fitter.places, np.diag(found.covariance), strict=True)
+        if place < own and found.fitter.parameters[place].scale == "log"
+    }
+    place = max(deviations, key=lambda place: deviations[place], default=None)
+    return place if place is not None and deviations[place] > _LOOSE else None
+
+
+def _integrated(found: Evidence, place: int) -> Evidence:
+    """With log ∫ Z(x) p(x) dx over the parameter x at this place, walking from its most probable value both ways.
+
+    Where the walk comes upon a point more probable than that, all begins again from there.
+    """
+    fitter, at = found.fitter, found.at
+    held = Fitter(fitter.hypothesis, held=place)
+    low, high = fitter.low[place], fitter.high[place]
+    deviation = float(np.sqrt(np.diag(found.covariance)[fitter.places.index(place)]))
+    stride = min(deviation, (high - low) / _FEWEST_STRIDES)
+    begin = float(at.point.fit[place])
+    walked = [_held_at(held, at, place, begin)]
+    for way in (-stride, stride):
+        near, value = walked[0].at, begin + way
+        while low <= value <= high:
+            walked.append(_held_at(held, near, place, value))
+            near, value = walked[-1].at, value + way
+            if walked[-1].log_evidence < max(entry.log_evidence for entry in walked) - _GONE:
+                break
+    best = min(walked, key=lambda entry: entry.at.cost - held.parameters[place].log_prior(entry.at.point.fit[place]))
+    if fitter.evaluate(best.at.point).cost < at.cost - _TRUSTED:
+        return laplace(fitter, fitter.improve(best.at.point))
+    total = np.logaddexp.reduce([entry.log_evidence for entry in walked]) + np.log(stride)
+    return replace(found, log_evidence=float(total))
+
+
+def _held_at(held: Fitter, near: Evaluated, place: int, value: float) -> Evidence:
+    """Of the other parameters with this one held at a value, times its prior's density there."""
+    fit = near.point.fit.copy()
+    fit[place] = value
+    begin = replace(held.settle(held.evaluate(replace(near.point, fit=fit)), 1), growth=near.growth)
+    found = _around(held, begin)
+    return replace(found, log_evidence=found.log_evidence + held.parameters[place].log_prior(value))
+
+
+def _around(fitter: Fitter, at: Evaluated) -> Evidence:
+    """By the quadratic around a most probable point, which is first brought to where the whole gradient vanishes."""
     places = fitter.places
     low, high = fitter.low[places], fitter.high[places]
     if fitter.hypothesis.placed and at.growth is None:
