@@ -158,7 +158,7 @@ class GainResidual:
         values = np.maximum(values, 0.0)[:, None] * amplitudes[:, None] ** 2
         along = (vectors.transpose(0, 2, 1) @ moment[..., None])[..., 0]
         gained = (amplitudes[:, None] ** 2 * along[:, None] ** 2 / (1 + values)).sum(axis=2)
-        gained = logsumexp(0.5 * (gained - np.log1p(values).sum(axis=2)), axis=1) - np.log(len(amplitudes))
+        gained = np.logaddexp.reduce(0.5 * (gained - np.log1p(values).sum(axis=2)), axis=1) - np.log(len(amplitudes))
         return np.asarray(scatter.log_weight - 0.5 * (chi2 + log_determinant) + gained)
 
 
