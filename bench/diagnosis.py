@@ -6,9 +6,8 @@ import subprocess
 import sys
 from statistics import median
 
+from bench.diagnosed import Effects
 from bench.figures import Figure
-
-Effects = dict[str, dict[str, float]]
 
 _TWO: Effects = {"amplifier_high_pass": {"corner_hz": 1.0}, "preload_dependent_d33": {"beta_per_mpa": 1.5}}
 CASES: dict[str, tuple[Effects, float]] = {  # what is hidden, and the scatter of position [mm]
@@ -20,13 +19,13 @@ CASES: dict[str, tuple[Effects, float]] = {  # what is hidden, and the scatter o
 ROUNDS = 3
 _ONE = """
 import json, resource, sys, time
-from rig.experiment import parse as experiment
-from rig.recorded import campaign, record_lines
+from bench.diagnosed import recorded
 from underskin.diagnosis.diagnose import diagnosis_report
-from underskin.recordings.campaign import parse
 from underskin.surrogate import load_table
 
-hidden = parse(campaign(record_lines(experiment(json.loads(sys.argv[1])))))
+preloads_n = 0.3, 0.5, 0.7, 1, 1.3, 1.6, 2, 2.3, 2.6, 3
+effects, position_mm = json.loads(sys.argv[1])
+hidden = recorded(effects, columns=5, preloads_n=preloads_n, lines=60, position_mm=position_mm)
 assert len(hidden.recordings) == 100
 start = time.process_time()
 verdict = diagnosis_report(hidden, load_table())["verdict"]
@@ -49,7 +48,7 @@ def measure() -> list[Figure]:
 
 def _diagnosed(effects: Effects, position_mm: float) -> tuple[float, float]:
     run = subprocess.run(
-        [sys.executable, "-c", _ONE, json.dumps(_experiment(effects, position_mm))],
+        [sys.executable, "-c", _ONE, json.dumps([effects, position_mm])],
         env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
         check=True,
         capture_output=True,
@@ -57,29 +56,3 @@ def _diagnosed(effects: Effects, position_mm: float) -> tuple[float, float]:
     )
     seconds, peak, _ = run.stdout.split()
     return float(seconds), float(peak)
-
-
-def _experiment(effects: Effects, position_mm: float) -> dict[str, object]:
-    """The prototype's corner: five sensors, two spheres, ten preloads; beside the centre where places scatter."""
-    return {
-        "schema": "experiment/1",
-        "name": "bench",
-        "seed": 5,
-        "kind": "frf",
-        "skin": {
-            "thickness_mm": 2.5,
-            "youngs_modulus_mpa": 16,
-            "sensor_radius_mm": 1.5,
-            "d33_pc_per_n": 14,
-            "array": {"columns": 5, "rows": 1, "pitch_mm": 8},
-        },
-        "design": {
-            "indenters_mm": [4, 10],
-            "preloads_n": [0.3, 0.5, 0.7, 1, 1.3, 1.6, 2, 2.3, 2.6, 3],
-            "dynamic_forces_n": [0.09],
-            "offsets_mm": [[1.2, 0.0] if position_mm else [0.0, 0.0]],
-        },
-        "lines": {"low_hz": 1, "high_hz": 1000, "count": 60},
-        "noise": {"gain": 0.02, "line": 0.01, "averages": 16, "position_mm": position_mm},
-        "effects": effects,
-    }

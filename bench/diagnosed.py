@@ -1,0 +1,39 @@
+"""The campaigns on which diagnoses are measured: our rig presses two spheres on sensors of the prototype's skin."""
+
+from collections.abc import Mapping, Sequence
+
+from rig.experiment import parse as experiment
+from rig.recorded import campaign, record_lines
+from underskin.recordings.campaign import Campaign, parse
+
+Effects = Mapping[str, Mapping[str, float | str]]
+
+
+def recorded(
+    effects: Effects, *, columns: int, preloads_n: Sequence[float], lines: int, position_mm: float = 0.0
+) -> Campaign:
+    """2 × `columns` × preloads recordings of so many `lines`; beside the centre where the place scatters by so much."""
+    document = {
+        "schema": "experiment/1",
+        "name": "bench",
+        "seed": 5,
+        "kind": "frf",
+        "skin": {
+            "thickness_mm": 2.5,
+            "youngs_modulus_mpa": 16,
+            "sensor_radius_mm": 1.5,
+            "d33_pc_per_n": 14,
+            "array": {"columns": columns, "rows": 1, "pitch_mm": 8},
+        },
+        "design": {
+            "indenters_mm": [4, 10],
+            "preloads_n": list(preloads_n),
+            "dynamic_forces_n": [0.09],
+            "offsets_mm": [[1.2, 0.0] if position_mm else [0.0, 0.0]],
+            "cycles_per_recording": 50,
+        },
+        "lines": {"low_hz": 1, "high_hz": 1000, "count": lines},
+        "noise": {"gain": 0.02, "line": 0.01, "averages": 16, "position_mm": position_mm},
+        "effects": effects,
+    }
+    return parse(campaign(record_lines(experiment(document))))
