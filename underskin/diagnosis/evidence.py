@@ -78,8 +78,9 @@ def _integrated(found: Evidence, place: int) -> Evidence:
             if walked[-1].log_evidence < max(entry.log_evidence for entry in walked) - _GONE:
                 break
     best = min(walked, key=lambda entry: entry.at.cost - held.parameters[place].log_prior(entry.at.point.fit[place]))
-    if fitter.evaluate(best.at.point).cost < at.cost - _TRUSTED:
-        return laplace(fitter, fitter.improve(best.at.point))
+    better = fitter.settle(fitter.evaluate(best.at.point), 1)
+    if better.cost < at.cost - _TRUSTED:
+        return laplace(fitter, better)
     total = np.logaddexp.reduce([entry.log_evidence for entry in walked]) + np.log(stride)
     return replace(found, log_evidence=float(total))
 
