@@ -8,10 +8,12 @@ import os
 import shutil
 import sqlite3
 import subprocess
-from contextlib import closing
+import tempfile
+from contextlib import closing, suppress
 from pathlib import Path
 
 from service.store.engine import Database, StoreError
+from service.store.tables import metadata
 
 
 def suffix(database: Database) -> str:
@@ -67,8 +69,7 @@ def replace_with(database: Database, file: Path) -> None:
     if database.is_sqlite:
         _copy_sqlite(file, _sqlite_file(database))
     else:
-        flags = ("--clean", "--if-exists", "--no-owner", "--single-transaction", "--exit-on-error")
-        _pg("pg_restore", database, *flags, str(file))
+        _replace_pg(database, file)
 
 
 def _copy_sqlite(source: Path, target: Path) -> None:
@@ -94,17 +95,52 @@ def _sqlite_file(database: Database) -> Path:
     return Path(database.url.database)
 
 
+def _replace_pg(database: Database, file: Path) -> None:
+    """All tables away and those of the backup there; `pg_restore --clean` knows only the latter, and a table that the
+    backup's version lacks would hold on to them."""
+    for program in ("psql", "pg_restore"):
+        _require(program)
+    address, password = _address(database)
+    ours = ", ".join([*metadata.tables, "alembic_version"])
+    command = ["psql", "--dbname", address, "--quiet", "--no-psqlrc", "--set=ON_ERROR_STOP=1", "--output=/dev/null"]
+    with (
+        tempfile.TemporaryFile() as complaints,
+        subprocess.Popen(command, env=os.environ | password, stdin=subprocess.PIPE, stderr=complaints) as psql,
+    ):
+        assert psql.stdin is not None
+        whole = False
+        with suppress(BrokenPipeError), psql.stdin as script:  # where it has ended, it says why
+            script.write(f"BEGIN; DROP TABLE IF EXISTS {ours};\n".encode())
+            script.flush()
+            made = subprocess.run(["pg_restore", "--no-owner", "--file=-", file], stdout=script, stderr=complaints)
+            whole = made.returncode == 0
+            script.write(b"COMMIT;\n" if whole else b"ROLLBACK;\n")
+        psql.wait()
+        complaints.seek(0)
+        if psql.returncode != 0 or not whole:
+            raise StoreError(f"the restore failed: {complaints.read().decode(errors='replace').strip()[-500:]}")
+
+
 def _pg(program: str, database: Database, *arguments: str) -> None:
+    address, password = _address(database)
+    run(program, "--dbname", address, *arguments, environment=password)
+
+
+def _address(database: Database) -> tuple[str, dict[str, str]]:
+    """Where the database is, and the password for the environment."""
     url = database.url.set(drivername="postgresql")
     password = {} if url.password is None else {"PGPASSWORD": str(url.password)}
-    address = url.set(password=None).render_as_string()
-    run(program, "--dbname", address, *arguments, environment=password)
+    return url.set(password=None).render_as_string(), password
+
+
+def _require(program: str) -> None:
+    if shutil.which(program) is None:
+        raise StoreError(f"{program}, which backs up and restores PostgreSQL, is not installed (postgresql-client)")
 
 
 def run(program: str, *arguments: str, environment: dict[str, str] | None = None) -> str:
     """What a program of PostgreSQL printed; raises StoreError with what it complained of."""
-    if shutil.which(program) is None:
-        raise StoreError(f"{program}, which backs up and restores PostgreSQL, is not installed (postgresql-client)")
+    _require(program)
     done = subprocess.run(
         [program, *arguments], env=os.environ | (environment or {}), capture_output=True, text=True, check=False
     )
