@@ -12,13 +12,28 @@ from service.pages import (
     joining,
     loads,
     login,
+    measured,
     pressure_map,
     skin,
     start,
     upload,
 )
 
-_PAGES = (start, skin, campaign, diagnosis, upload, design, example, joining, loads, pressure_map, login, assets)
+_PAGES = (
+    start,
+    skin,
+    campaign,
+    diagnosis,
+    upload,
+    design,
+    example,
+    joining,
+    loads,
+    pressure_map,
+    measured,
+    login,
+    assets,
+)
 
 router = APIRouter(include_in_schema=False)
 for page in _PAGES:
