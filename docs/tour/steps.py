@@ -140,8 +140,8 @@ STEPS = (
     Step(
         "adopted",
         "Adopted",
-        "Adopted, the explanation is the skin's model: its history shows d33 by it, or by the paper's, and every value "
-        "says by which.",
+        "Adopted, the explanation is the skin's model: skin and start head it, with d33 by it beside the paper's; map "
+        "and history show either, and every value says by which.",
         _adopted,
     ),
     Step(

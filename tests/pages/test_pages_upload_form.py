@@ -71,6 +71,9 @@ def test_the_mapping_fits_a_phone(visitor: Visit) -> None:
         assert box is not None
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= PHONE
+    told = region.locator("td", has_text="to 1.10").bounding_box()
+    assert told is not None
+    assert told["height"] < 40  # one line
     visitor.require_accessible()
     tops = [field.bounding_box() for field in region.get_by_role("combobox").all()]
     assert all(one is not None and other is not None and one["y"] < other["y"] for one, other in pairwise(tops))
