@@ -17,7 +17,7 @@ from service.pages.figures import Drawn, csv_answer
 from service.pages.forms import TOKEN, WRITE, Form, require_own, see
 from service.pages.html import page
 from service.pages.upload_figures import figures, lines_columns, trace_columns
-from service.pages.upload_keeping import SKIN_FIELD, all_told, keep_good
+from service.pages.upload_keeping import CORRECTS, SKIN_FIELD, all_told, keep_good
 from service.pages.upload_mapping import (
     CHANNELS,
     KINDS,
@@ -49,14 +49,20 @@ _MOST_NAMED = 5  # files in the request that does the same
 
 
 @router.get("")
-def form(request: Request, store: Store, skin: Annotated[str, Query(max_length=200)] = "") -> Response:
-    """Asks for files."""
+def form(
+    request: Request,
+    store: Store,
+    skin: Annotated[str, Query(max_length=200)] = "",
+    corrects: Annotated[str, Query(max_length=200)] = "",
+) -> Response:
+    """Asks for files; `corrects`: the campaign whose place they take."""
     with store.reading() as connection:
         known = [row.id for row in skins.listed(connection, None, None, _MOST_SKINS)]
     return page(
         request,
         "upload.html",
         skin=skin,
+        corrects=corrects,
         known=known,
         most_mb=request.app.state.settings.max_upload_mb,
         same=requests.files(request, ["monday.tdms"], "rig.yaml", skin),
@@ -78,6 +84,7 @@ async def send(request: Request, store: Store) -> Response:
         found = await run_in_threadpool(_rig, store, rig, fields.get(SKIN_FIELD, ""))
         shelved = shelf.put(cookie, given)
     shelved.skin = fields.get(SKIN_FIELD) or None
+    shelved.corrects = fields.get(CORRECTS) or None
     shelved.rig, shelved.refused = found
     shelved.rig_label = None if rig is None or shelved.rig is None else rig.label
     try:

@@ -11,12 +11,12 @@ from service.accepting import RIG, Terms, accept
 from service.pages.upload_shelf import Shelved
 from service.problems import Refusal
 from service.store.engine import Database
-from service.store.errors import Conflict
+from service.store.errors import Conflict, Missing
 from service.uploads import Upload
 from underskin import InvalidInput
 from underskin.errors import FileError
 
-SKIN_FIELD = "skin"
+SKIN_FIELD, CORRECTS = "skin", "corrects"
 
 
 def keep_good(request: Request, shelved: Shelved, sent: Mapping[str, str], store: Database) -> list[str]:
@@ -28,11 +28,13 @@ def keep_good(request: Request, shelved: Shelved, sent: Mapping[str, str], store
         sender = None if key is None else key.name
         together = sent.get("together", "").strip() if sent.get("as") == "one" else None
         shelved.skin = sent.get(SKIN_FIELD, "").strip() or None
+        shelved.reason = sent.get("reason", "").strip()
+        reason = shelved.reason or None if shelved.corrects is not None else None
         most = request.app.state.settings.max_body_bytes
         try:
-            terms = Terms(shelved.skin, None, None, False, together, None, sender, most)
+            terms = Terms(shelved.skin, shelved.corrects, reason, False, together, None, sender, most)
             answer, _ = accept(store, [*shelved.files, *_rig_upload(shelved)], terms)
-        except (InvalidInput, Conflict, Refusal) as error:
+        except (InvalidInput, Conflict, Missing, Refusal) as error:
             shelved.refused = all_told(error)
             return []
         kept = [result for result in answer["campaigns"] if result["id"] is not None]

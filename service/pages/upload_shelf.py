@@ -45,6 +45,8 @@ class Shelved:
     )  # what is wrong with the form, or kept it from being kept
     seen: list[FileSeen] = field(default_factory=list)
     drawn: dict[int, list[Drawn]] = field(default_factory=dict)
+    corrects: str | None = None  # the campaign whose place it takes
+    reason: str = ""  # why it does
     skin_seen: SkinSeen | None = None  # where it is an exported skin
     kept_at: str | None = None  # the page of what was kept
     lock: threading.Lock = field(default_factory=threading.Lock)

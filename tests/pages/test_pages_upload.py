@@ -170,6 +170,34 @@ def test_files_of_two_skins_are_not_joined_and_nothing_is_kept(visitor: Visit, s
     assert campaigns_of(server, "two-skins") == []
 
 
+def test_a_campaign_is_corrected_by_a_newer_file(visitor: Visit, server: Server) -> None:
+    page = visitor.page
+    wrong = server.http.post("/v1/campaigns", json=campaign("slip", id="corrected")).json()["id"]
+    visitor.go(f"/campaigns/{wrong}")
+    page.get_by_text("or correct or withdraw").click()
+    page.get_by_role("link", name="Upload a corrected version").click()
+    page.get_by_label("Files").set_input_files([file("right.json", as_json(campaign("right", id="corrected")))])
+    page.get_by_role("button", name="Look at them").click()
+    page.wait_for_url("**/upload/*")
+    assert wrong in page.locator("form.keep").inner_text()
+    visitor.require_accessible()
+    page.get_by_label("Why").fill("the modulus of another batch")
+    page.get_by_role("button", name="Keep 6 recordings").click()
+    page.wait_for_url("**/campaigns/*")
+    right = page.url.rpartition("/")[2]
+    found = server.http.get(f"/v1/campaigns/{wrong}").json()
+    assert (found["corrected_by"], found["state"]) == (right, "corrected")
+    visitor.go(f"/upload?skin=corrected&corrects={wrong}")  # once more, though it is corrected already
+    page.get_by_label("Files").set_input_files([file("again.json", as_json(campaign("again", id="corrected")))])
+    page.get_by_role("button", name="Look at them").click()
+    page.wait_for_url("**/upload/*")
+    page.get_by_label("Why").fill("another slip")
+    page.get_by_role("button", name="Keep 6 recordings").click()
+    assert "corrected" in page.get_by_role("alert").inner_text()
+    assert page.get_by_label("Why").input_value() == "another slip"
+    assert campaigns_of(server, "corrected") == [right]
+
+
 def test_hostile_names_in_files_stay_text(visitor: Visit) -> None:
     page = visitor.page
     page.on("dialog", lambda dialog: visitor.wrong.append(dialog.message))
