@@ -15,6 +15,7 @@ from service.pages.array import FIELDS as OF_ARRAY
 from service.pages.array import UNITS, number, refused
 from service.pages.figures import csv_answer
 from service.pages.html import page
+from service.pages.measured_adopted import ByModel, by_model
 from service.pages.skin_values import start
 from service.problems import from_validation
 from service.store.engine import Database
@@ -40,14 +41,17 @@ def view(request: Request, store: Store, table: Table, skin: Skin = None, rows: 
     error: str | None = None
     document: dict[str, Any] = {}
     found: Columns | None = None
+    adopted: ByModel | None = None
     try:
         document = _document(values, request.query_params, rows)
         found = _answered(table, store, document)
+        adopted = by_model(store, table, skin, request.query_params, document)
     except ValidationError as problem:
         entry = from_validation(problem).errors[0]
         error = _said(InvalidInput(entry["field"], entry["value"], entry["allowed"], entry["index"]))
     except UnderskinError as problem:
         error = _said(problem)
+    shown = document if adopted is None or adopted.document is None else adopted.document
     return page(
         request,
         "measured.html",
@@ -59,9 +63,10 @@ def view(request: Request, store: Store, table: Table, skin: Skin = None, rows: 
         rows=rows,
         error=error,
         findings=[] if found is None else found.shared["findings"],
-        columns=None if found is None else _columns(document, found),
+        columns=None if found is None else _columns(document, found, adopted),
+        adopted=adopted,
         query=request.url.query,
-        same=requests.post(request, "/v1/d33", document, f"client.d33(**{document!r})"),
+        same=requests.post(request, "/v1/d33", shown, f"client.d33(**{shown!r})"),
     )
 
 
@@ -70,7 +75,8 @@ def rows_csv(request: Request, store: Store, table: Table, skin: Skin = None, ro
     """What was measured and what it says, a row a measurement."""
     values, _ = _values(store, table, request.query_params, skin)
     document = _document(values, request.query_params, rows)
-    return csv_answer("d33", _columns(document, _answered(table, store, document)))
+    adopted = by_model(store, table, skin, request.query_params, document)
+    return csv_answer("d33", _columns(document, _answered(table, store, document), adopted))
 
 
 def _values(
@@ -92,10 +98,12 @@ def _answered(table: SigmaTable, store: Database, document: dict[str, Any]) -> C
     return answer(table, store, D33Columns.model_validate(document))
 
 
-def _columns(document: Mapping[str, Any], found: Columns) -> dict[str, list[Any]]:
+def _columns(document: Mapping[str, Any], found: Columns, adopted: ByModel | None) -> dict[str, list[Any]]:
     """What was sent and what is answered, a row a measurement."""
     sent = {name: document.get(name, [math.nan] * found.rows) for name in _ORDER}
-    return {**sent, **{name: found.full(name).tolist() for name in _ANSWERED}, "status": list(found.status())}
+    answered = {name: found.full(name).tolist() for name in _ANSWERED}
+    beside = {} if adopted is None else adopted.columns()
+    return {**sent, **answered, **beside, "status": list(found.status())}
 
 
 def _document(values: Mapping[str, str], given: Mapping[str, str], rows: str) -> dict[str, Any]:

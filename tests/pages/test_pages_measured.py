@@ -1,13 +1,16 @@
 """A few measured numbers typed into a page: the d33 that they mean."""
 
 import csv
+from pathlib import Path
 
 import httpx
 import pytest
 
 from tests.pages.conftest import Visit
+from tests.pages.test_pages_adopted import mistuned
 from tests.pages.test_pages_security import BROWSING
-from tests.store.server import Server
+from tests.store.diagnosed import diagnosed, resonant
+from tests.store.server import Place, Server, running
 
 
 def test_d33_from_a_few_numbers(visitor: Visit, server: Server) -> None:
@@ -53,3 +56,32 @@ def test_what_is_wrong_is_said_on_the_page(server: Server, query: dict[str, str]
     answer = httpx.get(f"{server.http.base_url}/d33", params=query, headers=BROWSING, timeout=60)
     assert answer.status_code in (200, 404)
     assert told in answer.text
+
+
+def test_d33_by_the_adopted_model_stands_beside_the_paper_s(tmp_path: Path) -> None:
+    with running(Place(tmp_path), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
+        _, diagnosis_id = diagnosed(server, resonant("monday"), mistuned(), "palm-m")
+        query = {"skin": "palm-m", "rows": "4 1 7.06 0.1\n8 2 7.45 0.1"}
+        before = server.http.get("/d33/rows.csv", params=query).text
+        assert "d33_adopted_pc_per_n" not in before
+        server.http.post("/v1/skins/palm-m/model", json={"diagnosis_id": diagnosis_id}).raise_for_status()
+        rows = list(csv.DictReader(server.http.get("/d33/rows.csv", params=query).text.splitlines()))
+        request = {
+            "thickness_mm": 2.5,
+            "youngs_modulus_mpa": 2.0,
+            "sensor_radius_mm": 1.5,
+            "indenter_radius_mm": [4, 8],
+            "preload_n": [1, 2],
+            "frf_pc_per_n": [7.06, 7.45],
+            "frf_uncertainty_pc_per_n": 0.1,
+        }
+        for model, column in (({}, ""), ({"model": "adopted", "skin_id": "palm-m"}, "adopted_")):
+            expected = server.http.post("/v1/d33", json={**request, **model}).json()
+            for part in ("", "uncertainty_"):
+                told = [float(row[f"d33_{column}{part}pc_per_n"]) for row in rows]
+                assert told == pytest.approx(expected[f"d33_{part}pc_per_n"], rel=1e-12)
+        shown = server.http.get("/d33", params=query, headers=BROWSING).text
+        assert "d33 by the adopted model [pC/N]" in shown
+        other = server.http.get("/d33", params={**query, "thickness_mm": "3"}, headers=BROWSING).text
+        assert "By the adopted model: thickness" in other
+        assert "d33 by the adopted model [pC/N]" not in other
