@@ -16,6 +16,7 @@ from service.pages import (
     pressure_map,
     skin,
     start,
+    tables,
     upload,
 )
 
@@ -31,6 +32,7 @@ _PAGES = (
     loads,
     pressure_map,
     measured,
+    tables,
     login,
     assets,
 )
