@@ -248,18 +248,6 @@ def test_of_three_recordings_the_one_that_is_off_is_named_and_of_two_neither(fac
     assert "a third" in of_two.lacking
 
 
-@pytest.mark.parametrize(("factor", "word"), [(1e3, "large"), (1e-3, "small")])
-def test_a_d33_far_from_the_declared_one_is_named(factor: float, word: str, table: SigmaTable) -> None:
-    """A thousandth of a ceramic's d33, or a weak polymer's times 1000, could be a sensor's."""
-    d33 = 0.5 if factor > 1 else 450.0
-    weak = campaign(replace(MADE, d33_pc_per_n=d33), table)
-    wrong = changed(weak, times(factor, *LINES), of_all)
-    assert codes(inspect(wrong, table).found) == set()
-    told = inspect(replace(wrong, skin=replace(weak.skin, d33_pc_per_n=-d33)), table).found
-    assert codes(told) == {("units_off_by_1000", "", "frf_re_pc_per_n")}
-    assert any(f"1000 × too {word}" in entry.statement for entry in told)
-
-
 def test_a_period_that_does_not_fit_between_recordings_is_named(good: Campaign, table: SigmaTable) -> None:
     """From 0.03 to 3.9 Hz is no impossible sweep, but not one in 20 s."""
 

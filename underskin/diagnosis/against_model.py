@@ -22,6 +22,7 @@ _SLIPS = {1e3: "1000 × too large: pC taken for nC, or N for mN?", 1e-3: "1000 �
 _SLIP_WIDTH = np.log(12.0)
 _LIKELY_D33 = (0.3, 1000.0)  # pC/N; polymers have 5 to 40, ceramics up to some hundred
 _LEAST_RESPONSE = 0.2  # of the campaign's largest prediction: below it, near a crossing of zero, a sign says nothing
+_LOWEST = 5  # one line of so many counts as low
 _D33 = 15.0  # pC/N: the prior's centre is what the prediction is made with
 
 Mask = NDArray[np.bool_]
@@ -40,11 +41,12 @@ def against_model(
     inside = in_reach(campaign, entries, model, table, found)
     ratio, expected = _apparent(entries, model, inside & ~silent)
     kept = inside & ~dead(entries, silent & inside, variance, expected, found)
-    if len(entries) == 2 and _contradict(ratio, found):
+    turned = np.where(_one_sided(entries), ratio, np.nan)
+    if len(entries) == 2 and _contradict(ratio, turned, found):
         return [], "two recordings that contradict each other (see findings); a third would tell which is off"
     kept &= ~_off_by_1000(entries, ratio, found)
     _of_all(ratio, campaign.skin.d33_pc_per_n, found)
-    signs = _signs(entries, ratio, kept, found)
+    signs = _signs(entries, turned, kept, found)
     entries = [entry if sign > 0 else _reversed(entry) for entry, sign in zip(entries, signs, strict=True)]
     return [entry for entry, chosen in zip(entries, kept, strict=True) if chosen], ""
 
@@ -76,12 +78,23 @@ def _off_by_1000(entries: list[FrfRecording], ratio: Floats, found: list[Finding
     return off
 
 
-def _contradict(ratio: Floats, found: list[Finding]) -> bool:
+def _one_sided(entries: list[FrfRecording]) -> Mask:
+    """Whether a recording's lowest lines are on the same side of zero as all of it: above a resonance charge is in
+    antiphase, which reverses nothing."""
+    sides = []
+    for entry in entries:
+        real = lines_of(entry).values.real
+        lowest = real[: 1 + (len(real) - 1) // _LOWEST]
+        sides.append(float(np.nanmedian(lowest)) * float(np.nanmedian(real)) > 0)
+    return np.array(sides)
+
+
+def _contradict(ratio: Floats, turned: Floats, found: list[Finding]) -> bool:
     """Whether two recordings' levels are about 1000 × apart, or of opposite signs; which of them is off, they hide."""
     low, high = sorted(np.abs(ratio).tolist())
     if not low > 0:
         return False
-    if np.prod(ratio) < 0:
+    if np.prod(turned) < 0:
         text = "the two recordings answer with opposite signs: one of them is reversed"
         found.append(Finding("sign_flipped", "", "frf_re_pc_per_n", text))
         return True
@@ -108,10 +121,10 @@ def _of_all(ratio: Floats, declared: float | None, found: list[Finding]) -> None
         found.append(Finding("units_off_by_1000", "", "frf_re_pc_per_n", text))
 
 
-def _signs(entries: list[FrfRecording], ratio: Floats, kept: Mask, found: list[Finding]) -> Floats:
+def _signs(entries: list[FrfRecording], turned: Floats, kept: Mask, found: list[Finding]) -> Floats:
     """Of each recording: −1 where its sensor's polarity is reversed, or its own alone."""
-    negative = np.isfinite(ratio) & (ratio < 0) & kept
-    positive = np.isfinite(ratio) & (ratio > 0) & kept
+    negative = np.isfinite(turned) & (turned < 0) & kept
+    positive = np.isfinite(turned) & (turned > 0) & kept
     signs = np.ones(len(entries))
     if negative.sum() > positive.sum():
         text = "charge is negative in compression: all signs were reversed (a negative d33, or the amplifier inverts)"
@@ -128,7 +141,7 @@ def _signs(entries: list[FrfRecording], ratio: Floats, kept: Mask, found: list[F
             negative = negative & ~own
     if negative.sum() <= max(0.2 * positive.sum(), 1) and positive.sum() > 1:
         for number in np.flatnonzero(negative):
-            text = "its sign is the opposite of the others of its sensor: reversed"
+            text = "its sign is the opposite of the others': reversed"
             found.append(Finding("sign_flipped", entries[number].id, "frf_re_pc_per_n", text))
             signs[number] *= -1.0
     return signs

@@ -19,6 +19,7 @@ from underskin.units import Floats
 
 _PRELOADS_N = (0.01, 150.0)  # the highest preload of a campaign, and the lowest
 _FREQUENCIES_HZ = (0.5, 2e4)  # the highest line of a campaign
+_LEAST_PAUSE_S = 5.0  # no sweep is made in less
 _SLOW_HZ = (0.02, 5.0)  # a sweep from below the one to no more than the other: a minute and more for each period
 _ELASTOMERS_MPA = (0.02, 300.0)  # from gels to the hardest polyurethanes
 _WIDEST_PITCH_MM = 300.0
@@ -78,7 +79,7 @@ def _of_frequencies(entries: Sequence[FrfRecording]) -> list[Finding]:
             )
             return [_slip("frequency_hz", text)]
     pause = _pause_s(entries)
-    if pause is not None and pause * lowest < 1:
+    if pause is not None and pause * lowest < 1 and _SLIP * highest <= _FREQUENCIES_HZ[1]:
         text = (
             f"no period of {lowest:g} Hz fits into the {pause:.3g} s after which, by recorded_at, the next recording "
             "follows: are they 1000 × too small, given in kHz?"
@@ -88,12 +89,15 @@ def _of_frequencies(entries: Sequence[FrfRecording]) -> list[Finding]:
 
 
 def _pause_s(entries: Sequence[FrfRecording]) -> float | None:
-    """From one recording to the next, as a rule; those made at one time were made together."""
+    """From one recording of a sensor to its next, as a rule; what is stamped within seconds was made together."""
     times = [entry.recorded_at for entry in entries]
     if None in times:
         return None
-    steps = np.diff(np.unique(hours(times)))
-    return 3600 * float(np.median(steps)) if len(steps) else None
+    seconds = 3600 * hours(times)
+    sensors = np.array([entry.sensor for entry in entries])
+    steps = np.concatenate([np.diff(np.sort(seconds[sensors == name])) for name in np.unique(sensors)])
+    pauses = steps[steps >= _LEAST_PAUSE_S]
+    return float(np.median(pauses)) if len(pauses) else None
 
 
 def _slip(field: str, text: str) -> Finding:

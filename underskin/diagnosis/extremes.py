@@ -14,16 +14,17 @@ from underskin.diagnosis.finding import Finding, Inspected
 from underskin.recordings.campaign import Campaign, Recording, SkinDescription
 
 _LENGTH, _FORCE, _TIME = (1e-9, 1e6), (1e-8, 1e8), (1e-12, 1e12)
+_PLACE = (0.0, 1e6)  # of what differences and rotations leave where 0 is meant, too
 _CHARGE = (1e-9, 1e9)
 _BOUNDS = {
     "thickness_mm": _LENGTH,
     "sensor_radius_mm": _LENGTH,
     "youngs_modulus_mpa": (1e-12, 1e12),
-    "sensors": _LENGTH,
+    "sensors": _PLACE,
     "indenter_radius_mm": _LENGTH,
     "sample_height_mm": _LENGTH,
     "sample_diameter_mm": _LENGTH,
-    "position_mm": _LENGTH,
+    "position_mm": _PLACE,
     "displacement_mm": _LENGTH,
     "preload_n": _FORCE,
     "dynamic_force_n": _FORCE,

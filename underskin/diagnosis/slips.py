@@ -15,6 +15,7 @@ from underskin.recordings.frf_estimation import lines_of
 
 _SLIP, _WITHIN = 1000.0, 3.0  # a value is back among the others, within this factor, once the slip is undone
 _ALONE = 0.25  # of the recordings at most, or one of three
+_FEW = 4  # recordings below which the others must agree, each within the same factor
 _FAINT = 5e-4  # dynamic force over preload
 
 
@@ -49,6 +50,8 @@ def lone_slips(entries: Sequence[FrfRecording], found: list[Finding]) -> NDArray
             if not far.any() or far.sum() > max(_ALONE * len(entries), 1.0) or len(entries) < 3:
                 continue
             others = values[~far]
+            if len(entries) < _FEW and others.max() > _WITHIN * others.min():
+                continue
             meant = values / factor
             back = far & (meant > others.min() / _WITHIN) & (meant < others.max() * _WITHIN)
             for number in np.flatnonzero(back & ~off).tolist():
