@@ -109,6 +109,13 @@ def test_a_recording_that_does_not_load_is_refused() -> None:
         indentation_modulus(np.linspace(0, 1, 50), -hertz(np.linspace(0.4e-3, 0, 50)) * 0, RADIUS, 0.5)
 
 
+def test_a_modulus_that_one_sample_in_contact_leaves_open_is_refused() -> None:
+    depth = np.linspace(0, 0.4e-3, 20)
+    force = np.where(np.arange(20) == 19, 1.0, 0.0)
+    with pytest.raises(InvalidInput, match="displacement_mm"):
+        indentation_modulus(depth, force, RADIUS, 0.5)
+
+
 @NEEDS_RECORDINGS
 @pytest.mark.parametrize(("product", "modulus_kpa"), [("EF10_0T", 62.5), ("EF30_0T", 114.0), ("EF50_0T", 181.0)])
 def test_silicones_under_compression(product: str, modulus_kpa: float) -> None:

@@ -148,7 +148,7 @@ def compression_modulus(displacement: Floats, force: Floats, height: float, diam
 def indentation_modulus(displacement: Floats, force: Floats, radius: float, poisson_ratio: float) -> IndentationModulus:
     """Hertz' modulus with a free contact point, and a free force offset where points before contact show it.
 
-    Raises InvalidInput where the loading branch has too few points, or does not load.
+    Raises InvalidInput where the loading branch has too few points, does not load, or leaves the modulus open.
     """
     depth, load = _loading(displacement, force)
     contact = _contact_point(depth, load, offset=True)
@@ -163,9 +163,7 @@ def indentation_modulus(displacement: Floats, force: Floats, radius: float, pois
     jacobian = np.column_stack([design, slope])
     freedom = max(1, len(load) - jacobian.shape[1])
     variance = float(residual @ residual) / freedom * _correlation_factor(residual)
-    size = np.linalg.norm(jacobian, axis=0)
-    shape = jacobian / size
-    deviation = float(np.sqrt(variance * np.linalg.pinv(shape.T @ shape)[0, 0]) / size[0])
+    deviation = float(np.sqrt(variance)) * _amplification(jacobian)
     per_stiffness = 0.75 * (1 - poisson_ratio**2) / np.sqrt(radius)
     return IndentationModulus(
         modulus=float(stiffness * per_stiffness),
@@ -174,6 +172,17 @@ def indentation_modulus(displacement: Floats, force: Floats, radius: float, pois
         force_offset=float(offset[0]) if offset else 0.0,
         residual=float(np.sqrt(np.mean(residual**2))),
     )
+
+
+def _amplification(jacobian: Floats) -> float:
+    """The first parameter's standard deviation over that of the noise; raises InvalidInput where it has none."""
+    size = np.linalg.norm(jacobian, axis=0)
+    shape = jacobian / np.where(size > 0, size, 1)
+    normal = shape.T @ shape
+    if np.linalg.matrix_rank(normal, hermitian=True) < len(normal):
+        allowed = "must tell the modulus from the contact point: more samples in contact"
+        raise InvalidInput("displacement_mm", f"{np.count_nonzero(jacobian[:, 0])} samples in contact", allowed)
+    return float(np.sqrt(np.linalg.inv(normal)[0, 0]) / size[0])
 
 
 def _loading(along: Floats, load: Floats) -> tuple[Floats, Floats]:

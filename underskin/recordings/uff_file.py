@@ -93,7 +93,7 @@ def _each_alone(
     for frf in frfs:
         mate = next((one for one in waiting if _freedom(one) == _freedom(frf) and _same_abscissa(one, frf)), None)
         if mate is not None:
-            waiting.remove(mate)
+            waiting = [one for one in waiting if one is not mate]
             used.add(mate["number"])
         used.add(frf["number"])
         name = _name(frf)
