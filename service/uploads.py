@@ -5,6 +5,7 @@ A file's own name is kept as a label. It never becomes a path, and says nothing 
 
 import fcntl
 import hashlib
+import math
 import shutil
 import tempfile
 from collections.abc import AsyncIterator, Iterator
@@ -72,19 +73,20 @@ def _nobody_uses(folder: Path) -> bool:
 
 
 @asynccontextmanager
-async def received(request: Request, parent: UploadFolder) -> AsyncIterator[list[Upload]]:
+async def received(request: Request, parent: UploadFolder, most_bytes: float = math.inf) -> AsyncIterator[list[Upload]]:
     """The files of a multipart form, or the whole body as one file; gone at the end of the block.
 
-    Raises Refusal where a form cannot be read (400) or is of the other kind (415), StorageFull where the disk is full.
+    Raises Refusal where a form cannot be read (400), is of the other kind (415) or the body has more than `most_bytes`,
+    besides the limit of all uploads (413), StorageFull where the disk is full.
     """
     with full_disk_said(), tempfile.TemporaryDirectory(dir=parent.path) as folder:
         content_type, options = parse_options_header(request.headers.get("content-type", ""))
         if content_type == b"application/x-www-form-urlencoded":
             raise Refusal(415, "Files come as they are (application/octet-stream) or as a form of multipart/form-data.")
         if content_type == b"multipart/form-data":
-            yield await _parts(request, Path(folder), options.get(b"boundary", b""))
+            yield await _parts(_body(request, most_bytes), Path(folder), options.get(b"boundary", b""))
         else:
-            yield [await _whole(request, Path(folder))]
+            yield [await _whole(_body(request, most_bytes), Path(folder))]
 
 
 @contextmanager
@@ -98,21 +100,30 @@ def full_disk_said() -> Iterator[None]:
         raise
 
 
-async def _whole(request: Request, folder: Path) -> Upload:
+async def _body(request: Request, most_bytes: float) -> AsyncIterator[bytes]:
+    size = 0
+    async for chunk in request.stream():
+        size += len(chunk)
+        if size > most_bytes:
+            raise Refusal(413, f"The body exceeds {most_bytes / 1e6:g} MB; send less.", title="Body too large")
+        yield chunk
+
+
+async def _whole(body: AsyncIterator[bytes], folder: Path) -> Upload:
     part = _Part(folder / "0")
     try:
-        async for chunk in request.stream():
+        async for chunk in body:
             part.write(chunk)
     finally:
         part.close()
     return part.upload(in_form=False)
 
 
-async def _parts(request: Request, folder: Path, boundary: bytes) -> list[Upload]:
+async def _parts(body: AsyncIterator[bytes], folder: Path, boundary: bytes) -> list[Upload]:
     form = _Form(folder)
     try:
         parser = MultipartParser(boundary, form.callbacks())
-        async for chunk in request.stream():
+        async for chunk in body:
             parser.write(chunk)
         parser.finalize()
     except FormParserError as error:  # of the boundary, too

@@ -1,5 +1,6 @@
 """An array under loads: the fields of the forms that ask for one, and the request of `POST /v1/stress` in them."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,11 +14,13 @@ from service.pages.skin_values import start
 from service.store import campaigns, skins
 from service.store.engine import Database
 from underskin import InvalidInput, UnderskinError
+from underskin.recordings import text
 from underskin.stress_answer import StressAnswer, answer
 from underskin.stress_request import read_request
 from underskin.surrogate import SigmaTable
 
 _MOST_SENSORS = 10_000
+_BETWEEN = re.compile(r"[;\s]+|,(?:\s+|$)")  # numbers in a line: a comma without a space may be a decimal one
 # Field, words, unit.
 FIELDS = (
     ("thickness_mm", "thickness h", "mm"),
@@ -94,16 +97,33 @@ def charge_columns(found: StressAnswer) -> dict[str, list[Any]]:
     return {"sensor": list(found.sensors), **{name: column.tolist() for name, column in found.columns.items()}}
 
 
-def number(name: str, text: str) -> float:
+def number(name: str, typed: str) -> float:
     """A number that somebody typed; raises InvalidInput."""
     try:
-        return float(text)
+        return float(typed)
     except ValueError:
-        raise InvalidInput(name, text[:80], "must be a number") from None
+        raise InvalidInput(name, typed[:80], "must be a number") from None
+
+
+def numbers(name: str, line: str) -> list[float]:
+    """The numbers of a line that somebody typed, with decimal points or with decimal commas; raises InvalidInput.
+
+    Between them are spaces, tabs, semicolons, or commas and a space: `7,06` is one number.
+    """
+    typed = [cell for cell in _BETWEEN.split(line) if cell]
+    decimal = "," if any("," in cell for cell in typed) else "."
+    found = [text.number(cell, decimal) for cell in typed]
+    if decimal == "," and None in found:
+        allowed = "must be numbers with spaces between them, with decimal points or with decimal commas, not both"
+        raise InvalidInput(name, line[:80], allowed)
+    return [number(name, cell) if value is None else value for cell, value in zip(typed, found, strict=True)]
 
 
 def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:
     columns, rows, pitch = values["columns"], values["rows"], values["pitch_mm"]
+    for name in ("columns", "rows"):
+        if not values[name].is_integer():
+            raise InvalidInput(name, f"{values[name]:g}", "must be a whole number")
     if not (1 <= columns <= 1000 and 1 <= rows <= 1000 and columns * rows <= _MOST_SENSORS):
         raise InvalidInput("columns", f"{columns:g} × {rows:g}", f"must be 1 to {_MOST_SENSORS} sensors in all")
     return [

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from service.dependencies import Store, Table
 from service.pages import requests
-from service.pages.array import Described, answered, charge_columns, described, number, refused
+from service.pages.array import Described, answered, charge_columns, described, numbers, refused
 from service.pages.figures import csv_answer, drawn
 from service.pages.html import page
 from underskin import InvalidInput, UnderskinError
@@ -78,7 +78,7 @@ def _document(array: Described, loads: str) -> dict[str, Any]:
 
 def _load(place: int, line: str) -> dict[str, Any]:
     """A line of numbers: x, y, radius and force, and perhaps the tangential force along x and y."""
-    parts = [number(f"load in line {place}", part) for part in line.replace(",", " ").split()]
+    parts = numbers(f"load in line {place}", line)
     if len(parts) not in (4, 6):
         raise InvalidInput(f"load in line {place}", line[:80], "must be x y R F, or x y R F Fx Fy (mm, N)")
     load: dict[str, Any] = dict(zip(_ORDER, parts, strict=False))

@@ -12,7 +12,7 @@ from service.d33 import D33Columns, answer
 from service.dependencies import Store, Table
 from service.pages import requests
 from service.pages.array import FIELDS as OF_ARRAY
-from service.pages.array import UNITS, number, refused
+from service.pages.array import UNITS, number, numbers, refused
 from service.pages.figures import csv_answer
 from service.pages.html import page
 from service.pages.measured_adopted import ByModel, by_model
@@ -117,7 +117,7 @@ def _document(values: Mapping[str, str], given: Mapping[str, str], rows: str) ->
 
 
 def _row(place: int, line: str) -> list[float]:
-    parts = [number(f"row {place}", part) for part in line.replace(",", " ").split()]
+    parts = numbers(f"row {place}", line)
     if len(parts) not in (3, 4):
         raise InvalidInput(f"row {place}", line[:80], "must be R F FRF, or R F FRF and its uncertainty (mm, N, pC/N)")
     return parts

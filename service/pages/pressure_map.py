@@ -28,6 +28,7 @@ router = APIRouter(prefix="/loads/map")
 
 _EXAMPLE = "map.csv"
 _LARGEST_BYTES = 1_000_000
+_LARGEST_BODY_BYTES = 2 * _LARGEST_BYTES + 100_000  # a file, the text of the last map, and the other fields
 _LONGEST_FIELD = 1000  # bytes of a field beside the map
 _MAP, _FILE, _SKIN = "map", "file", "skin"
 
@@ -42,7 +43,7 @@ def view(request: Request, store: Store, skin: Annotated[str | None, Query()] = 
 @router.post("")
 async def send(request: Request, store: Store) -> Response:
     """With the map that was sent as a file, or else as text."""
-    async with received(request, request.app.state.uploads) as sent:
+    async with received(request, request.app.state.uploads, _LARGEST_BODY_BYTES) as sent:
         fields = {one.field or "": _start(one, _LONGEST_FIELD) for one in sent if one.field not in (_MAP, _FILE)}
         given = {name: value.decode("utf-8", "replace").strip() for name, value in fields.items()}
         require_own(request, given.get(TOKEN, ""))

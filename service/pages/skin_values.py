@@ -64,9 +64,9 @@ def _pressed(scalars: Sequence[Mapping[str, Any]]) -> dict[str, float]:
 
 
 def _pitch(sensors: Sequence[Mapping[str, Any]]) -> dict[str, float]:
-    """The least distance of two sensors."""
+    """The least distance of two sensors in different places."""
     places = np.array([[sensor["x_mm"], sensor["y_mm"]] for sensor in sensors], dtype=float)
     if len(places) < 2:
         return {}
     apart = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
-    return {"pitch_mm": float(apart[apart > 0].min())}
+    return {"pitch_mm": float(apart[apart > 0].min())} if apart.any() else {}

@@ -43,6 +43,8 @@ SKIN = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16, "sensor_radius_mm": 1.5, 
     [
         ({"rows": ""}, "must be one or more"),
         ({"rows": "4 1"}, "must be R F FRF"),
+        ({"rows": "4,1 7.06 0.1"}, "not both"),
+        ({"rows": "4,1,7"}, "with spaces between them"),
         ({"rows": "4 -1 7"}, "preload_n"),
         ({"rows": "4 nan 7"}, "preload_n"),
         ({"rows": "4 1 inf"}, "frf_pc_per_n"),
@@ -85,3 +87,13 @@ def test_d33_by_the_adopted_model_stands_beside_the_paper_s(tmp_path: Path) -> N
         other = server.http.get("/d33", params={**query, "thickness_mm": "3"}, headers=BROWSING).text
         assert "By the adopted model: thickness" in other
         assert "d33 by the adopted model [pC/N]" not in other
+
+
+@pytest.mark.parametrize("rows", ["4 1 7,06", "4;1;7,06;", "4\t1\t7,06", "4, 1, 7.06", "4,0 1,0 7,06"])
+def test_a_decimal_comma_is_one(server: Server, rows: str) -> None:
+    answer = httpx.get(f"{server.http.base_url}/d33/rows.csv", params={"rows": rows}, headers=BROWSING, timeout=60)
+    found = list(csv.DictReader(answer.text.splitlines()))
+    expected = server.http.post("/v1/d33", json={**SKIN, "preload_n": [1], "frf_pc_per_n": [7.06]}).json()
+    assert [float(row["frf_pc_per_n"]) for row in found] == [7.06]
+    assert [float(row["d33_pc_per_n"]) for row in found] == pytest.approx(expected["d33_pc_per_n"])
+    assert [row["frf_uncertainty_pc_per_n"] for row in found] == ["nan"]

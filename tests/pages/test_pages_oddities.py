@@ -157,6 +157,18 @@ def test_what_nobody_declared_is_the_prototype_s_and_said(server: Server) -> Non
     assert "Not declared, so taken from the paper&#39;s prototype: pitch of the array 8 mm." in text
 
 
+def test_sensors_in_one_place_have_their_views(server: Server) -> None:
+    document = campaign("stacked", id="stacked", sensors=2)
+    for sensor in document["skin"]["sensors"]:
+        sensor["x_mm"] = sensor["y_mm"] = 0.0
+    assert server.http.post("/v1/campaigns", json=document).status_code == 201
+    for path in ("/design", "/loads", "/loads/map", "/d33"):
+        answer = server.http.get(f"{path}?skin=stacked", headers=BROWSING)
+        assert (path, answer.status_code) == (path, 200)
+    text = server.http.get("/design?skin=stacked", headers=BROWSING).text
+    assert "pitch of the array 8 mm" in text
+
+
 def test_two_ids_become_one_skin(server: Server) -> None:
     for name in ("left hand", "left-hand"):
         assert server.http.post("/v1/campaigns", json=campaign(name, id=name)).status_code == 201
@@ -177,6 +189,9 @@ def test_two_ids_become_one_skin(server: Server) -> None:
         ("thickness_mm=x", "thickness h [mm]: x"),
         ("columns=0", "sensors along x"),
         ("columns=1e9", "sensors along x"),
+        ("columns=2.5", "sensors along x: 2.5 – must be a whole number"),
+        ("rows=nan", "sensors along y: nan – must be a whole number"),
+        ("loads=10,5 8 4 1.2", "with decimal points or with decimal commas, not both"),
         ("poisson_ratio=0.7", "Poisson&#39;s ratio ν: 0.7"),
         ("loads=0 0 4 1e9", "load in line 1, F"),
         ("loads=0 0 4 1%0A%0A9 0 -4 1", "load in line 3, R: -4"),
@@ -193,6 +208,15 @@ def test_loads_that_cannot_be_are_explained(server: Server, query: str, said: st
     assert said in alert
     assert not any(name in alert for name in ("contacts", "_mm", "_n", "units_checked")), alert
     assert server.http.get(f"/loads/charge.csv?{query}").status_code == 422
+
+
+def test_loads_may_have_decimal_commas(server: Server) -> None:
+    with_points, with_commas, listed = (
+        server.http.get("/loads/charge.csv", params={"loads": loads})
+        for loads in ("10.5 8 4 1.2", "10,5 8 4 1,2", "10.5, 8, 4, 1.2")
+    )
+    assert with_points.status_code == 200
+    assert with_points.text == with_commas.text == listed.text
 
 
 def test_a_band_without_lines_is_refused_by_name(server: Server) -> None:

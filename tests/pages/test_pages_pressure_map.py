@@ -94,6 +94,14 @@ def test_what_is_wrong_with_a_map_is_said_beside_it(server: Server, content: byt
     assert 'name="thickness_mm" value="2.25"' in answer.text
 
 
+def test_much_more_than_a_map_is_not_taken(server: Server) -> None:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody:
+        form = {"form_token": token_of(somebody.get("/loads/map").text)}
+        answer = somebody.post("/loads/map", data=form, files={"file": ("a.csv", b"0,1,1\n" * 500_000)})
+    assert answer.status_code == 413
+    assert "exceeds 2.1 MB" in answer.text
+
+
 def test_a_map_needs_the_session_s_own_form_and_no_right_to_write(
     server: Server, locked: tuple[Server, dict[str, str]]
 ) -> None:
@@ -101,7 +109,7 @@ def test_a_map_needs_the_session_s_own_form_and_no_right_to_write(
         assert somebody.post("/loads/map", files={"map": (None, SMALL)}).status_code == 403
     other, keys = locked
     own = {"Origin": str(other.http.base_url).rstrip("/")}
-    with httpx.Client(base_url=other.http.base_url, headers=BROWSING | own) as reader:
+    with httpx.Client(base_url=other.http.base_url, headers=BROWSING | own, timeout=60) as reader:
         reader.post("/login", data={"form_token": token_of(reader.get("/login").text), "key": keys["read"]})
         form = {"form_token": token_of(reader.get("/loads/map").text)}
         answer = reader.post("/loads/map", data=form, files={"map": (None, SMALL)})
