@@ -88,12 +88,12 @@ def test_a_universal_file_that_is_cut_off_is_said() -> None:
 @leaky_writer
 @pytest.mark.parametrize("turned", [False, True])
 def test_frfs_of_one_degree_of_freedom_on_two_axes_have_each_its_coherence(turned: bool) -> None:
-    frf, coherence = frf_datasets(["sweep"])
-    finer = {"x": np.array([1.0, 2.0]), "abscissa_inc": 1.0, "num_pts": 2}
-    fine_frf = {**frf, **finer, "id1": "zoom", "data": np.array([8 - 1j, 8.1])}
-    fine_coherence = {**coherence, **finer, "data": np.array([0.9, 0.8])}
-    coherences = [fine_coherence, coherence] if turned else [coherence, fine_coherence]
-    blocks = {block.name: block for block in contents(uff(0, [frf, fine_frf, *coherences]), "run.uff").blocks}
+    frf, coherence = ({**one, "abscissa_spacing": 0, "abscissa_inc": 0.0} for one in frf_datasets(["sweep"]))
+    zoomed = {"x": np.array([20.0, 21.0, 23.0])}
+    zoom_frf = {**frf, **zoomed, "id1": "zoom"}
+    zoom_coherence = {**coherence, **zoomed, "data": np.array([0.9, 0.8, 0.7])}
+    coherences = [zoom_coherence, coherence] if turned else [coherence, zoom_coherence]
+    blocks = {block.name: block for block in contents(uff(0, [frf, zoom_frf, *coherences]), "run.uff").blocks}
     assert set(blocks) == {"sweep", "zoom"}
     assert blocks["sweep"].channels[2].values == pytest.approx([0.99] * 3)
-    assert blocks["zoom"].channels[2].values == pytest.approx([0.9, 0.8])
+    assert blocks["zoom"].channels[2].values == pytest.approx([0.9, 0.8, 0.7])
