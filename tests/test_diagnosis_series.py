@@ -50,7 +50,9 @@ def times(campaign: Campaign, field: str, factor: float, *names: str) -> Campaig
 
 
 def codes(found: Any) -> set[tuple[str, str, str]]:
-    return {(entry.code, entry.recording, entry.field) for entry in found if entry.code != "constant_axis"}
+    """Those that say that something is wrong: all of these have one preload axis only, and lines beside the band."""
+    usual = {"constant_axis", "lines_left_out"}
+    return {(entry.code, entry.recording, entry.field) for entry in found if entry.code not in usual}
 
 
 FIELDS = ("sample_rate_hz", "force_n", "charge_pc", "preload_n", "dynamic_force_n")
@@ -98,7 +100,98 @@ def test_lines_without_force_are_no_misfit(sample_rate_hz: float, table: SigmaTa
     campaign = recorded(drive={"kind": "sweep", "sample_rate_hz": sample_rate_hz, "duration_s": 8.0})
     report = diagnosis_report(campaign, table)
     assert report["verdict"] == "no_mismatch"
-    assert {entry["code"] for entry in report["findings"]} <= {"constant_axis", "damaged_samples"}
+    assert {entry["code"] for entry in report["findings"]} <= {"constant_axis", "damaged_samples", "lines_left_out"}
+    (said,) = [entry["statement"] for entry in report["findings"] if entry["code"] == "lines_left_out"]
+    assert "the force has little power" in said
+
+
+def forces(campaign: Campaign, **changes: Any) -> Campaign:
+    """Each recording with other fields; those that are functions, of the recording."""
+    return replace(
+        campaign,
+        recordings=tuple(
+            replace(entry, **{name: new(entry) if callable(new) else new for name, new in changes.items()})
+            for entry in campaign.recordings
+        ),
+    )
+
+
+def struck(quiet: Campaign) -> Campaign:
+    """Blows of 2 ms in 4 s, seen by a force cell without the preload, their peak declared."""
+    time = np.arange(4 * 4096) / 4096.0
+    blow = np.where((time > 0.1) & (time < 0.102), 0.09 * np.sin(np.pi * (time - 0.1) / 0.002), 0.0)
+    random = np.random.default_rng(4)
+    return forces(
+        quiet,
+        sample_rate_hz=4096.0,
+        dynamic_force_n=0.09,
+        force_n=lambda _: blow - blow.mean() + 1e-5 * random.normal(size=len(time)),
+        charge_pc=lambda _: 7.0 * blow + 1e-4 * random.normal(size=len(time)),
+    )
+
+
+def relaxing(quiet: Campaign) -> Campaign:
+    """2 mN of noise about a preload that falls by 30 % in two minutes."""
+    time = np.arange(120 * 64) / 64.0
+    random = np.random.default_rng(4)
+    fall = 0.3 * (1 - np.exp(-time / 40.0))
+    shaken = {entry.id: 0.002 / np.sqrt(2) * random.normal(size=len(time)) for entry in quiet.recordings}
+    return forces(
+        quiet,
+        sample_rate_hz=64.0,
+        dynamic_force_n=0.002,
+        force_n=lambda entry: entry.preload_n * (1 - fall) + shaken[entry.id],
+        charge_pc=lambda entry: (
+            7.0 * (shaken[entry.id] - entry.preload_n * fall) + 1e-4 * random.normal(size=len(time))
+        ),
+    )
+
+
+@pytest.mark.parametrize("excited", [struck, relaxing])
+def test_neither_a_blow_nor_drift_of_the_force_is_a_slip(excited: Any, quiet: Campaign, table: SigmaTable) -> None:
+    right = excited(quiet)
+    assert "units_off_by_1000" not in {entry.code for entry in inspect(right, table).found}
+    found = inspect(times(right, "force_n", 1e-3), table)
+    assert codes(found.found) == {("units_off_by_1000", "", "force_n")}
+    assert found.lacking
+
+
+def test_a_force_said_to_be_right_is_used_all_the_same(quiet: Campaign, table: SigmaTable) -> None:
+    slipped = times(quiet, "dynamic_force_n", 1e-3)
+    assert not inspect(slipped, table).campaign.recordings
+    found = inspect(replace(slipped, units_checked=True), table)
+    assert ("units_off_by_1000", "", "dynamic_force_n") in codes(found.found)
+    assert len(found.campaign.recordings) == len(quiet.recordings)
+    assert found.lacking == ""
+
+
+def test_slips_of_different_fields_are_each_told(quiet: Campaign, table: SigmaTable) -> None:
+    slipped = times(times(quiet, "force_n", 1e3, "r001", "r002"), "preload_n", 1e-3, "r003", "r004")
+    found = inspect(slipped, table)
+    assert codes(found.found) == {
+        ("units_off_by_1000", name, field)
+        for name, field in (("r001", "force_n"), ("r002", "force_n"), ("r003", "preload_n"), ("r004", "preload_n"))
+    }
+    assert found.lacking
+
+
+def test_mains_within_the_excited_band_are_found(table: SigmaTable) -> None:
+    """Their lines are known badly, but the force has its power there."""
+    pickup = {"mains_pickup": {"charge_pc": 0.3, "mains_hz": 50.0}}
+    report = diagnosis_report(recorded(effects=pickup, drive={"duration_s": 8.0}), table)
+    assert report["verdict"] != "no_mismatch"
+    assert [entry["name"] for entry in report["mechanisms"]] == ["mains_pickup"]
+    (said,) = [entry for entry in report["findings"] if entry["code"] == "mains_in_charge"]
+    assert said["field"] == "charge_pc"
+    assert "8 of 8 recordings" in said["statement"]
+    assert "50 Hz" in said["statement"]
+
+
+def test_mains_beside_the_excited_band_are_said(table: SigmaTable) -> None:
+    drive = {"low_hz": 70.0, "high_hz": 140.0, "duration_s": 8.0}
+    campaign = recorded(effects={"mains_pickup": {"charge_pc": 0.1, "mains_hz": 60.0}}, drive=drive)
+    assert ("mains_in_charge", "", "charge_pc") in codes(inspect(campaign, table).found)
+    assert "mains_in_charge" not in {entry.code for entry in inspect(recorded(drive=drive), table).found}
 
 
 def test_what_a_time_series_hides_is_still_found(table: SigmaTable) -> None:
