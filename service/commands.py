@@ -1,5 +1,6 @@
 """Commands that need the server: serve and key."""
 
+import errno
 import ipaddress
 import socket
 import tempfile
@@ -139,4 +140,5 @@ def _listen(host: str, port: int) -> socket.socket:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         return socket.create_server(address, family=family, backlog=2048)
     except OSError as error:
-        raise OSError(f"cannot listen on {host} port {port}: {error.strerror}") from error
+        other = "; take another: --port PORT, or make serve PORT=..." if error.errno == errno.EADDRINUSE else ""
+        raise OSError(f"cannot listen on {host} port {port}: {error.strerror}{other}") from error

@@ -13,10 +13,10 @@ from tests.mechanism_campaigns import indentation_campaign
 from underskin.diagnosis.diagnose import diagnose
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.lines import lines
-from underskin.diagnosis.numbers import in_percent
 from underskin.diagnosis.plan import DECIDED, plan
 from underskin.diagnosis.rig_limits import Limits
 from underskin.diagnosis.search import Answer, Search, search
+from underskin.digits import in_percent
 from underskin.mechanisms import compose
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate import SigmaTable, load_table

@@ -18,11 +18,11 @@ from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.fit import Fitter
 from underskin.diagnosis.lines import Lines, lines
 from underskin.diagnosis.locate import AxisResult
-from underskin.diagnosis.numbers import in_percent
 from underskin.diagnosis.page import page
 from underskin.diagnosis.report import report
 from underskin.diagnosis.search import Answer
 from underskin.diagnosis.statements import answer_statement, location_statement, why_not
+from underskin.digits import in_percent
 from underskin.mechanisms.mechanism import Kind
 from underskin.surrogate import SigmaTable, load_table
 from underskin.units import Floats

@@ -36,6 +36,7 @@ def test_a_port_in_use_is_named(tmp_path: Path) -> None:
         port = other.getsockname()[1]
         line = refusal(tmp_path, "--port", str(port))
     assert f"cannot listen on 127.0.0.1 port {port}: Address already in use" in line
+    assert "PORT=" in line
 
 
 @pytest.mark.parametrize("place", ["a file/data", "/proc/underskin"])

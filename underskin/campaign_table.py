@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from underskin.columns import PIPED_WIDTH
+from underskin.digits import significant
 from underskin.errors import InvalidInput
 from underskin.inversion import Inversion
 from underskin.mixed_model import Estimate
@@ -128,7 +129,10 @@ def _array(found: Inversion) -> Table:
     zone = found.zone
     if found.campaign_d33 is not None:
         value, uncertainty, low, high = _in_lab(found.campaign_d33)[0]
-        listed.add_row("d33 of the array", f"{value:.4g} ± {uncertainty:.2g} pC/N (95 %: {low:.4g} to {high:.4g})")
+        ends = f"{significant(low, 4)} to {significant(high, 4)}"
+        listed.add_row(
+            "d33 of the array", f"{significant(value, 4)} ± {significant(uncertainty, 2)} pC/N (95 %: {ends})"
+        )
     for name, scatter, factor, unit in (
         ("spread over sensors", found.spread, 100.0, "%"),
         ("scatter of gain", found.gain, 100.0, "%"),
@@ -171,5 +175,7 @@ def _table(first: str, *numbers: str, remark: str) -> Table:
 
 def _short(numbers: Sequence[float]) -> list[str]:
     """As many digits as are read; two of an uncertainty, which comes second."""
-    digits = (".4g", ".2g", ".4g", ".4g")
-    return ["-" if number != number else format(number, form) for number, form in zip(numbers, digits, strict=False)]
+    digits = (4, 2, 4, 4)
+    return [
+        "-" if number != number else significant(number, most) for number, most in zip(numbers, digits, strict=False)
+    ]

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from underskin.client import Client
 
 Files = Annotated[list[Path] | None, typer.Argument(help="Campaigns (campaign/1, JSON, or any format that is read).")]
+_REPORTS = Path("diagnosis")
+
 Workers = Annotated[int, typer.Option(min=0, help="Processes; 0 is one for each core.")]
 
 
@@ -42,8 +44,8 @@ def add_commands(app: typer.Typer) -> None:
 
 
 def diagnose(
-    output_dir: Annotated[Path, typer.Option(help="Folder for the reports; made where it does not exist.")],
     files: Files = None,
+    output_dir: Annotated[Path, typer.Option(help="Folder for the reports; made where it does not exist.")] = _REPORTS,
     html: Annotated[bool, typer.Option("--html", help="Also write each report as a page with figures.")] = False,
     workers: Workers = 0,
     scheduler: Annotated[
@@ -77,6 +79,8 @@ def diagnose(
                 failed |= bool(outcome.problem)
                 line = f"underskin: {outcome.problem}" if outcome.problem else f"{outcome.source}: {outcome.verdict}"
                 console.print(line, markup=False, highlight=False, soft_wrap=True)
+    if output_dir == _REPORTS and any(output_dir.iterdir()):
+        console.print(f"reports are in {output_dir}", markup=False, highlight=False)
     if failed:
         raise typer.Exit(2)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from underskin.digits import significant
 from underskin.errors import UnderskinError
 
 if TYPE_CHECKING:
@@ -140,12 +141,12 @@ def _figures(client: "Client", campaign_id: str) -> tuple[str, list[str]]:
     except UnderskinError as error:  # the campaign is kept all the same
         return f"no d33: {error}", []
     moduli = [
-        f"E {one['youngs_modulus_mpa']:.4g} ± {one['youngs_modulus_uncertainty_mpa']:.2g} MPa"
+        f"E {significant(one['youngs_modulus_mpa'], 4)} ± {significant(one['youngs_modulus_uncertainty_mpa'], 2)} MPa"
         for one in answer["moduli"]
     ]
     array = answer["array"]
     if array is not None:
-        d33 = f"d33 {array['d33_pc_per_n']:.3g} ± {array['d33_uncertainty_pc_per_n']:.2g} pC/N"
+        d33 = f"d33 {significant(array['d33_pc_per_n'], 3)} ± {significant(array['d33_uncertainty_pc_per_n'], 2)} pC/N"
     else:
         d33 = f"no d33: {answer['reason'] or 'every sensor stands out'}"
     told = moduli if moduli and answer["status"] == "none" else [d33, *moduli]

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from underskin.digits import significant
 from underskin.errors import InvalidInput, UnderskinError
 from underskin.units import LAB, Finding, Floats
 
@@ -183,4 +184,4 @@ def _unit(name: str) -> str:
 def _rounded(name: str, value: float) -> str:
     if value != value:
         return "-"
-    return format(value, ".1e" if name == "rel_error" else ".5g")
+    return format(value, ".1e") if name == "rel_error" else significant(value, 5)

@@ -10,6 +10,8 @@ import orjson
 
 from underskin.errors import InvalidInput, ServiceError, Unreachable
 
+_ELSEWHERE = " (where it is elsewhere: base_url of Client, --url or UNDERSKIN_URL of the command line)"
+
 
 class Session:
     """The service at `base_url`; every request raises ServiceError (refused or failed) or Unreachable (no answer).
@@ -58,7 +60,7 @@ class Session:
             yield
         except httpx.TransportError as error:
             reason = "no answer in time" if isinstance(error, httpx.TimeoutException) else error
-            raise Unreachable(f"the service at {self.http.base_url} cannot be reached: {reason}") from error
+            raise Unreachable(f"the service at {self.http.base_url} cannot be reached: {reason}{_ELSEWHERE}") from error
 
 
 def _document(response: httpx.Response) -> dict[str, Any] | None:

@@ -8,6 +8,8 @@ from typing import Any
 import orjson
 from markupsafe import Markup, escape
 
+from underskin.digits import in_percent, significant
+
 _UNSAFE = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026", 0x2028: "\\u2028", 0x2029: "\\u2029"}
 
 
@@ -26,9 +28,7 @@ def short_and_exact(value: float | None, unit: str, digits: int) -> tuple[str, s
     """A number to so many digits, and with its unit all of it."""
     if value is None or not math.isfinite(value):
         return "–", "not known"
-    shown = f"{value:#.{digits}g}".rstrip(".") if 1e-4 <= abs(value) < 1e5 else f"{value:.{digits}g}"
-    if "e+0" in shown and abs(value) < 1e5:  # 1.10e+03 is 1100
-        shown = f"{float(shown):.0f}"
+    shown = significant(value, digits, trailing_zeros=1e-4 <= abs(value) < 1e5)
     return shown.replace("-", "−"), f"{value!r} {unit}".strip()
 
 
@@ -67,4 +67,5 @@ def short(text: str, most: int = 60) -> Markup:
 
 FILTERS: Mapping[str, Callable[..., Any]] = {
     "number": number, "given": given, "moment": moment, "json_inside": json_inside, "words": words, "short": short,
+    "in_percent": in_percent,
 }  # fmt: skip

@@ -42,9 +42,10 @@ def skin(
     show: Annotated[Shown, Query()] = "d33",
     sensor: Annotated[str | None, Query()] = None,
     before: Annotated[str | None, Query()] = None,
-    by: Annotated[By, Query(alias="model")] = "paper",
+    by: Annotated[By | None, Query(alias="model")] = None,
 ) -> Response:
-    """All at a glance; `sensor` picks the one whose history is drawn, `by` the model that it rests on."""
+    """All at a glance; `sensor` picks the one whose history is drawn, `by` the model that it rests on: without it the
+    one in force, or the paper's where that tells nothing of the latest campaign."""
     root, waiting = _completed(store, table, skin_id)
     with store.reading() as connection:
         filters = campaigns.Filters(skin=root, state=None)
@@ -57,12 +58,12 @@ def skin(
         verdict = verdicts.of_rows(connection, told, [row.id for row in told if row.model_id is not None])
         model = _in_force(connection, root)
     serves = model is not None and model.outdated is None
-    by = by if serves else "paper"
-    history = _told(store, table, root, by)
     last = latest[0] if latest else None
-    sensor = sensor if sensor in {entry.sensor for entry in history.sensors} else None
     answer = None if last is None else inverting.answer(store, table, last, None)
     by_model, why_not = (None, None) if last is None or not serves else answer_by_it(store, table, root, last)
+    by = (by or ("paper" if by_model is None else "adopted")) if serves else "paper"
+    history = _told(store, table, root, by)
+    sensor = sensor if sensor in {entry.sensor for entry in history.sensors} else None
     mapped = by_model if by == "adopted" else answer
     figures = []
     if last is not None and mapped is not None and mapped["sensors"]:

@@ -43,7 +43,7 @@ def start(
                 sparkline(glance.d33),
                 None if glance.diagnosis is None else verdict[glance.diagnosis.id],
                 None if glance.model is None else adoptions[glance.model.id],
-                adoption.change_percent(glance.d33[-1][1] if glance.d33 else None, glance.adopted_d33),
+                adoption.change_percent(glance.paper_d33, glance.adopted_d33),
             )
             for glance in shown
         ],

@@ -8,6 +8,7 @@ from sqlalchemy import Connection
 
 from service.store import diagnoses
 from service.store.tables import AnyRow
+from underskin.digits import in_percent
 
 _SURE = 0.8  # least probability that is stated without its rivals, as a report does
 _WORTH_NAMING = 0.02  # probability of a rival, as in a report
@@ -59,7 +60,7 @@ def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> Verdict:
         return Verdict(row.id, tag, "quiet", "", at)
     probability = report["probability"]
     if report["verdict"] in ("no_mismatch", "unexplained"):
-        tag = f"{tag}, {_percent(probability)}"
+        tag = f"{tag}, {in_percent(probability)}"
     sure = report["verdict"] == "no_mismatch" and probability >= _SURE
     mood: Literal["good", "look"] = "good" if sure or adopted else "look"
     return Verdict(row.id, f"{tag}, adopted" if adopted else tag, mood, _beside(report), at)
@@ -68,9 +69,9 @@ def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> Verdict:
 def _beside(report: Mapping[str, Any]) -> str:
     """The explanations with their probabilities; of no mismatch, what is not ruled out."""
     verdict, probability = report["verdict"], report["probability"]
-    leader = [f"{in_words(mechanisms_of(report))} {_percent(probability)}"] if report["mechanisms"] else []
+    leader = [f"{in_words(mechanisms_of(report))} {in_percent(probability)}"] if report["mechanisms"] else []
     rivals = [
-        f"{in_words(entry['mechanisms'])} {_percent(entry['probability'])}"
+        f"{in_words(entry['mechanisms'])} {in_percent(entry['probability'])}"
         for entry in report.get("alternatives", ())[:_MOST_RIVALS]
         if entry["probability"] > _WORTH_NAMING
     ]
@@ -79,10 +80,3 @@ def _beside(report: Mapping[str, Any]) -> str:
     if verdict == "no_mismatch":
         return f"not ruled out: {', '.join(rivals)}" if rivals else ""
     return " or ".join([*leader, *rivals])
-
-
-def _percent(probability: float) -> str:
-    """Never 0 or 100 %, which nothing here can know."""
-    if probability > 0.995:
-        return "over 99 %"
-    return f"{100 * probability:.0f} %"

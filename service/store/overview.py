@@ -29,7 +29,9 @@ class Glance:
     d33: list[tuple[str, float]] = field(default_factory=list)
     diagnosis: AnyRow | None = None  # the latest of the last campaign
     model: AnyRow | None = None  # in force
-    adopted_d33: float | None = None  # as the last of `d33`, by that model; None where it is not kept
+    # d33 of the array [pC/N] in the last campaign by the model in force, and by the paper's; None where not kept
+    adopted_d33: float | None = None
+    paper_d33: float | None = None
 
 
 def glances(
@@ -58,7 +60,9 @@ def glances(
             glance.diagnosis = diagnosed.get(glance.last.number)
         glance.model = adopted.get(glance.skin_id)
         if glance.model is not None and glance.last is not None:
-            glance.adopted_d33 = _adopted_median(connection, glance.last, glance.model.model_id, table_sha256)
+            by_model = inversions.find_adopted(connection, glance.last, glance.model.model_id, table_sha256)
+            glance.adopted_d33 = _of_array(by_model)
+            glance.paper_d33 = _of_array(inversions.find(connection, glance.last, table_sha256))
     return list(found.values())
 
 
@@ -95,12 +99,9 @@ def medians(connection: Connection, numbers: Sequence[int], table_sha256: str) -
     return {number: median(values) for number, values in by_campaign.items()}
 
 
-def _adopted_median(connection: Connection, row: AnyRow, model_id: str, table_sha256: str) -> float | None:
-    """Median over the sensors of d33 [pC/N] by an adopted model, where it is kept."""
-    answer = inversions.find_adopted(connection, row, model_id, table_sha256)
-    values = [] if answer is None else [entry["d33_pc_per_n"] for entry in answer["sensors"]]
-    known = [value for value in values if value is not None]
-    return median(known) if known else None
+def _of_array(answer: Any | None) -> float | None:
+    """d33 of the array [pC/N] of an answer that is kept."""
+    return None if answer is None or answer["array"] is None else float(answer["array"]["d33_pc_per_n"])
 
 
 def latest_diagnoses(connection: Connection, numbers: Sequence[int]) -> dict[int, AnyRow]:

@@ -159,6 +159,8 @@ def test_an_exported_skin_comes_alone(sender: httpx.Client, export: bytes) -> No
     both = [("file", ("a.json", as_json(campaign("beside")).encode())), ("file", ("skin.h5", export))]
     shown = sender.post("/upload", data=form, files=both, follow_redirects=True).text
     assert "it comes in alone" in shown
+    assert "Nothing is wrong with the file" in shown
+    assert "Put it right in the file" not in shown
 
 
 def test_bringing_a_skin_in_needs_the_session_s_own_form_and_is_done_once(tmp_path: Path, export: bytes) -> None:

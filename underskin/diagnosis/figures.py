@@ -14,10 +14,10 @@ from plotly.subplots import make_subplots
 from underskin.diagnosis.axes import WORDS
 from underskin.diagnosis.explanation import Explanation, Workbench, own_places
 from underskin.diagnosis.locate import SIGNIFICANT
-from underskin.diagnosis.numbers import in_percent
 from underskin.diagnosis.points import Levels, Points, Thinned
 from underskin.diagnosis.report import Diagnosis
 from underskin.diagnosis.statements import SIMPLEST
+from underskin.digits import in_percent
 from underskin.units import Floats
 
 AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in WORDS.items()}
@@ -63,7 +63,7 @@ def explanations(document: Mapping[str, Any]) -> go.Figure:
         text=[in_percent(value) for value in values],
         textposition="outside",
         cliponaxis=False,
-        hovertemplate="%{y}: %{x:.3f}<extra></extra>",
+        hovertemplate="%{y}: %{text}<extra></extra>",
     )
     figure.update_layout(
         title="How probable each explanation is", height=130 + 34 * len(rows), margin={"r": 110, "t": 60}

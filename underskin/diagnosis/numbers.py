@@ -21,14 +21,6 @@ def probability(value: float) -> float:
     return round(value, 3)
 
 
-def in_percent(value: float) -> str:
-    """A probability in words; never 0 or 100 %, which nothing here can know."""
-    stated = probability(value)
-    if 0.001 <= stated <= 0.999:
-        return f"{100 * stated:.3g} %"
-    return "under 0.1 %" if stated < 0.5 else "over 99.9 %"
-
-
 def in_digits(value: float, digits: int = 4) -> str:
     """To significant digits, never as a power of ten."""
     return np.format_float_positional(float(f"{value:.{digits}g}"), trim="-")

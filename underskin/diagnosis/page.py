@@ -12,8 +12,8 @@ import plotly.io
 from plotly.offline import get_plotlyjs
 
 from underskin.diagnosis.figures import explanations
-from underskin.diagnosis.numbers import in_percent
 from underskin.diagnosis.wording import axis, error, group, interval, number, plain, readable, unit, words
+from underskin.digits import in_percent
 from underskin.mechanisms.catalogue import CATALOGUE
 
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
@@ -34,6 +34,12 @@ _AFTER = {
     "no_mismatch": "the same, since nothing is added",
 }
 _OPEN = " What they cannot tell, as listed above, stays open."
+_D33 = (
+    "One fit of everything to all these recordings: its 95 % interval holds what is unsure of the mechanisms, of the "
+    "modulus and of the thickness. Quote it as the d33 of this campaign. The d33 that the skin's page or /v1/campaigns "
+    "tells is a mean over the sensors with the model held as it was found, to compare sensors and campaigns with: "
+    "value and interval differ somewhat."
+)
 _STYLE = """
 body { font: 17px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.1rem; font-weight: 600; color: #555; margin: 0; }
@@ -155,6 +161,7 @@ def _what(report: Report, drawn: Drawn) -> str:
     if report["d33"] is not None:
         one = report["d33"]
         parts.append(_paragraph(f"d33 under this explanation: {number(one['value'])} ({interval(one)}) {one['unit']}."))
+        parts.append(_note(_D33))
     if report["alternatives"]:
         rows = [
             (" + ".join(map(words, entry["mechanisms"])), in_percent(entry["probability"]), readable(entry["why_not"]))

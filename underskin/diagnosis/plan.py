@@ -18,10 +18,10 @@ import numpy as np
 
 from underskin.diagnosis.axes import WORDS
 from underskin.diagnosis.explanation import Workbench
-from underskin.diagnosis.numbers import in_percent
 from underskin.diagnosis.rig_limits import Limits, candidates, inferred, wider
 from underskin.diagnosis.search import Answer, Search
 from underskin.diagnosis.statements import in_words
+from underskin.digits import in_percent
 from underskin.mechanisms.catalogue import CATALOGUE
 from underskin.mechanisms.mechanism import Unsupported
 from underskin.mechanisms.model import compose

@@ -8,8 +8,9 @@ import numpy as np
 from underskin.diagnosis.axes import WORDS
 from underskin.diagnosis.effect import Effect
 from underskin.diagnosis.locate import SIGNIFICANT, AxisResult
-from underskin.diagnosis.numbers import in_digits, in_percent
+from underskin.diagnosis.numbers import in_digits
 from underskin.diagnosis.search import NONE_OF_THESE, NOTHING_MISSING, Answer
+from underskin.digits import in_percent
 from underskin.mechanisms.catalogue import CATALOGUE
 from underskin.mechanisms.mechanism import Kind
 
