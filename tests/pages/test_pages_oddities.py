@@ -181,6 +181,14 @@ def test_two_ids_become_one_skin(server: Server) -> None:
         assert lab.post("/skins/left%20hand/join", data=form | {"reason": " "}).status_code == 422
 
 
+def test_a_sensor_out_of_reach_says_so(server: Server) -> None:
+    text = server.http.get("/loads?pitch_mm=100&loads=0 0 4 1", headers=BROWSING).text
+    assert "out of reach: no load within" in text.partition(">s02<")[2].partition("</tr>")[0]
+    assert "out of reach" not in text.partition(">s01<")[2].partition("</tr>")[0]
+    assert "± at most [pC]" in text
+    assert '<a href="/d33">d33</a>' in text  # at the top of every page
+
+
 @pytest.mark.parametrize(
     ("query", "said"),
     [

@@ -1,0 +1,19 @@
+"""Numbers as people read them."""
+
+import pytest
+
+from underskin.digits import significant
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "shown"),
+    [(13600.0, 3, "13600"), (570.0, 2, "570"), (-13649.0, 3, "-13600"), (13.0, 4, "13"), (2.5e6, 2, "2.5e+06"),
+     (99960.0, 3, "100000"), (1.5e-7, 2, "1.5e-07")],
+)  # fmt: skip
+def test_a_number_that_can_be_written_out_has_no_power_of_ten(value: float, digits: int, shown: str) -> None:
+    assert significant(value, digits) == shown
+
+
+def test_trailing_zeros_say_how_many_digits_are_known() -> None:
+    assert significant(13.0, 4, trailing_zeros=True) == "13.00"
+    assert significant(1100.0, 3, trailing_zeros=True) == "1100"
