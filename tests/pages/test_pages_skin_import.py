@@ -157,7 +157,9 @@ def test_a_file_that_cannot_come_in_says_what_is_wrong_with_it(
 def test_an_exported_skin_comes_alone(sender: httpx.Client, export: bytes) -> None:
     form = {"form_token": token_of(sender.get("/upload").text)}
     both = [("file", ("a.json", as_json(campaign("beside")).encode())), ("file", ("skin.h5", export))]
-    shown = sender.post("/upload", data=form, files=both, follow_redirects=True).text
+    both_seen = sender.post("/upload", data=form, files=both, follow_redirects=True)
+    assert "it comes in alone" in both_seen.text
+    shown = sender.get(both_seen.url.copy_with(query=b"file=1")).text
     assert "it comes in alone" in shown
     assert "Nothing is wrong with the file" in shown
     assert "Put it right in the file" not in shown
