@@ -21,10 +21,10 @@ from service.skin_columns import (
     require_paper,
 )
 from service.store import Database
-from underskin import InvalidInput, response
+from underskin import InvalidInput, d33_findings, response
 from underskin.answers import lab_columns, pressed
 from underskin.surrogate import SigmaTable
-from underskin.units import Complexes, Floats, findings, finite, non_negative, to_lab, to_si
+from underskin.units import Complexes, Floats, finite, non_negative, to_lab, to_si
 
 router = APIRouter(prefix="/v1", tags=["d33"])
 
@@ -74,7 +74,8 @@ class D33Answer(PressedSkinAnswer):
         description="Standard uncertainty: the FRF's and the table's, in quadrature; null without the FRF's [pC/N]."
     )
     findings: list[FindingModel] = Field(
-        description="Measured values that look wrong, such as C/N taken for pC/N; they are used all the same."
+        description="Measured values that look wrong, such as C/N taken for pC/N, and a d33 that no sensors have; "
+        "they are used all the same."
     )
 
 
@@ -95,7 +96,7 @@ def answer(table: SigmaTable, store: Database, request: D33Columns) -> Columns:
         model=request.model,
         table_sha256=table.sha256,
         inside=reached.inside & np.isfinite(d33),
-        shared={"findings": [asdict(finding) for finding in findings("frf_pc_per_n", measured["frf_pc_per_n"])]},
+        shared={"findings": _findings(measured, to_lab("d33_pc_per_n", d33))},
         columns={
             **lab_columns(reached),
             **measured,
@@ -131,12 +132,13 @@ def _adopted_answer(table: SigmaTable, store: Database, request: D33Columns) -> 
         model=request.model,
         table_sha256=table.sha256,
         inside=felt.inside & np.isfinite(value),
-        shared={
-            "model_id": serving.model_id,
-            "findings": [asdict(finding) for finding in findings("frf_pc_per_n", measured["frf_pc_per_n"])],
-        },
+        shared={"model_id": serving.model_id, "findings": _findings(measured, value)},
         columns={**felt.columns, **measured, "d33_pc_per_n": value, "d33_uncertainty_pc_per_n": unsure},
     )
+
+
+def _findings(measured: Mapping[str, Floats], d33: Floats) -> list[dict[str, Any]]:
+    return [asdict(finding) for finding in d33_findings.of_rows(measured["frf_pc_per_n"], d33)]
 
 
 def _given(request: D33Columns) -> dict[str, Floats]:

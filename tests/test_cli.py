@@ -66,6 +66,13 @@ def test_frf_agrees_with_the_service(server_url: str) -> None:
     assert written["status"] == answer.status.tolist() == ["ok", "ok", "ok", "out_of_domain"]
 
 
+def test_a_d33_that_no_sensor_has_is_answered_and_named() -> None:
+    for frf, said in (("7400", "more than sensors have"), ("0.0074", "less than sensors have"), ("-7.4", "negative")):
+        found = run("d33", *SKIN, "--preload-n", "1", "--frf-pc-per-n", frf)
+        assert found.returncode == 0
+        assert f"look at d33_pc_per_n: d33 is {float(frf) * 1.8932:.3g} pC/N, {said}" in found.stderr
+
+
 def test_d33_takes_back_what_frf_gave_through_csv() -> None:
     frf = columns(*FRF, "--preload-n", "1,3")["frf_pc_per_n"]
     table = f"preload_n,frf_pc_per_n\n1,{frf[0]}\n\n3,{frf[1]}\n"

@@ -101,6 +101,25 @@ def test_what_looks_wrong_is_used_and_said(http: httpx.Client, frf: Any, index: 
     assert posted(http, preload_n=1, frf_pc_per_n=7.4)["findings"] == []
 
 
+@pytest.mark.parametrize(
+    ("frf", "index", "said"),
+    [
+        (7400.0, None, "1.4e+04 pC/N, more than sensors have: was mV/pC meant"),
+        ([7.4, 7.4e-3, 7.4e-3], 1, "0.014 pC/N, less than sensors have: was mV/nC meant"),
+        ([-7.4], 0, "-14 pC/N, negative: is the sign of charge or force turned"),
+    ],
+)
+def test_a_d33_that_no_sensor_has_is_answered_and_said(
+    http: httpx.Client, frf: Any, index: int | None, said: str
+) -> None:
+    answer = posted(http, preload_n=1, frf_pc_per_n=frf)
+    assert set(answer["status"]) == {"ok"}
+    (finding,) = answer["findings"]
+    assert (finding["field"], finding["index"]) == ("d33_pc_per_n", index)
+    assert said in finding["statement"]
+    assert ("(1 more rows like it)" in finding["statement"]) == (index == 1)
+
+
 def test_rows_outside_are_null_and_spoil_no_other(http: httpx.Client) -> None:
     frf: dict[str, Any] = {"frf_pc_per_n": [7.4, 7.4, 7.4], "frf_uncertainty_pc_per_n": 0.1}
     answer = posted(http, preload_n=[1, 300, 1], poisson_ratio=[0.5, 0.5, 0.45], **frf)

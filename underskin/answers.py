@@ -7,11 +7,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin import half_space
+from underskin import d33_findings, half_space
 from underskin.prediction import Transmission, transmission
 from underskin.skin import Indenter, Skin
 from underskin.surrogate import SigmaTable
-from underskin.units import Finding, Floats, checked, findings, finite, non_negative, to_lab, to_si
+from underskin.units import Finding, Floats, checked, finite, non_negative, to_lab, to_si
 
 Model = Literal["layer", "half_space"]
 
@@ -52,7 +52,8 @@ def d33(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> 
     measured = (to_si(name, given[name]) for name in ("frf_pc_per_n", "frf_uncertainty_pc_per_n"))
     value, uncertainty = reached.d33(*measured)
     answer = _skin_answer(table, reached, {"d33_pc_per_n": value, "d33_uncertainty_pc_per_n": uncertainty})
-    return replace(answer, findings=findings("frf_pc_per_n", given["frf_pc_per_n"]))
+    looked_at = d33_findings.of_rows(given["frf_pc_per_n"], answer.columns["d33_pc_per_n"])
+    return replace(answer, findings=looked_at)
 
 
 def pressed(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Transmission:

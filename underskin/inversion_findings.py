@@ -1,15 +1,15 @@
 """What looks wrong in a campaign's FRF recordings and their d33 and is used all the same, in words."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
+from underskin import d33_findings
 from underskin.mixed_model import Estimate
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf_estimation import Frf
 from underskin.units import Floats, findings, to_lab
 
-_LEAST_D33, _MOST_D33 = 0.05, 1000.0  # pC/N: beyond these no skin's sensors have been
 _CLEAR = 3.0  # standard deviations that a force's mean must be from 0 to be a preload, not what a coupling left
 _CONTRADICTS = 3.0  # times
 
@@ -26,7 +26,8 @@ def in_words(
     forces = [f"recording {item.id}: {said}" for item in recorded if (said := _force(item)) is not None]
     typical = to_lab("frf_pc_per_n", np.nanmedian(np.abs(level)))
     slips = [f"FRF, median of the recordings: {one.statement}" for one in findings("frf_pc_per_n", typical)]
-    return (*defects, *forces, *slips, *(() if array is None else _array(float(to_lab("d33_pc_per_n", array.value)))))
+    found = () if array is None else d33_findings.of_array(float(to_lab("d33_pc_per_n", array.value)))
+    return (*defects, *forces, *slips, *found)
 
 
 def _force(recording: FrfRecording) -> str | None:
@@ -37,13 +38,3 @@ def _force(recording: FrfRecording) -> str | None:
     if abs(mean) <= _CLEAR * scatter or 1 / _CONTRADICTS <= abs(mean) / recording.preload_n <= _CONTRADICTS:
         return None
     return f"force_n is {mean:.3g} N in the mean, but preload_n is {recording.preload_n:g}: is one in another unit?"
-
-
-def _array(d33: float) -> Iterator[str]:
-    """Of the array's d33 [pC/N]."""
-    if abs(d33) > _MOST_D33:
-        yield f"d33 of the array is {d33:.3g} pC/N, more than sensors have: was mV/pC meant, not mV/nC, or N, not mN?"
-    if abs(d33) < _LEAST_D33:
-        yield f"d33 of the array is {d33:.3g} pC/N, less than sensors have: was mV/nC meant, not mV/pC, or mN, not N?"
-    if d33 < 0:
-        yield f"d33 of the array is negative, {d33:.3g} pC/N: is the sign of charge or force turned?"
