@@ -16,6 +16,7 @@ from service.pages.array import UNITS, number, numbers, refused
 from service.pages.figures import csv_answer
 from service.pages.html import page
 from service.pages.measured_adopted import ByModel, by_model
+from service.pages.measured_outside import reasons
 from service.pages.skin_values import start
 from service.problems import from_validation
 from service.store.engine import Database
@@ -28,6 +29,7 @@ FIELDS = tuple(field for field in OF_ARRAY if field[0] != "d33_pc_per_n")
 _LONGEST = 20_000  # characters of the rows
 _ROWS = "4 1 7.06 0.1\n4 3 7.45 0.1"
 _ORDER = ("indenter_radius_mm", "preload_n", "frf_pc_per_n", "frf_uncertainty_pc_per_n")
+_WORDS = {"frf_pc_per_n": "FRF", "d33_pc_per_n": "d33"}  # that findings are about
 _ANSWERED = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "contact_radius_mm", "sigma", "mean_stress_mpa")
 
 Rows = Annotated[str, Query(max_length=_LONGEST)]
@@ -63,8 +65,10 @@ def view(request: Request, store: Store, table: Table, skin: Skin = None, rows: 
         rows=rows,
         error=error,
         findings=[] if found is None else found.shared["findings"],
+        words=_WORDS,
         columns=None if found is None else _columns(document, found, adopted),
         adopted=adopted,
+        outside=[] if found is None else reasons(document, found, table),
         query=request.url.query,
         same=requests.post(request, "/v1/d33", shown, f"client.d33(**{shown!r})"),
     )
