@@ -95,3 +95,33 @@ def test_parts_of_a_file_with_a_long_name_have_ids_of_their_own() -> None:
         "x" * 194 + " first",
         "x" * 193 + " second",
     ]
+
+
+def test_an_empty_file_is_said_to_be_empty() -> None:
+    for name in ("monday.csv", "skin.h5"):
+        with pytest.raises(FileError) as refusal:
+            read_file(b"", name)
+        assert str(refusal.value) == f"{name}: the file is empty (0 bytes)"
+
+
+UNITS = """schema,campaign/1
+name,x
+skin.thickness [m],{}
+skin.poisson_ratio,0.5
+{}
+id,kind,sample_height_mm,sample_diameter_mm,time_s,force_n,displacement_mm
+c1,compression,5,20,0,0,0
+,,,,1,1,0.1
+,,,,2,2,0.2
+"""
+
+
+def test_a_unit_that_a_heading_says_and_its_value_contradicts_is_named_by_both() -> None:
+    asked = r"^x\.csv: line 3: skin\.thickness \[m\] = 2\.5: 2\.5 m is 2500 mm: was 2\.5 mm meant\?"
+    with pytest.raises(FileError, match=asked):
+        read_file(UNITS.format("2.5", "").encode(), "x.csv")
+    said = read_file(UNITS.format("2.5", "units_checked,true").encode(), "x.csv")
+    right = read_file(UNITS.format("0.0025", "").encode(), "x.csv")
+    assert isinstance(said, Reading)
+    assert isinstance(right, Reading)
+    assert [found.campaign.skin.thickness_mm for found in (said, right)] == [2500.0, 2.5]

@@ -19,7 +19,8 @@ from typing import Any, BinaryIO
 from underskin.errors import FileError
 from underskin.recordings import text
 from underskin.recordings.campaign import COLUMNS, KINDS, SCHEMA, SkinDescription
-from underskin.recordings.unit_labels import lab_field
+from underskin.recordings.unit_labels import lab_field, labelled_unit
+from underskin.units import LAB, LabField
 
 _FIRST_LINE = 200
 _SEPARATORS = ("\t", ";", ",")
@@ -86,6 +87,19 @@ class _Template:
             if f"skin.{field}" not in _SKIN_FIELDS or not name.startswith("skin."):
                 raise FileError(self.file, f"line {index + 1}", f"{name!r} is neither of the campaign nor of its skin")
             document["skin"][field] = self._value(f"skin.{field}", values[0], factor)
+            if factor != 1.0 and not self._units_checked():
+                self._require_meant(name, field, values[0], document["skin"][field], index)
+
+    def _units_checked(self) -> bool:
+        return any([cell.lower() for cell in row[:2]] == ["units_checked", "true"] for row in self.rows)
+
+    def _require_meant(self, heading: str, field: str, cell: str, converted: Any, index: int) -> None:
+        """Refuses a value that is likely in the field's unit and unlikely in the one that its heading says."""
+        number, known = text.number(cell, self.decimal), LAB[field]
+        if number is None or known.likely is None or _likely(known, converted) or not _likely(known, number):
+            return
+        said = f"{cell} {labelled_unit(heading)} is {converted:g} {known.unit}: was {cell} {known.unit} meant?"
+        raise FileError(self.file, f"line {index + 1}", f"{heading} = {cell}: {said} (if not, units_checked,true)")
 
     def _recordings(self, table: int) -> list[dict[str, Any]]:
         headings = self._headings(table)
@@ -146,6 +160,11 @@ class _Template:
             return None
         number = None if field in _TEXTS else text.number(cell, self.decimal)
         return cell if number is None else number * factor
+
+
+def _likely(known: LabField, value: float) -> bool:
+    assert known.likely is not None
+    return known.likely[0] <= value <= known.likely[1]
 
 
 def _without_unused(recording: dict[str, Any]) -> dict[str, Any]:

@@ -39,7 +39,7 @@ def detect(stream: BinaryIO, file: str) -> str:
     stream.seek(0)
     head = stream.read(_HEAD_BYTES)
     if not head:
-        raise FileError(file, "byte 0", "is empty")
+        raise FileError(file, "", "the file is empty (0 bytes)")
     for start, what in _FOREIGN.items():
         if head.startswith(start):
             raise FileError(file, "byte 0", f"is {what}")
