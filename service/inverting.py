@@ -96,6 +96,14 @@ def _derive_adopted(store: Database, table: SigmaTable, row: AnyRow) -> None:
         adopted_answer(store, table, row, serving(store, row.skin_id), None)
 
 
+def foreseen(table: SigmaTable, campaign: Campaign) -> list[str]:
+    """The findings of a campaign that is not kept yet."""
+    model = {"model": "paper", "model_id": None, "model_percent": None}
+    document = {"campaign_id": campaign.name, "table_sha256": table.sha256, **model}
+    found: list[str] = _computed(document, campaign, table, None, [])[0]["findings"]
+    return found
+
+
 def complete(store: Database, table: SigmaTable, root: str) -> None:
     """Compute and keep what is missing of a skin's current campaigns."""
     with store.reading() as connection:

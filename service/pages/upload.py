@@ -12,7 +12,7 @@ from service import inverting, session
 from service.accepting import RIG
 from service.campaigns import heavy
 from service.dependencies import Store, Table
-from service.pages import requests, upload_alike, upload_skin
+from service.pages import requests, upload_alike, upload_before, upload_skin
 from service.pages.figures import Drawn, csv_answer
 from service.pages.forms import TOKEN, WRITE, Form, require_own, see
 from service.pages.html import page
@@ -239,7 +239,7 @@ def _look(request: Request, shelved: Shelved) -> None:
         found = _looked(request, shelved, number)
         recordings += sum(one.recordings for one in found.found)
         require_few(len(summaries) + len(found.found), recordings)
-        summaries.append(seen(upload, found))
+        summaries.append(seen(upload, found, upload_before.worth_knowing(request, found, shelved.corrects)))
         if number == 0:
             drawn = figures(found, f"/upload/{shelved.id}/0/")
     shelved.seen, shelved.drawn = summaries, {0: drawn}

@@ -1,9 +1,11 @@
 """A rig description as a form: what each channel of a file is, and what the file does not say."""
 
+import re
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
+from service.pages.form_words import FOR_REQUESTS
 from service.pages.upload_seen import ChannelSeen
 from underskin import InvalidInput
 from underskin.recordings.rig_description import SCHEMA, channel_fields
@@ -49,6 +51,7 @@ _WORDS = {
     "sensors": "layout",
     _RATE: "sample rate [Hz]",
 }
+_UNQUOTED_FIELD = re.compile(r"(?<!['\w])[a-z0-9]+(?:_[a-z0-9]+)+(?!['\w])")  # what is quoted is the file's own
 _TEXTS = ("sensor",)
 _SEPARATORS = (";", "\t", ",", None)  # of a line of the layout, as tried; None: blanks
 _PARTS = 3  # of it: name, x, y
@@ -61,7 +64,9 @@ _BY_DIMENSION = {
         "time": "time_s",
     },
     "indentation": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
+    "compression": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
 }
+_OF_COMPRESSION = ("compress", "engineering strain", "true strain")  # as testing machines call their columns
 _BY_WORD = {
     "force": "force_n",
     "load": "force_n",
@@ -80,7 +85,8 @@ def field_words(field: str) -> str:
 def what_to_do(error: Mapping[str, Any]) -> str:
     """What is allowed; for what the form asks, where to say it."""
     if error["allowed"] != "required" or field_words(error["field"]) == error["field"]:
-        return str(error["allowed"])
+        allowed = str(error["allowed"]).replace(FOR_REQUESTS, " (or tick “Take unlikely magnitudes as they are”)")
+        return _UNQUOTED_FIELD.sub(lambda found: field_words(found[0]), allowed)
     if error["field"] == _RATE:
         return "required: fill it in below, or say which channel is the time"
     if error["field"] in CHANNELS:
@@ -122,7 +128,10 @@ def passed_over(channels: Sequence[ChannelSeen]) -> list[str]:
 def _likely(channels: Sequence[ChannelSeen]) -> tuple[str, list[str]]:
     """The kind of recording, and of each channel the field that it may be; empty where nothing speaks for one."""
     dimensions = [known.dimension if (known := unit(one.unit)) else "" for one in channels]
-    kind = "indentation" if "length" in dimensions and "charge" not in dimensions else "frf"
+    kind = "frf"
+    if "length" in dimensions and "charge" not in dimensions:
+        named = any(words in one.name.lower() for one in channels for words in _OF_COMPRESSION)
+        kind = "compression" if named else "indentation"
     found = []
     for one, dimension in zip(channels, dimensions, strict=True):
         word = next((field for word, field in _BY_WORD.items() if word in one.name.lower()), "")

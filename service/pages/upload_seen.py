@@ -55,14 +55,15 @@ class FileSeen:
     notes: Sequence[str]
     campaigns: Sequence[str]  # their names
     skin: str | None
+    known: Sequence[str] = ()  # what to know before it is kept
     parts: int = 0
     sample_rate_hz: float | None = None
     channels: Sequence[ChannelSeen] = ()
     properties: Mapping[str, str | float] = field(default_factory=dict)
 
 
-def seen(upload: Upload, look: Look) -> FileSeen:
-    """A summary that is small however large the file."""
+def seen(upload: Upload, look: Look, known: Sequence[str]) -> FileSeen:
+    """A summary that is small however large the file; `known`: what to know before it is kept."""
     arrived = [arrived_as(found) for found in look.found]
     campaigns = [one.campaign for one in arrived if one.campaign is not None]
     recordings = [recording for campaign in campaigns for recording in campaign.recordings]
@@ -79,6 +80,7 @@ def seen(upload: Upload, look: Look) -> FileSeen:
         notes=[note for one in arrived for note in one.notes],
         campaigns=[campaign.name for campaign in campaigns],
         skin=next(iter(skins)) if len(skins) == 1 else None,
+        known=known,
         **about,
     )
 

@@ -59,6 +59,15 @@ def test_channels_and_what_a_file_states_are_guessed_by_unit_and_name() -> None:
     assert set(curve["channels"]) == {"displacement_mm", "force_n", "time_s"}
 
 
+def test_a_testing_machine_s_table_is_guessed_to_be_a_compression() -> None:
+    table = [channel("Time (s)", "s"), channel("Compression (mm)", "mm"), channel("Load (N)", "N")]
+    found = guessed([*table, channel("Engineering Strain [-]", "-")], {}, {})
+    assert found["kind"] == "compression"
+    named = {field: how["channel"] for field, how in found["channels"].items()}
+    assert named == {"time_s": "Time (s)", "displacement_mm": "Compression (mm)", "force_n": "Load (N)"}
+    assert guessed([channel("Displacement (mm)", "mm"), channel("Load (N)", "N")], {}, {})["kind"] == "indentation"
+
+
 def test_both_parts_of_an_frf_are_guessed_and_complex_ones_and_the_sample_rate() -> None:
     parts = [channel("frequency", ""), channel("FRF real", "pC/N"), channel("FRF imaginary", "pC/N")]
     assert set(guessed(parts, {}, {})["channels"]) == {"frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n"}
@@ -71,6 +80,12 @@ def test_what_is_missing_is_said_in_the_form_s_words() -> None:
     assert field_words("frf_im_pc_per_n") == "FRF, imaginary part"
     missing = {"field": "frf_im_pc_per_n", "value": None, "allowed": "required"}
     assert what_to_do(missing) == "required: say below which channel it is"
+    refused = "channel 'force_n': its unit 'V' is one of voltage; force_n needs one of force, such as N"
+    told = what_to_do({"field": "file", "value": "x.csv", "allowed": refused})
+    assert told == "channel 'force_n': its unit 'V' is one of voltage; force needs one of force, such as N"
+    unlikely = "must be 0.01 to 100 mm in magnitude (or set units_checked to true)"
+    told = what_to_do({"field": "skin.thickness_mm", "value": 2500, "allowed": unlikely})
+    assert told.endswith("(or tick “Take unlikely magnitudes as they are”)")
     assert "fill it in below" in what_to_do({**missing, "field": "sample_rate_hz"})
 
 

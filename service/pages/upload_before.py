@@ -1,0 +1,32 @@
+"""What the reader of an upload should know before keeping it: that it is here already, and what its d33 will look like.
+
+Nothing kept is ever deleted, so that afterwards is late.
+"""
+
+from collections.abc import Iterator
+
+from fastapi import Request
+
+from service import inverting
+from service.reading import Look, arrived_as
+from service.store import repeated
+from service.store.engine import Database
+from underskin.recordings.campaign import Campaign
+
+
+def worth_knowing(request: Request, look: Look, corrects: str | None) -> list[str]:
+    """In sentences, of the campaigns of one file; `corrects`: the campaign whose place they take."""
+    store, table = request.app.state.store, request.app.state.table
+    found = [one.campaign for one in map(arrived_as, look.found) if one.campaign is not None]
+    return [
+        said for campaign in found for said in (*_kept(store, campaign, corrects), *inverting.foreseen(table, campaign))
+    ]
+
+
+def _kept(store: Database, campaign: Campaign, corrects: str | None) -> Iterator[str]:
+    with store.reading() as connection:
+        row = repeated.campaign_with(connection, campaign)
+    if row is not None and row.id != corrects:
+        yield (
+            f"these recordings are in campaign {row.name} of skin {row.skin_id} already (kept {row.received_at[:10]})."
+        )
