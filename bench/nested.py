@@ -101,7 +101,7 @@ def _compared(effects: Effects) -> Compared:
 
 def _explained(bench: Workbench) -> list[Explanation]:
     found = [bench.explain(names) for names in HYPOTHESES]
-    return [entry for entry in found if entry is not None]  # without a parent none is left out
+    return [entry.integrated() for entry in found if entry is not None]  # without a parent none is left out
 
 
 def _sampled(bench: Workbench, explained: Explanation) -> Sampled:

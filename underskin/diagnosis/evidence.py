@@ -42,7 +42,11 @@ class Evidence:
 
 def laplace(fitter: Fitter, at: Evaluated) -> Evidence:
     """The evidence around a most probable point, over all values of a parameter that the lines leave loose."""
-    found = _around(fitter, at)
+    return integrated(around(fitter, at))
+
+
+def integrated(found: Evidence) -> Evidence:
+    """Over all values of a parameter that the lines leave loose, where there is one."""
     place = _loosest(found)
     return found if place is None else _integrated(found, place)
 
@@ -91,11 +95,11 @@ def _held_at(held: Fitter, near: Evaluated, place: int, value: float) -> Evidenc
     fit = near.point.fit.copy()
     fit[place] = value
     begin = replace(held.settle(held.evaluate(replace(near.point, fit=fit)), 1), growth=near.growth)
-    found = _around(held, begin)
+    found = around(held, begin)
     return replace(found, log_evidence=found.log_evidence + held.parameters[place].log_prior(value))
 
 
-def _around(fitter: Fitter, at: Evaluated) -> Evidence:
+def around(fitter: Fitter, at: Evaluated) -> Evidence:
     """By the quadratic around a most probable point, which is first brought to where the whole gradient vanishes."""
     places = fitter.places
     low, high = fitter.low[places], fitter.high[places]

@@ -7,11 +7,12 @@ two under their prior.
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
 from underskin.diagnosis.curvature import curvature
-from underskin.diagnosis.evidence import Evidence, laplace
+from underskin.diagnosis.evidence import Evidence, around, integrated
 from underskin.diagnosis.fit import Evaluated, Fitter
 from underskin.diagnosis.hypothesis import Hypothesis, Point
 from underskin.diagnosis.likelihood import Curvature
@@ -38,6 +39,21 @@ class Explanation:
     log_evidence: float
     best: Evidence
     placed: float  # probability that there is positioning scatter, given this set
+    each: tuple[tuple[float, Evidence], ...]  # without and with it, as far as they were fitted, with their log priors
+
+    @classmethod
+    def of(cls, names: Sequence[str], each: Sequence[tuple[float, Evidence]]) -> Self:
+        """From the fits, the log prior of each beside it."""
+        weights = np.array([prior + found.log_evidence for prior, found in each])
+        total = float(np.logaddexp.reduce(weights))
+        best = each[int(np.argmax(weights))][1]
+        scattered = [found.fitter.hypothesis.placed for _, found in each]
+        placed = float(np.exp(weights[scattered] - total).sum())
+        return cls(tuple(name for name in CATALOGUE if name in names), total, best, placed, tuple(each))
+
+    def integrated(self) -> Self:
+        """With the evidence of each fit over all values of a parameter that the lines leave loose."""
+        return self.of(self.names, [(prior, integrated(found)) for prior, found in self.each])
 
     @property
     def model(self) -> Model:
@@ -90,31 +106,26 @@ class Workbench:
         plain = self.hypothesis(names, False)
         fitters = [Fitter(plain), Fitter(replace(plain, placed=True))]
         weights = np.log([NO_POSITION, 1 - NO_POSITION])
-        found: list[Evidence | None] = [None, None]
+        found: list[tuple[float, Evidence]] = []
         starts: list[Evaluated] = []
         if parent is None or parent.placed < _DECIDED:
             starts = [fitters[0].improve(at.point) for at in self._starts(fitters[0], names, parent)]
             best = min(starts, key=lambda entry: entry.cost)
             if not self._gains(best, parent, 0):
                 return None
-            found[0] = laplace(fitters[0], best)
             if parent is None and not self._position_matters(best):
                 weights[0] = 0.0
+            found.append((weights[0], around(fitters[0], best)))
         if (parent is None and weights[0] < 0) or (parent is not None and parent.placed > 1 - _DECIDED):
             beside = starts or self._starts(fitters[1], names, parent)
             best = min((fitters[1].improve(_placed_start(fitters[1], at)) for at in beside), key=lambda at: at.cost)
             if not self._gains(best, parent, 1):
                 return None
-            found[1] = laplace(fitters[1], best)
-        each = np.array([-np.inf if entry is None else entry.log_evidence for entry in found]) + weights
-        total = float(np.logaddexp.reduce(each))
-        chosen = found[int(np.argmax(each))]
-        assert chosen is not None
-        ordered = tuple(name for name in CATALOGUE if name in names)
-        return Explanation(ordered, total, chosen, float(np.exp(each[1] - total)))
+            found.append((weights[1], around(fitters[1], best)))
+        return Explanation.of(names, found)
 
     def refit(self, found: Explanation) -> Explanation | None:
-        """A set that was fitted to more recordings, fitted to these, from where it stood.
+        """A set that was fitted to more recordings, fitted to these, from where it stood; its evidence is a bell's.
 
         None where the set has other parameters here. Raises Unsupported.
         """
@@ -122,8 +133,8 @@ class Workbench:
         fitter = Fitter(self.hypothesis(found.names, placed))
         if [entry.name for entry in fitter.parameters] != [entry.name for entry in found.model.parameters]:
             return None
-        best = laplace(fitter, fitter.improve(replace(found.point, bend=fitter.no_bend)))
-        return Explanation(found.names, best.log_evidence, best, float(placed))
+        best = around(fitter, fitter.improve(replace(found.point, bend=fitter.no_bend)))
+        return Explanation.of(found.names, [(0.0, best)])
 
     @staticmethod
     def _gains(at: Evaluated, parent: Explanation | None, placed: int) -> bool:

@@ -20,8 +20,10 @@ NOTHING_MISSING, NONE_OF_THESE = "nothing_missing", "none_of_these"
 # "Nothing" stands for all that does not show as well, which is every other campaign.
 PRIORS = {"nothing_missing": 0.45, "one": 0.34, "two": 0.14, "three": 0.02, "none_of_these": 0.05}
 _PARENTS = 3
+_BEST = 3  # nothing and two more: processes are tried on top of the best two
 SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
 _UNTHOUGHT = 0.015  # probability that none of what was compared is right
+_WITHIN = 20.0  # nats behind the best within which evidence is worth integrating over loose parameters
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
 
 
@@ -125,7 +127,9 @@ def search(bench: Workbench) -> Search:
         assert single is not None
         found[frozenset((name,))] = single
     names = [name for name in CATALOGUE if name not in unsupported]
+    done: set[frozenset[str]] = set()
     for size in (2, 3):
+        _integrate(found, done, unsupported, 1)
         for parent in _parents(Search(tuple(found.values()), (), unsupported), size):
             for name in names:
                 chosen = frozenset((*parent.names, name))
@@ -134,10 +138,24 @@ def search(bench: Workbench) -> Search:
                 grown = bench.explain(tuple(chosen), parent)
                 if grown is not None:
                     found[chosen] = grown
+    _integrate(found, done, unsupported, _BEST)
     result = Search(tuple(found.values()), (), unsupported)
     best = sorted((entry for entry in result.explanations if entry.names), key=result.log_weight, reverse=True)[:2]
     processes = tuple((entry, discrepancy(bench, entry)) for entry in (nothing, *best))
     return replace(result, discrepancies=processes)
+
+
+def _integrate(
+    found: dict[frozenset[str], Explanation], done: set[frozenset[str]], unsupported: dict[str, str], best: int
+) -> None:
+    """Integrate the evidences that may count, and the `best` anyhow, over loose parameters, once each."""
+    weight = Search(tuple(found.values()), (), unsupported).log_weight
+    ranked = sorted(found, key=lambda names: weight(found[names]), reverse=True)
+    least = weight(found[ranked[0]]) - _WITHIN
+    for place, names in enumerate(ranked):
+        if names not in done and (place < best or weight(found[names]) > least):
+            found[names] = found[names].integrated()
+            done.add(names)
 
 
 def _parents(result: Search, size: int) -> list[Explanation]:
