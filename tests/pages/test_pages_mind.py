@@ -27,7 +27,7 @@ def test_a_recording_is_excluded_and_the_campaign_withdrawn_by_clicks(reader: Vi
     kept = idle.http.post("/v1/campaigns?skin=mind", json=campaign("a loose cable")).json()
     before = idle.http.get(f"/v1/campaigns/{kept['id']}/d33").json()["array"]["d33_pc_per_n"]
     reader.go(f"/campaigns/{kept['id']}")
-    page.get_by_text("Exclude a recording, or withdraw the campaign").click()
+    page.get_by_text("Exclude a recording, or correct or withdraw the campaign").click()
     exclude = page.locator("form", has=page.get_by_role("button", name="Exclude", exact=True))
     exclude.get_by_label("Recording").fill("s1-2N")
     exclude.get_by_label("Reason").fill("cable <b>loose</b>")
@@ -39,7 +39,7 @@ def test_a_recording_is_excluded_and_the_campaign_withdrawn_by_clicks(reader: Vi
     assert after != before
     assert f"{after:.3g}" in page.locator(".result").inner_text()
     reader.require_accessible()
-    page.get_by_text("Exclude a recording, or withdraw the campaign").click()
+    page.get_by_text("Exclude a recording, or correct or withdraw the campaign").click()
     withdraw = page.locator("form", has=page.get_by_role("button", name="Withdraw the campaign"))
     withdraw.get_by_label("Reason").fill("wrong sphere")
     withdraw.get_by_role("button", name="Withdraw the campaign").click()
@@ -58,7 +58,7 @@ def test_a_recording_that_is_not_there_is_said_so(reader: Visit, idle: Server) -
     page = reader.page
     kept = idle.http.post("/v1/campaigns?skin=slip", json=campaign("a slip")).json()
     reader.go(f"/campaigns/{kept['id']}")
-    page.get_by_text("Exclude a recording, or withdraw the campaign").click()
+    page.get_by_text("Exclude a recording, or correct or withdraw the campaign").click()
     exclude = page.locator("form", has=page.get_by_role("button", name="Exclude", exact=True))
     exclude.get_by_label("Recording").fill("s9")
     exclude.get_by_label("Reason").fill("a guess")
@@ -79,7 +79,7 @@ def test_an_excluded_recording_takes_the_model_out_of_force(reader: Visit, idle:
     page.wait_for_url("**/skins/adopts?model=adopted")
     assert "In force: contact resonance" in page.get_by_role("region", name="Adopted model").inner_text()
     reader.go(f"/campaigns/{campaign_id}")
-    page.get_by_text("Exclude a recording, or withdraw the campaign").click()
+    page.get_by_text("Exclude a recording, or correct or withdraw the campaign").click()
     exclude = page.locator("form", has=page.get_by_role("button", name="Exclude", exact=True))
     exclude.get_by_label("Recording").fill("r0")
     exclude.get_by_label("Reason").fill("cable loose")
