@@ -27,7 +27,7 @@ from service import (
     umbridge,
 )
 from service.dependencies import authorised
-from service.diagnosing import Runner, Terms
+from service.diagnosing import Planner, Runner, Terms
 from service.front import Front
 from service.gate import Gate
 from service.handlers import install_handlers
@@ -47,6 +47,7 @@ async def _lifespan(api: FastAPI) -> AsyncIterator[None]:
     state.runner.start()
     yield
     await run_in_threadpool(state.runner.stop)
+    await run_in_threadpool(state.planner.stop)
     state.uploads.close()
     state.store.close()
     record.flush()
@@ -67,7 +68,9 @@ def create_api(settings: Settings, table: SigmaTable, gate: Gate, store: Databas
     api.state.table = table
     api.state.gate = gate
     api.state.store = store
-    api.state.runner = runner(settings, table, store)
+    terms = diagnosing_terms(settings, table)
+    api.state.runner = Runner(store, terms)
+    api.state.planner = Planner(store, terms)
     install_handlers(api)
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"])])
     for noun in (sigma, frf, d33, stress, design, tables, campaigns, diagnoses, exports, skins, models):
@@ -77,11 +80,10 @@ def create_api(settings: Settings, table: SigmaTable, gate: Gate, store: Databas
     return api
 
 
-def runner(settings: Settings, table: SigmaTable, store: Database) -> Runner:
-    """What runs the diagnoses."""
+def diagnosing_terms(settings: Settings, table: SigmaTable) -> Terms:
+    """What diagnoses and plans are run with."""
     memory_bytes = int(settings.diagnosis_memory_mb * 1e6)
-    path = settings.tables / SIGMA_TABLE
-    return Runner(store, Terms(settings.diagnosis_workers, memory_bytes, path, table.sha256))
+    return Terms(settings.diagnosis_workers, memory_bytes, settings.tables / SIGMA_TABLE, table.sha256)
 
 
 def create_app(settings: Settings, table: SigmaTable, gate: Gate, store: Database) -> ASGIApp:

@@ -132,9 +132,9 @@ STEPS = (
         "better",
         "How much better",
         "The error with the explanation and without, on recordings that it was not fitted to, beside what noise alone "
-        "gives; measured against predicted, before and after. Then what to measure next, where something is left open. "
-        "The whole is printed, saved as PDF from the browser's print dialog, or saved as one HTML file that opens "
-        "anywhere.",
+        "gives; measured against predicted, before and after. Then what to measure next, where something is left open, "
+        "also within the limits of your own rig: the spheres at hand, the preloads it holds. The whole is printed, "
+        "saved as PDF from the browser's print dialog, or saved as one HTML file that opens anywhere.",
         _better,
     ),
     Step(

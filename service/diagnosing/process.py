@@ -27,6 +27,7 @@ class Worker:
         self.progress = 0.0
         self.report: dict[str, Any] | None = None
         self.figures: dict[str, str] | None = None
+        self.plan: dict[str, Any] | None = None
         self.error: str | None = None
         self.news = threading.Event()
         self.ended = False
@@ -90,6 +91,7 @@ class Worker:
                 self.progress = message.get("progress", self.progress)
                 self.report = message.get("report", self.report)
                 self.figures = message.get("figures", self.figures)
+                self.plan = message.get("plan", self.plan)
                 self.error = message.get("error", self.error)
         self._process.wait()
         self.ended = True

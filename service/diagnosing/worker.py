@@ -1,8 +1,9 @@
-"""The worker process: one campaign in, its report out, at the lowest priority and within a limit on memory.
+"""The worker process: one campaign in, its report or next experiment out, at the lowest priority and within a limit on
+memory.
 
 Standard input: a line of JSON (`Job`), then the campaign (`campaign/1`), then nothing until the runner ends: a worker
 whose runner is gone ends too. Standard output: a line of JSON for each progress, then one with the report and one with
-its figures, or one with the error.
+its figures, or one with the plan where the rig's limits are told, or one with the error.
 """
 
 import os
@@ -22,13 +23,17 @@ _NICENESS = 10
 
 @dataclass(frozen=True)
 class Job:
-    """What a worker is told beside the campaign: where its bytes end, the table to use, what was left out and why."""
+    """What a worker is told beside the campaign: where its bytes end, the table to use, what was left out and why.
+
+    With `limits` (of `Limits`, by name) it plans the next experiment within them, and makes no report.
+    """
 
     campaign_bytes: int
     table: str
     table_sha256: str
     memory_bytes: int
     excluded: tuple[tuple[str, str], ...]
+    limits: dict[str, Any] | None = None
 
     def line(self) -> bytes:
         """As the worker reads it."""
@@ -62,6 +67,7 @@ def _work(job: Job, campaign: bytes, say: Callable[[dict[str, Any]], None]) -> N
     from underskin.diagnosis.diagnose import diagnose
     from underskin.diagnosis.figures import figures
     from underskin.diagnosis.report import report
+    from underskin.diagnosis.rig_limits import Limits
     from underskin.errors import TableError
     from underskin.recordings.campaign import parse
     from underskin.surrogate import load_table
@@ -70,7 +76,11 @@ def _work(job: Job, campaign: bytes, say: Callable[[dict[str, Any]], None]) -> N
     if table.sha256 != job.table_sha256:
         raise TableError(f"{job.table} changed since the server started: restart it")
     _limit(job.memory_bytes)
-    found = diagnose(parse(orjson.loads(campaign)), table, lambda share: say({"progress": share}))
+    limits = Limits(**job.limits or {})
+    found = diagnose(parse(orjson.loads(campaign)), table, lambda share: say({"progress": share}), limits)
+    if job.limits is not None:
+        say({"plan": dict(found.next_experiment)})
+        return
     document = report(found)
     left_out = [
         {"code": "excluded", "recording": name, "field": "", "statement": f"Left out: {reason}"}

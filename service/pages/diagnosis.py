@@ -15,6 +15,7 @@ from service.pages.diagnosis_numbers import columns
 from service.pages.figures import Drawn, csv_answer, drawn, drawn_before
 from service.pages.forms import WRITE, Form, see
 from service.pages.html import page, render
+from service.pages.plan import FIELDS, left_open
 from service.problems import Refusal
 from service.store import campaigns, diagnoses, models, skins
 from service.store.engine import Database
@@ -65,6 +66,8 @@ def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Resp
         outdated=diagnoses.outdated(row),
         in_force=model is not None and model.id == row.id,
         may_be_adopted=row.verdict == "explained" and report is not None and report["d33"] is not None,
+        open=report is not None and left_open(report),
+        limit_fields=FIELDS,
         not_adopted=None if report is None else _not_adopted(report),
         same=requests.get(request, place, f"client.diagnoses.get({row.id!r})"),
     )

@@ -55,6 +55,23 @@ def exported_skin(request: Request, label: str) -> SameRequest:
     return SameRequest(_curl(request, "/v1/skins/import") + send, _python(request, f"client.skins.load({label!r})"))
 
 
+def planned(request: Request, campaign_id: str, options: Sequence[str], limits: str) -> SameRequest:
+    """Fetch a campaign, and plan its next experiment with `options` of the command, `limits` of the library."""
+    file = "campaign.json"
+    fetch = f"{_curl(request, f'/v1/campaigns/{campaign_id}/document')} -o {file}"
+    python = (
+        "from pathlib import Path\n\n"
+        "from underskin.diagnosis.diagnose import diagnose\n"
+        "from underskin.diagnosis.rig_limits import Limits\n"
+        "from underskin.recordings import read_file\n"
+        "from underskin.surrogate import load_table\n\n"
+        f"campaign = read_file(Path({file!r}), {file!r}).campaign\n"
+        f"found = diagnose(campaign, load_table(), limits=Limits({limits}))\n"
+        "print(dict(found.next_experiment))"
+    )
+    return SameRequest(f"{fetch}\n{shlex.join(['underskin', 'plan', file, *options])}", python)
+
+
 def _curl(request: Request, path: str) -> str:
     key = ' -H "Authorization: Bearer $UNDERSKIN_API_KEY"' if request.scope["key"] is not None else ""
     return f"curl -s {shlex.quote(_origin(request) + path)}{key}"

@@ -226,6 +226,11 @@ def _next(report: Report) -> str:
             return _paragraph(f"What is lacking: {readable(report['statement'].partition(': ')[2])}")
         decided = _DECIDED + (_OPEN if report["not_identifiable"] else "")
         return _paragraph(_NOTHING_NEXT.get(report["verdict"], decided))
+    return plan_of(planned)
+
+
+def plan_of(planned: Mapping[str, Any]) -> str:
+    """A report's `next_experiment` that is not empty, as HTML."""
     if not planned["recordings"]:
         return _paragraph(readable(planned["statement"]))
     heads = list(dict.fromkeys(name for entry in planned["recordings"] for name in entry))

@@ -1,11 +1,13 @@
 """What the rig can do, as the user says or as the campaign did, and the recordings that this allows."""
 
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from underskin.errors import InvalidInput
 from underskin.mechanisms.frf_design import frf_recordings, offsets
 from underskin.recordings.campaign import Campaign, FrfRecording
 
@@ -20,7 +22,10 @@ _LOUDER, _LONGER = (
 
 @dataclass(frozen=True)
 class Limits:
-    """What the rig can do, in lab units; what is left None is inferred from the campaign."""
+    """What the rig can do, in lab units; what is left None is inferred from the campaign.
+
+    Raises InvalidInput where no rig could: a force, a radius or a count not above zero, a distance or a time below it.
+    """
 
     preload_n: tuple[float, float] | None = None
     indenter_radius_mm: Sequence[float] | None = None
@@ -30,6 +35,18 @@ class Limits:
     recordings: int = MOST_RECORDINGS
     minutes_per_recording: float = 5.0
     minutes_per_indenter: float = 10.0
+
+    def __post_init__(self) -> None:
+        if self.preload_n is not None and not 0 < self.preload_n[0] <= self.preload_n[1] < math.inf:
+            raise InvalidInput("preload_n", list(self.preload_n), "must be above 0, the lowest first")
+        for name in ("indenter_radius_mm", "dynamic_force_n"):
+            if any(not 0 < value < math.inf for value in getattr(self, name) or ()):
+                raise InvalidInput(name, list(getattr(self, name)), "must be above 0, each")
+        for name in ("dwell_s", "offset_mm"):
+            if any(not 0 <= value < math.inf for value in getattr(self, name) or ()):
+                raise InvalidInput(name, list(getattr(self, name)), "must be 0 or more, each")
+        if self.recordings < 1:
+            raise InvalidInput("recordings", self.recordings, "must be 1 or more")
 
     @property
     def given(self) -> bool:

@@ -1,14 +1,14 @@
 "use strict";
-// How far a diagnosis is, until it has ended; then the page that says what it found.
+// How far a diagnosis or a plan is, until it has ended; then the page that says what it found.
 
-const place = document.querySelector("[data-diagnosis]");
+const place = document.querySelector("[data-progress]");
 const far = document.getElementById("far");
 const bar = place.querySelector("progress");
 
 async function look() {
   let found;
   try {
-    const answer = await fetch(`/v1/diagnoses/${place.dataset.diagnosis}`, { headers: { Accept: "application/json" } });
+    const answer = await fetch(place.dataset.progress, { headers: { Accept: "application/json" } });
     if (!answer.ok) throw new Error(answer.statusText);
     found = await answer.json();
   } catch {
