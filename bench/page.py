@@ -47,7 +47,7 @@ server and Tesseract Core's runtime, each serving the same spline.""",
 server, over HTTP on one machine, the median of nine after the first; weight as sent, without plotly's script. The
 main thread is Chromium's, from the start of the page on, with plotly's script in its cache.""",
     "diagnosis": "Campaigns of the virtual rig; each diagnosis in a fresh process with one BLAS thread.",
-    "nested": """Nothing and five single mechanisms on campaigns of 24 recordings × 20 lines of the virtual rig: the
+    "nested": """Nothing and three single mechanisms on campaigns of 24 recordings × 20 lines of the virtual rig: the
 diagnosis' fits from many starts and Laplace's method, against dynesty with its own defaults. Both call the same code
 for a likelihood, with the same priors and noise. Differences are of all hypotheses within 10 nats of the winner.""",
     "mechanisms": """One prediction of all lines with its derivatives with respect to all parameters and to the
