@@ -101,7 +101,7 @@ class Workbench:
         """The set's explanation; from a parent's, which has one mechanism less, where one is given.
 
         None where the log posterior density gains less than `_LEAST_GAIN` over the parent: the added mechanism does
-        not show. Raises Unsupported.
+        not show. Its evidence is a bell's, until it is `integrated`. Raises Unsupported.
         """
         plain = self.hypothesis(names, False)
         fitters = [Fitter(plain), Fitter(replace(plain, placed=True))]
