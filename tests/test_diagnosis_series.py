@@ -194,13 +194,16 @@ def test_mains_beside_the_excited_band_are_said(table: SigmaTable) -> None:
     assert "mains_in_charge" not in {entry.code for entry in inspect(recorded(drive=drive), table).found}
 
 
-def test_what_a_time_series_hides_is_still_found(table: SigmaTable) -> None:
-    campaign = recorded(effects={"amplifier_high_pass": {"corner_hz": 1.0}}, drive={"duration_s": 8.0})
-    report = diagnosis_report(campaign, table)
+@pytest.mark.parametrize("kind", ["random", "sweep"])
+def test_what_a_time_series_hides_is_still_found(kind: str, table: SigmaTable) -> None:
+    """The lines next to 0 Hz would say more than a high-pass."""
+    drive = {"kind": kind, "duration_s": 8.0}
+    report = diagnosis_report(recorded(effects={"amplifier_high_pass": {"corner_hz": 1.0}}, drive=drive), table)
     assert (report["verdict"], [entry["name"] for entry in report["mechanisms"]]) == (
         "explained",
         ["amplifier_high_pass"],
     )
+    assert report["mechanisms"][0]["parameters"][0]["value"] == pytest.approx(1.0, rel=0.05)
 
 
 def test_series_that_make_no_frf_are_left_out(quiet: Campaign, table: SigmaTable) -> None:

@@ -6,8 +6,8 @@ uncertainty √((1 − γ²)/(2nγ²)) of a line is below a fifth and below five
 left out if the force's power is below a 25th of what it has there: the noise of an FRF goes as 1/√power, so five times
 again. A line that is uncertain although the force has its power (mains, a weak response) is kept.
 Neighbouring lines of tapered blocks share their noise (a Hann window's by 4/9), two apart hardly (1/36): none is kept
-beside another. The first line is kept only where charge follows force: the straight line taken off each block
-is a part of it and the window mixes it with 0 Hz, so that beside an amplifier's high-pass its FRF is wrong.
+beside another, and the two next to 0 Hz are left out where others are enough: the straight line taken off each block
+is a part of them and the window mixes them with 0 Hz, so that beside an amplifier's high-pass their FRF is wrong.
 """
 
 from dataclasses import dataclass
@@ -23,6 +23,7 @@ from underskin.units import Floats
 
 _UNSURE, _BESIDE_BEST, _BEST = 0.2, 5.0, 0.1  # the best: this quantile
 _LEAST_LINES = 8  # so that of a record of few lines all are kept
+_BIASED = 2  # lines, next to 0 Hz
 _MAINS_HZ, _HARMONICS = (50.0, 60.0), 5
 _BETWEEN, _AROUND = 2.5, 12.5  # lines from a multiple of the mains: what is usual there
 _STANDS_OUT = 10.0  # times the median power around; noise averaged over eight blocks reaches 3
@@ -55,9 +56,9 @@ def telling(entry: FrfRecording, measured: Frf) -> Choice:
         return Choice(lines, len(lines))
     force, charge = (_power(entry, name, measured, size) for name in ("force_n", "charge_pc"))
     powerful = force >= np.median(force[sure]) / _BESIDE_BEST**2
-    powerful[0] = False
     strong = np.flatnonzero(sure | powerful)
-    kept = _apart(strong) if len(strong) >= _LEAST_LINES else [int(line) for line in strong]
+    enough = len(strong) >= _LEAST_LINES
+    kept = _apart(strong[strong >= _BIASED]) if enough else [int(line) for line in strong]
     mains = _mains(measured, uncertainty, force, charge)
     return Choice(kept, len(lines), len(lines) - len(strong), len(strong) - len(kept), mains)
 
