@@ -11,7 +11,7 @@ from scipy.signal import lfilter, lfilter_zi
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf_estimation import Frf, broadband, estimate, lines_of, stepped_sine
-from underskin.recordings.signal_check import defects
+from underskin.recordings.signal_check import defects, defects_of_pair
 from underskin.recordings.stepped_sine import find_steps
 from underskin.units import Complexes, Floats
 
@@ -194,6 +194,18 @@ def test_a_coarse_but_whole_sine_is_not_called_overloaded_or_held() -> None:
     for amplitude in (7.3, 20.0, 50.5):
         sine = np.round(amplitude * np.sin(2 * np.pi * np.arange(20_000) * 3.1 / RATE))
         assert defects("force_n", sine) == []
+
+
+def test_where_a_periodic_sweep_begins_anew_nothing_is_damaged() -> None:
+    """It jumps there in force and charge, at one distance; so do samples lost at the end of each buffer, which are."""
+    time = np.arange(1000) / RATE
+    period = 1.0 + np.cos(2 * np.pi * (1.0 + 40.0 * time) * time + 0.7)
+    force = np.tile(period, 8) + 1e-4 * np.random.default_rng(3).normal(size=8000)
+    assert {defect.kind for defect in defects("force_n", force)} == {"jump"}
+    assert defects_of_pair(force, 1e12 * answer_to(force)) == []
+    sine = np.sin(2 * np.pi * 3.73 * np.arange(9000) / RATE)
+    lossy = np.delete(sine, [sample for start in range(1000, 9000, 1000) for sample in range(start, start + 30)])
+    assert len([defect for defect in defects_of_pair(lossy, 7.0 * lossy) if defect.channel == "force_n"]) == 8
 
 
 @pytest.mark.parametrize("kind", ["overload", "held_samples", "jump"])

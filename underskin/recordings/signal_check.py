@@ -16,6 +16,7 @@ _HELD_RUN = 5  # samples in a row of one value
 _COARSE = 0.2  # share of samples that equal the one before, above which the levels are coarse
 _JUMP = 12.0  # second difference over its scale among neighbours; a sine stays below 1.5, noise below 6
 _BLOW, _ANSWER = 20.0, 6.0  # kurtosis; a sine has 1.5, noise 3, a hammer's blow hundreds, what rings after it tens
+_BEGINNINGS, _ALIKE = 3, 0.9  # jumps at one distance at least, and the correlation of what lies between them
 _LOCAL = 64  # samples that make a neighbourhood
 
 
@@ -40,11 +41,35 @@ class Defect:
 
 
 def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
-    """Every defect of force and charge; where the force is a blow that the charge answers, its jumps are no defect."""
+    """Every defect of force and charge; no defect are the jumps where the force is a blow that the charge answers, and
+    those where a periodic force, such as a sweep, begins anew."""
     found = [*defects("force_n", force), *defects("charge_pc", charge)]
     if _kurtosis(force) > _BLOW and _kurtosis(charge) > _ANSWER:
         return [defect for defect in found if defect.kind != "jump"]
-    return found
+    jumps = [defect.first_sample for defect in found if (defect.kind, defect.channel) == ("jump", "force_n")]
+    period = _period(force, jumps)
+    return [
+        defect
+        for defect in found
+        if defect.kind != "jump" or not period or _apart(defect.first_sample - jumps[0], period) > 1
+    ]
+
+
+def _period(signal: Floats, jumps: list[int]) -> int:
+    """The samples after which a signal that jumps at these places repeats itself, 0 where it does not."""
+    steps = np.diff(jumps)
+    if len(steps) < _BEGINNINGS - 1:
+        return 0
+    period = int(steps.min())
+    if period < _LOCAL or any(_apart(int(step), period) > 1 for step in steps):
+        return 0
+    first, repeated = signal[:-period], signal[period:]
+    return period if np.corrcoef(first, repeated)[0, 1] > _ALIKE else 0
+
+
+def _apart(distance: int, period: int) -> int:
+    """How far a distance is from the next multiple of a period."""
+    return min(distance % period, -distance % period)
 
 
 def _kurtosis(signal: Floats) -> float:
