@@ -110,7 +110,8 @@ def test_import_tells_what_the_files_are_worth(server: Server, tmp_path: Path) -
     assert done.returncode == 0, done.stderr
     assert "6 recordings: no d33: none of the 6 recordings can be used: recording " in lines[0]
     assert "6 recordings: d33 -13." in lines[1]
-    assert "look at: d33 of the array is negative" in lines[2]
+    assert "look at: d33 of the array is -13." in lines[2]
+    assert "negative: is the sign of charge or force turned?" in lines[2]
     assert "left out: recording " in lines[3]
     assert "exceeds 0.1" in lines[3]
 
