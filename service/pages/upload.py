@@ -180,7 +180,7 @@ async def keep(request: Request, upload_id: str, sent: Form, store: Store, table
 
 
 @router.post("/{upload_id}/skin", dependencies=WRITE)
-async def bring_in(request: Request, upload_id: str, sent: Form, store: Store) -> Response:  # noqa: ARG001 -- as below
+async def bring_in(request: Request, upload_id: str, sent: Form, store: Store) -> Response:  # noqa: ARG001 -- see discard
     """Brings in an exported skin."""
     shelved = _find(request, upload_id)
     if shelved.skin_seen is None:

@@ -85,6 +85,18 @@ def visitor(browser: Browser, server: Server) -> Iterator[Visit]:
     yield from visit(browser, server)
 
 
+@pytest.fixture(scope="module")
+def idle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A server of a module's own, since what is withdrawn or adopted stays; it runs no diagnosis."""
+    with running(Place(tmp_path_factory.mktemp("idle")), UNDERSKIN_DIAGNOSIS_WORKERS="0") as started:
+        yield started
+
+
+@pytest.fixture
+def reader(browser: Browser, idle: Server) -> Iterator[Visit]:
+    yield from visit(browser, idle)
+
+
 @pytest.fixture(scope="session")
 def locked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, dict[str, str]]]:
     """A server that asks for a key, and the keys by scope."""

@@ -1,28 +1,14 @@
 """What lists and skins say of a diagnosis and of an adopted model: which, how sure, since when, and by how much."""
 
 import re
-from collections.abc import Iterator
 from datetime import UTC, datetime
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser
 
-from tests.pages.conftest import Visit, visit
+from tests.pages.conftest import Visit
 from tests.store.diagnosed import diagnosed, report, resonant, sent
-from tests.store.server import Place, Server, running
-
-
-@pytest.fixture(scope="module")
-def idle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """A server that runs no diagnosis."""
-    with running(Place(tmp_path_factory.mktemp("idle")), UNDERSKIN_DIAGNOSIS_WORKERS="0") as started:
-        yield started
-
-
-@pytest.fixture
-def reader(browser: Browser, idle: Server) -> Iterator[Visit]:
-    yield from visit(browser, idle)
+from tests.store.server import Server
 
 
 def mistuned() -> dict[str, Any]:

@@ -1,25 +1,8 @@
 """Changing one's mind with a mouse: a recording excluded, a campaign withdrawn; and what then is said of models."""
 
-from collections.abc import Iterator
-
-import pytest
-from playwright.sync_api import Browser
-
-from tests.pages.conftest import Visit, visit
+from tests.pages.conftest import Visit
 from tests.store.diagnosed import diagnosed, report, resonant
-from tests.store.server import Place, Server, campaign, running
-
-
-@pytest.fixture(scope="module")
-def idle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """A server of its own, since withdrawn campaigns stay; it runs no diagnosis."""
-    with running(Place(tmp_path_factory.mktemp("idle")), UNDERSKIN_DIAGNOSIS_WORKERS="0") as started:
-        yield started
-
-
-@pytest.fixture
-def reader(browser: Browser, idle: Server) -> Iterator[Visit]:
-    yield from visit(browser, idle)
+from tests.store.server import Server, campaign
 
 
 def test_a_recording_is_excluded_and_the_campaign_withdrawn_by_clicks(reader: Visit, idle: Server) -> None:
