@@ -11,12 +11,12 @@ EXAMPLE = "/skins/example"
 
 
 @pytest.fixture
-def newcomer(visitor: Visit) -> Visit:
+def newcomer(reader: Visit) -> Visit:
     """Somebody who loads the example."""
-    visitor.go("/")
-    visitor.page.get_by_role("button", name="Load the example skin").click()
-    visitor.page.wait_for_url(f"**{EXAMPLE}")
-    return visitor
+    reader.go("/")
+    reader.page.get_by_role("button", name="Load the example skin").click()
+    reader.page.wait_for_url(f"**{EXAMPLE}")
+    return reader
 
 
 def test_from_the_start_to_a_campaign(newcomer: Visit) -> None:
