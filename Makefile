@@ -7,6 +7,9 @@ TESTS  ?= tests
 # From Debian: the proxy with TLS, its certificate, and what runs the examples.
 TEST_PACKAGES = nginx openssl octave curl postgresql chromium
 
+# Two processes; the tests of one file stay in one of them, since they share servers.
+PYTEST = $(PYTHON) -m pytest --numprocesses 2 --dist loadfile
+
 PIP_INSTALL = $(PYTHON) -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
@@ -20,11 +23,11 @@ serve: $(VENV)/.runtime ## serve on http://127.0.0.1:8000 (PORT=...)
 
 test: $(VENV)/.dev ## run the tests at reduced counts (TESTS=tests/test_x.py for some of them)
 	@scripts/system-packages.sh $(TEST_PACKAGES)
-	$(PYTHON) -m pytest $(TESTS)
+	$(PYTEST) $(TESTS)
 
 soak: $(VENV)/.dev ## run the tests at full counts, the long ones included
 	@scripts/system-packages.sh $(TEST_PACKAGES)
-	UNDERSKIN_SOAK=1 $(PYTHON) -m pytest $(TESTS)
+	UNDERSKIN_SOAK=1 $(PYTEST) $(TESTS)
 
 check: $(VENV)/.dev ## format, lint, strict types, import direction
 	$(PYTHON) -m ruff format --check .
