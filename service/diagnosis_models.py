@@ -58,8 +58,8 @@ class Adoption(BaseModel):
     diagnosis_id: str = Field(description="A diagnosis of one of the skin's campaigns, its verdict `explained`.")
 
 
-class ModelEntry(BaseModel):
-    """A model that was adopted for a skin."""
+class ModelVersion(BaseModel):
+    """A model that was adopted for a skin: from which diagnosis, by whom, and whether it was withdrawn."""
 
     id: str = Field(description="Its name; histories say it with the values that used it.")
     version: int = Field(description="1, 2, ... in the skin that it was adopted for.")
@@ -68,6 +68,14 @@ class ModelEntry(BaseModel):
     adopted_from: str | None = Field(description="Name of the API key that adopted it.")
     diagnosis_id: str = Field(description="The diagnosis that it comes from.")
     campaign_id: str = Field(description="The campaign that was diagnosed.")
+    withdrawn_at: str | None = Field(description="When it was withdrawn, UTC; null where it was not.")
+    withdrawn_from: str | None = Field(description="Name of the API key that withdrew it.")
+    withdraw_reason: str | None = Field(description="Why.")
+
+
+class ModelEntry(ModelVersion):
+    """A model with its evidence."""
+
     outdated: str | None = Field(
         description="Why it serves no figures: its campaign was changed after the diagnosis; null where it serves."
     )
@@ -84,7 +92,9 @@ class ModelVersions(BaseModel):
     """All models of a skin and of those joined to it."""
 
     skin_id: str = Field(description="The skin; the one it was joined to, where it was.")
-    models: list[ModelEntry] = Field(description="The latest adoption first; the first one is in force.")
+    models: list[ModelEntry] = Field(
+        description="The latest adoption first; the first one is in force unless withdrawn."
+    )
 
 
 def entry(row: AnyRow) -> dict[str, Any]:

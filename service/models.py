@@ -1,11 +1,14 @@
-"""Models of skins: adopted from explained diagnoses, in force until another is."""
+"""Models of skins: adopted from explained diagnoses, in force until another is, or until they are withdrawn."""
 
-from fastapi import APIRouter, Security
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Security
 from fastapi.responses import JSONResponse
 from sqlalchemy import Connection
 
 from service import diagnosis_models as answers
 from service.adopted import of_row
+from service.campaign_models import Reason
 from service.dependencies import SkinId, Store, authorised
 from service.once import IdempotentOnce
 from service.problems import Refusal
@@ -46,9 +49,28 @@ def adopted(connection: Connection, skin_id: str, diagnosis_id: str, sender: str
     return models.adopt(connection, root, diagnosis, sender)
 
 
+@router.delete(
+    "/skins/{skin_id}/model", operation_id="withdraw_model", summary="Withdraw the model in force", dependencies=WRITE
+)
+def withdraw(
+    skin_id: SkinId,
+    reason: Annotated[Reason, Query(description="Why; kept with it.")],
+    once: IdempotentOnce,
+    store: Store,
+) -> answers.ModelVersion:
+    """Has no model in force, as before the first adoption: the paper's model serves. Nothing is deleted: the version
+    stays, and says when, by whom and why it was withdrawn; 404 where none was in force."""
+
+    def act(connection: Connection) -> dict[str, object]:
+        root = skins.require_root(connection, skin_id)
+        return _version(models.withdraw(connection, root, reason, once.sender)).model_dump()
+
+    return answers.ModelVersion(**once.answer(store, {"withdraw": reason}, act))
+
+
 @router.get("/skins/{skin_id}/model", operation_id="skin_model", summary="The model in force")
 def in_force(skin_id: SkinId, store: Store) -> answers.ModelEntry:
-    """With the campaign and the evidence that it comes from; 404 where none was adopted."""
+    """With the campaign and the evidence that it comes from; 404 where there is none."""
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
         row = models.in_force(connection, root)
@@ -66,11 +88,8 @@ def versions(skin_id: SkinId, store: Store) -> answers.ModelVersions:
     return answers.ModelVersions(skin_id=root, models=found)
 
 
-def _entry(connection: Connection, row: AnyRow) -> answers.ModelEntry:
-    report = diagnoses.report_of(connection, row.number)
-    assert report is not None
-    model = of_row(connection, row)
-    return answers.ModelEntry(
+def _version(row: AnyRow) -> answers.ModelVersion:
+    return answers.ModelVersion(
         id=row.model_id,
         version=row.model_version,
         skin_id=row.model_skin,
@@ -78,6 +97,18 @@ def _entry(connection: Connection, row: AnyRow) -> answers.ModelEntry:
         adopted_from=row.adopted_from,
         diagnosis_id=row.id,
         campaign_id=row.campaign_id,
+        withdrawn_at=row.model_withdrawn_at,
+        withdrawn_from=row.model_withdrawn_from,
+        withdraw_reason=row.model_withdraw_reason,
+    )
+
+
+def _entry(connection: Connection, row: AnyRow) -> answers.ModelEntry:
+    report = diagnoses.report_of(connection, row.number)
+    assert report is not None
+    model = of_row(connection, row)
+    return answers.ModelEntry(
+        **_version(row).model_dump(),
         outdated=diagnoses.outdated(row),
         **{name: report[name] for name in ("mechanisms", "probability", "statement", "fit", "provenance")},
         needs=list(model.needs),

@@ -1,4 +1,4 @@
-"""POST under an Idempotency-Key: the same request is answered the same and done once."""
+"""A request under an Idempotency-Key: the same request is answered the same and done once."""
 
 import hashlib
 from collections.abc import Callable

@@ -47,6 +47,7 @@ OPERATIONS = {
     ("post", "/v1/skins/{skin_id}/join"): "join_skins",
     ("get", "/v1/skins/{skin_id}/history"): "skin_history",
     ("post", "/v1/skins/{skin_id}/model"): "adopt_model",
+    ("delete", "/v1/skins/{skin_id}/model"): "withdraw_model",
     ("get", "/v1/skins/{skin_id}/model"): "skin_model",
     ("get", "/v1/skins/{skin_id}/model/versions"): "skin_model_versions",
     ("get", "/v1/skins/{skin_id}/export"): "export_skin",

@@ -160,6 +160,10 @@ class Skins:
         """Make an explained diagnosis the skin's model, which `adopted` stands for from now on."""
         return self._session.json("POST", _skin(skin_id, "model"), json={"diagnosis_id": diagnosis_id})
 
+    def withdraw_model(self, skin_id: str, reason: str) -> Document:
+        """Have no model in force, as before the first was adopted; the version that was stays, with when and why."""
+        return self._session.json("DELETE", _skin(skin_id, "model"), **query_of(reason=reason))
+
     def model(self, skin_id: str) -> Document:
         """The model in force, with the campaign and the evidence that it comes from."""
         return self._session.json("GET", _skin(skin_id, "model"))

@@ -1,4 +1,4 @@
-"""The model in force of a skin, as pages head it: what it adds, since when, and d33 by it beside the paper's."""
+"""The model of a skin, as pages head it: what it adds, since when and until when, and d33 by it beside the paper's."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,18 +18,28 @@ from underskin.surrogate import SigmaTable
 
 
 @dataclass(frozen=True)
+class Withdrawal:
+    """When a model was withdrawn, by whom (name of the API key), and why."""
+
+    at: str
+    sender: str | None
+    reason: str
+
+
+@dataclass(frozen=True)
 class Adoption:
-    """A model in force; `outdated`: why it serves no figures, None where it does."""
+    """A model that was adopted; `outdated`: why it serves no figures, None where it does."""
 
     diagnosis_id: str
     version: int
     at: str
     mechanisms: str
     outdated: str | None
+    withdrawn: Withdrawal | None
 
 
 def of_rows(connection: Connection, rows: Sequence[AnyRow]) -> list[Adoption]:
-    """Of rows of models in force."""
+    """Of rows of models."""
     reports = diagnoses.reports_of(connection, [row.number for row in rows])
     return [
         Adoption(
@@ -38,9 +48,16 @@ def of_rows(connection: Connection, rows: Sequence[AnyRow]) -> list[Adoption]:
             row.adopted_at,
             in_words(mechanisms_of(reports[row.number])),
             diagnoses.outdated(row),
+            _withdrawal(row),
         )
         for row in rows
     ]
+
+
+def _withdrawal(row: AnyRow) -> Withdrawal | None:
+    if row.model_withdrawn_at is None:
+        return None
+    return Withdrawal(row.model_withdrawn_at, row.model_withdrawn_from, row.model_withdraw_reason)
 
 
 def answer_by_it(

@@ -10,7 +10,7 @@ from service.dependencies import CampaignId, Store, Table
 from service.pages import requests, verdicts
 from service.pages.campaign_figures import band_query, figures, frf_columns
 from service.pages.figures import csv_answer
-from service.pages.forms import WRITE, Form, see
+from service.pages.forms import WRITE, Form, reason, see
 from service.pages.html import page
 from service.store import campaigns, diagnoses
 from service.store.engine import Database
@@ -119,7 +119,7 @@ def curves_csv(campaign_id: CampaignId, store: Store) -> Response:
 def exclude(campaign_id: CampaignId, sent: Form, store: Store, table: Table) -> Response:
     """Leave a recording out of all figures."""
     with store.writing() as connection:
-        campaigns.exclude(connection, campaign_id, sent.get("recording", ""), _reason(sent))
+        campaigns.exclude(connection, campaign_id, sent.get("recording", ""), reason(sent))
     inverting.derive(store, table, [campaign_id])
     return see(f"/campaigns/{quote(campaign_id, safe='')}")
 
@@ -128,15 +128,8 @@ def exclude(campaign_id: CampaignId, sent: Form, store: Store, table: Table) -> 
 def withdraw(campaign_id: CampaignId, sent: Form, store: Store) -> Response:
     """Leave the campaign out of all figures."""
     with store.writing() as connection:
-        campaigns.withdraw(connection, campaign_id, _reason(sent))
+        campaigns.withdraw(connection, campaign_id, reason(sent))
     return see(f"/campaigns/{quote(campaign_id, safe='')}")
-
-
-def _reason(sent: dict[str, str]) -> str:
-    reason = sent.get("reason", "").strip()
-    if not 0 < len(reason) <= 1000:
-        raise InvalidInput("reason", reason[:80], "must say why in 1 to 1000 characters")
-    return reason
 
 
 def _loaded(store: Database, campaign_id: str) -> tuple[AnyRow, Campaign]:

@@ -10,10 +10,10 @@ from markupsafe import Markup
 from service.dependencies import CampaignId, Store, Table
 from service.diagnoses import DiagnosisId, runner_of
 from service.models import adopted
-from service.pages import requests
+from service.pages import adoption, requests
 from service.pages.diagnosis_numbers import columns
 from service.pages.figures import Drawn, csv_answer, drawn, drawn_before
-from service.pages.forms import WRITE, Form, see
+from service.pages.forms import WRITE, Form, see, sender
 from service.pages.html import page, render
 from service.pages.plan import FIELDS, left_open
 from service.problems import Refusal
@@ -41,7 +41,7 @@ _ODD = (LookupError, TypeError, ValueError, AttributeError)  # of a report that 
 def ask(request: Request, campaign_id: CampaignId, sent: Form, store: Store, table: Table) -> Response:  # noqa: ARG001
     """Puts it into the queue; one that was diagnosed as it is now is shown."""
     with store.writing() as connection:
-        row = diagnoses.ask(connection, campaign_id, table.sha256, __version__, _sender(request))
+        row = diagnoses.ask(connection, campaign_id, table.sha256, __version__, sender(request))
     runner_of(request).stir()
     return see(f"/diagnoses/{row.id}")
 
@@ -53,7 +53,9 @@ def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Resp
         row = diagnoses.find(connection, diagnosis_id)
         report = diagnoses.report_of(connection, row.number)
         figures = diagnoses.figures_of(connection, row.number)
-        model = models.in_force(connection, skins.require_root(connection, row.skin_id))
+        of_skin = models.of_skin(connection, skins.require_root(connection, row.skin_id))
+        own = next((model for model in of_skin if model.id == row.id), None)
+        adopted_as = None if own is None else adoption.of_rows(connection, [own])[0]
         campaign = campaigns.find(connection, row.campaign_id)
     place = f"/v1/diagnoses/{row.id}"
     return page(
@@ -64,7 +66,8 @@ def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Resp
         shown=None if report is None else _shown(row, report, figures),
         lacks_figures=report is not None and report["fit"] is not None and not figures,
         outdated=diagnoses.outdated(row),
-        in_force=model is not None and model.id == row.id,
+        adopted_as=adopted_as,
+        in_force=own is not None and own is of_skin[0] and own.model_withdrawn_at is None,
         may_be_adopted=row.verdict == "explained" and report is not None and report["d33"] is not None,
         open=report is not None and left_open(report),
         limit_fields=FIELDS,
@@ -120,7 +123,7 @@ def adopt(request: Request, diagnosis_id: DiagnosisId, sent: Form, store: Store)
     """Makes it the model of its skin."""
     with store.writing() as connection:
         skin = diagnoses.find(connection, diagnosis_id).skin_id
-        model = adopted(connection, skin, diagnosis_id, _sender(request))
+        model = adopted(connection, skin, diagnosis_id, sender(request))
     return see(f"/skins/{quote(model.model_skin, safe='')}?model=adopted")
 
 
@@ -173,8 +176,3 @@ def _drawn(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> 
 
 def _cannot_be_shown(row: AnyRow) -> NoReturn:
     raise Refusal(422, f"The report of diagnosis {row.id!r} came with an import and lacks what a page shows.") from None
-
-
-def _sender(request: Request) -> str | None:
-    key = request.scope["key"]
-    return None if key is None else str(key.name)

@@ -9,6 +9,7 @@ from fastapi.responses import RedirectResponse
 from service import session
 from service.dependencies import authorised
 from service.problems import Refusal
+from underskin import InvalidInput
 
 TOKEN = "form_token"  # noqa: S105 -- the name of the field
 WRITE = [Security(authorised, scopes=["write"])]
@@ -37,6 +38,20 @@ def require_own(request: Request, token: str) -> None:
 
 
 Form = Annotated[dict[str, str], Depends(_fields)]
+
+
+def reason(sent: dict[str, str]) -> str:
+    """Why, as somebody wrote it; raises InvalidInput."""
+    why = sent.get("reason", "").strip()
+    if not 0 < len(why) <= 1000:
+        raise InvalidInput("reason", why[:80], "must say why in 1 to 1000 characters")
+    return why
+
+
+def sender(request: Request) -> str | None:
+    """Name of the API key that the session was begun with."""
+    key = request.scope["key"]
+    return None if key is None else str(key.name)
 
 
 def see(path: str) -> RedirectResponse:

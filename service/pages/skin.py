@@ -16,6 +16,7 @@ from service.dependencies import SkinId, Store, Table
 from service.pages import requests, verdicts
 from service.pages.adoption import Adoption, answer_by_it, change_percent, of_rows
 from service.pages.figures import Drawn, csv_answer, drawn
+from service.pages.forms import WRITE, Form, reason, see, sender
 from service.pages.html import page
 from service.skin_models import History, SensorHistory
 from service.store import campaigns, inversions, models, overview, skins
@@ -54,9 +55,10 @@ def skin(
         numbers = [row.number for row in rows]
         medians = overview.medians(connection, numbers, table.sha256)
         diagnosed = overview.latest_diagnoses(connection, numbers)
-        told = list(diagnosed.values())
-        verdict = verdicts.of_rows(connection, told, [row.id for row in told if row.model_id is not None])
-        model = _in_force(connection, root)
+        last_model = _last_model(connection, root)
+        model = last_model if last_model is not None and last_model.withdrawn is None else None
+        adopted = [] if model is None else [model.diagnosis_id]
+        verdict = verdicts.of_rows(connection, list(diagnosed.values()), adopted)
     serves = model is not None and model.outdated is None
     last = latest[0] if latest else None
     answer = None if last is None else inverting.answer(store, table, last, None)
@@ -85,6 +87,7 @@ def skin(
         following=rows[_ON_A_PAGE - 1].number if len(rows) > _ON_A_PAGE else None,
         history=history,
         model=model,
+        withdrawn=last_model if model is None else None,
         by_model=by_model,
         why_not=why_not,
         change=None if by_model is None or answer is None else change_percent(_array(answer), _array(by_model)),
@@ -102,6 +105,15 @@ def skin(
     if waiting:
         made.background = BackgroundTask(inverting.complete, store, table, root)
     return made
+
+
+@router.post("/model/withdraw", dependencies=WRITE)
+def withdraw_model(request: Request, skin_id: SkinId, sent: Form, store: Store) -> Response:
+    """Has no model in force."""
+    with store.writing() as connection:
+        root = skins.require_root(connection, skin_id)
+        models.withdraw(connection, root, reason(sent), sender(request))
+    return see(f"/skins/{quote(root, safe='')}")
 
 
 @router.get("/map.csv")
@@ -158,8 +170,8 @@ def history_csv(
     )
 
 
-def _in_force(connection: Connection, root: str) -> Adoption | None:
-    row = models.in_force(connection, root)
+def _last_model(connection: Connection, root: str) -> Adoption | None:
+    row = models.last(connection, root)
     return None if row is None else of_rows(connection, [row])[0]
 
 

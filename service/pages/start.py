@@ -31,8 +31,8 @@ def start(
         found = overview.glances(connection, find or None, number_of(before), _ON_A_PAGE + 1, table.sha256)
         shown = found[:_ON_A_PAGE]
         told = [glance.diagnosis for glance in shown if glance.diagnosis is not None]
-        verdict = verdicts.of_rows(connection, told, [row.id for row in told if row.model_id is not None])
         models = [glance.model for glance in shown if glance.model is not None]
+        verdict = verdicts.of_rows(connection, told, [row.id for row in models])
         adoptions = {one.diagnosis_id: one for one in adoption.of_rows(connection, models)}
     answer = page(
         request,

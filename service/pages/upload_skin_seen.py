@@ -16,6 +16,7 @@ class ModelSeen:
     skin: str
     version: int
     adopted_at: str
+    withdrawn_at: str | None
     mechanisms: Sequence[str]
     probability: float
     present: bool
@@ -63,4 +64,6 @@ def skin_seen(found: Found) -> SkinSeen:
 
 def _model(row: Any, report: Mapping[str, Any], present: bool) -> ModelSeen:
     mechanisms = [entry["name"] for entry in report["mechanisms"]]
-    return ModelSeen(row.skin_id, row.version, row.adopted_at, mechanisms, report["probability"], present)
+    return ModelSeen(
+        row.skin_id, row.version, row.adopted_at, row.withdrawn_at, mechanisms, report["probability"], present
+    )

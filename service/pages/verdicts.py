@@ -35,8 +35,7 @@ class Verdict:
 
 
 def of_rows(connection: Connection, rows: Sequence[AnyRow], adopted: Sequence[str] = ()) -> dict[str, Verdict]:
-    """By the diagnosis' id; `adopted`: ids of those that
-    became a model."""
+    """By the diagnosis' id; `adopted`: ids of those whose model is in force."""
     reports = diagnoses.reports_of(connection, [row.number for row in rows if row.state == "done"])
     return {row.id: _verdict(row, reports.get(row.number, {}), row.id in adopted) for row in rows}
 

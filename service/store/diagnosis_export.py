@@ -27,7 +27,8 @@ _DIAGNOSIS = (
     "id", "excluded", "table_sha256", "version", "state", "progress", "asked_at", "asked_from", "started_at",
     "ended_at", "reason", "verdict", "probability",
 )  # fmt: skip
-_MODEL = ("id", "skin_id", "version", "adopted_at", "adopted_from")
+_WITHDRAWAL = ("withdrawn_at", "withdrawn_from", "withdraw_reason")
+_MODEL = ("id", "skin_id", "version", "adopted_at", "adopted_from", *_WITHDRAWAL)
 
 
 class _Row(BaseModel):
@@ -100,6 +101,9 @@ class ModelRow(_Row):
     diagnosis_id: Id
     adopted_at: Time
     adopted_from: Text | None
+    withdrawn_at: Time | None = None  # which older files do not have, nor the next two
+    withdrawn_from: Text | None = None
+    withdraw_reason: Text | None = None
 
 
 @dataclass(frozen=True)
@@ -138,6 +142,8 @@ def checked(
     for model in model_rows:
         if model.diagnosis_id not in explained or model.skin_id not in set(skin_ids):
             raise KeyError(f"model {model.id}")
+        if (model.withdrawn_at is None) != (model.withdraw_reason is None):
+            raise KeyError(f"model {model.id}: withdraw_reason")
     return Checked(rows, model_rows)
 
 

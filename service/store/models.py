@@ -1,14 +1,14 @@
-"""Models of skins, adopted from diagnoses; each stays, and the last one is in force."""
+"""Models of skins, adopted from diagnoses; each stays, and the last one is in force unless it was withdrawn."""
 
 import secrets
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import Connection, Select, func, insert, select
+from sqlalchemy import Connection, Select, func, insert, select, update
 
 from service.store import diagnoses as kept
 from service.store import skins
-from service.store.errors import Conflict
+from service.store.errors import Conflict, Missing
 from service.store.tables import AnyRow, diagnoses, models
 from service.store.tables import skins as skin_rows
 from service.store.times import now
@@ -20,6 +20,9 @@ _OWN = (
     models.c.skin_id.label("model_skin"),
     models.c.adopted_at,
     models.c.adopted_from,
+    models.c.withdrawn_at.label("model_withdrawn_at"),
+    models.c.withdrawn_from.label("model_withdrawn_from"),
+    models.c.withdraw_reason.label("model_withdraw_reason"),
 )
 
 
@@ -52,9 +55,28 @@ def adopt(connection: Connection, root: str, diagnosis: AnyRow, adopted_from: st
     return adopted
 
 
-def in_force(connection: Connection, root: str) -> AnyRow | None:
-    """The model adopted last for a skin or for one joined to it; None where there is none."""
+def withdraw(connection: Connection, root: str, reason: str, withdrawn_from: str | None) -> AnyRow:
+    """Have no model in force; the one that was, with who withdrew it. Raises Missing where there is none."""
+    skins.lock(connection, [root])
+    before = in_force(connection, root)
+    if before is None:
+        raise Missing(f"Skin {root!r} has no adopted model.")
+    values = {"withdrawn_at": now(), "withdrawn_from": withdrawn_from, "withdraw_reason": reason}
+    connection.execute(update(models).where(models.c.number == before.model_number).values(**values))
+    withdrawn = last(connection, root)
+    assert withdrawn is not None
+    return withdrawn
+
+
+def last(connection: Connection, root: str) -> AnyRow | None:
+    """The model adopted last for a skin or for one joined to it, withdrawn or not; None where there is none."""
     return connection.execute(_rows(root).limit(1)).first()
+
+
+def in_force(connection: Connection, root: str) -> AnyRow | None:
+    """The same unless it was withdrawn: those before it do not come back."""
+    found = last(connection, root)
+    return None if found is None or found.model_withdrawn_at is not None else found
 
 
 def in_force_of(connection: Connection, roots: Sequence[str]) -> dict[str, AnyRow]:
@@ -62,7 +84,8 @@ def in_force_of(connection: Connection, roots: Sequence[str]) -> dict[str, AnyRo
     query = kept.rows().add_columns(*_OWN, skin_rows.c.root_id).join(models, models.c.diagnosis == diagnoses.c.number)
     query = query.join(skin_rows, skin_rows.c.id == models.c.skin_id).where(skin_rows.c.root_id.in_(roots))
     found = connection.execute(query.order_by(models.c.adopted_at, models.c.number))
-    return {row.root_id: row for row in found}  # the last one stays
+    latest = {row.root_id: row for row in found}
+    return {root: row for root, row in latest.items() if row.model_withdrawn_at is None}
 
 
 def of_skin(connection: Connection, root: str) -> Sequence[AnyRow]:

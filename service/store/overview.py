@@ -10,7 +10,7 @@ from sqlalchemy import ColumnElement, Connection, func, select
 from service.store import campaigns as kept
 from service.store import inversions
 from service.store import models as adopted_models
-from service.store.tables import AnyRow, campaigns, diagnoses, models, sensor_d33, skins
+from service.store.tables import AnyRow, campaigns, diagnoses, sensor_d33, skins
 from service.store.tables import inversions as derived
 
 _OF_CAMPAIGNS = ("id", "number", "name", "recordings", "excluded", "revision")
@@ -105,12 +105,7 @@ def _of_array(answer: Any | None) -> float | None:
 
 
 def latest_diagnoses(connection: Connection, numbers: Sequence[int]) -> dict[int, AnyRow]:
-    """The latest diagnosis of each of these campaigns that has one; `model_id`: of the model it was adopted as."""
+    """The latest diagnosis of each of these campaigns that has one."""
     columns: list[ColumnElement[Any]] = [column for column in diagnoses.c if column.name in _OF_DIAGNOSES]
-    query = (
-        select(*columns, models.c.id.label("model_id"))
-        .outerjoin(models, models.c.diagnosis == diagnoses.c.number)
-        .where(diagnoses.c.campaign.in_(numbers))
-        .order_by(diagnoses.c.number)
-    )
+    query = select(*columns).where(diagnoses.c.campaign.in_(numbers)).order_by(diagnoses.c.number)
     return {row.campaign: row for row in connection.execute(query)}

@@ -1,8 +1,8 @@
 """The tables of the store. What a table of an older version lacks is added by service/store/migrations.
 
 Times are text, ISO 8601 in UTC with microseconds (`2017-05-03T09:00:00.000000Z`): they sort as text on every database.
-Nothing is deleted: a campaign is withdrawn or corrected, a recording excluded, a skin joined to another, each with the
-reason, and the rows stay.
+Nothing is deleted: a campaign is withdrawn or corrected, a recording excluded, a skin joined to another, a model
+withdrawn, each with the reason, and the rows stay.
 """
 
 from typing import Any, TypeAlias
@@ -157,7 +157,7 @@ adopted_inversions = Table(
     Column("document", LargeBinary, nullable=False),  # compressed JSON
 )
 
-# Models of skins, one a diagnosis that was adopted; the last one is in force.
+# Models of skins, one a diagnosis that was adopted; the last one is in force, unless it was withdrawn.
 models = Table(
     "models",
     metadata,
@@ -168,6 +168,9 @@ models = Table(
     Column("diagnosis", _Number, ForeignKey("diagnoses.number"), nullable=False),
     Column("adopted_at", String, nullable=False),
     Column("adopted_from", Text),  # name of the API key
+    Column("withdrawn_at", String),
+    Column("withdrawn_from", Text),  # name of the API key
+    Column("withdraw_reason", Text),
     UniqueConstraint("skin_id", "version", name="version_of_skin"),
 )
 

@@ -35,7 +35,8 @@ def test_an_adopted_model_heads_its_skin_and_the_start(reader: Visit, idle: Serv
     reader.go("/skins/palm-a")
     assert "the paper's" in page.locator(".facts").inner_text()
     reader.go(f"/diagnoses/{diagnosis_id}")
-    assert "until another diagnosis of the skin is adopted" in page.locator("#adopt ~ p").all_inner_texts()[1]
+    stays = page.locator("#adopt ~ p").all_inner_texts()[1]
+    assert "until another diagnosis of the skin is adopted, or until it is withdrawn" in stays
     page.get_by_role("button", name="Adopt this model").click()
     page.wait_for_url("**/skins/palm-a?model=adopted")
     by_paper, by_model = (d33(idle, campaign_id, model) for model in ("paper", "adopted"))
@@ -99,6 +100,49 @@ def test_an_outdated_model_is_said_to_serve_nothing(reader: Visit, idle: Server)
     assert "outdated and serves no figures: its campaign was withdrawn: loose cable" in said
     reader.go("/")
     assert "is outdated" in reader.page.get_by_role("row", name="palm-c").inner_text()
+
+
+def test_a_model_is_withdrawn_on_its_skin_s_page(reader: Visit, idle: Server) -> None:
+    page = reader.page
+    _, diagnosis_id = diagnosed(idle, resonant("friday"), mistuned(), "palm-d")
+    idle.http.post("/v1/skins/palm-d/model", json={"diagnosis_id": diagnosis_id}).raise_for_status()
+    reader.go("/skins/palm-d")
+    button = page.get_by_role("button", name="Withdraw the model")
+    assert not button.is_visible()
+    page.get_by_text("Withdraw the adopted model").click()
+    reader.require_accessible()
+    button.click()  # without a reason: the browser asks for it
+    assert page.get_by_label("Reason").first.evaluate("field => field.validity.valueMissing")
+    assert idle.http.get("/v1/skins/palm-d/model").status_code == 200
+    page.get_by_label("Reason").first.fill("the <b>wrong</b> diagnosis")
+    button.click()
+    page.wait_for_url("**/skins/palm-d")
+    for address in ("/skins/palm-d", "/skins/palm-d?model=adopted"):
+        reader.go(address)
+        reader.drawn(2)
+        assert "the paper's" in page.locator(".facts").inner_text()
+        assert page.get_by_role("region", name="Adopted model").count() == 0
+        assert page.get_by_text("Withdraw the adopted model").count() == 0
+        said = page.get_by_role("status")
+        assert "modulus error (version 1, since" in said.inner_text()
+        assert "was withdrawn" in said.inner_text()
+        assert "the <b>wrong</b> diagnosis" in said.inner_text()
+        today = datetime.now(UTC).strftime("%Y-%m-%d")
+        assert today in str(said.locator("time").last.get_attribute("datetime"))
+        assert "by the paper's model" in page.locator("#figure-map figcaption").inner_text()
+        assert page.get_by_role("row", name="friday").locator("a.tag").inner_text() == "mismatch, explained"
+        reader.require_accessible()
+    reader.go("/")
+    assert "adopted" not in page.get_by_role("row", name="palm-d").inner_text()
+    reader.go("/d33?skin=palm-d")
+    assert "by the adopted model" not in page.locator("main").inner_text()
+    reader.go(f"/diagnoses/{diagnosis_id}")
+    assert "was withdrawn" in page.get_by_role("status").inner_text()
+    page.get_by_role("button", name="Adopt this model").click()
+    page.wait_for_url("**/skins/palm-d?model=adopted")
+    assert "version 2" in page.get_by_role("region", name="Adopted model").inner_text()
+    assert "was withdrawn" not in page.locator("main").inner_text()
+    assert "adopted" in page.get_by_role("row", name="friday").locator("a.tag").inner_text()
 
 
 @pytest.mark.parametrize(

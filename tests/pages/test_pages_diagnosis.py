@@ -186,6 +186,7 @@ def test_what_changes_something_needs_the_session_s_own_form(idle: Server, made:
         f"/campaigns/{campaign_id}/diagnosis",
         f"/diagnoses/{diagnosis_id}/cancel",
         f"/diagnoses/{diagnosis_id}/adopt",
+        "/skins/forms/model/withdraw",
     ):
         assert idle.http.post(path, data={"form_token": "x"}, headers=BROWSING).status_code == 403
     assert idle.http.get("/v1/skins/forms/model").status_code == 404
@@ -204,6 +205,7 @@ def test_who_may_read_only_sees_no_button_and_changes_nothing(locked: tuple[Serv
             f"/campaigns/{campaign_id}/diagnosis",
             f"/diagnoses/{diagnosis_id}/cancel",
             f"/diagnoses/{diagnosis_id}/adopt",
+            "/skins/locked/model/withdraw",
         ):
             answer = somebody.post(path, data=form, headers=own)
             assert answer.status_code == 403

@@ -22,7 +22,7 @@ PATH = quote(SKIN, safe="")
 
 @pytest.fixture(scope="module")
 def export(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """A skin of three campaigns, one with an excluded recording, one diagnosed; its model was adopted."""
+    """A skin of three campaigns, one with an excluded recording, one diagnosed; its model was adopted and withdrawn."""
     with running(Place(tmp_path_factory.mktemp("source")), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
         http = server.http
         for name in ("monday", "tuesday"):
@@ -32,6 +32,8 @@ def export(tmp_path_factory: pytest.TempPathFactory) -> bytes:
         _, diagnosis_id = diagnosed(server, resonant("array"), report(), SKIN)
         adopted = http.post(f"/v1/skins/{PATH}/model", json={"diagnosis_id": diagnosis_id})
         assert adopted.is_success, adopted.text
+        withdrawn = http.delete(f"/v1/skins/{PATH}/model", params={"reason": "wrong diagnosis"})
+        assert withdrawn.is_success, withdrawn.text
         return http.get(f"/v1/skins/{PATH}/export").content
 
 
@@ -80,6 +82,7 @@ def test_an_exported_skin_comes_in_where_somebody_says_so(reader: Visit, elsewhe
     assert page.get_by_role("heading", level=1).inner_text() == f"Skin {SKIN}"
     told = page.get_by_role("region", name="Adopted models").inner_text()
     assert "contact resonance" in told
+    assert ", withdrawn " in told
     row = page.get_by_role("row", name="tuesday").inner_text().split("\t")
     assert (row[2:]) == ["6", "1", "not yet"]
     reader.require_accessible()
@@ -88,7 +91,9 @@ def test_an_exported_skin_comes_in_where_somebody_says_so(reader: Visit, elsewhe
     page.wait_for_url("**/skins/*")
     assert page.get_by_role("heading", level=1).inner_text() == f"Skin {SKIN}"
     assert sorted(kept(elsewhere)) == ["array", "monday", "tuesday"]
-    assert page.get_by_text("version 1").count()
+    said = page.get_by_role("status").first.inner_text()
+    assert "version 1" in said
+    assert "wrong diagnosis" in said
     look_at(reader, [file("palm.h5", export)], skin="another name")
     assert "All of it is here already" in page.locator(".adopted").inner_text()
     assert "keeps its name" in page.locator("main").inner_text()

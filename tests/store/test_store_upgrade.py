@@ -102,6 +102,8 @@ def test_an_older_store_is_taken_up_with_all_that_it_holds(older: Place, rows: R
             page = server.http.get(path, headers={"Accept": "text/html"})
             assert page.status_code == 200, path
             assert ("In force: contact resonance" in page.text) == (known and path == "/skins/palm")
+        withdrawn = server.http.delete("/v1/skins/palm/model", params={"reason": "after the upgrade"})
+        assert withdrawn.status_code == (200 if known else 404), withdrawn.text
         added = server.http.post("/v1/campaigns?skin=palm", json=campaign("after")).raise_for_status().json()
         asked = server.http.post(f"/v1/campaigns/{added['id']}/diagnosis").raise_for_status().json()
         assert asked["state"] == "queued"
