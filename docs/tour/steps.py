@@ -141,7 +141,8 @@ STEPS = (
         "adopted",
         "Adopted",
         "Adopted, the explanation is the skin's model: skin and start head it, with d33 by it beside the paper's; map "
-        "and history show either, and every value says by which.",
+        "and history show either, and every value says by which. Withdrawn, with a reason, it stays as that version, "
+        "and the paper's model is in force again.",
         _adopted,
     ),
     Step(
