@@ -137,9 +137,9 @@ def test_a_model_is_withdrawn_on_its_skin_s_page(reader: Visit, idle: Server) ->
     reader.go("/d33?skin=palm-d")
     assert "by the adopted model" not in page.locator("main").inner_text()
     reader.go(f"/diagnoses/{diagnosis_id}")
-    said = page.get_by_role("status").inner_text()
-    assert "as version 1, and was withdrawn" in said
-    assert "“the <b>wrong</b> diagnosis”" in said
+    reminder = page.get_by_role("status").inner_text()
+    assert "as version 1, and was withdrawn" in reminder
+    assert "“the <b>wrong</b> diagnosis”" in reminder
     page.get_by_role("button", name="Adopt this model").click()
     page.wait_for_url("**/skins/palm-d?model=adopted")
     assert "version 2" in page.get_by_role("region", name="Adopted model").inner_text()
