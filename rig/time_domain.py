@@ -2,7 +2,8 @@
 
 The shaker's force about the preload is made on a grid `_FINER` times finer than the converter's; tip and electronics
 are integrated there (`linear_filters.apply`), the charge of a moving edge follows the curve Fσ(F) at every instant.
-Noise is white plus 1/f; the converter rounds to its steps and stops at its range.
+Noise is white plus 1/f; the converter filters what it could not tell from lower frequencies, rounds to its steps and
+stops at its range.
 """
 
 from collections.abc import Iterator
@@ -10,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import chirp
+from scipy.signal import chirp, resample_poly
 
 from rig import effects, linear_filters
 from rig.bench import Bench
@@ -52,15 +53,15 @@ def _recording(bench: Bench, row: int, gain: float) -> TimeSeries:
     charge = linear_filters.apply(linear_filters.electrical(bench.on, preload), charge, 1 / rate)
     time = np.arange(len(charge)) / rate
     charge += _mains(bench, time, random)
-    kept = slice(round(_RUN_IN_S * rate), None, _FINER)
     late = 1e-6 * effects.of(bench.on, "timing_delay", "delay_us")
     if late:
         charge = CubicSpline(time, charge)(np.clip(time - late, 0, time[-1]))
-    noise = coloured_noise(len(time[kept]), drive, random)
+    applied, charge = _sampled(applied, rate), _sampled(charge, rate)
+    noise = coloured_noise(len(applied), drive, random)
     return TimeSeries(
-        converted(preload + applied[kept] + drive.force_noise_n * random.normal(size=len(noise)),
+        converted(preload + applied + drive.force_noise_n * random.normal(size=len(noise)),
                   drive.force_range_n, drive.converter_bits),
-        converted(charge[kept] + noise, drive.charge_range_pc, drive.converter_bits),
+        converted(charge + noise, drive.charge_range_pc, drive.converter_bits),
     )  # fmt: skip
 
 
@@ -110,6 +111,12 @@ def _mains(bench: Bench, time: Floats, random: np.random.Generator) -> Floats:
     charge, mains = (effects.of(bench.on, "mains_pickup", name) for name in ("charge_pc", "mains_hz"))
     phase = 2 * np.pi * mains * time + 2 * np.pi * random.random()
     return charge * (np.sin(phase) + np.sin(3 * phase) / 3)
+
+
+def _sampled(signal: Floats, rate: float) -> Floats:
+    """The signal at the converter's rate without the run-in, through the filter that keeps what is beyond half of that
+    rate from folding back: where a sweep begins anew the force jumps."""
+    return resample_poly(signal, 1, _FINER, padtype="line")[round(_RUN_IN_S * rate / _FINER) :]
 
 
 def coloured_noise(samples: int, drive: Drive, random: np.random.Generator) -> Floats:

@@ -10,7 +10,8 @@ from scipy.signal import lfilter, lfilter_zi
 
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.frf_estimation import Frf, broadband, estimate, lines_of, stepped_sine
+from underskin.recordings.frf_estimation import Frf, broadband, estimate, lines_of, periodic, stepped_sine
+from underskin.recordings.periodic import period_of
 from underskin.recordings.signal_check import defects, defects_of_pair
 from underskin.recordings.stepped_sine import find_steps
 from underskin.units import Complexes, Floats
@@ -84,6 +85,49 @@ def test_preload_and_drift_of_the_charge_change_nothing() -> None:
     drift = 4e-12 * np.linspace(0, 1, len(tones))
     clean, drifting = (stepped_sine(tones, charge + extra, RATE) for extra in (0.0, 7e-12 + drift))
     np.testing.assert_allclose(drifting.values, clean.values, rtol=1e-4)
+
+
+def repeated(period: Floats, times: int) -> tuple[Floats, Floats]:
+    """A force that repeats itself about a preload, and the charge behind a high-pass at 3 Hz, settled."""
+    force = np.tile(period, times + 20)
+    charge = lfilter([GAIN, -GAIN], [1, -0.99], force)
+    return 2.0 + force[20 * len(period) :], charge[20 * len(period) :]
+
+
+def swept(samples: int) -> Floats:
+    time = np.arange(samples) / RATE
+    return 0.09 * np.cos(2 * np.pi * (1.0 + 0.5 * (300.0 - 1.0) / time[-1] * time) * time)
+
+
+@pytest.mark.parametrize("kind", ["sweep", "noise"])
+def test_of_a_periodic_force_the_lowest_lines_are_right_too(kind: str) -> None:
+    """A straight line taken off each block would take a part of them, and a window's neighbours mix with them."""
+    force, charge = repeated(swept(1000) if kind == "sweep" else 0.05 * np.random.default_rng(3).normal(size=1000), 8)
+    drift = np.linspace(0, 1, len(force))
+    frf = estimate(force - 0.3 * drift, charge + 4e-12 * drift, RATE)
+    np.testing.assert_allclose(frf.frequency[:3], [2.0, 4.0, 6.0])
+    delay = np.exp(-2j * np.pi * frf.frequency / RATE)
+    strong = frf.frequency < 290
+    np.testing.assert_allclose(frf.values[strong], (GAIN * (1 - delay) / (1 - 0.99 * delay))[strong], rtol=1e-5)
+    assert frf.independent
+    assert frf.coherence is not None
+    assert frf.coherence[strong].min() > 1 - 1e-9
+
+
+def test_periods_are_found_and_only_where_there_are_some() -> None:
+    random = np.random.default_rng(5)
+    noise = random.normal(size=20_000)
+    creep = 0.5 * np.exp(-np.arange(8000) / 3000.0)
+    assert period_of(repeated(swept(1000), 8)[0] + 0.01 * noise[:8000] + creep) == 1000
+    uneven = np.interp(np.arange(8000) % 800.4, np.arange(900), swept(900))
+    assert period_of(uneven) in (800, 1601)
+    narrow = lfilter([1.0], np.poly([0.995 * np.exp(0.1j), 0.995 * np.exp(-0.1j)]), noise)
+    blow = np.zeros(8000)
+    blow[100:110] = np.hanning(10)
+    for force in (noise, narrow, blow, swept(8000), np.full(8000, 2.0), noise[:50]):
+        assert period_of(force) == 0
+    with pytest.raises(InvalidInput, match="repeat itself"):
+        periodic(noise, noise, RATE)
 
 
 def test_the_kind_of_excitation_is_recognised() -> None:
@@ -203,6 +247,9 @@ def test_where_a_periodic_sweep_begins_anew_nothing_is_damaged() -> None:
     force = np.tile(period, 8) + 1e-4 * np.random.default_rng(3).normal(size=8000)
     assert {defect.kind for defect in defects("force_n", force)} == {"jump"}
     assert defects_of_pair(force, 1e12 * answer_to(force)) == []
+    spiked = 1e12 * answer_to(force)
+    spiked[4321] += 3.0
+    assert [(found.kind, found.channel) for found in defects_of_pair(force, spiked)] == [("jump", "charge_pc")]
     sine = np.sin(2 * np.pi * 3.73 * np.arange(9000) / RATE)
     lossy = np.delete(sine, [sample for start in range(1000, 9000, 1000) for sample in range(start, start + 30)])
     assert len([defect for defect in defects_of_pair(lossy, 7.0 * lossy) if defect.channel == "force_n"]) == 8
@@ -224,6 +271,17 @@ def test_damage_is_named_and_left_out(kind: str) -> None:
     assert kind in {defect.kind for defect in frf.found}
     if kind != "jump":  # after lost samples of one channel, the phase is off for good
         np.testing.assert_allclose(frf.values, known_frf(frf.frequency), rtol=5e-3)
+
+
+def test_coarse_levels_are_no_held_samples() -> None:
+    """Noise of few levels repeats one by chance, and a slow signal turns on one; a hold within either is still seen."""
+    random = np.random.default_rng(9)
+    noise = np.round(4.0 * random.normal(size=100_000))
+    sweeps = np.tile(np.round(400.0 * swept(1000)), 8)
+    assert defects("force_n", noise) == []
+    assert {found.kind for found in defects("force_n", sweeps)} <= {"jump"}
+    noise[5000:5020] = noise[5000]
+    assert [(found.kind, found.first_sample) for found in defects("force_n", noise)] == [("held_samples", 5000)]
 
 
 def test_a_spike_is_a_defect_and_a_blow_is_not() -> None:

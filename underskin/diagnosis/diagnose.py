@@ -74,7 +74,7 @@ def diagnose(
     found = [*left_out, *inspected.found]
     if inspected.lacking:
         return Diagnosis(campaign.name, found, provenance, lacking=inspected.lacking)
-    bench = Workbench(lines(inspected.campaign), table)
+    bench = Workbench(lines(inspected.campaign, inspected.uneven), table)
     return _work_out(campaign.name, bench, search(bench), found, provenance, progress, limits)
 
 

@@ -1,9 +1,10 @@
 """A finding: what is wrong with the recordings themselves, or noteworthy about their diagnosis."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from underskin.recordings.campaign import Campaign
+from underskin.units import Floats
 
 
 @dataclass(frozen=True)
@@ -18,8 +19,10 @@ class Finding:
 
 @dataclass(frozen=True)
 class Inspected:
-    """The recordings that can be used, what was found, and what is lacking where nothing can be told from them."""
+    """The recordings that can be used, what was found, what is lacking where nothing can be told from them, and by
+    their id how `uneven` the noise of the lines of time series is."""
 
     campaign: Campaign
     found: Sequence[Finding]
     lacking: str = ""
+    uneven: Mapping[str, Floats] = field(default_factory=dict)

@@ -31,11 +31,11 @@ def inspect(campaign: Campaign, table: SigmaTable) -> Inspected:
     """The campaign without what cannot be used, reversed sensors put right, and what was found."""
     found: list[Finding] = []
     recorded = frf_recordings(campaign) if campaign.recordings else ()
-    estimated, doubtful = as_lines(recorded, found, units_checked=campaign.units_checked)
-    if doubtful:
-        return _inspected(campaign, [], doubtful, _cannot_be_right(doubtful, []))
-    inspected = _inspect_lines(campaign, estimated, found, table)
-    return replace(inspected, found=as_given(recorded, inspected.found))
+    series = as_lines(recorded, found, units_checked=campaign.units_checked)
+    if series.doubtful:
+        return _inspected(campaign, [], series.doubtful, _cannot_be_right(series.doubtful, []))
+    inspected = _inspect_lines(campaign, series.entries, found, table)
+    return replace(inspected, found=as_given(recorded, inspected.found), uneven=series.uneven)
 
 
 def _inspect_lines(

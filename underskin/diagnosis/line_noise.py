@@ -6,6 +6,8 @@ What all recordings share at a frequency is taken off, then each line is compare
 which smooth misfit hardly reaches. log rel² is piecewise linear in log f; it and the floor are fitted with Student's
 likelihood, so that single wild lines (mains, a resonance between two lines) do not count, and the level is set by the
 median of |e|². Where `coherence` γ² is given, (1 − γ²)/γ² has the shape of (d/A)² (its n is unknown), and steadies it.
+Where lines are known to be `uneven` (of a time series whose force has more power at one than at the next), rel is that
+much larger.
 """
 
 import itertools
@@ -34,7 +36,9 @@ class LineNoise:
     floor: float
 
 
-def line_noise(value: Complexes, frequency: Floats, recording: NDArray[np.intp], coherence: Floats) -> LineNoise:
+def line_noise(
+    value: Complexes, frequency: Floats, recording: NDArray[np.intp], coherence: Floats, uneven: Floats
+) -> LineNoise:
     """The noise of the rows, which run over recordings one after another, sorted by frequency within each."""
     if len(value) == 0:
         return LineNoise(np.zeros(0), 1.0, 0.0)
@@ -51,14 +55,15 @@ def line_noise(value: Complexes, frequency: Floats, recording: NDArray[np.intp],
     hats = _hats(log_f, knots)
     scale = float(np.median(amplitude))
     size2 = (amplitude / scale) ** 2
+    weighed2 = size2 * uneven**2
     known = np.isfinite(coherence) & (coherence > 0) & (coherence < 1)
     from_coherence = np.log((1 - coherence[known]) / coherence[known]) if known.any() else None
 
     def variance(p: Floats) -> Floats:
-        return np.exp(hats @ p[:-2]) * size2 + np.exp(p[-2])
+        return np.exp(hats @ p[:-2]) * weighed2 + np.exp(p[-2])
 
     def objective(p: Floats) -> tuple[float, Floats]:
-        relative, floor = np.exp(hats @ p[:-2]) * size2, np.exp(p[-2])
+        relative, floor = np.exp(hats @ p[:-2]) * weighed2, np.exp(p[-2])
         d2 = relative + floor
         v = (weights * d2[rows]).sum(axis=0)
         u = rough / scale**2 / v

@@ -100,6 +100,6 @@ def frequency_bins(frequency: Floats) -> tuple[NDArray[np.intp], Floats]:
     if len(distinct) <= _MOST_LINES:
         return line, distinct
     edges = np.geomspace(distinct[0], distinct[-1] * (1 + 1e-9), _MOST_LINES + 1)
-    line = np.searchsorted(edges, frequency, side="right") - 1
+    line = np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, _MOST_LINES - 1)
     used, line = np.unique(line, return_inverse=True)
     return line, np.sqrt(edges[used] * edges[used + 1])

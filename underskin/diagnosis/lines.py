@@ -5,6 +5,7 @@ weighted mean: with weights 1/d², Σ|y − m|²/d² = Σ|y − ȳ|²/d² + |ȳ 
 first sum, which no such model changes, is carried along in `scatter`.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -119,14 +120,15 @@ class Lines:
         )
 
 
-def lines(campaign: Campaign) -> Lines:
-    """The FRF lines of a campaign, sorted by frequency, those that are not finite left out.
+def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None) -> Lines:
+    """The FRF lines of a campaign, sorted by frequency, those that are not finite left out. `uneven` is, of recordings
+    by their id, the noise of each line over its course along frequency (1 where not given).
 
     Recordings of another kind and recordings without a finite line are left out of the `campaign` that comes with them.
     """
     numbers = {sensor.id: index for index, sensor in enumerate(campaign.skin.sensors)}
     entries: list[FrfRecording] = []
-    values, frequencies, coherences, sensors = [], [], [], []
+    values, frequencies, coherences, unevens, sensors = [], [], [], [], []
     for entry in campaign.recordings:
         if not isinstance(entry, FrfRecording):
             continue
@@ -141,11 +143,14 @@ def lines(campaign: Campaign) -> Lines:
         frequencies.append(frequency)
         coherence = measured.coherence
         coherences.append(np.full(len(order), np.nan) if coherence is None else coherence[order])
+        unevens.append((uneven or {}).get(entry.id, np.ones(len(measured.values)))[order])
         sensors.append(numbers[entry.sensor])
     recording = np.repeat(np.arange(len(values)), [len(value) for value in values]).astype(np.intp)
     value = np.concatenate([*values, np.zeros(0, dtype=complex)])
     frequency = np.concatenate([*frequencies, np.zeros(0)])
-    noise = line_noise(value, frequency, recording, np.concatenate([*coherences, np.zeros(0)]))
+    noise = line_noise(
+        value, frequency, recording, np.concatenate([*coherences, np.zeros(0)]), np.concatenate([*unevens, np.zeros(0)])
+    )
     return Lines(
         campaign=replace(campaign, recordings=tuple(entries)),
         value=value,

@@ -1,4 +1,5 @@
-"""The FRF, charge over force, from time series: H1, H2 and Hv with their coherence, for broadband and stepped sine.
+"""The FRF, charge over force, from time series: H1, H2 and Hv with their coherence, for stepped sine, periodic and
+broadband forces.
 
 Convention e^(+iωt): a charge that lags the force has a negative phase. With S the spectra averaged over n blocks
 (Bendat and Piersol, Random Data, chapters 5 and 9)
@@ -9,8 +10,9 @@ H1 is unbiased by noise in the charge, H2 by noise in the force, and Hv (total l
 power has the ratio κ; κ is taken to be the ratio of the signals' own powers, so that Hv does not depend on units.
 """
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,7 @@ from scipy.signal import get_window
 
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.periodic import period_of, without_drift
 from underskin.recordings.signal_check import Defect, damaged, defects_of_pair
 from underskin.recordings.stepped_sine import find_steps, settled, step_amplitudes
 from underskin.units import Complexes, Floats, to_si
@@ -34,7 +37,8 @@ class Frf:
     """Lines of a measured FRF: `frequency` [Hz], `values` [C/N], and γ² and the number of averages where known.
 
     `averages` counts independent blocks (overlapping ones count for less than one each); NaN coherence where a line
-    was averaged over one block. `found` says what was wrong with the time series.
+    was averaged over one block. `found` says what was wrong with the time series. `force_power` [N²] and
+    `charge_power` [C²] are mean squared amplitudes, None of tones. `independent`: whether neighbouring lines' noise is.
     """
 
     frequency: Floats
@@ -42,6 +46,9 @@ class Frf:
     coherence: Floats | None = None
     averages: Floats | None = None
     found: tuple[Defect, ...] = ()
+    force_power: Floats | None = None
+    charge_power: Floats | None = None
+    independent: bool = True
 
     @property
     def relative_uncertainty(self) -> Floats | None:
@@ -73,10 +80,13 @@ def lines_of(recording: FrfRecording) -> Frf:
 
 
 def estimate(force: Floats, charge: Floats, sample_rate: float, *, estimator: Estimator = "H1") -> Frf:
-    """The FRF by the method that the force asks for: stepped sine where it dwells on tones, else broadband."""
-    steps = find_steps(force, sample_rate)
-    if steps:
+    """The FRF by the method that the force asks for: stepped sine where it dwells on tones, periodic where it begins
+    anew, else broadband."""
+    _check(force, charge, sample_rate)
+    if find_steps(force, sample_rate):
         return stepped_sine(force, charge, sample_rate, estimator=estimator)
+    if period_of(force):
+        return periodic(force, charge, sample_rate, estimator=estimator)
     return broadband(force, charge, sample_rate, estimator=estimator)
 
 
@@ -103,18 +113,22 @@ def broadband(
         raise InvalidInput("overlap", overlap, "must be 0 or greater and less than 1")
     step = max(1, round(size * (1 - overlap)))
     taper = np.asarray(get_window(window, size), dtype=np.float64)
-    found = defects_of_pair(force, charge)
-    whole = ~np.lib.stride_tricks.sliding_window_view(damaged(found, len(force)), size)[::step].any(axis=1)
-    if not whole.any():
-        raise InvalidInput("force_n", f"{len(found)} defects", f"no undamaged block: {found[0].statement}")
-    kept = slice(1, (size + 1) // 2)
-    force_spectra, charge_spectra = (_spectra(signal, taper, step)[whole][:, kept] for signal in (force, charge))
-    frequency: Floats = np.fft.rfftfreq(size, 1 / sample_rate)[kept].astype(np.float64)
-    averages = _independent_blocks(int(whole.sum()), taper, step)
-    values, coherence = _ratio(force_spectra, charge_spectra, estimator)
-    if whole.sum() == 1:
-        coherence = np.full_like(coherence, np.nan)
-    return Frf(frequency, values, coherence, np.full(len(frequency), averages), tuple(found))
+    averaged = _averaged(force, charge, _Blocks(taper, step, slice(1, (size + 1) // 2), _without_line), estimator)
+    return replace(averaged, frequency=averaged.frequency * sample_rate, independent=False)
+
+
+def periodic(force: Floats, charge: Floats, sample_rate: float, *, estimator: Estimator = "H1") -> Frf:
+    """The multiples of 1/T of a force of period T, exactly (see `periodic`): the average over all two periods in a row.
+
+    Raises InvalidInput where the force has no period, or no undamaged two of them are left.
+    """
+    _check(force, charge, sample_rate)
+    period = period_of(force)
+    if not period:
+        raise InvalidInput("force_n", f"{len(force)} samples", "must repeat itself at least four times")
+    taper = np.asarray(get_window("hann", 2 * period), dtype=np.float64)
+    averaged = _averaged(force, charge, _Blocks(taper, period, slice(2, period, 2), without_drift), estimator)
+    return replace(averaged, frequency=averaged.frequency * sample_rate)
 
 
 def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator: Estimator = "H1") -> Frf:
@@ -148,6 +162,48 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
     return Frf(frequency, values, coherence, averages, tuple(found))
 
 
+@dataclass(frozen=True)
+class _Blocks:
+    """Blocks as long as their `taper` that start every `step` samples, less what `steadied` takes off them, and the
+    `lines` of their spectra that are kept."""
+
+    taper: Floats
+    step: int
+    lines: slice
+    steadied: Callable[[Floats], Floats]
+
+    def of(self, signal: NDArray[np.generic]) -> NDArray[Any]:
+        """(blocks, samples)."""
+        return np.lib.stride_tricks.sliding_window_view(signal, len(self.taper))[:: self.step]
+
+    def spectra(self, signal: Floats) -> Complexes:
+        """(blocks, lines)."""
+        return np.fft.rfft(self.steadied(self.of(signal)) * self.taper)[:, self.lines]
+
+
+def _averaged(force: Floats, charge: Floats, blocks: _Blocks, estimator: Estimator) -> Frf:
+    """The average over the undamaged blocks, its frequencies in cycles per sample."""
+    found = defects_of_pair(force, charge)
+    whole = ~blocks.of(damaged(found, len(force))).any(axis=1)
+    count = int(whole.sum())
+    if not count:
+        raise InvalidInput(found[0].channel, f"{len(found)} defects", f"no undamaged block: {found[0].statement}")
+    force_spectra, charge_spectra = (blocks.spectra(signal)[whole] for signal in (force, charge))
+    frequency: Floats = np.fft.rfftfreq(len(blocks.taper))[blocks.lines].astype(np.float64)
+    averages = _independent_blocks(count, blocks.taper, blocks.step)
+    values, coherence = _ratio(force_spectra, charge_spectra, estimator)
+    scale = 2 / blocks.taper.sum()
+    powers = (np.mean(np.abs(scale * spectra) ** 2, axis=0) for spectra in (force_spectra, charge_spectra))
+    return Frf(
+        frequency,
+        values,
+        coherence if count > 1 else np.full_like(coherence, np.nan),
+        np.full(len(frequency), averages),
+        tuple(found),
+        *powers,
+    )
+
+
 def _ratio(force: Complexes, charge: Complexes, estimator: Estimator) -> tuple[Complexes, Floats]:
     """H and γ² of spectra (blocks, lines)."""
     if estimator not in ("H1", "H2", "Hv"):
@@ -164,12 +220,6 @@ def _ratio(force: Complexes, charge: Complexes, estimator: Estimator) -> tuple[C
     root = np.sqrt(difference**2 + 4 * kappa * np.abs(fq) ** 2)
     share = np.where(difference > 0, (difference + root) / (2 * np.maximum(np.abs(fq) ** 2, _TINY)), 0)
     return fq * np.where(difference > 0, share, 2 * kappa / np.maximum(root - difference, _TINY)), coherence
-
-
-def _spectra(signal: Floats, taper: Floats, step: int) -> Complexes:
-    """The spectra (blocks, lines) of blocks that start every `step` samples."""
-    blocks = np.lib.stride_tricks.sliding_window_view(signal, len(taper))[::step]
-    return np.fft.rfft(_without_line(blocks) * taper)
 
 
 def _without_line(blocks: Floats) -> Floats:

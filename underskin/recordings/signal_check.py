@@ -7,16 +7,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
+from underskin.recordings.periodic import period_of
 from underskin.units import Floats
 
 _CLIPPED_RUN = 3  # samples in a row at the extreme value
 _CLIPPED_RATIO = 5.0  # a quantised sine's top level holds at most 1/(√2 − 1) = 2.4 times the samples of the next
 _HELD_RUN = 5  # samples in a row of one value
 _COARSE = 0.2  # share of samples that equal the one before, above which the levels are coarse
+_ONE_LEVEL = 1.5
+_BY_CHANCE = 1e-3  # runs as long in the whole signal
 _JUMP = 12.0  # second difference over its scale among neighbours; a sine stays below 1.5, noise below 6
 _BLOW, _ANSWER = 20.0, 6.0  # kurtosis; a sine has 1.5, noise 3, a hammer's blow hundreds, what rings after it tens
-_BEGINNINGS, _ALIKE = 3, 0.9  # jumps at one distance at least, and the correlation of what lies between them
+_AS_SHARP = 0.5  # of a jump: the usual bend at its place in a period, where a periodic signal begins anew
 _LOCAL = 64  # samples that make a neighbourhood
 
 
@@ -42,34 +46,26 @@ class Defect:
 
 def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
     """Every defect of force and charge; no defect are the jumps where the force is a blow that the charge answers, and
-    those where a periodic force, such as a sweep, begins anew."""
+    those where a periodic force, such as a sweep, begins anew, which recur in each period."""
     found = [*defects("force_n", force), *defects("charge_pc", charge)]
     if _kurtosis(force) > _BLOW and _kurtosis(charge) > _ANSWER:
         return [defect for defect in found if defect.kind != "jump"]
-    jumps = [defect.first_sample for defect in found if (defect.kind, defect.channel) == ("jump", "force_n")]
-    period = _period(force, jumps)
-    return [
-        defect
-        for defect in found
-        if defect.kind != "jump" or not period or _apart(defect.first_sample - jumps[0], period) > 1
-    ]
+    if all(defect.kind != "jump" for defect in found):
+        return found
+    period = period_of(force)
+    recurs = {name: _recurs(signal, period) for name, signal in (("force_n", force), ("charge_pc", charge))}
+    return [defect for defect in found if defect.kind != "jump" or not recurs[defect.channel][defect.first_sample]]
 
 
-def _period(signal: Floats, jumps: list[int]) -> int:
-    """The samples after which a signal that jumps at these places repeats itself, 0 where it does not."""
-    steps = np.diff(jumps)
-    if len(steps) < _BEGINNINGS - 1:
-        return 0
-    period = int(steps.min())
-    if period < _LOCAL or any(_apart(int(step), period) > 1 for step in steps):
-        return 0
-    first, repeated = signal[:-period], signal[period:]
-    return period if np.corrcoef(first, repeated)[0, 1] > _ALIKE else 0
-
-
-def _apart(distance: int, period: int) -> int:
-    """How far a distance is from the next multiple of a period."""
-    return min(distance % period, -distance % period)
+def _recurs(signal: Floats, period: int) -> NDArray[np.bool_]:
+    """Where a signal bends as sharply in most of the other periods, give or take a sample; nowhere without a period."""
+    bend = np.pad(np.abs(np.diff(signal, n=2)), 1)
+    if not period:
+        return np.zeros(len(signal), dtype=bool)
+    around = maximum_filter1d(bend, 3)
+    whole = len(signal) // period * period
+    usual = np.median(around[:whole].reshape(-1, period), axis=0)
+    return np.asarray(np.resize(usual, len(signal)) > _AS_SHARP * bend)
 
 
 def _kurtosis(signal: Floats) -> float:
@@ -113,15 +109,19 @@ def _overload(signal: Floats) -> NDArray[np.bool_]:
 
 
 def _held(signal: Floats) -> NDArray[np.bool_]:
-    """Runs of one value; in a signal of coarse levels, which stays on each for a while, those that end in a leap."""
+    """Runs of one value that end in more than one level's step (a slow signal turns on one level); where levels are so
+    coarse that neighbours are alike by chance, those that end in a leap."""
     step = np.abs(np.diff(signal))
     same = np.concatenate([[False], step == 0])
     mask = np.zeros(len(signal), dtype=bool)
-    coarse = same.mean() > _COARSE
-    leap = 2 * np.quantile(step, 0.999)
+    usual, width = float(same.mean()), 2 * _LOCAL + 1
+    around = uniform_filter1d(same.astype(float), width)
+    level, leap = float(step[step > 0].min(initial=np.inf)), 2 * np.quantile(step, 0.999)
     for first, count in _runs(same):
-        after = step[first + count - 1] if first + count < len(signal) else 0.0
-        if count >= _HELD_RUN - 1 and (not coarse or after > leap):
+        after = step[first + count - 1] if first + count < len(signal) else 2 * level
+        alike = max(usual, around[first + count // 2] - count / width)
+        by_chance = usual > _COARSE or len(signal) * alike**count > _BY_CHANCE
+        if count >= _HELD_RUN - 1 and after > (leap if by_chance else _ONE_LEVEL * level):
             mask[first - 1 : first + count] = True
     return mask
 
