@@ -12,6 +12,7 @@ from rig.recorded import campaign as recorded
 from tests.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.diagnose import diagnosis_report
 from underskin.diagnosis.explanation import Workbench
+from underskin.diagnosis.line_process import frequency_bins
 from underskin.diagnosis.lines import lines
 from underskin.diagnosis.recording_process import GainResidual, Scatter
 from underskin.recordings.campaign import from_dict
@@ -91,3 +92,12 @@ def test_the_evidence_of_a_process_is_that_of_the_whole_covariance(table: SigmaT
     assert found - found[0] == pytest.approx(np.array(expected) - expected[0], abs=1e-6)
     # With hardly any amplitude nothing is gained, but for the grids of scatter: usual ones, and any.
     assert residual.gains(sets, np.array([1e-9])) == pytest.approx(0.0, abs=0.3)
+
+
+@pytest.mark.parametrize("spacing", [1 / 1.7, 1 / 1.3, 0.62515263])
+def test_more_frequencies_than_bins_each_fall_into_one(spacing: float) -> None:
+    """Those at the ends, too, that six decimals round up or down."""
+    frequency = np.tile(spacing * np.arange(1, 401), 2)
+    line, centres = frequency_bins(frequency)
+    assert len(centres) <= 160
+    assert np.abs(np.log(centres[line] / frequency)).max() <= np.log(400) / 160
