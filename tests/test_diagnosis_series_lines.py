@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from tests.series_campaigns import codes, recorded
 from underskin.diagnosis.diagnose import diagnosis_report
@@ -155,3 +156,22 @@ def test_recordings_of_different_drives_rates_and_lengths_go_together(table: Sig
         ["amplifier_high_pass"],
     )
     assert report["mechanisms"][0]["parameters"][0]["value"] == pytest.approx(1.0, rel=0.02)
+
+
+def test_of_a_single_sweep_a_high_pass_is_still_found(quiet: Campaign, table: SigmaTable) -> None:
+    """It has each line in one block alone, whose ends cut it: the lowest lines would say more than a high-pass."""
+    time = np.arange(16 * 1024) / 1024.0
+    force = 0.09 * np.sin(2 * np.pi * (1.0 + 0.5 * 129.0 / 16.0 * time) * time)
+    decay = np.exp(-2 * np.pi / 1024.0)
+    answer = lfilter(np.array([1.0, -1.0]) * (1 + decay) / 2, [1.0, -decay], force)
+
+    def made(level: float, random: np.random.Generator) -> Any:
+        return force, level * answer + 0.02 * random.normal(size=len(force))
+
+    report = diagnosis_report(shaken(quiet, table, 1024.0, made), table)
+    assert (report["verdict"], [entry["name"] for entry in report["mechanisms"]]) == (
+        "explained",
+        ["amplifier_high_pass"],
+    )
+    assert report["mechanisms"][0]["parameters"][0]["value"] == pytest.approx(1.0, rel=0.03)
+    assert "force_acts_once" in {entry["code"] for entry in report["findings"]}

@@ -50,7 +50,7 @@ def as_lines(entries: Sequence[FrfRecording], found: list[Finding], *, units_che
             choices[entry.id] = choice = estimated[1]
             if choice.uneven is not None:
                 uneven[entry.id] = choice.uneven
-    found += [*_left_out(choices), *_mains(choices)]
+    found += [*_left_out(choices), *_once(choices), *_mains(choices)]
     return Estimated(kept, [], uneven)
 
 
@@ -115,6 +115,19 @@ def _left_out(choices: dict[str, Choice]) -> list[Finding]:
     text = f"{faint} of {measured} lines of {len(choices)} recordings are left out: the force has little power there"
     shared = f", and {beside} that share their noise with the next one" if beside else ""
     return [Finding("lines_left_out", "", "force_n", f"{text} and charge does not follow it{shared}")]
+
+
+def _once(choices: dict[str, Choice]) -> list[Finding]:
+    """Where the force passes through its band once."""
+    names = [name for name, choice in choices.items() if choice.once]
+    if not names:
+        return []
+    text = (
+        f"in {len(names)} of {len(choices)} recordings the force acts at each frequency once, as a single sweep or "
+        "blow: the lowest lines are left out, and those beside a sharp resonance are off by parts of a percent; a "
+        "drive that repeats itself at least four times gives them all"
+    )
+    return [Finding("force_acts_once", names[0] if len(names) == 1 else "", "force_n", text)]
 
 
 def _mains(choices: dict[str, Choice]) -> list[Finding]:

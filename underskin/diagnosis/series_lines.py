@@ -8,7 +8,9 @@ that of the best, and not by chance. What is expected decides, since of lines ch
 larger would be kept. A line that mains spoil is left out. Neighbouring lines of blocks of noise share theirs (a Hann
 window's by 4/9), two apart hardly (1/36): none is kept beside another, and the two next to 0 Hz are left out where
 others are enough: the straight line taken off each block is a part of them and the window mixes them with 0 Hz, so that
-beside an amplifier's high-pass their FRF is wrong. Lines of a periodic force have nothing of that.
+beside an amplifier's high-pass their FRF is wrong. Of a force that acts once (a single sweep or blow) hardly more than
+one block holds a line, which the taper cuts short where a sweep begins: the first sixteen are left out, but not more
+than half. Lines of a periodic force have nothing of that.
 """
 
 from dataclasses import dataclass
@@ -24,13 +26,14 @@ _UNSURE, _SURE = 0.2, 0.05  # relative uncertainty
 _BESIDE_BEST, _BEST = 5.0, 0.1  # the best: this quantile
 _BY_CHANCE = 1e-6
 _LEAST_LINES = 8  # so that of a record of few lines all are kept
-_BIASED = 2  # lines, next to 0 Hz
+_BIASED, _BIASED_ONCE = 2, 16  # lines, next to 0 Hz
+_ONCE = 2.0  # passes; noise has half as many as there are blocks
 
 
 @dataclass(frozen=True)
 class Choice:
     """The `lines` that are used, of `measured` many; how many are left out as `faint` or `beside` others; the `mains`
-    that spoil some; and how `uneven` the noise of those used is."""
+    that spoil some; how `uneven` the noise of those used is; and whether the force has each but `once`."""
 
     lines: list[int]
     measured: int
@@ -38,6 +41,7 @@ class Choice:
     beside: int = 0
     mains: Pickup | None = None
     uneven: Floats | None = None
+    once: bool = False
 
 
 def telling(measured: Frf) -> Choice:
@@ -58,9 +62,11 @@ def telling(measured: Frf) -> Choice:
     powerful |= (uncertainty <= min(_SURE, _BESIDE_BEST * best)) & _beyond_chance(measured)
     strong = np.flatnonzero(powerful if mains is None else powerful & ~mains.spoilt)
     shared = not measured.independent and len(strong) >= _LEAST_LINES
-    kept = _apart(strong[strong >= _BIASED]) if shared else [int(line) for line in strong]
+    once = measured.passes is not None and float(np.median(measured.passes[powerful])) < _ONCE
+    biased = min(_BIASED_ONCE, len(strong) // 2) if once else _BIASED
+    kept = _apart(strong[strong >= biased]) if shared else [int(line) for line in strong]
     uneven = _uneven(force[kept], uncertainty[kept])
-    return Choice(kept, len(lines), int((~powerful).sum()), len(strong) - len(kept), mains, uneven)
+    return Choice(kept, len(lines), int((~powerful).sum()), len(strong) - len(kept), mains, uneven, once)
 
 
 def _beyond_chance(measured: Frf) -> NDArray[np.bool_]:

@@ -38,7 +38,8 @@ class Frf:
 
     `averages` counts independent blocks (overlapping ones count for less than one each); NaN coherence where a line
     was averaged over one block. `found` says what was wrong with the time series. `force_power` [N²] and
-    `charge_power` [C²] are mean squared amplitudes, None of tones. `independent`: whether neighbouring lines' noise is.
+    `charge_power` [C²] are mean squared amplitudes, and `passes` is in how many blocks the force has its power at a
+    line, (Σ p)²/Σ p²; None of tones. `independent`: whether neighbouring lines' noise is.
     """
 
     frequency: Floats
@@ -49,6 +50,7 @@ class Frf:
     force_power: Floats | None = None
     charge_power: Floats | None = None
     independent: bool = True
+    passes: Floats | None = None
 
     @property
     def relative_uncertainty(self) -> Floats | None:
@@ -193,14 +195,16 @@ def _averaged(force: Floats, charge: Floats, blocks: _Blocks, estimator: Estimat
     averages = _independent_blocks(count, blocks.taper, blocks.step)
     values, coherence = _ratio(force_spectra, charge_spectra, estimator)
     scale = 2 / blocks.taper.sum()
-    powers = (np.mean(np.abs(scale * spectra) ** 2, axis=0) for spectra in (force_spectra, charge_spectra))
+    force_power, charge_power = (np.abs(scale * spectra) ** 2 for spectra in (force_spectra, charge_spectra))
     return Frf(
         frequency,
         values,
         coherence if count > 1 else np.full_like(coherence, np.nan),
         np.full(len(frequency), averages),
         tuple(found),
-        *powers,
+        force_power.mean(axis=0),
+        charge_power.mean(axis=0),
+        passes=force_power.sum(axis=0) ** 2 / np.maximum((force_power**2).sum(axis=0), _TINY),
     )
 
 
