@@ -11,7 +11,8 @@ from scipy.stats import multivariate_normal, multivariate_t
 
 from tests.diagnosis_campaigns import Made, campaign
 from tests.nested_sampling import Posterior, nested
-from underskin.diagnosis.evidence import Evidence, laplace, log_box
+from underskin.diagnosis.bell import log_box
+from underskin.diagnosis.evidence import Evidence, laplace
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.fit import Evaluated, Fitter
 from underskin.diagnosis.lines import Lines, lines

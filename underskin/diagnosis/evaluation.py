@@ -21,6 +21,8 @@ from underskin.mechanisms.composition import SENSOR_SPREAD
 from underskin.mechanisms.model import Prediction
 from underskin.units import Floats
 
+GAIN, POSITION = 0, 2  # places among the covariance's parameters, the latter where there is positioning scatter
+
 _STEP = 0.05  # of the finite differences in the covariance's logarithms
 _FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
 _BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
@@ -72,7 +74,7 @@ class Evaluator:
         """Predict, where that was not done already, and weigh."""
         hypothesis = self.hypothesis
         prediction = prediction or hypothesis.model.predict(point.fit)
-        position = float(np.exp(point.covariance[2])) if hypothesis.placed else 0.0
+        position = float(np.exp(point.covariance[POSITION])) if hypothesis.placed else 0.0
         lines = hypothesis.lines
         for _ in range(_BENDINGS):
             ratio = self._smooth(point) / float(np.exp(point.covariance[1]))
@@ -103,7 +105,7 @@ class Evaluator:
 
     def _own_levels(self, covariance: Floats, predicted_at: Floats) -> tuple[Floats | float, ...]:
         """p, τ and the pick-up over the prediction's, where covariance parameters (…, parameters) hold them."""
-        position: Floats | float = np.exp(covariance[..., 2]) if self.hypothesis.placed else 0.0
+        position: Floats | float = np.exp(covariance[..., POSITION]) if self.hypothesis.placed else 0.0
         spread: Floats | float = SENSOR_SPREAD
         pickup: Floats | float = 1.0
         for place, column in zip(self._own, range(self._common, len(self.covariance)), strict=True):
@@ -146,15 +148,15 @@ class Evaluator:
         precision, centre = self._priors[places].T
         return information + np.diag(precision), gradient - precision * (at.point.fit[places] - centre)
 
-    def settle(self, at: Evaluated, steps: int) -> Evaluated:
-        """Newton steps of the covariance parameters at a fixed prediction."""
+    def settle(self, at: Evaluated, steps: int, held: int | None = None) -> Evaluated:
+        """Newton steps of the covariance parameters, one of which may be held, at a fixed prediction."""
         for _ in range(steps):
             gradient, hessian = self.covariance_equations(at, mixed=False)
             low, high = self._lowest, self._highest
             eigenvalues, vectors = np.linalg.eigh(hessian)
             step = -vectors @ ((vectors.T @ gradient) / np.maximum(np.abs(eigenvalues), 1.0))
             outwards = ((at.point.covariance <= low) & (step < 0)) | ((at.point.covariance >= high) & (step > 0))
-            step = np.where(outwards, 0.0, step)
+            step = np.where(outwards | (np.arange(len(step)) == held), 0.0, step)
             step *= min(1.0, 0.7 / max(np.abs(step).max(), 1e-12))
             for _ in range(4):
                 point = self.moved(at.point, np.clip(at.point.covariance + step, low, high))
@@ -172,9 +174,9 @@ class Evaluator:
     def _summed_again(self, at: Evaluated) -> Evaluated:
         """With the moments of the same prediction at the positioning scatter that the point has come to."""
         same = at.marginal.levels.position == at.moments.position
-        return at if same else self._weigh_anew(at.point, at)
+        return at if same else self.weighed_anew(at.point, at)
 
-    def _weigh_anew(self, point: Point, at: Evaluated) -> Evaluated:
+    def weighed_anew(self, point: Point, at: Evaluated) -> Evaluated:
         """A point with the prediction of another, whose moments are summed at the point's own scatter."""
         lines, curvature = self.hypothesis.lines, self.hypothesis.curvature
         position = self.levels(point, at.predicted_at).position
@@ -194,7 +196,7 @@ class Evaluator:
         centre = np.clip(here, self._lowest + 2 * _STEP, self._highest - 2 * _STEP)
         pairs = [(a, b) for a in range(count) for b in range(a if mixed else 0)]
         both = [steps[a] + steps[b] for a, b in pairs]
-        costs = self._costs(at, centre + np.array([np.zeros(count), *steps, *-steps, *both]))
+        costs = self.costs(at, centre + np.array([np.zeros(count), *steps, *-steps, *both]))
         middle, up, down = costs[0], costs[1 : count + 1], costs[count + 1 : 2 * count + 1]
         gradient = (up - down) / (2 * _STEP)
         hessian = np.diag((up + down - 2 * middle) / _STEP**2)
@@ -202,7 +204,7 @@ class Evaluator:
             hessian[a, b] = hessian[b, a] = (cost - up[a] - up[b] + middle) / _STEP**2
         return gradient + hessian @ (here - centre), hessian
 
-    def _costs(self, at: Evaluated, covariances: Floats) -> Floats:
+    def costs(self, at: Evaluated, covariances: Floats) -> Floats:
         """The costs with other covariance parameters (K, parameters) at the same prediction."""
         if self.hypothesis.lines.curves:  # each of which weighs its rows anew
             points = [self.moved(at.point, covariance) for covariance in covariances]

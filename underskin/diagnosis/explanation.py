@@ -26,6 +26,7 @@ from underskin.surrogate import SigmaTable
 _QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7, 0.9), 3: (0.2, 0.5, 0.8)}
 _KEPT_STARTS = 3
 _DECIDED = 0.999  # probability beyond which a parent's positioning scatter, or none, is its offspring's
+_COUNTS = 8.0  # nats behind the other fit within which one counts
 _POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
 _LEAST_GAIN = 1.0  # in log posterior density
 _LEAST_SCATTER = 3e-3  # relative effect of positioning scatter on a recording below which it is not looked for
@@ -52,8 +53,12 @@ class Explanation:
         return cls(tuple(name for name in CATALOGUE if name in names), total, best, placed, tuple(each))
 
     def integrated(self) -> Self:
-        """With the evidence of each fit over all values of a parameter that the lines leave loose."""
-        return self.of(self.names, [(prior, integrated(found)) for prior, found in self.each])
+        """With the evidence of each fit that counts over all values of what the lines leave loose."""
+        least = max(prior + found.log_evidence for prior, found in self.each) - _COUNTS
+        return self.of(
+            self.names,
+            [(prior, integrated(found) if prior + found.log_evidence > least else found) for prior, found in self.each],
+        )
 
     @property
     def model(self) -> Model:

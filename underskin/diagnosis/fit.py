@@ -72,7 +72,7 @@ class Fitter(Evaluator):
 
     def rescaled(self, begin: Evaluated, covariance: Floats) -> Evaluated:
         """At other covariance parameters, and d33 as they would have it: no further prediction."""
-        at = self._weigh_anew(self.moved(begin.point, covariance), begin)
+        at = self.weighed_anew(self.moved(begin.point, covariance), begin)
         place = [entry.name for entry in self.parameters].index("d33")
         information, gradient = self.posterior_equations(at)
         index = self.places.index(place)
@@ -82,7 +82,7 @@ class Fitter(Evaluator):
             fit[place] + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP), self.low[place], self.high[place]
         )
         prediction = _scaled(at.prediction, fit[place] - at.point.fit[place])
-        return self.settle(self._weigh_anew(replace(at.point, fit=fit), replace(at, prediction=prediction)), 2)
+        return self.settle(self.weighed_anew(replace(at.point, fit=fit), replace(at, prediction=prediction)), 2)
 
     def improve(self, start: Point) -> Evaluated:
         """The most probable point near the start."""
