@@ -90,7 +90,7 @@ def campaign(made: Made, table: SigmaTable) -> Campaign:
         value += (prediction.position_slopes * missed).sum(axis=0)
     if prediction.pickup is not None:
         phase = (random.normal(size=count) + 1j * random.normal(size=count))[model.recording]
-        value = value + prediction.pickup * phase
+        value = value + np.sqrt(prediction.pickup_variance) * phase
     spread, _ = model.sensor_spread_of(fit)
     assert model.sensor is not None
     gain = random.normal(0, made.gain, count) + random.normal(0, spread, made.sensors)[model.sensor]

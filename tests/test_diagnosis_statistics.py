@@ -47,7 +47,7 @@ def real(rows: np.ndarray) -> Floats:
     [
         (Made(sensors=2, lines=4, preloads_n=(0.5, 2.0)), False),
         (Made(sensors=2, lines=4, preloads_n=(0.5, 2.0), offsets_mm=(0.0, 1.3)), True),
-        (Made(("mains_pickup",), (0.05,), sensors=1, lines=5, preloads_n=(0.5, 2.0), highest_hz=50.0), False),
+        (Made(("mains_pickup",), (0.05, 2.0, 1.0), sensors=1, lines=5, preloads_n=(0.5, 2.0), highest_hz=50.0), False),
     ],
 )
 def test_the_likelihood_is_that_of_the_whole_covariance_matrix(made: Made, placed: bool, table: SigmaTable) -> None:
@@ -71,9 +71,7 @@ def test_the_likelihood_is_that_of_the_whole_covariance_matrix(made: Made, place
         for slope in prediction.position_slopes:
             column = real(slope * factor)
             covariance += levels.position**2 * np.outer(column, column) * same
-    if prediction.pickup is not None:
-        for column in (real(prediction.pickup + 0j), real(1j * prediction.pickup)):
-            covariance += np.outer(column, column) * same
+    covariance += np.diag(np.tile(prediction.pickup_variance, 2))
     exact = float(multivariate_normal.logpdf(real(used.value), model, covariance, allow_singular=True))
     # What all hypotheses share is left out: 2π and the lines' own deviations
     shared = -float(len(model) * np.log(2 * np.pi) / 2 + 2 * np.log(used.deviation).sum())

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from underskin.diagnosis.hypothesis import (
-    COVARIANCE_NAMES,
     Hypothesis,
     Point,
     curvature_of_prior,
@@ -36,12 +35,16 @@ class Evaluated:
     """
 
     point: Point
-    predicted_at: Floats
     prediction: Prediction
     moments: Moments
     marginal: Marginal
     cost: float
     growth: Floats | None = None
+
+    @property
+    def pickup_variance(self) -> Floats:
+        """Of real and of imaginary part of each row, at the point's own levels [(C/N)²]."""
+        return replace(self.prediction, pickup=self.marginal.levels.pickup).pickup_variance
 
 
 class Evaluator:
@@ -65,7 +68,7 @@ class Evaluator:
         self._own = [index for index, entry in enumerate(self.parameters) if moves_covariance(entry)]
         self._common = len(self.covariance) - len(self._own)
         names = [entry.name for entry in self.parameters]
-        self._spread, self._pickup = (names.index(name) if name in names else None for name in COVARIANCE_NAMES)
+        self._spread = names.index("spread") if "spread" in names else None
         self.nuisances = len(names) - own_parameters(hypothesis)
         sensors = int(hypothesis.lines.sensor.max()) + 1
         self.no_bend = np.zeros(sensors)
@@ -79,8 +82,8 @@ class Evaluator:
         for _ in range(_BENDINGS):
             ratio = self._smooth(point) / float(np.exp(point.covariance[1]))
             moments = Moments(lines, prediction, point.bend[lines.sensor], hypothesis.curvature, position, ratio)
-            at = self._weigh(point, point.fit, prediction, moments)
-            if self.levels(point, point.fit).spread < _FREE_SPREAD:
+            at = self._weigh(point, prediction, moments)
+            if self.levels(point).spread < _FREE_SPREAD:
                 break
             bend = np.clip(at.marginal.sensor_gains, -_LARGEST_BEND, _LARGEST_BEND)
             if np.abs(bend - point.bend).max() < _BENT:
@@ -88,32 +91,32 @@ class Evaluator:
             point = replace(point, bend=bend)
         return at
 
-    def _weigh(self, point: Point, predicted_at: Floats, prediction: Prediction, moments: Moments) -> Evaluated:
-        lines, levels = self.hypothesis.lines, self.levels(point, predicted_at)
+    def _weigh(self, point: Point, prediction: Prediction, moments: Moments) -> Evaluated:
+        lines, levels = self.hypothesis.lines, self.levels(point)
         if lines.curves and levels.smooth != moments.ratio * levels.level:
             moments = moments.at_ratio(levels.smooth / levels.level)
         marginal = Marginal(lines, moments, levels)
         cost = -marginal.log_likelihood - self._log_prior(point)
-        return Evaluated(point, predicted_at, prediction, moments, marginal, cost)
+        return Evaluated(point, prediction, moments, marginal, cost)
 
-    def levels(self, point: Point, predicted_at: Floats) -> NoiseLevels:
-        """The noise levels at a point, for a prediction made at other coordinates of the covariance."""
+    def levels(self, point: Point) -> NoiseLevels:
+        """The noise levels at a point."""
         gain, level, *_ = np.exp(point.covariance).tolist()
-        own = self._own_levels(point.covariance, predicted_at)
-        position, spread, pickup = (float(value) for value in own)
-        return NoiseLevels(gain, level, position, spread, pickup, self._smooth(point))
+        position, spread, pickup = self._own_levels(point.covariance)
+        return NoiseLevels(gain, level, float(position), float(spread), pickup, self._smooth(point))
 
-    def _own_levels(self, covariance: Floats, predicted_at: Floats) -> tuple[Floats | float, ...]:
-        """p, τ and the pick-up over the prediction's, where covariance parameters (…, parameters) hold them."""
+    def _own_levels(self, covariance: Floats) -> tuple[Floats | float, Floats | float, Floats | None]:
+        """p, τ and the pick-up (…, picked rows) that covariance parameters (…, parameters) hold."""
         position: Floats | float = np.exp(covariance[..., POSITION]) if self.hypothesis.placed else 0.0
         spread: Floats | float = SENSOR_SPREAD
-        pickup: Floats | float = 1.0
+        values = {}
         for place, column in zip(self._own, range(self._common, len(self.covariance)), strict=True):
             if place == self._spread:
                 spread = np.exp(covariance[..., column])
             else:
-                pickup = np.exp(covariance[..., column] - predicted_at[place])
-        return position, spread, pickup
+                values[self.parameters[place].name] = np.exp(covariance[..., [column]])
+        pickup = self.hypothesis.model.pickup
+        return position, spread, None if pickup is None else pickup.deviation(values)
 
     def _smooth(self, point: Point) -> float:
         """η, which follows the two that all recordings have."""
@@ -160,7 +163,7 @@ class Evaluator:
             step *= min(1.0, 0.7 / max(np.abs(step).max(), 1e-12))
             for _ in range(4):
                 point = self.moved(at.point, np.clip(at.point.covariance + step, low, high))
-                tried = self._weigh(point, at.predicted_at, at.prediction, at.moments)
+                tried = self._weigh(point, at.prediction, at.moments)
                 if tried.cost < at.cost:
                     break
                 step = step / 4
@@ -179,9 +182,9 @@ class Evaluator:
     def weighed_anew(self, point: Point, at: Evaluated) -> Evaluated:
         """A point with the prediction of another, whose moments are summed at the point's own scatter."""
         lines, curvature = self.hypothesis.lines, self.hypothesis.curvature
-        position = self.levels(point, at.predicted_at).position
+        position = self.levels(point).position
         moments = Moments(lines, at.prediction, point.bend[lines.sensor], curvature, position)
-        return self._weigh(point, at.predicted_at, at.prediction, moments)
+        return self._weigh(point, at.prediction, moments)
 
     def moved(self, point: Point, covariance: Floats) -> Point:
         """The point with other covariance parameters, a mechanism's own among the coordinates of the fit."""
@@ -208,13 +211,13 @@ class Evaluator:
         """The costs with other covariance parameters (K, parameters) at the same prediction."""
         if self.hypothesis.lines.curves:  # each of which weighs its rows anew
             points = [self.moved(at.point, covariance) for covariance in covariances]
-            return np.array([self._weigh(point, at.predicted_at, at.prediction, at.moments).cost for point in points])
-        columns = np.exp(covariances[:, :2]).T[..., None]
-        own = [
-            value if isinstance(value, float) else value[:, None]
-            for value in self._own_levels(covariances, at.predicted_at)
-        ]
-        likelihoods = LogLikelihoods(self.hypothesis.lines, at.moments, SeveralLevels(*columns, *own)).each
+            return np.array([self._weigh(point, at.prediction, at.moments).cost for point in points])
+        gain, level = np.exp(covariances[:, :2]).T[..., None]
+        position, spread, pickup = self._own_levels(covariances)
+        position, spread = (value if isinstance(value, float) else value[:, None] for value in (position, spread))
+        likelihoods = LogLikelihoods(
+            self.hypothesis.lines, at.moments, SeveralLevels(gain, level, position, spread, pickup)
+        ).each
         prior = np.zeros(len(covariances))
         for entry, column in zip(self.covariance, covariances.T.tolist(), strict=True):
             density = {value: entry.log_density(value) for value in set(column)}

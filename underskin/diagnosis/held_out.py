@@ -142,7 +142,8 @@ def _predict(smaller: Workbench, explanation: Explanation, bench: Workbench, row
     left = bench.lines.part(rows)
     model = compose(explanation.names, bench.lines.campaign, bench.table, bench.kind)
     point, levels = explanation.point, explanation.best.at.marginal.levels
-    prediction = _some(model.predict(point.fit), rows)
+    whole = model.predict(point.fit)
+    prediction, pickup_variance = _some(whole, rows), whole.pickup_variance
     seen = np.isin(left.sensor, smaller.lines.sensor)
     gains = np.zeros(max(int(left.sensor.max()), int(smaller.lines.sensor.max())) + 1)
     found = explanation.best.at.marginal.sensor_gains
@@ -156,8 +157,7 @@ def _predict(smaller: Workbench, explanation: Explanation, bench: Workbench, row
         noise = noise + (levels.smooth * left.smooth.scale) ** 2
     if prediction.position_slopes is not None:
         noise = noise + levels.position**2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
-    if prediction.pickup is not None:
-        noise = noise + 2 * prediction.pickup**2
+    noise = noise + 2 * pickup_variance[rows]
     square = np.abs(left.value - value) ** 2
     first = left.first
     each, expected = np.add.reduceat(square, first), np.add.reduceat(noise, first)
@@ -184,5 +184,4 @@ def _some(whole: Predicted, rows: NDArray[np.bool_]) -> Predicted:
         whole,
         value=whole.value[rows],
         position_slopes=None if whole.position_slopes is None else whole.position_slopes[:, rows],
-        pickup=None if whole.pickup is None else whole.pickup[rows],
     )

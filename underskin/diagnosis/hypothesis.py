@@ -13,9 +13,10 @@ from underskin.mechanisms.catalogue import CATALOGUE
 from underskin.mechanisms.composition import parameters_together
 from underskin.mechanisms.mechanism import Normal, Parameter
 from underskin.mechanisms.model import Model
+from underskin.mechanisms.pickup import PICKUP_NAMES
 from underskin.units import Floats
 
-COVARIANCE_NAMES = ("spread", "pickup_charge")
+COVARIANCE_NAMES = ("spread", *PICKUP_NAMES)
 _LEVELS = (0.1, 100.0)  # bounds of the lines' level
 _CURVE_LEVELS = (0.5, 3.0)  # no cell is more accurate, however smooth; rougher than its neighbours differ is no noise
 _UNDECLARED = 0.2  # sd of the logarithm of a modulus beyond which it is as good as unknown

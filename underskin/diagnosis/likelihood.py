@@ -1,9 +1,10 @@
 """How probable the recordings are under a model, with all of its noise marginalised exactly.
 
-Recording i of sensor s, rows j:  y_ij = m_ij (1 + g_i) e^(b_s) + ∂m_ij·δ_i + pickup_ij z_i + n_ij, with
-    n ~ N(0, κ² d_ij²) in real and imaginary part, g ~ N(0, s²), δ ~ N(0, p² I), z complex normal, b ~ N(0, τ²).
+Recording i of sensor s, rows j:  y_ij = m_ij (1 + g_i) e^(b_s) + ∂m_ij·δ_i + n_ij, with
+    n ~ N(0, κ² d_ij² + q_ij²) in real and imaginary part, g ~ N(0, s²), δ ~ N(0, p² I), b ~ N(0, τ²);
+q is mains pick-up, 0 on most rows.
 The contact's place scales a recording by a real factor, so m and ∂m are one direction u in each recording; where m
-vanishes, u is that of ∂m. C_i = κ² D + q² (c cᵀ + (ic)(ic)ᵀ) + V_i u uᵀ, V_i = s² a² + p² |t|² + ½ p⁴ tr(H²) a², with
+vanishes, u is that of ∂m. C_i = κ² D + Q + V_i u uᵀ, V_i = s² a² + p² |t|² + ½ p⁴ tr(H²) a², with
 m = a u and ∂m = t u; sensors add τ² m mᵀ over their recordings. All of it is taken out by Sherman and Morrison's
 identity, so that time is linear in rows and recordings. The covariance follows the model, so log|C| stays.
 
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.lines import Lines
+from underskin.diagnosis.picked import PickedRows
 from underskin.mechanisms.differentiated import Array
 from underskin.mechanisms.model import Prediction
 from underskin.units import Floats
@@ -38,25 +40,25 @@ class Curvature:
 
 @dataclass(frozen=True)
 class NoiseLevels:
-    """`gain` s, `level` κ, `position` p [m] (0: none), `spread` τ, the pick-up over the prediction's, `smooth` η."""
+    """`gain` s, `level` κ, `position` p [m] (0: none), `spread` τ, `pickup` q on the rows it reaches, `smooth` η."""
 
     gain: float
     level: float
     position: float
     spread: float
-    pickup: float = 1.0
+    pickup: Floats | None = None
     smooth: float = 0.0  # of curves
 
 
 @dataclass(frozen=True)
 class SeveralLevels:
-    """K sets of noise levels; each a column (K, 1), or a number that all share."""
+    """K sets of noise levels; each a column (K, 1), or a number that all share; of pick-up (K, picked rows)."""
 
     gain: Floats
     level: Floats
     position: Floats | float
     spread: Floats | float
-    pickup: Floats | float
+    pickup: Floats | None
 
 
 class Moments:
@@ -95,23 +97,43 @@ class Moments:
         self._residual = residual
         self.second_order = curvature.square
         self._sum_up()
-        self.picked = prediction.pickup is not None
-        self.cu: Array | None = None
-        self.cr: Array | None = None
-        if prediction.pickup is not None:
-            self._pickup = prediction.pickup / lines.deviation
-            self.cc = self._sum(self._pickup, self._pickup)
-            self.cu = self._with_pickup(direction)
-            self.cr = self._with_pickup(residual)
+        self.picked = None if prediction.picked is None else PickedRows(lines, prediction.picked)
 
-    def at_position(self, position: float | Floats) -> tuple[Array, Array, Array, Array | None]:
-        """a, uᵀr, rᵀr and (c + i·ic)ᵀr with the second-order mean at another p than these were summed at."""
+    def summed(self, levels: NoiseLevels | SeveralLevels) -> tuple[Array, Array, Array, Floats | float]:
+        """uᵀu, uᵀr and rᵀr less what rows lose to pick-up, and what that adds to the log of the determinant."""
+        if self.picked is None or levels.pickup is None:
+            return self.uu, self.ur, self.rr, 0.0
+        lost = self.picked.lost(levels.pickup, levels.level)
+        u, r = self._direction_rows[self.picked.rows], self._residual[self.picked.rows]
+        uu, ur, rr = (
+            whole - self.picked.over_recordings(lost * (a.conj() * b).real)
+            for whole, a, b in ((self.uu, u, u), (self.ur, u, r), (self.rr, r, r))
+        )
+        return uu, ur, rr, -2 * np.log1p(-lost).sum(axis=-1, keepdims=True)
+
+    def without(self, levels: NoiseLevels) -> "Moments":
+        """With all sums less what rows lose to pick-up."""
+        if self.picked is None or levels.pickup is None:
+            return self
+        other = copy(self)
+        other.uu, other.ur, other.rr, _ = self.summed(levels)
+        jj, uj, jr = self.slopes
+        lost, rows = self.picked.lost(levels.pickup, levels.level), self.picked.rows
+        slopes, over = self._slope_rows[:, rows], self.picked.over_recordings
+        real = np.concatenate([slopes.real, slopes.imag], axis=1)
+        jj = jj - (real * np.tile(lost, 2)) @ real.T
+        uj = uj - over(lost * (self._direction_rows[rows].conj() * slopes).real).T
+        jr = jr - over(lost * (self._residual[rows].conj() * slopes).real).T
+        other.__dict__["slopes"] = jj, uj, jr
+        return other
+
+    def at_position(self, position: float | Floats, uu: Array, ur: Array, rr: Array) -> tuple[Array, Array, Array]:
+        """a, uᵀr, rᵀr with the second-order mean at another p than these were summed at."""
         if np.all(position == self.position):
-            return self.along, self.ur, self.rr, self.cr
+            return self.along, ur, rr
         factor = np.exp(0.5 * (position**2 - self.position**2) * self._laplacian)
         less = (factor - 1) * (1 - self._bend) * self.along
-        cr = None if self.cr is None or self.cu is None else self.cr - less * self.cu
-        return self.along * factor, self.ur - less * self.uu, self.rr - 2 * less * self.ur + less**2 * self.uu, cr
+        return self.along * factor, ur - less * uu, rr - 2 * less * ur + less**2 * uu
 
     @property
     def log_slopes(self) -> Floats:
@@ -160,18 +182,13 @@ class Moments:
         products = (a.conj() * b).real
         return products if len(self._first) == len(products) else np.add.reduceat(products, self._first)
 
-    def _with_pickup(self, rows: Array) -> Array:
-        """c·x + i (ic)·x, as one complex number a recording."""
-        products = self._pickup * rows
-        return products if len(self._first) == len(products) else np.add.reduceat(products, self._first)
-
     @cached_property
     def _slope_rows(self) -> Array:
         return self._weighed(self._slopes * self._factor)
 
     @cached_property
-    def slopes(self) -> tuple[Floats, Floats, Floats, NDArray[np.complex128] | None]:
-        """Of the model's derivatives J: JᵀJ (P, P); for each recording uᵀJ, Jᵀr, (c + i·ic)ᵀJ (recordings, P)."""
+    def slopes(self) -> tuple[Floats, Floats, Floats]:
+        """Of the model's derivatives J: JᵀJ (P, P); for each recording uᵀJ and Jᵀr (recordings, P)."""
         rows = self._slope_rows
         real = np.concatenate([rows.real, rows.imag], axis=1)
 
@@ -182,7 +199,7 @@ class Moments:
 
         uj = summed((self._direction_rows.conj() * rows).real)
         jr = summed((self._residual.conj() * rows).real)
-        return real @ real.T, uj, jr, summed(self._pickup * rows) if self.picked else None
+        return real @ real.T, uj, jr
 
 
 class LogLikelihoods:
@@ -191,19 +208,11 @@ class LogLikelihoods:
     def __init__(self, lines: Lines, moments: Moments, levels: NoiseLevels | SeveralLevels) -> None:
         """Take out pick-up, gain and position, recording by recording, then the sensors."""
         self._k2 = k2 = levels.level**2
-        along, ur, rr, cr = moments.at_position(levels.position)
+        uu, ur, rr, picked = moments.summed(levels)
+        along, ur, rr = moments.at_position(levels.position, uu, ur, rr)
         self._along = along
-        uu, ur, rr = moments.uu / k2, ur / k2, rr / k2
-        log_determinant: Any = moments.log_determinant
-        self._cr = cr
-        if moments.cu is not None and cr is not None:
-            q2 = levels.pickup**2
-            inner = 1 + q2 * moments.cc / k2
-            self._phi = q2 / inner / k2**2
-            uu = uu - self._phi * np.abs(moments.cu) ** 2
-            ur = ur - self._phi * (moments.cu.conj() * cr).real
-            rr = rr - self._phi * np.abs(cr) ** 2
-            log_determinant = log_determinant + 2 * _over_recordings(np.log(inner))
+        uu, ur, rr = uu / k2, ur / k2, rr / k2
+        log_determinant: Any = moments.log_determinant + picked
         self._uu, self._ur = uu, ur
         a2 = along**2
         variance = levels.gain**2 * a2
@@ -232,8 +241,14 @@ class Marginal(LogLikelihoods):
     def __init__(self, lines: Lines, moments: Moments, levels: NoiseLevels) -> None:
         """Take out the noise."""
         super().__init__(lines, moments, levels)
-        self._lines, self._moments, self.levels = lines, moments, levels
+        self._lines, self.levels = lines, levels
+        self._all = moments
         self.log_likelihood = float(self.each)
+
+    @cached_property
+    def moments(self) -> Moments:
+        """The inner products, less what rows lose to pick-up."""
+        return self._all.without(self.levels)
 
     @property
     def sensor_gains(self) -> Array:
@@ -247,14 +262,9 @@ class Marginal(LogLikelihoods):
         dC = V_i (J mᵀ + m Jᵀ) + dV_i m mᵀ. dV_i, from how the position's slopes t change, is told by their `growth`
         ∂ log |t|²/∂θ (recordings, P); without it they are taken to change as m does, or where they lead, not at all.
         """
-        moments, k2 = self._moments, self._k2
-        jj, uj, jr, cj = moments.slopes
+        moments, k2 = self.moments, self._k2
+        jj, uj, jr = moments.slopes
         jj, uj, jr = jj / k2, uj / k2, jr / k2
-        if cj is not None and moments.cu is not None and self._cr is not None:
-            phi = self._phi[:, None]
-            jj = jj - ((phi * cj).conj().T @ cj).real
-            uj = uj - phi * (moments.cu[:, None].conj() * cj).real
-            jr = jr - phi * (self._cr[:, None].conj() * cj).real
         information = jj - uj.T @ (self._shrink[:, None] * uj)
         jr = jr - uj * (self._shrink * self._ur)[:, None]
         mj = uj * (self._along * self._reduced)[:, None]

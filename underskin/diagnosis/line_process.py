@@ -32,7 +32,10 @@ def over_lines(bench: Workbench, explanation: Explanation) -> dict[str, float]:
     lines = bench.lines
     if np.bincount(lines.recording).max() < _LEAST_LINES:
         return {}
-    relative, weight = line_residuals(lines, whole_prediction(bench, explanation))
+    at, further = explanation.best.at, 0.0 * lines.deviation
+    if at.prediction.picked is not None:
+        further = at.pickup_variance / at.marginal.levels.level**2
+    relative, weight = line_residuals(lines, whole_prediction(bench, explanation), further)
     noise = _LineNoise(
         float((weight * np.abs(relative) ** 2).sum()),
         2 * len(relative) + lines.scatter[1] - lines.recordings,

@@ -108,8 +108,7 @@ class Thinned:
             variance += (levels.smooth * self.lines.smooth.scale) ** 2
         if prediction.position_slopes is not None:
             variance += levels.position**2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
-        if prediction.pickup is not None:
-            variance += prediction.pickup**2
+        variance += explanation.best.at.pickup_variance
         return variance if len(variance) == len(self.lines.value) else variance[self.lines.recording]
 
     def _mean(self, column: Floats) -> Floats:

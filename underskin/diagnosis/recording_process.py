@@ -94,8 +94,8 @@ class GainResidual:
 
     def __init__(self, bench: Workbench, explanation: Explanation) -> None:
         at, parameters = explanation.best.at, explanation.best.fitter.parameters
-        self._moments = moments = at.moments
-        _, uj, _, _ = moments.slopes
+        self._moments = moments = at.marginal.moments
+        _, uj, _ = moments.slopes
         size = moments.along * moments.uu
         self._least = _FAINT * np.abs(size).max()
         slopes = uj / self._not_faint(size)[:, None]
@@ -115,7 +115,7 @@ class GainResidual:
         """No scatter of position and each of these [m], with each of gain; relative to the model's mean under it."""
         moments, found = self._moments, []
         for position, share in _shares(positions).items():
-            along, ur, _, _ = moments.at_position(position)
+            along, ur, _ = moments.at_position(position, moments.uu, moments.ur, moments.rr)
             size = self._not_faint(along * moments.uu)
             placed = position**2 * (self._moving**2).sum(axis=0) + 0.5 * position**4 * moments.second_order
             for gain in _GAINS:

@@ -31,10 +31,13 @@ def whole_prediction(bench: Workbench, explanation: Explanation) -> Array:
     return value if len(value) == len(bench.lines.value) else value[bench.lines.recording]
 
 
-def line_residuals(lines: Lines, prediction: Array) -> tuple[Array, Floats]:
-    """Each line over its recording's own best real multiple of the model, less 1, and its weight 1/variance."""
+def line_residuals(lines: Lines, prediction: Array, further: Floats | float = 0.0) -> tuple[Array, Floats]:
+    """Each line over its recording's own best real multiple of the model, less 1, and its weight 1/variance.
+
+    `further` is a variance (rows,) beside the lines' own, as theirs before the noise's level.
+    """
     first = lines.first
-    precision = lines.deviation**-2
+    precision = 1 / (lines.deviation**2 + further)
     along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, first)
     size = np.add.reduceat(precision * np.abs(prediction) ** 2, first)
     fitted = prediction * (along / size)[lines.recording]

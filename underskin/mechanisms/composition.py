@@ -24,11 +24,19 @@ class Prediction:
     value: Array  # (rows,) complex FRF [C/N], or force [N]
     slopes: Array  # (parameters, rows)
     position_slopes: Array | None  # (2, rows) ∂value/∂x, ∂value/∂y of the contact's place [1/m] (frf)
-    pickup: Floats | None  # (rows,) sd of mains pick-up along a recording's common random complex amplitude [C/N]
-    pickup_slopes: Floats | None  # (parameters, rows)
+    pickup: Floats | None  # sd of mains pick-up [C/N], of real and of imaginary part, on the rows that it reaches
+    picked: NDArray[np.intp] | None  # those rows
     # (rows,) False where the contact lies beyond the tables, which are continued there, or the sensor's disc beyond the
     # stress profile, behind whose end the value is 0
     inside: NDArray[np.bool_]
+
+    @property
+    def pickup_variance(self) -> Floats:
+        """Of real and of imaginary part (rows,) [(C/N)²]."""
+        found = np.zeros(len(self.value))
+        if self.pickup is not None and self.picked is not None:
+            found[self.picked] = self.pickup**2
+        return found
 
 
 class Composition:

@@ -16,6 +16,7 @@ from underskin.mechanisms.differentiated import Differentiated, constant
 from underskin.mechanisms.indentation_model import declared_modulus, times_of
 from underskin.mechanisms.mechanism import Mechanism, Parameter, Values
 from underskin.mechanisms.nuisances import contact_point, modulus_parameter
+from underskin.mechanisms.pickup import Pickup
 from underskin.mechanisms.relaxation import relaxed
 from underskin.recordings import elastomer
 from underskin.recordings.campaign import Campaign, CompressionRecording
@@ -41,6 +42,7 @@ class CompressionModel:
         self._ids = [entry.id for entry in recordings]
         self.recording = np.repeat(np.arange(len(recordings)), [len(entry.force_n) for entry in recordings])
         self.valid = np.ones(len(self.recording), dtype=bool)
+        self.pickup: Pickup | None = None
         self._first = np.diff(self.recording, prepend=-1) > 0
         heights = to_si("sample_height_mm", [entry.sample_height_mm for entry in recordings])
         diameters = to_si("sample_diameter_mm", [entry.sample_diameter_mm for entry in recordings])

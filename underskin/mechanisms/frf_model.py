@@ -23,6 +23,7 @@ from underskin.mechanisms.frf_design import FrfDesign, Indices, largest_offset
 from underskin.mechanisms.mechanism import Mechanism, Values
 from underskin.mechanisms.nuisances import FRF_NUISANCES
 from underskin.mechanisms.offset_sigma import PROFILE_END, offset_sigma
+from underskin.mechanisms.pickup import Pickup
 from underskin.mechanisms.pressed import press, stiffness
 from underskin.mechanisms.sigma_curves import layer_of, sigma_curves
 from underskin.recordings.campaign import Campaign
@@ -58,8 +59,8 @@ class FrfModel:
         self._sigma = offset_sigma(table, self._sensor_radius / self._thickness, stretch, reached)
         self._needs_stiffness = any(mechanism.needs_stiffness for mechanism in mechanisms)
         self._last_layer: tuple[Layer, ContactCurves] | None = None
-        shapes = [(mechanism, mechanism.pickup_shape(campaign, design)) for mechanism in mechanisms]
-        self._pickup_shapes = [(mechanism, shape) for mechanism, shape in shapes if shape is not None]
+        pickups = [mechanism.pickup(campaign, design) for mechanism in self._mechanisms]
+        self.pickup: Pickup | None = next((pickup for pickup in pickups if pickup is not None), None)
         self._force, self._increments = _force_nodes(self._mechanisms, design)
         self.valid = self._declared_inside(table)[design.point][design.recording]
 
@@ -75,14 +76,13 @@ class FrfModel:
             None if lines is None else lines.spread(len(self.design.line_frequency)),
             self.design,
         )
-        pickup = self._pickup(own)
         count = len(self.parameters)
         return Prediction(
             value=value,
             slopes=slopes[:count],
             position_slopes=slopes[count:],
-            pickup=None if pickup is None else pickup.value,
-            pickup_slopes=None if pickup is None else pickup.slopes[:count],
+            pickup=None if self.pickup is None else self.pickup.deviation(_by_name(own)),
+            picked=None if self.pickup is None else self.pickup.rows,
             inside=inside[self.design.point][self.recording],
         )
 
@@ -190,11 +190,6 @@ class FrfModel:
                 product = factor if product is None else product * factor
         return product
 
-    def _pickup(self, own: dict[str, Values]) -> Differentiated | None:
-        for mechanism, shape in self._pickup_shapes:
-            return shape * mechanism.pickup_charge(own[mechanism.name])
-        return None
-
     def _declared_inside(self, table: SigmaTable) -> NDArray[np.bool_]:
         """Which points lie inside the table as declared."""
         none = np.zeros((0, 1))
@@ -238,6 +233,11 @@ def _on_rows(level: Differentiated, lines: Differentiated | None, design: FrfDes
         if of_lines.any():
             row += on_rows * of_lines[design.line]
     return on_rows * factor, slopes
+
+
+def _by_name(own: dict[str, Values]) -> dict[str, Floats]:
+    """The mechanisms' parameters (1,), whosever they are."""
+    return {name: value.value for values in own.values() for name, value in values.items()}
 
 
 def _required(name: str, value: float | None) -> float:

@@ -21,6 +21,7 @@ from underskin.mechanisms.giving_stage import relaxing_on_stage
 from underskin.mechanisms.indentation_law import Sphere, in_contact
 from underskin.mechanisms.mechanism import Mechanism, Parameter, Values
 from underskin.mechanisms.nuisances import THICKNESS, contact_point, force_offset, modulus_parameter
+from underskin.mechanisms.pickup import Pickup
 from underskin.mechanisms.receding_contact import Presses, relaxing
 from underskin.recordings import elastomer
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
@@ -44,6 +45,7 @@ class IndentationModel:
         lengths = [len(entry.force_n) for entry in recordings]
         self.recording = np.repeat(np.arange(len(recordings)), lengths)
         self.valid = np.ones(len(self.recording), dtype=bool)
+        self.pickup: Pickup | None = None
         self._first = np.diff(self.recording, prepend=-1) > 0
         self._radius = to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in recordings])
         self._displacement = to_si("displacement_mm", np.concatenate([entry.displacement_mm for entry in recordings]))

@@ -1,31 +1,34 @@
 """The mains put charge on the sensors' leads, so lines at the mains' frequency and its multiples are off, the more the
 weaker the dynamic force.
 
-Law: a charge q at the mains' frequency and q/n at its n-th harmonic, each a line of width 1.5 Hz (the analysis
-window's), whatever the dynamic force: an FRF error of q/Fd, complex, its phase independent in each recording. It enters
-the covariance as pickup · pickupᵀ within a recording.
+Law: a charge q at the mains' frequency and a share of q/n at its n-th harmonic, each a line of some width, whatever the
+dynamic force: an FRF error of q/Fd, complex, its phase independent in each recording and on each line. It adds its
+square to the lines' variance.
 
 Assumptions: q is the standard deviation of each component over recordings; 50 or 60 Hz, whichever stands out in the
-campaign's lines; harmonics up to the fifth.
+campaign's lines; harmonics up to the fifth, all with the same share; lines are bells exp(−½ (f/width)²). How phases of
+neighbouring lines hang together, and the lines' shape in detail, depend on the analyser's window and on how the mains
+drift: neither is relied on.
 
 Source: Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling to leads).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.mechanisms.differentiated import Differentiated
 from underskin.mechanisms.frf_design import FrfDesign, frf_recordings
-from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.mechanism import Kind, Mechanism, Normal, Parameter
+from underskin.mechanisms.pickup import Pickup
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.frf_estimation import Frf, lines_of
 from underskin.units import Floats
 
 _MAINS_HZ = (50.0, 60.0)
 _HARMONICS = np.arange(1, 6)
-_WIDTH_HZ = 1.5
+_WIDTH_HZ = 1.5  # where it is asked which mains stand out
+_FURTHEST_HZ = 20.0  # beyond which no line reaches, and short of half way from one harmonic to the next
 _REACH_HZ = 3.0
 _REACHED = 0.05  # of the shape
 _LEAST_LINES = 3
@@ -41,7 +44,7 @@ class MainsPickup(Mechanism):
     needs = "a line within 3 Hz of 50 or 60 Hz"
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The charge."""
+        """The charge, and what its lines look like."""
         return (
             Parameter(
                 name="pickup_charge",
@@ -53,6 +56,26 @@ class MainsPickup(Mechanism):
                 limit=0.0,
                 reason="unshielded leads of some pF to mains at 230 V collect hundredths to tenths of a pC",
             ),
+            Parameter(
+                name="pickup_width",
+                unit="Hz",
+                low=0.2,
+                high=6.0,
+                prior=Normal(0.4, 0.6),
+                scale="log",
+                limit=None,
+                reason="the analyser's window and the mains' drift make lines a few Hz wide",
+            ),
+            Parameter(
+                name="pickup_harmonics",
+                unit="-",
+                low=1e-3,
+                high=10.0,
+                prior=Normal(0.0, 1.5),
+                scale="log",
+                limit=None,
+                reason="the n-th harmonic has about 1/n of the charge; a sine has none, rectifiers have more",
+            ),
         )
 
     def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
@@ -63,15 +86,21 @@ class MainsPickup(Mechanism):
                 return None
         return "no line lies within 3 Hz of 50 or 60 Hz (frequency_hz)"
 
-    def pickup_shape(self, campaign: Campaign, design: FrfDesign) -> Floats:
-        """The lines' shape over Fd [1/N]."""
+    def pickup(self, campaign: Campaign, design: FrfDesign) -> Pickup:
+        """Of the lines within the reach of the mains that stand out."""
         lines = [lines_of(entry) for entry in frf_recordings(campaign)]
         mains = max(_MAINS_HZ, key=lambda mains: _excess(lines, mains))
-        return _shape(design.row_frequency, mains) / design.row_dynamic_force
+        away = design.row_frequency[:, None] - mains * _HARMONICS
+        rows = np.flatnonzero((np.abs(away) < _FURTHEST_HZ).any(axis=1))
+        square, force = away[rows] ** 2, design.row_dynamic_force[rows]
 
-    def pickup_charge(self, values: Values) -> Differentiated:
-        """q [C]."""
-        return 1e-12 * values["pickup_charge"]
+        def deviation(values: Mapping[str, Floats]) -> Floats:
+            lines = np.exp(-0.5 * square / values["pickup_width"][..., None] ** 2)
+            strength = np.where(_HARMONICS == 1, 1.0, values["pickup_harmonics"][..., None] / _HARMONICS)
+            charge = 1e-12 * values["pickup_charge"] * np.sqrt(((strength * lines) ** 2).sum(axis=-1))
+            return np.asarray(charge / force)
+
+        return Pickup(rows, deviation)
 
 
 def _excess(recordings: Sequence[Frf], mains: float) -> float:

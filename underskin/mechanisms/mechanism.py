@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from underskin.mechanisms.contact_state import Contacts
     from underskin.mechanisms.curve_state import Curve
     from underskin.mechanisms.frf_design import FrfDesign
+    from underskin.mechanisms.pickup import Pickup
 
 Kind = Literal["frf", "indentation", "compression"]
 UNITS = ("-", "mm", "MPa", "1/MPa", "GPa", "N/mm", "N", "g", "J/m²", "Hz", "s", "µs", "pC", "pC/N", "cycles")
@@ -219,13 +220,9 @@ class Mechanism:
         """The complex factor on each distinct line (contact and frequency)."""
         return None
 
-    def pickup_shape(self, campaign: Campaign, design: FrfDesign) -> Floats | None:
-        """The pick-up on each row [1/N] for a charge of 1."""
+    def pickup(self, campaign: Campaign, design: FrfDesign) -> Pickup | None:
+        """Charge from elsewhere that is random on each row, and on which rows."""
         return None
-
-    def pickup_charge(self, values: Values) -> Differentiated:
-        """The standard deviation of that charge [C]."""
-        raise NotImplementedError
 
     def on_curve(self, curve: Curve, values: Values) -> None:
         """Change what governs an indentation or compression."""

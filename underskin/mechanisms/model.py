@@ -15,6 +15,7 @@ from underskin.mechanisms.compression_model import CompressionModel
 from underskin.mechanisms.frf_model import FrfModel
 from underskin.mechanisms.indentation_model import IndentationModel
 from underskin.mechanisms.mechanism import Kind, Parameter
+from underskin.mechanisms.pickup import Pickup
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate import SigmaTable
 from underskin.units import Floats
@@ -34,6 +35,7 @@ class Model(Protocol):
     recording: NDArray[np.intp]
     sensor: NDArray[np.intp] | None
     valid: NDArray[np.bool_]
+    pickup: Pickup | None
 
     def predict(self, fit: Floats) -> Prediction:
         """All rows at one point of the fit coordinates (parameters,)."""
