@@ -17,7 +17,8 @@ import numpy as np
 from underskin.diagnosis.explanation import Workbench
 from underskin.diagnosis.fit import Fitter
 from underskin.diagnosis.hypothesis import COVARIANCE_NAMES
-from underskin.diagnosis.likelihood import Marginal, Moments, NoiseLevels
+from underskin.diagnosis.likelihood import Marginal, Moments
+from underskin.diagnosis.noise_levels import NoiseLevels
 from underskin.diagnosis.search import Answer
 from underskin.diagnosis.smooth_error import TYPICAL
 from underskin.mechanisms.catalogue import CATALOGUE

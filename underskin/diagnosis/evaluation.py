@@ -15,7 +15,8 @@ from underskin.diagnosis.hypothesis import (
     moves_covariance,
     own_parameters,
 )
-from underskin.diagnosis.likelihood import LogLikelihoods, Marginal, Moments, NoiseLevels, SeveralLevels
+from underskin.diagnosis.likelihood import LogLikelihoods, Marginal, Moments
+from underskin.diagnosis.noise_levels import NoiseLevels, SeveralLevels
 from underskin.mechanisms.composition import SENSOR_SPREAD
 from underskin.mechanisms.model import Prediction
 from underskin.units import Floats

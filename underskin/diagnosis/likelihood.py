@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.lines import Lines
+from underskin.diagnosis.noise_levels import NoiseLevels, SeveralLevels
 from underskin.diagnosis.picked import PickedRows
 from underskin.mechanisms.differentiated import Array
 from underskin.mechanisms.model import Prediction
@@ -36,29 +37,6 @@ class Curvature:
 
     laplacian: Floats
     square: Floats
-
-
-@dataclass(frozen=True)
-class NoiseLevels:
-    """`gain` s, `level` κ, `position` p [m] (0: none), `spread` τ, `pickup` q on the rows it reaches, `smooth` η."""
-
-    gain: float
-    level: float
-    position: float
-    spread: float
-    pickup: Floats | None = None
-    smooth: float = 0.0  # of curves
-
-
-@dataclass(frozen=True)
-class SeveralLevels:
-    """K sets of noise levels; each a column (K, 1), or a number that all share; of pick-up (K, picked rows)."""
-
-    gain: Floats
-    level: Floats
-    position: Floats | float
-    spread: Floats | float
-    pickup: Floats | None
 
 
 class Moments:
