@@ -40,7 +40,7 @@ SHOWN: dict[str, dict[str, float]] = {
     "sensor_relaxation": {"exponent": 0.03, "step": 0.1, "step_frequency": 20.0},
     "amplifier_high_pass": {"corner": 1.0},
     "timing_delay": {"delay": 300.0},
-    "mains_pickup": {"pickup_charge": 0.05},
+    "mains_pickup": {"pickup_charge": 0.05, "pickup_width": 1.5, "pickup_harmonics": 1.0},
     "instrument_compliance": {"stage_stiffness": 20.0},
     "platen_friction": {"friction": 0.5},
 }
@@ -190,9 +190,8 @@ def _pickup(name: str, table: SigmaTable) -> Panel:
         line = _recording(0, dynamic_force_n=force, frequency_hz=frequency, frf_re_pc_per_n=np.ones(600))
         campaign = Campaign("signature", _SKIN, (replace(line, frf_im_pc_per_n=np.zeros(600)),))
         model = compose([name], campaign, table)
-        pickup = model.predict(_fit(name, model)).pickup
-        assert pickup is not None
-        curves[f"Fd = {force:g} N"] = frequency, 1e12 * pickup
+        variance = model.predict(_fit(name, model)).pickup_variance
+        curves[f"Fd = {force:g} N"] = frequency, 1e12 * np.sqrt(variance)
     return Panel("frequency, Hz", "sd of pick-up, pC/N", curves)
 
 

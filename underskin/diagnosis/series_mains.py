@@ -26,7 +26,7 @@ _SPREAD = 3.0  # lines to each side that the window of neighbouring lines spread
 @dataclass(frozen=True)
 class Pickup:
     """The `mains` [Hz], the largest `charge` that they put on one of their multiples (peak) [C], and the lines that
-    they spoil (lines,)."""
+    they may spoil (lines,): near any multiple."""
 
     mains: float
     charge: float
@@ -59,6 +59,7 @@ def _of_mains(measured: Frf, mains: float, signs: list[tuple[Floats, Floats]]) -
     highest, power, spoilt = 0.0, 0.0, np.zeros(len(measured.frequency), dtype=bool)
     for multiple in mains * np.arange(1, _HARMONICS + 1):
         away = np.abs(measured.frequency - multiple) / spacing
+        spoilt |= away <= spread
         near, around = away <= reach, (away > _BETWEEN) & (away <= _AROUND)
         if not near.any() or not around.any() or (_BETWEEN * spacing >= np.ptp(_MAINS_HZ) and away.min() > 0.01):
             continue
@@ -66,7 +67,6 @@ def _of_mains(measured: Frf, mains: float, signs: list[tuple[Floats, Floats]]) -
         outstanding = max(_beyond(sign, near, around) for sign, _ in signs) / of_force
         if outstanding >= _STANDS_OUT:
             power = max([power, *(float(one[near].max()) for _, one in signs)])
-            spoilt |= away <= spread
         highest = max(highest, outstanding)
     return highest, Pickup(mains, float(np.sqrt(power)), spoilt)
 
