@@ -42,6 +42,7 @@ class MainsPickup(Mechanism):
     name = "mains_pickup"
     axes = ("frequency_hz", "dynamic_force_n")
     needs = "a line within 3 Hz of 50 or 60 Hz"
+    _last: tuple[Campaign, float] | None = None
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The charge, and what its lines look like."""
@@ -87,20 +88,25 @@ class MainsPickup(Mechanism):
         return "no line lies within 3 Hz of 50 or 60 Hz (frequency_hz)"
 
     def pickup(self, campaign: Campaign, design: FrfDesign) -> Pickup:
-        """Of the lines within the reach of the mains that stand out."""
-        lines = [lines_of(entry) for entry in frf_recordings(campaign)]
-        mains = max(_MAINS_HZ, key=lambda mains: _excess(lines, mains))
-        away = design.row_frequency[:, None] - mains * _HARMONICS
-        rows = np.flatnonzero((np.abs(away) < _FURTHEST_HZ).any(axis=1))
-        square, force = away[rows] ** 2, design.row_dynamic_force[rows]
+        """Of the lines within the reach of the mains that stand out, each by the nearest multiple."""
+        away = np.abs(design.row_frequency[:, None] - self._outstanding(campaign) * _HARMONICS)
+        rows = np.flatnonzero(away.min(axis=1) < _FURTHEST_HZ)
+        harmonic = _HARMONICS[away[rows].argmin(axis=1)]
+        half_square, force = 0.5 * away[rows].min(axis=1) ** 2, design.row_dynamic_force[rows]
 
         def deviation(values: Mapping[str, Floats]) -> Floats:
-            lines = np.exp(-0.5 * square / values["pickup_width"][..., None] ** 2)
-            strength = np.where(_HARMONICS == 1, 1.0, values["pickup_harmonics"][..., None] / _HARMONICS)
-            charge = 1e-12 * values["pickup_charge"] * np.sqrt(((strength * lines) ** 2).sum(axis=-1))
-            return np.asarray(charge / force)
+            line = np.exp(-half_square / values["pickup_width"] ** 2)
+            share = np.where(harmonic == 1, 1.0, values["pickup_harmonics"] / harmonic)
+            return np.asarray(1e-12 * values["pickup_charge"] * share * line / force)
 
         return Pickup(rows, deviation)
+
+    def _outstanding(self, campaign: Campaign) -> float:
+        """The mains' frequency; that of the last campaign is kept."""
+        if self._last is None or self._last[0] is not campaign:
+            lines = [lines_of(entry) for entry in frf_recordings(campaign)]
+            self._last = campaign, max(_MAINS_HZ, key=lambda mains: _excess(lines, mains))
+        return self._last[1]
 
 
 def _excess(recordings: Sequence[Frf], mains: float) -> float:
