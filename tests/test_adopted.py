@@ -159,6 +159,14 @@ def test_what_cannot_serve_is_refused(changes: dict[str, Any]) -> None:
         adopted(report({}, **changes), frf_campaign())
 
 
+def test_a_pick_up_with_the_parameters_of_an_older_report_serves() -> None:
+    """None of them moves a prediction."""
+    older = {"name": "mains_pickup", "parameters": [{"name": "pickup_charge", "value": 0.05}]}
+    delay = {"name": "timing_delay", "parameters": [{"name": "delay", "value": 200.0}]}
+    model = adopted(report({}, mechanisms=[older, delay]), frf_campaign())
+    assert model.of_lines == [mechanism.name for mechanism in model.mechanisms] == ["timing_delay"]
+
+
 def test_curves_make_no_model_of_charge() -> None:
     with pytest.raises(InvalidInput, match="kind frf"):
         adopted(report({}), indentation_campaign())

@@ -35,7 +35,7 @@ NOT_ADOPTED = {
     "plans (next_experiment), send it together with these recordings, and diagnose that",
 }  # by verdict: why it is refused, and what to do
 _SAME = 1e-9  # relative
-# These widen what is expected of recordings, and move no prediction.
+# These widen what is expected of recordings, and move no prediction; parameters of older reports may be others.
 _WIDENING = frozenset({"sensor_spread", "mains_pickup"})
 _REPORTED_SDS = 2 * float(ndtri(0.975))  # width of a report's interval
 
@@ -162,7 +162,8 @@ def adopted(report: Mapping[str, Any], campaign: Campaign) -> AdoptedModel:
     frf = [mechanism for name, mechanism in CATALOGUE.items() if name in parameters and "frf" in mechanism.kinds]
     known = parameters_together(frf, campaign, "frf")
     for name, values in parameters.items():
-        if name not in known or set(values) != {entry.name for entry in known[name]}:
+        as_known = name in known and (name in _WIDENING or set(values) == {entry.name for entry in known[name]})
+        if not as_known:
             allowed = "must be of mechanisms that this version knows, with the parameters that it knows"
             raise InvalidInput("diagnosis_id", name, allowed)
     d33 = report["d33"]
