@@ -11,7 +11,9 @@ from scipy.signal import lfilter
 from tests.series_campaigns import codes, recorded
 from underskin.diagnosis.diagnose import diagnosis_report
 from underskin.diagnosis.findings import inspect
+from underskin.diagnosis.series_lines import telling
 from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.frf_estimation import Frf
 from underskin.surrogate import SigmaTable, load_table
 
 
@@ -175,3 +177,18 @@ def test_of_a_single_sweep_a_high_pass_is_still_found(quiet: Campaign, table: Si
     )
     assert report["mechanisms"][0]["parameters"][0]["value"] == pytest.approx(1.0, rel=0.03)
     assert "force_acts_once" in {entry["code"] for entry in report["findings"]}
+
+
+def test_mains_that_spoil_every_line_are_said() -> None:
+    """Lines 10 Hz apart: three to each side of every multiple are all that the force has."""
+    frequency = 10.0 * np.arange(1.0, 28.0)
+    force = np.where(frequency > 10, 1.0, 1e-6)
+    at_mains = frequency == 50
+    charge = np.where(at_mains, 2.0, 1.0) * force
+    coherence = np.where(at_mains, 0.5, np.where(frequency > 10, 0.9999, 0.1))
+    averages = np.full(len(frequency), 14.0)
+    measured = Frf(frequency, np.ones(27, complex), coherence, averages, (), force, charge, independent=False)
+    choice = telling(measured)
+    assert choice.lines == []
+    assert choice.mains is not None
+    assert choice.mains.mains == 50

@@ -88,7 +88,10 @@ def _estimated(entry: FrfRecording, found: list[Finding]) -> tuple[FrfRecording,
     choice = telling(measured)
     chosen = choice.lines
     if not chosen:
-        text = "charge follows force at no frequency: left out"
+        if choice.mains is None:
+            text = "charge follows force at no frequency: left out"
+        else:
+            text = f"mains of {choice.mains.mains:g} Hz may spoil all lines where the force has its power: left out"
         found.append(Finding("no_response", entry.id, "charge_pc", text))
         return None
     values = to_lab("frf_pc_per_n", measured.values[chosen].real), to_lab("frf_pc_per_n", measured.values[chosen].imag)

@@ -65,6 +65,8 @@ def telling(measured: Frf) -> Choice:
     once = measured.passes is not None and float(np.median(measured.passes[powerful])) < _ONCE
     biased = min(_BIASED_ONCE, len(strong) // 2) if once else _BIASED
     kept = _apart(strong[strong >= biased]) if shared else [int(line) for line in strong]
+    if not kept:  # mains spoil all, where lines are coarse
+        return Choice([], len(lines), mains=mains)
     uneven = _uneven(force[kept], uncertainty[kept])
     return Choice(kept, len(lines), int((~powerful).sum()), len(strong) - len(kept), mains, uneven, once)
 
