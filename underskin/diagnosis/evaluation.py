@@ -153,14 +153,19 @@ class Evaluator:
         return information + np.diag(precision), gradient - precision * (at.point.fit[places] - centre)
 
     def settle(self, at: Evaluated, steps: int, held: int | None = None) -> Evaluated:
-        """Newton steps of the covariance parameters, one of which may be held, at a fixed prediction."""
+        """Newton steps of the covariance parameters, one of which may be held, at a fixed prediction.
+
+        Several of a mechanism's own hang together, so that steps of one at a time would creep.
+        """
         for _ in range(steps):
-            gradient, hessian = self.covariance_equations(at, mixed=False)
+            gradient, hessian = self.covariance_equations(at, mixed=len(self._own) > 1)
+            if held is not None:
+                hessian[held, :] = hessian[:, held] = gradient[held] = 0.0
             low, high = self._lowest, self._highest
             eigenvalues, vectors = np.linalg.eigh(hessian)
             step = -vectors @ ((vectors.T @ gradient) / np.maximum(np.abs(eigenvalues), 1.0))
             outwards = ((at.point.covariance <= low) & (step < 0)) | ((at.point.covariance >= high) & (step > 0))
-            step = np.where(outwards | (np.arange(len(step)) == held), 0.0, step)
+            step = np.where(outwards, 0.0, step)
             step *= min(1.0, 0.7 / max(np.abs(step).max(), 1e-12))
             for _ in range(4):
                 point = self.moved(at.point, np.clip(at.point.covariance + step, low, high))
@@ -200,12 +205,14 @@ class Evaluator:
         centre = np.clip(here, self._lowest + 2 * _STEP, self._highest - 2 * _STEP)
         pairs = [(a, b) for a in range(count) for b in range(a if mixed else 0)]
         both = [steps[a] + steps[b] for a, b in pairs]
-        costs = self.costs(at, centre + np.array([np.zeros(count), *steps, *-steps, *both]))
+        costs = self.costs(at, centre + np.array([np.zeros(count), *steps, *-steps, *both, *(-step for step in both)]))
         middle, up, down = costs[0], costs[1 : count + 1], costs[count + 1 : 2 * count + 1]
+        alone = up + down - 2 * middle
+        together = costs[2 * count + 1 :].reshape(2, -1).sum(axis=0) - 2 * middle
         gradient = (up - down) / (2 * _STEP)
-        hessian = np.diag((up + down - 2 * middle) / _STEP**2)
-        for (a, b), cost in zip(pairs, costs[2 * count + 1 :], strict=True):
-            hessian[a, b] = hessian[b, a] = (cost - up[a] - up[b] + middle) / _STEP**2
+        hessian = np.diag(alone / _STEP**2)
+        for (a, b), both_ways in zip(pairs, together, strict=True):
+            hessian[a, b] = hessian[b, a] = (both_ways - alone[a] - alone[b]) / (2 * _STEP**2)
         return gradient + hessian @ (here - centre), hessian
 
     def costs(self, at: Evaluated, covariances: Floats) -> Floats:

@@ -81,13 +81,13 @@ class Moments:
         """uᵀu, uᵀr and rᵀr less what rows lose to pick-up, and what that adds to the log of the determinant."""
         if self.picked is None or levels.pickup is None:
             return self.uu, self.ur, self.rr, 0.0
-        lost = self.picked.lost(levels.pickup, levels.level)
+        lost, log_determinant = self.picked.lost(levels.pickup, levels.level)
         u, r = self._direction_rows[self.picked.rows], self._residual[self.picked.rows]
         uu, ur, rr = (
             whole - self.picked.over_recordings(lost * (a.conj() * b).real)
             for whole, a, b in ((self.uu, u, u), (self.ur, u, r), (self.rr, r, r))
         )
-        return uu, ur, rr, -2 * np.log1p(-lost).sum(axis=-1, keepdims=True)
+        return uu, ur, rr, log_determinant
 
     def without(self, levels: NoiseLevels) -> "Moments":
         """With all sums less what rows lose to pick-up."""
@@ -96,7 +96,7 @@ class Moments:
         other = copy(self)
         other.uu, other.ur, other.rr, _ = self.summed(levels)
         jj, uj, jr = self.slopes
-        lost, rows = self.picked.lost(levels.pickup, levels.level), self.picked.rows
+        (lost, _), rows = self.picked.lost(levels.pickup, levels.level), self.picked.rows
         slopes, over = self._slope_rows[:, rows], self.picked.over_recordings
         real = np.concatenate([slopes.real, slopes.imag], axis=1)
         jj = jj - (real * np.tile(lost, 2)) @ real.T

@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 from underskin.diagnosis.axes import recording_axes
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.matern import AMPLITUDES, features, matern, normalised
-from underskin.diagnosis.residuals import line_residuals, whole_prediction
+from underskin.diagnosis.residuals import line_residuals
 from underskin.diagnosis.scatter import Bell, level_prior
 from underskin.mechanisms.differentiated import Array
 from underskin.units import Floats
@@ -32,10 +32,7 @@ def over_lines(bench: Workbench, explanation: Explanation) -> dict[str, float]:
     lines = bench.lines
     if np.bincount(lines.recording).max() < _LEAST_LINES:
         return {}
-    at, further = explanation.best.at, 0.0 * lines.deviation
-    if at.prediction.picked is not None:
-        further = at.pickup_variance / at.marginal.levels.level**2
-    relative, weight = line_residuals(lines, whole_prediction(bench, explanation), further)
+    relative, weight = line_residuals(bench, explanation)
     noise = _LineNoise(
         float((weight * np.abs(relative) ** 2).sum()),
         2 * len(relative) + lines.scatter[1] - lines.recordings,

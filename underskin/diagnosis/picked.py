@@ -18,10 +18,11 @@ class PickedRows:
         self._owner = lines.recording[rows]
         self._first = np.flatnonzero(np.diff(self._owner, prepend=-1))
 
-    def lost(self, pickup: Floats, level: Floats | float) -> Floats:
-        """The share of their weight 1/(κ d)² that rows lose to pick-up of these deviations (…, picked rows)."""
+    def lost(self, pickup: Floats, level: Floats | float) -> tuple[Floats, Floats]:
+        """The share of their weight 1/(κ d)² that rows lose to pick-up of these deviations (…, picked rows), and what
+        that adds to the log of the determinant (…, 1)."""
         ratio = (pickup / (level * self._deviation)) ** 2
-        return np.asarray(ratio / (1 + ratio))
+        return np.asarray(ratio / (1 + ratio)), np.asarray(2 * np.log1p(ratio).sum(axis=-1, keepdims=True))
 
     def over_recordings(self, products: Floats) -> Floats:
         """Sums over the picked rows of each recording: (…, picked rows) to (…, recordings)."""

@@ -49,7 +49,6 @@ def over_recordings(bench: Workbench, explanation: Explanation) -> dict[str, flo
         return {}
     if len(axes) > 1:
         axes["all"] = np.concatenate(list(axes.values()), axis=1) / np.sqrt(len(axes))
-        axes.pop("sensor", None)  # whatever each sensor has of its own is `sensor_spread`
     before = preload_before(campaign)
     if before is not None:
         axes["preload_before"] = normalised(before)

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.diagnosis.explanation import Explanation, Workbench
-from underskin.diagnosis.lines import Lines
 from underskin.mechanisms.differentiated import Array
 from underskin.units import Floats
 
@@ -31,12 +30,14 @@ def whole_prediction(bench: Workbench, explanation: Explanation) -> Array:
     return value if len(value) == len(bench.lines.value) else value[bench.lines.recording]
 
 
-def line_residuals(lines: Lines, prediction: Array, further: Floats | float = 0.0) -> tuple[Array, Floats]:
+def line_residuals(bench: Workbench, explanation: Explanation) -> tuple[Array, Floats]:
     """Each line over its recording's own best real multiple of the model, less 1, and its weight 1/variance.
 
-    `further` is a variance (rows,) beside the lines' own, as theirs before the noise's level.
+    The variance is that before the noise's level; mains pick-up adds to it.
     """
+    lines, prediction, at = bench.lines, whole_prediction(bench, explanation), explanation.best.at
     first = lines.first
+    further = 0.0 if at.prediction.picked is None else at.pickup_variance / at.marginal.levels.level**2
     precision = 1 / (lines.deviation**2 + further)
     along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, first)
     size = np.add.reduceat(precision * np.abs(prediction) ** 2, first)
@@ -61,5 +62,5 @@ def residuals(bench: Workbench, explanation: Explanation, gain: float, position:
         np.abs(explanation.best.at.prediction.value[first]) ** 2, 1e-60
     )
     placed = position**2 * relative.sum(axis=0) + 0.5 * position**4 * moments.second_order
-    line, weight = line_residuals(lines, prediction)
+    line, weight = line_residuals(bench, explanation)
     return Residuals(along / size - 1, np.sqrt(gain**2 + placed + 1 / size), line, weight)

@@ -6,9 +6,9 @@ dynamic force: an FRF error of q/Fd, complex, its phase independent in each reco
 square to the lines' variance.
 
 Assumptions: q is the standard deviation of each component over recordings; 50 or 60 Hz, whichever stands out in the
-campaign's lines; harmonics up to the fifth, all with the same share; lines are bells exp(−½ (f/width)²). How phases of
-neighbouring lines hang together, and the lines' shape in detail, depend on the analyser's window and on how the mains
-drift: neither is relied on.
+campaign's lines; harmonics up to the fifth, all with the same share; lines are bells exp(−½ (f/width)²), f from the
+multiple. How phases of neighbouring lines hang together, and the lines' shape in detail, depend on the analyser's
+window and on how the mains drift: neither is relied on.
 
 Source: Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling to leads).
 """
@@ -102,11 +102,15 @@ class MainsPickup(Mechanism):
         return Pickup(rows, deviation)
 
     def _outstanding(self, campaign: Campaign) -> float:
-        """The mains' frequency; that of the last campaign is kept."""
-        if self._last is None or self._last[0] is not campaign:
+        """The mains' frequency, where none stands out the one that has a line nearest; that of the last campaign is
+        kept."""
+        last = self._last
+        if last is None or last[0] is not campaign:
             lines = [lines_of(entry) for entry in frf_recordings(campaign)]
-            self._last = campaign, max(_MAINS_HZ, key=lambda mains: _excess(lines, mains))
-        return self._last[1]
+            nearest = {mains: min(float(np.abs(one.frequency - mains).min()) for one in lines) for mains in _MAINS_HZ}
+            last = campaign, max(_MAINS_HZ, key=lambda mains: (_excess(lines, mains), -nearest[mains]))
+            self._last = last
+        return last[1]
 
 
 def _excess(recordings: Sequence[Frf], mains: float) -> float:
