@@ -22,7 +22,7 @@ _SLIPS = {1e3: "1000 Ã— too large: pC taken for nC, or N for mN?", 1e-3: "1000 Ã
 _SLIP_WIDTH = np.log(12.0)
 _LIKELY_D33 = (0.3, 1000.0)  # pC/N; polymers have 5 to 40, ceramics up to some hundred
 _LEAST_RESPONSE = 0.2  # of the campaign's largest prediction: below it, near a crossing of zero, a sign says nothing
-_LOWEST = 5  # one line of so many counts as low
+_LOWEST = 5  # one line of so many counts as low, and of evenly spaced ones only the lowest third in log frequency
 _D33 = 15.0  # pC/N: the prior's centre is what the prediction is made with
 
 Mask = NDArray[np.bool_]
@@ -83,8 +83,10 @@ def _one_sided(entries: list[FrfRecording]) -> Mask:
     antiphase, which reverses nothing."""
     sides = []
     for entry in entries:
-        real = lines_of(entry).values.real
-        lowest = real[: 1 + (len(real) - 1) // _LOWEST]
+        measured = lines_of(entry)
+        real, frequency = measured.values.real, measured.frequency
+        low = int((frequency <= np.cbrt(frequency[0] ** 2 * frequency[-1])).sum())
+        lowest = real[: max(1, min(1 + (len(real) - 1) // _LOWEST, low))]
         sides.append(float(np.nanmedian(lowest)) * float(np.nanmedian(real)) > 0)
     return np.array(sides)
 

@@ -17,9 +17,9 @@ from underskin.units import Floats
 
 _MAINS_HZ, _HARMONICS = (50.0, 60.0), 5
 _BETWEEN, _AROUND = 2.5, 12.5  # lines from a multiple of the mains: what is usual there
-_LEAST_AROUND = 6
+_LEAST_AROUND = 10
 _ANSWER = 4.0  # times the power that the usual FRF gives: an answer to the force
-_STANDS_OUT = 20.0  # times the median around; a line's noise reaches that once in a million
+_STANDS_OUT = 25.0  # times the median around; a line's noise reaches that once in a million
 _SPREAD = 3.0  # lines to each side that the window of neighbouring lines spreads mains over
 
 
@@ -40,19 +40,23 @@ def pickup(measured: Frf, powerful: NDArray[np.bool_]) -> Pickup | None:
     assert measured.force_power is not None
     assert measured.charge_power is not None
     stray = measured.charge_power * (1 - measured.coherence)
-    signs = [(stray, stray)]
+    assert measured.averages is not None
+    signs = [(stray, stray, np.zeros(len(stray)))]
     if measured.independent:
         answer = _ANSWER * np.median(np.abs(measured.values[powerful])) ** 2 * measured.force_power
         beside = np.where(powerful, 0.0, np.where(measured.charge_power < answer, stray, measured.charge_power))
-        signs += [_off_course(measured, np.flatnonzero(powerful)), (beside, beside)]
+        signs += [
+            (*_off_course(measured, np.flatnonzero(powerful)), stray / measured.averages),
+            (beside, beside, stray),
+        ]
     found = [_of_mains(measured, mains, signs) for mains in _MAINS_HZ]
     outstanding, strongest = max(found, key=lambda one: one[0])
     return strongest if outstanding >= _STANDS_OUT else None
 
 
-def _of_mains(measured: Frf, mains: float, signs: list[tuple[Floats, Floats]]) -> tuple[float, Pickup]:
+def _of_mains(measured: Frf, mains: float, signs: list[tuple[Floats, Floats, Floats]]) -> tuple[float, Pickup]:
     """How many times what is usual the signs are at a multiple of the mains, at most. A sign of mains (lines,) is what
-    is alike from line to line without them, and the power [C²] that it stands for."""
+    is alike from line to line without them, the power [C²] that it stands for, and what noise alone makes of it."""
     assert measured.force_power is not None
     spacing = measured.frequency[0]
     reach, spread = (0.999, 0.999) if measured.independent else (1.0, _SPREAD)
@@ -64,17 +68,19 @@ def _of_mains(measured: Frf, mains: float, signs: list[tuple[Floats, Floats]]) -
         if not near.any() or not around.any() or (_BETWEEN * spacing >= np.ptp(_MAINS_HZ) and away.min() > 0.01):
             continue
         of_force = max(float(measured.force_power[near].max() / np.median(measured.force_power[around])), 1.0)
-        outstanding = max(_beyond(sign, near, around) for sign, _ in signs) / of_force
+        outstanding = max(_beyond(sign, noise, near, around) for sign, _, noise in signs) / of_force
         if outstanding >= _STANDS_OUT:
-            power = max([power, *(float(one[near].max()) for _, one in signs)])
+            power = max([power, *(float(one[near].max()) for _, one, _ in signs)])
         highest = max(highest, outstanding)
     return highest, Pickup(mains, float(np.sqrt(power)), spoilt)
 
 
-def _beyond(sign: Floats, near: NDArray[np.bool_], around: NDArray[np.bool_]) -> float:
-    """How many times its median around the largest is; 0 where too few lines around have it."""
+def _beyond(sign: Floats, noise: Floats, near: NDArray[np.bool_], around: NDArray[np.bool_]) -> float:
+    """How many times its median around, or that of its noise, the largest is; 0 where too few lines around have it."""
     usual = sign[around & (sign > 0)]
-    return float(sign[near].max() / np.median(usual)) if len(usual) >= _LEAST_AROUND else 0.0
+    if len(usual) < _LEAST_AROUND:
+        return 0.0
+    return float(sign[near].max() / max(np.median(usual), np.median(noise[around])))
 
 
 def _off_course(measured: Frf, rows: NDArray[np.intp]) -> tuple[Floats, Floats]:

@@ -20,7 +20,8 @@ _ONE_LEVEL = 1.5
 _BY_CHANCE = 1e-3  # runs as long in the whole signal
 _JUMP = 12.0  # second difference over its scale among neighbours; a sine stays below 1.5, noise below 6
 _BLOW, _ANSWER = 20.0, 6.0  # kurtosis; a sine has 1.5, noise 3, a hammer's blow hundreds, what rings after it tens
-_AS_SHARP = 0.5  # of a jump: the usual bend at its place in a period, where a periodic signal begins anew
+_AS_SHARP = 0.5  # of a jump: the bend at its place in the next period, where a periodic signal begins anew
+_GIVE_OR_TAKE = 2  # samples: a period need not be a whole number of them
 _LOCAL = 64  # samples that make a neighbourhood
 
 
@@ -58,14 +59,14 @@ def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
 
 
 def _recurs(signal: Floats, period: int) -> NDArray[np.bool_]:
-    """Where a signal bends as sharply in most of the other periods, give or take a sample; nowhere without a period."""
+    """Where a signal bends as sharply a period before or after; nowhere without a period."""
     bend = np.pad(np.abs(np.diff(signal, n=2)), 1)
     if not period:
         return np.zeros(len(signal), dtype=bool)
-    around = maximum_filter1d(bend, 3)
-    whole = len(signal) // period * period
-    usual = np.median(around[:whole].reshape(-1, period), axis=0)
-    return np.asarray(np.resize(usual, len(signal)) > _AS_SHARP * bend)
+    around = maximum_filter1d(bend, 2 * _GIVE_OR_TAKE + 1)
+    before, after = np.zeros((2, len(signal)))
+    before[period:], after[:-period] = around[:-period], around[period:]
+    return np.asarray(np.maximum(before, after) > _AS_SHARP * bend)
 
 
 def _kurtosis(signal: Floats) -> float:
