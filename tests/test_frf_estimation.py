@@ -255,6 +255,15 @@ def test_where_a_periodic_sweep_begins_anew_nothing_is_damaged() -> None:
     assert len([defect for defect in defects_of_pair(lossy, 7.0 * lossy) if defect.channel == "force_n"]) == 8
 
 
+@pytest.mark.parametrize("period", [300.4, 251.25])
+def test_a_period_need_not_be_a_whole_number_of_samples(period: float) -> None:
+    time = np.arange(8000) % period / RATE
+    force = 1.0 + np.cos(2 * np.pi * (4.0 + 120.0 * time) * time + 0.7)
+    force = force + 1e-4 * np.random.default_rng(3).normal(size=8000)
+    assert {defect.kind for defect in defects("force_n", force)} == {"jump"}
+    assert defects_of_pair(force, 1e12 * answer_to(force)) == []
+
+
 @pytest.mark.parametrize("kind", ["overload", "held_samples", "jump"])
 def test_damage_is_named_and_left_out(kind: str) -> None:
     random = np.random.default_rng(8)
