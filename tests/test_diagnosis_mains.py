@@ -53,6 +53,7 @@ def test_mains_are_named(shape: str, width_hz: float, share: float, table: Sigma
     assert report["verdict"] == "explained"
     (found,) = report["mechanisms"]
     assert found["name"] == "mains_pickup"
+    assert found["explains_percent"] > 80.0 or share < 0.5
     assert all(entry["low"] < entry["value"] < entry["high"] for entry in found["parameters"])
     if shape == "bell":
         _, width, _ = found["parameters"]

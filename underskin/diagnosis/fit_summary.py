@@ -9,18 +9,22 @@ from underskin.diagnosis import held_out
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.numbers import parameter, place_of, rounded
 from underskin.diagnosis.search import NOTHING_MISSING, Search
+from underskin.mechanisms.catalogue import CATALOGUE
+from underskin.mechanisms.pickup import PICKUP_NAMES
 
 
 def explains_percent(
     search: Search, bench: Workbench, explanation: Explanation, name: str, whole: held_out.Prediction
 ) -> float | None:
-    """How much of the misfit beyond noise, without the mechanism, it takes away [%]."""
+    """How much of the misfit beyond noise, without the mechanism, it takes away or, as mains pick-up, expects [%]."""
     rest = tuple(entry for entry in explanation.names if entry != name)
     without = next((entry for entry in search.explanations if entry.names == rest), None)
     if without is None:
         return None
     misfit = held_out.in_sample(bench, without)
-    beyond = misfit.square / misfit.size - whole.noise / whole.size
+    picks_up = any(entry.name in PICKUP_NAMES for entry in CATALOGUE[name].parameters(bench.lines.campaign, bench.kind))
+    floor = whole.noise - whole.pickup if picks_up else whole.noise
+    beyond = misfit.square / misfit.size - floor / whole.size
     left = whole.square / whole.size - whole.noise / whole.size
     return round(100 * float(np.clip(1 - max(left, 0.0) / beyond, 0.0, 1.0)), 1) if beyond > 0 else 0.0
 

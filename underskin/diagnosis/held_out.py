@@ -38,6 +38,7 @@ class Prediction:
     noise: float = 0.0  # Σ E|y − m|² from noise alone
     log_score: float = 0.0  # Σ log predictive density of the recordings' levels, relative
     recordings: int = 0
+    pickup: float = 0.0  # that part of `noise` which is mains pick-up
 
     def __add__(self, other: "Prediction") -> "Prediction":
         return Prediction(
@@ -46,6 +47,7 @@ class Prediction:
             self.noise + other.noise,
             self.log_score + other.log_score,
             self.recordings + other.recordings,
+            self.pickup + other.pickup,
         )
 
     @property
@@ -157,13 +159,15 @@ def _predict(smaller: Workbench, explanation: Explanation, bench: Workbench, row
         noise = noise + (levels.smooth * left.smooth.scale) ** 2
     if prediction.position_slopes is not None:
         noise = noise + levels.position**2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
-    noise = noise + 2 * pickup_variance[rows]
+    picked_up = 2 * pickup_variance[rows]
+    noise = noise + picked_up
     square = np.abs(left.value - value) ** 2
     first = left.first
     each, expected = np.add.reduceat(square, first), np.add.reduceat(noise, first)
     size = np.add.reduceat(np.abs(value) ** 2, first)
     score = -0.5 * (each / expected + np.log(2 * np.pi * expected / size))
-    return Prediction(float(square.sum()), float(size.sum()), float(noise.sum()), float(score.sum()), len(first))
+    square_sum, size_sum, noise_sum, score_sum = (float(column.sum()) for column in (square, size, noise, score))
+    return Prediction(square_sum, size_sum, noise_sum, score_sum, len(first), float(picked_up.sum()))
 
 
 def total(found: Sequence[HeldOut]) -> tuple[Prediction, Prediction]:

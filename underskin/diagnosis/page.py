@@ -142,7 +142,7 @@ def _what(report: Report, drawn: Drawn) -> str:
         share = (
             ""
             if explains is None
-            else f"; takes away {explains:.0f} % of the misfit beyond noise in the recordings fitted to"
+            else f"; accounts for {explains:.0f} % of the misfit beyond noise in the recordings fitted to"
         )
         parts.append(f"<h3>{escape(words(name))}</h3>")
         parts.append(_paragraph("" if known is None else known.plain))

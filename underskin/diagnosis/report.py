@@ -85,7 +85,8 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
         "probability": probability(leader.probability),
         "statement": answer_statement(
             search.answers, stated, diagnosis.shape, bench.kind, fit["after"].get("youngs_modulus")
-        ),
+        )
+        + _mains_left_out(diagnosis.findings),
         "location": _location(diagnosis, bench, stated == "no_mismatch"),
         "mechanisms": [] if named is None else _mechanisms(search, bench, named),
         "alternatives": _alternatives(search.answers),
@@ -99,6 +100,13 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_experiment": dict(diagnosis.next_experiment) or None,
         "provenance": dict(diagnosis.provenance),
     }
+
+
+def _mains_left_out(found: Sequence[Finding]) -> str:
+    """What no answer says, since their lines were left out before."""
+    if all(entry.code != "mains_in_charge" for entry in found):
+        return ""
+    return " The charge holds mains pick-up, whose lines were left out before: see the findings."
 
 
 def _findings(found: Sequence[Finding]) -> list[dict[str, str]]:
