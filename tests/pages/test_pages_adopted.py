@@ -190,7 +190,7 @@ def test_a_tag_says_how_sure_it_is(
         assert beside in shown.locator("xpath=..").inner_text()
         assert ("not ruled out" in shown.locator("xpath=..").inner_text()) == ("not ruled out" in beside)
     shown.click()
-    assert reader.page.locator(".report .verdict").count() == 1
+    reader.page.locator(".report .verdict").wait_for()
     cannot = reader.page.get_by_text("It cannot be adopted as the skin's model:")
     assert cannot.count() == (0 if verdict == "explained" else 1)
     assert reader.page.get_by_role("button", name="Adopt this model").count() == 1 - cannot.count()
