@@ -12,6 +12,7 @@ def test_each_table_tells_its_range_its_errors_and_how_it_was_made(visitor: Visi
     page = visitor.page
     visitor.go("/design")
     page.get_by_role("link", name="Tables").click()
+    page.wait_for_url("**/tables")
     answered = server.http.get("/v1/tables").json()["tables"]
     assert page.locator("main section").count() == len(answered) == 3
     for summary in page.get_by_text("How it was made").all():
