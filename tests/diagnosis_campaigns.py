@@ -1,6 +1,6 @@
 """Campaigns made with the mechanisms' own models and the noise that a diagnosis assumes, to test its statistics."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from underskin.mechanisms import compose
 from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription
 from underskin.surrogate import SigmaTable
+from underskin.units import Complexes, Floats
 
 PITCH_MM = 8.0
 
@@ -103,3 +104,21 @@ def campaign(made: Made, table: SigmaTable) -> Campaign:
         own_lines = 1e12 * value[model.recording == number]
         recordings.append(replace(entry, frf_re_pc_per_n=own_lines.real, frf_im_pc_per_n=own_lines.imag))
     return replace(empty, recordings=tuple(recordings))
+
+
+def added(made: Campaign, charge: Callable[[Floats], Complexes]) -> Campaign:
+    """With a complex charge over force [pC/N] added to each recording's lines, made of their real parts."""
+    entries = []
+    for entry in made.recordings:
+        assert isinstance(entry, FrfRecording)
+        assert entry.frf_re_pc_per_n is not None
+        assert entry.frf_im_pc_per_n is not None
+        more = charge(entry.frf_re_pc_per_n)
+        entries.append(
+            replace(
+                entry,
+                frf_re_pc_per_n=entry.frf_re_pc_per_n + more.real,
+                frf_im_pc_per_n=entry.frf_im_pc_per_n + more.imag,
+            )
+        )
+    return replace(made, recordings=tuple(entries))

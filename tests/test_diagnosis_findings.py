@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.diagnosis_campaigns import Made, campaign
+from tests.diagnosis_campaigns import Made, added, campaign
 from underskin.diagnosis.diagnose import diagnosis_report
 from underskin.diagnosis.findings import inspect
 from underskin.recordings.campaign import Campaign, FrfRecording, from_dict, to_dict
 from underskin.surrogate import SigmaTable, load_table
+from underskin.units import Complexes, Floats
 
 MADE = Made(sensors=3, repeats=2, lines=20)
 LINES = ("frf_re_pc_per_n", "frf_im_pc_per_n")
@@ -282,15 +283,11 @@ def test_where_little_is_expected_silence_is_kept(table: SigmaTable) -> None:
     """Far beside the sensor the response is below the noise, as the model says: such recordings count."""
     far = campaign(Made(offsets_mm=(0.0, 5.5), lines=20, line=0.01), table)
     random = np.random.default_rng(2)
-    entries = []
-    for entry in far.recordings:
-        assert isinstance(entry, FrfRecording)
-        assert entry.frf_re_pc_per_n is not None
-        assert entry.frf_im_pc_per_n is not None
-        re, im = 0.05 * random.normal(size=(2, 20))
-        entries.append(
-            replace(entry, frf_re_pc_per_n=entry.frf_re_pc_per_n + re, frf_im_pc_per_n=entry.frf_im_pc_per_n + im)
-        )
-    inspected = inspect(replace(far, recordings=tuple(entries)), table)
+
+    def noise(real: Floats) -> Complexes:
+        return np.asarray(0.05 * (random.normal(size=len(real)) + 1j * random.normal(size=len(real))))
+
+    noisy = added(far, noise)
+    inspected = inspect(noisy, table)
     assert codes(inspected.found) == set()
-    assert len(inspected.campaign.recordings) == len(entries)
+    assert len(inspected.campaign.recordings) == len(far.recordings)

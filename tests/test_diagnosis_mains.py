@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.diagnosis_campaigns import Made, campaign
+from tests.diagnosis_campaigns import Made, added, campaign
 from underskin.diagnosis.diagnose import diagnosis_report
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate import SigmaTable, load_table
@@ -22,20 +22,9 @@ def table() -> SigmaTable:
 def picked_up(quiet: Campaign, line: Floats, share: float) -> Campaign:
     """A charge of random phase in each recording, `share` of the response at the middle of a line of this shape."""
     random = np.random.default_rng(4)
-    entries = []
-    for entry in quiet.recordings:
-        assert isinstance(entry, FrfRecording)
-        assert entry.frf_re_pc_per_n is not None
-        assert entry.frf_im_pc_per_n is not None
-        charge = share * np.median(entry.frf_re_pc_per_n) * np.exp(2j * np.pi * random.random()) * line
-        entries.append(
-            replace(
-                entry,
-                frf_re_pc_per_n=entry.frf_re_pc_per_n + charge.real,
-                frf_im_pc_per_n=entry.frf_im_pc_per_n + charge.imag,
-            )
-        )
-    return replace(quiet, recordings=tuple(entries))
+    return added(
+        quiet, lambda real: share * np.median(real) * np.exp(2j * np.pi * random.random()) * line.astype(complex)
+    )
 
 
 @pytest.mark.parametrize("share", [0.1, 0.7])

@@ -133,14 +133,12 @@ def test_slips_of_different_fields_are_each_told(quiet: Campaign, table: SigmaTa
 
 def test_exchanged_channels_are_told(quiet: Campaign, table: SigmaTable) -> None:
     """The charge has the preload for its mean and the dynamic force for its size, and the force has neither."""
-    exchanged = tuple(
-        replace(entry, force_n=entry.charge_pc, charge_pc=entry.force_n)  # type: ignore[union-attr, arg-type]
-        for entry in quiet.recordings
-    )
-    found = inspect(replace(quiet, recordings=exchanged), table)
+    exchanged = forces(quiet, force_n=lambda entry: entry.charge_pc, charge_pc=lambda entry: entry.force_n)
+    fourth = exchanged.recordings[3]
+    found = inspect(exchanged, table)
     assert codes(found.found) == {("channels_swapped", "", "force_n")}
     assert found.lacking
-    one = inspect(replace(quiet, recordings=(*quiet.recordings[:3], exchanged[3], *quiet.recordings[4:])), table)
+    one = inspect(replace(quiet, recordings=(*quiet.recordings[:3], fourth, *quiet.recordings[4:])), table)
     assert codes(one.found) == {("channels_swapped", "r004", "force_n")}
     assert len(one.campaign.recordings) == len(quiet.recordings) - 1
     assert one.lacking == ""

@@ -12,8 +12,9 @@ from tests.series_campaigns import codes, recorded
 from underskin.diagnosis.diagnose import diagnosis_report
 from underskin.diagnosis.findings import inspect
 from underskin.diagnosis.series_lines import telling
+from underskin.mechanisms.frf_design import frf_recordings
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.frf_estimation import Frf
+from underskin.recordings.frf_estimation import Frf, lines_of
 from underskin.surrogate import SigmaTable, load_table
 
 
@@ -52,7 +53,9 @@ def test_mains_are_told_and_their_lines_left_out(drive: dict[str, Any], table: S
     assert said["field"] == "charge_pc"
     assert "8 of 8 recordings" in said["statement"]
     assert "50 Hz" in said["statement"]
-    charge = float(re.search("about ([0-9.]+) pC", said["statement"])[1])  # type: ignore[index]
+    measured = re.search("about ([0-9.]+) pC", said["statement"])
+    assert measured is not None
+    charge = float(measured[1])
     assert charge == pytest.approx(0.05, rel=0.15)
 
 
@@ -97,7 +100,7 @@ def test_a_resonance_on_a_multiple_of_the_mains_is_none(quiet: Campaign, table: 
 
     found = inspect(shaken(quiet, table, 2048.0, made), table)
     assert "mains_in_charge" not in {entry.code for entry in found.found}
-    assert all(300.0 in list(entry.frequency_hz) for entry in found.campaign.recordings)  # type: ignore[union-attr, arg-type]
+    assert all(300.0 in lines_of(entry).frequency for entry in frf_recordings(found.campaign))
 
 
 def test_lines_of_uneven_power_are_no_mains(quiet: Campaign, table: SigmaTable) -> None:

@@ -6,44 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter, lfilter_zi
+from scipy.signal import lfilter
 
+from tests.known_signals import GAIN, RATE, answer_to, dwelling, known_frf, rms_error, shaken, swept
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf_estimation import Frf, broadband, estimate, lines_of, periodic, stepped_sine
 from underskin.recordings.periodic import period_of
-from underskin.recordings.signal_check import defects, defects_of_pair
 from underskin.recordings.stepped_sine import find_steps
-from underskin.units import Complexes, Floats
-
-RATE = 2000.0
-POLE = 0.9  # of the known system: charge[k] = POLE · charge[k − 1] + (1 − POLE) · GAIN · force[k], which lags
-GAIN = 5e-12
-
-
-def known_frf(frequency: Floats) -> Complexes:
-    return (1 - POLE) * GAIN / (1 - POLE * np.exp(-2j * np.pi * frequency / RATE))
-
-
-def answer_to(force: Floats) -> Floats:
-    taps, poles = [(1 - POLE) * GAIN], [1, -POLE]
-    return lfilter(taps, poles, force, zi=lfilter_zi(taps, poles) * force[0])[0]
-
-
-def shaken(seed: int, samples: int = 60_000, preload: float = 2.0) -> tuple[Floats, Floats]:
-    random = np.random.default_rng(seed)
-    force = preload + 0.05 * random.standard_normal(samples)
-    return force, answer_to(force)
-
-
-def dwelling(frequencies: list[float], cycles: int = 40, preload: float = 2.0) -> Floats:
-    tones = [0.09 * np.sin(2 * np.pi * f * np.arange(round(max(cycles / f, 0.5) * RATE)) / RATE) for f in frequencies]
-    return preload + np.concatenate(tones)
-
-
-def rms_error(frf: Frf) -> float:
-    true = known_frf(frf.frequency)
-    return float(np.sqrt(np.mean(np.abs(frf.values / true - 1) ** 2)))
+from underskin.units import Floats
 
 
 def test_broadband_recovers_a_known_system_and_a_lagging_charge_has_a_negative_phase() -> None:
@@ -92,11 +63,6 @@ def repeated(period: Floats, times: int) -> tuple[Floats, Floats]:
     force = np.tile(period, times + 20)
     charge = lfilter([GAIN, -GAIN], [1, -0.99], force)
     return 2.0 + force[20 * len(period) :], charge[20 * len(period) :]
-
-
-def swept(samples: int) -> Floats:
-    time = np.arange(samples) / RATE
-    return 0.09 * np.cos(2 * np.pi * (1.0 + 0.5 * (300.0 - 1.0) / time[-1] * time) * time)
 
 
 @pytest.mark.parametrize("kind", ["sweep", "noise"])
@@ -209,101 +175,6 @@ def test_at_least_as_accurate_as_pyfrf(estimator: str, drift: float) -> None:
     assert rms_error(ours) <= 1.005 * rms_error(theirs)  # what chance alone may do
     if drift:
         assert rms_error(ours) < 0.6 * rms_error(theirs)
-
-
-def test_overload_is_seen_where_it_is_and_nowhere_else() -> None:
-    _, charge = shaken(7)
-    ceiling = np.quantile(charge, 0.98)
-    found = defects("charge_pc", np.minimum(charge, ceiling))
-    assert {defect.kind for defect in found} == {"overload"}
-    assert all(charge[defect.first_sample : defect.first_sample + defect.samples].min() >= ceiling for defect in found)
-    assert "overload" in found[0].statement
-    assert defects("charge_pc", charge) == []
-
-
-def test_broadband_leaves_damaged_blocks_out() -> None:
-    force, charge = shaken(10)
-    damaged = charge.copy()
-    damaged[30_000:30_100] = damaged[30_000]
-    frf = broadband(force, damaged, RATE, block_samples=2000)
-    whole = broadband(force, charge, RATE, block_samples=2000)
-    assert [defect.kind for defect in frf.found] == ["held_samples"]
-    assert rms_error(frf) < 1.2 * rms_error(whole)
-    assert frf.averages is not None
-    assert whole.averages is not None
-    assert frf.averages[0] < whole.averages[0]
-
-
-def test_a_coarse_but_whole_sine_is_not_called_overloaded_or_held() -> None:
-    for amplitude in (7.3, 20.0, 50.5):
-        sine = np.round(amplitude * np.sin(2 * np.pi * np.arange(20_000) * 3.1 / RATE))
-        assert defects("force_n", sine) == []
-
-
-def test_where_a_periodic_sweep_begins_anew_nothing_is_damaged() -> None:
-    """It jumps there in force and charge, at one distance; so do samples lost at the end of each buffer, which are."""
-    time = np.arange(1000) / RATE
-    period = 1.0 + np.cos(2 * np.pi * (1.0 + 40.0 * time) * time + 0.7)
-    force = np.tile(period, 8) + 1e-4 * np.random.default_rng(3).normal(size=8000)
-    assert {defect.kind for defect in defects("force_n", force)} == {"jump"}
-    assert defects_of_pair(force, 1e12 * answer_to(force)) == []
-    spiked = 1e12 * answer_to(force)
-    spiked[4321] += 3.0
-    assert [(found.kind, found.channel) for found in defects_of_pair(force, spiked)] == [("jump", "charge_pc")]
-    sine = np.sin(2 * np.pi * 3.73 * np.arange(9000) / RATE)
-    lossy = np.delete(sine, [sample for start in range(1000, 9000, 1000) for sample in range(start, start + 30)])
-    assert len([defect for defect in defects_of_pair(lossy, 7.0 * lossy) if defect.channel == "force_n"]) == 8
-
-
-@pytest.mark.parametrize("period", [300.4, 251.25])
-def test_a_period_need_not_be_a_whole_number_of_samples(period: float) -> None:
-    time = np.arange(8000) % period / RATE
-    force = 1.0 + np.cos(2 * np.pi * (4.0 + 120.0 * time) * time + 0.7)
-    force = force + 1e-4 * np.random.default_rng(3).normal(size=8000)
-    assert {defect.kind for defect in defects("force_n", force)} == {"jump"}
-    assert defects_of_pair(force, 1e12 * answer_to(force)) == []
-
-
-@pytest.mark.parametrize("kind", ["overload", "held_samples", "jump"])
-def test_damage_is_named_and_left_out(kind: str) -> None:
-    random = np.random.default_rng(8)
-    force = dwelling([10.0], cycles=100)
-    charge = answer_to(force) + 1e-16 * random.standard_normal(len(force))
-    if kind == "overload":
-        charge[6000:6400] *= 1.5
-        charge = np.minimum(charge, 1.04 * np.quantile(charge, 0.9))
-    elif kind == "held_samples":
-        charge[7005:7045] = charge[7005]
-    else:
-        charge = np.concatenate([charge[:7010], charge[7030:], charge[-20:]])
-    frf = stepped_sine(force, charge, RATE)
-    assert kind in {defect.kind for defect in frf.found}
-    if kind != "jump":  # after lost samples of one channel, the phase is off for good
-        np.testing.assert_allclose(frf.values, known_frf(frf.frequency), rtol=5e-3)
-
-
-def test_coarse_levels_are_no_held_samples() -> None:
-    """Noise of few levels repeats one by chance, and a slow signal turns on one; a hold within either is still seen."""
-    random = np.random.default_rng(9)
-    noise = np.round(4.0 * random.normal(size=100_000))
-    sweeps = np.tile(np.round(400.0 * swept(1000)), 8)
-    assert defects("force_n", noise) == []
-    assert {found.kind for found in defects("force_n", sweeps)} <= {"jump"}
-    noise[5000:5020] = noise[5000]
-    assert [(found.kind, found.first_sample) for found in defects("force_n", noise)] == [("held_samples", 5000)]
-
-
-def test_a_spike_is_a_defect_and_a_blow_is_not() -> None:
-    random = np.random.default_rng(11)
-    force = 0.001 * random.standard_normal(8192)
-    spiked = force.copy()
-    spiked[3000] = 5.0
-    assert [defect.kind for defect in broadband(spiked, 1e-12 * force, RATE).found] == ["jump"]
-    force[3000:3005] += np.hanning(7)[1:-1]
-    frf = broadband(force, answer_to(force), RATE, block_samples=8192, window="boxcar")
-    assert frf.found == ()
-    struck = frf.frequency < 300  # the blow's own spectrum ends at 670 Hz
-    assert rms_error(Frf(frf.frequency[struck], frf.values[struck])) < 0.03
 
 
 @pytest.mark.skipif("UNDERSKIN_RECORDINGS" not in os.environ, reason="UNDERSKIN_RECORDINGS does not name the folder")

@@ -1,7 +1,6 @@
 """A diagnosis in the browser: asked for, watched, read, saved, adopted; and what nobody else may do with it."""
 
 import csv
-from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,13 +9,12 @@ from typing import Any
 import httpx
 import orjson
 import pytest
-from playwright.sync_api import Browser
 
 from service.store import database, diagnoses
-from tests.pages.conftest import Visit, visit
+from tests.pages.conftest import Visit
 from tests.pages.test_pages_security import BROWSING, HOSTILE, token_of
 from tests.store.diagnosed import asked, resonant, sent, table
-from tests.store.server import Place, Server, running
+from tests.store.server import Server
 from underskin import __version__
 from underskin.diagnosis.diagnose import diagnose
 from underskin.diagnosis.figures import figures
@@ -42,13 +40,6 @@ def made() -> Made:
     return Made(plain, {name: figure.to_json() for name, figure in figures(found, document).items()})
 
 
-@pytest.fixture(scope="module")
-def idle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """A server that runs no diagnosis."""
-    with running(Place(tmp_path_factory.mktemp("idle")), UNDERSKIN_DIAGNOSIS_WORKERS="0") as started:
-        yield started
-
-
 def keep(server: Server, document: dict[str, Any], made: Made, skin: str) -> str:
     """The id of a diagnosis that is done."""
     campaign_id = sent(server, document, skin)
@@ -59,11 +50,6 @@ def keep(server: Server, document: dict[str, Any], made: Made, skin: str) -> str
             assert diagnoses.finish(connection, claimed.number, "test", made.report, made.figures)
     store.close()
     return str(row.id)
-
-
-@pytest.fixture
-def reader(browser: Browser, idle: Server) -> Iterator[Visit]:
-    yield from visit(browser, idle)
 
 
 def test_a_diagnosis_is_watched_read_and_adopted(visitor: Visit, server: Server) -> None:

@@ -8,9 +8,8 @@ from urllib.parse import quote
 import h5py
 import httpx
 import pytest
-from playwright.sync_api import Browser
 
-from tests.pages.conftest import Visit, visit
+from tests.pages.conftest import Visit
 from tests.pages.test_pages_security import BROWSING, token_of
 from tests.pages.test_pages_upload import as_json, file, look_at
 from tests.store.diagnosed import diagnosed, report, resonant
@@ -38,17 +37,6 @@ def export(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with running(Place(tmp_path_factory.mktemp("elsewhere")), UNDERSKIN_DIAGNOSIS_WORKERS="0") as started:
-        yield started
-
-
-@pytest.fixture
-def reader(browser: Browser, elsewhere: Server) -> Iterator[Visit]:
-    yield from visit(browser, elsewhere)
-
-
-@pytest.fixture(scope="module")
 def empty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """Where nothing ever comes in."""
     with running(Place(tmp_path_factory.mktemp("empty"))) as started:
@@ -73,7 +61,7 @@ def looked_at(client: httpx.Client, content: bytes) -> str:
     return answer.text
 
 
-def test_an_exported_skin_comes_in_where_somebody_says_so(reader: Visit, elsewhere: Server, export: bytes) -> None:
+def test_an_exported_skin_comes_in_where_somebody_says_so(reader: Visit, idle: Server, export: bytes) -> None:
     page = reader.page
     look_at(reader, [file("palm.h5", export)])
     status = page.get_by_role("status")
@@ -86,11 +74,11 @@ def test_an_exported_skin_comes_in_where_somebody_says_so(reader: Visit, elsewhe
     row = page.get_by_role("row", name="tuesday").inner_text().split("\t")
     assert (row[2:]) == ["6", "1", "not yet"]
     reader.require_accessible()
-    assert kept(elsewhere) == []
+    assert kept(idle) == []
     page.get_by_role("button", name="Bring it in").click()
     page.wait_for_url("**/skins/*")
     assert page.get_by_role("heading", level=1).inner_text() == f"Skin {SKIN}"
-    assert sorted(kept(elsewhere)) == ["array", "monday", "tuesday"]
+    assert sorted(kept(idle)) == ["array", "monday", "tuesday"]
     said = page.get_by_role("status").first.inner_text()
     assert "version 1" in said
     assert "wrong diagnosis" in said
@@ -98,10 +86,8 @@ def test_an_exported_skin_comes_in_where_somebody_says_so(reader: Visit, elsewhe
     assert "All of it is here already" in page.locator(".adopted").inner_text()
     assert "keeps its name" in page.locator("main").inner_text()
     assert page.get_by_role("button", name="Bring it in").count() == 0
-    monday = next(
-        entry for entry in elsewhere.http.get("/v1/campaigns").json()["campaigns"] if entry["name"] == "monday"
-    )
-    withdrawn = elsewhere.http.post(f"/v1/campaigns/{monday['id']}/withdraw", json={"reason": "fell down"})
+    monday = next(entry for entry in idle.http.get("/v1/campaigns").json()["campaigns"] if entry["name"] == "monday")
+    withdrawn = idle.http.post(f"/v1/campaigns/{monday['id']}/withdraw", json={"reason": "fell down"})
     assert withdrawn.status_code == 200
     look_at(reader, [file("palm.h5", export)])
     alert = page.get_by_role("alert").inner_text()
