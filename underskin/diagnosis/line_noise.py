@@ -1,11 +1,13 @@
-"""The noise of single lines, from how rough the lines are along frequency: no hypothesis enters.
+"""The noise of single lines, from how rough the lines are along frequency.
 
 Real and imaginary part each have variance d² = rel(f)² A² + floor², A the recording's amplitude around the line.
 What all recordings share at a frequency is taken off, then each line is compared with its two neighbours,
     e_j = z_j − λ z_(j−1) − (1−λ) z_(j+1)   (linear in log f),   E|e_j|²/2 = d_j² + λ² d_(j−1)² + (1−λ)² d_(j+1)²,
-which smooth misfit hardly reaches. log rel² is piecewise linear in log f; it and the floor are fitted with Student's
-likelihood, so that single wild lines (mains, a resonance between two lines) do not count, and the level is set by the
-median of |e|². Where `coherence` γ² is given, (1 − γ²)/γ² has the shape of (d/A)² (its n is unknown), and steadies it.
+which smooth misfit hardly reaches. A steep course, such as the flank of a resonance that moves with the preload, does
+reach it: where a law describes that, its prediction (`expected`) is taken off as well (see noise_refinement.py).
+log rel² is piecewise linear in log f; it and the floor are fitted with Student's likelihood, so that single wild lines
+(mains, a resonance between two lines) do not count, and the level is set by the median of |e|².
+Where `coherence` γ² is given, (1 − γ²)/γ² has the shape of (d/A)² (its n is unknown), and steadies it.
 Where lines are known to be `uneven` (of a time series whose force has more power at one than at the next), rel is that
 much larger.
 """
@@ -37,14 +39,22 @@ class LineNoise:
 
 
 def line_noise(
-    value: Complexes, frequency: Floats, recording: NDArray[np.intp], coherence: Floats, uneven: Floats
+    value: Complexes,
+    frequency: Floats,
+    recording: NDArray[np.intp],
+    coherence: Floats,
+    uneven: Floats,
+    expected: Complexes | None = None,
 ) -> LineNoise:
-    """The noise of the rows, which run over recordings one after another, sorted by frequency within each."""
+    """The noise of the rows, which run over recordings one after another, sorted by frequency within each.
+
+    `expected` (rows,) is a prediction whose course along frequency is no noise.
+    """
     if len(value) == 0:
         return LineNoise(np.zeros(0), 1.0, 0.0)
     amplitude = local_amplitude(value, recording)
     middle = _interior(recording, frequency)
-    z = _without_shared(value, frequency, recording)
+    z = _without_shared(value, frequency, recording, value if expected is None else value - expected)
     log_f = np.log(frequency)
     span = log_f[middle + 1] - log_f[middle - 1]
     share = (log_f[middle + 1] - log_f[middle]) / span
@@ -128,20 +138,21 @@ def _interior(recording: NDArray[np.intp], frequency: Floats) -> NDArray[np.intp
     return inner[same & apart & (frequency[inner - 1] > 0)]
 
 
-def _without_shared(value: Complexes, frequency: Floats, recording: NDArray[np.intp]) -> Complexes:
-    """Each recording's lines less its level times what all recordings have at that frequency, where many have it."""
+def _without_shared(value: Complexes, frequency: Floats, recording: NDArray[np.intp], rest: Complexes) -> Complexes:
+    """`rest` (rows,), the lines or what is left of them, less each recording's level times what all recordings have of
+    it at that frequency, where many have it."""
     level = np.array([np.median(value.real[recording == number]) for number in range(int(recording.max()) + 1)])
-    ratio = value / np.where(level == 0, 1.0, level)[recording]
+    ratio = rest / np.where(level == 0, 1.0, level)[recording]
     _, line, count = np.unique(np.round(frequency, 9), return_inverse=True, return_counts=True)
     if count[line].min() < _SHARED:
-        return value
+        return rest
     shared = np.empty(len(count), dtype=complex)
     strong = np.abs(level)[recording] > 0.3 * np.median(np.abs(level))
     for number in range(len(count)):
         chosen = ratio[(line == number) & strong]
         chosen = chosen if len(chosen) else ratio[line == number]
         shared[number] = np.median(chosen.real) + 1j * np.median(chosen.imag)
-    return value - level[recording] * shared[line]
+    return rest - level[recording] * shared[line]
 
 
 def _knots(log_f: Floats) -> Floats:

@@ -120,9 +120,10 @@ class Lines:
         )
 
 
-def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None) -> Lines:
+def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None, expected: Complexes | None = None) -> Lines:
     """The FRF lines of a campaign, sorted by frequency, those that are not finite left out. `uneven` is, of recordings
-    by their id, the noise of each line over its course along frequency (1 where not given).
+    by their id, the noise of each line over its course along frequency (1 where not given); `expected` a prediction of
+    the rows (rows,), whose course is not counted as noise.
 
     Recordings of another kind and recordings without a finite line are left out of the `campaign` that comes with them.
     """
@@ -149,7 +150,12 @@ def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None) -> Lin
     value = np.concatenate([*values, np.zeros(0, dtype=complex)])
     frequency = np.concatenate([*frequencies, np.zeros(0)])
     noise = line_noise(
-        value, frequency, recording, np.concatenate([*coherences, np.zeros(0)]), np.concatenate([*unevens, np.zeros(0)])
+        value,
+        frequency,
+        recording,
+        np.concatenate([*coherences, np.zeros(0)]),
+        np.concatenate([*unevens, np.zeros(0)]),
+        expected,
     )
     return Lines(
         campaign=replace(campaign, recordings=tuple(entries)),
