@@ -11,13 +11,22 @@ from numpy.typing import NDArray
 from underskin.units import LAB, Finding, Floats, findings
 
 _LEAST_D33, _MOST_D33 = 0.05, 1000.0  # pC/N: beyond these no skin's sensors have been
+_OF_PVDF = 1.0, 100.0  # pC/N: PVDF and its copolymers have 10 to 40
 
 
 def of_array(d33: float) -> Iterator[str]:
     """Of an array's d33 [pC/N]."""
-    for words, found in _slips(np.array(d33)).items():
-        if found:
-            yield f"d33 of the array is {d33:.3g} pC/N, {words}"
+    said = implausible(d33)
+    if said is not None:
+        yield f"d33 of the array is {d33:.3g} pC/N, {said}"
+
+
+def implausible(d33: float) -> str | None:
+    """What is to be said of a d33 [pC/N] that PVDF cannot have; None of one that it may have."""
+    said = next((words for words, found in _slips(np.array(d33)).items() if found), None)
+    if said is not None or _OF_PVDF[0] <= d33 <= _OF_PVDF[1]:
+        return said
+    return "which PVDF cannot have: it and its copolymers have 10 to 40"
 
 
 def of_rows(frf: Floats, d33: Floats) -> list[Finding]:

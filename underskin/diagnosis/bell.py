@@ -77,6 +77,13 @@ def log_volume(hessian: Floats) -> float:
     return float(0.5 * len(hessian) * np.log(2 * np.pi) - 0.5 * np.log(eigenvalues).sum())
 
 
+def levels_covariance(hessian: Floats) -> Floats:
+    """Of logarithms of noise levels; never narrower than that bell: at a bound the Hessian may be negative, and an
+    interval that was read from it would have no width."""
+    eigenvalues, vectors = np.linalg.eigh(hessian)
+    return np.asarray(vectors / np.maximum(eigenvalues, _LEAST_COVARIANCE_CURVATURE) @ vectors.T)
+
+
 def _equations(fitter: Fitter, at: Evaluated) -> tuple[Floats, Floats]:
     """Information on the mean parameters and the gradient of the cost."""
     information, ascent = fitter.posterior_equations(at)

@@ -19,10 +19,10 @@ from underskin.diagnosis.explanation import Workbench
 from underskin.diagnosis.extremes import without_extremes
 from underskin.diagnosis.finding import Finding
 from underskin.diagnosis.findings import inspect
-from underskin.diagnosis.lines import lines
 from underskin.diagnosis.locate import SEED, in_region, locate, region
+from underskin.diagnosis.noise_refinement import frf_workbench
 from underskin.diagnosis.plan import plan
-from underskin.diagnosis.remainder import describe, worth_telling
+from underskin.diagnosis.remainder import contradicts, describe, worth_telling
 from underskin.diagnosis.report import Diagnosis, report
 from underskin.diagnosis.residuals import residuals, whole_prediction
 from underskin.diagnosis.rig_limits import Limits
@@ -74,7 +74,7 @@ def diagnose(
     found = [*left_out, *inspected.found]
     if inspected.lacking:
         return Diagnosis(campaign.name, found, provenance, lacking=inspected.lacking)
-    bench = Workbench(lines(inspected.campaign, inspected.uneven), table)
+    bench = frf_workbench(inspected.campaign, inspected.uneven, table)
     return _work_out(campaign.name, bench, search(bench), found, provenance, progress, limits)
 
 
@@ -104,6 +104,10 @@ def _work_out(
     ranked = [answer.explanation for answer in result.answers if answer.explanation is not None]
     groups = held_out.hold_out(bench, ranked, nothing, result.supported)
     progress(0.95)
+    if contradicts(bench, nothing, groups):
+        result = replace(result, null_contradicted=True)
+        leader = result.answers[0]
+        shown = result.shown_or_nothing(leader)
     shape = describe(bench, shown) if leader.explanation is None else ""
     return Diagnosis(
         name,

@@ -7,7 +7,7 @@ from underskin.diagnosis.finding import Finding
 from underskin.diagnosis.numbers import in_digits
 from underskin.diagnosis.statements import SIMPLEST, in_words
 
-_NOISY = 2.0  # times what the lines' own roughness says
+NOISY = 2.0  # times what the lines' own roughness says
 
 
 def doubts(bench: Workbench, explanation: Explanation) -> list[Finding]:
@@ -38,7 +38,7 @@ def _beyond_tables(bench: Workbench, explanation: Explanation) -> list[Finding]:
 
 def _noisy(bench: Workbench, explanation: Explanation) -> list[Finding]:
     level = explanation.best.at.marginal.levels.level
-    if bench.lines.curves or level < _NOISY:
+    if bench.lines.curves or level < NOISY:
         return []
     text = (
         f"the lines scatter {in_digits(level, 2)} times more about the stated answer than about their own neighbours: "

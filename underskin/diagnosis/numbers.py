@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri
 
+from underskin.diagnosis.bell import levels_covariance
 from underskin.diagnosis.explanation import Explanation
 from underskin.diagnosis.hypothesis import COVARIANCE_NAMES
 
@@ -36,9 +37,9 @@ def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
     fitter, point = explanation.best.fitter, explanation.point
     entry = fitter.parameters[place]
     if entry.name in COVARIANCE_NAMES:
-        _, hessian = fitter.covariance_equations(explanation.best.at)
         names = [parameter.name for parameter in fitter.covariance]
-        variance = float(np.linalg.pinv(hessian)[names.index(entry.name), names.index(entry.name)])
+        own = names.index(entry.name)
+        variance = float(levels_covariance(fitter.covariance_equations(explanation.best.at)[1])[own, own])
     else:
         index = fitter.places.index(place)
         variance = float(explanation.best.covariance[index, index])

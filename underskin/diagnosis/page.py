@@ -11,6 +11,7 @@ import plotly.graph_objects as go
 import plotly.io
 from plotly.offline import get_plotlyjs
 
+from underskin.diagnosis.caveats import caveats
 from underskin.diagnosis.figures import explanations
 from underskin.diagnosis.wording import axis, error, group, interval, number, plain, readable, unit, words
 from underskin.digits import in_percent
@@ -40,6 +41,10 @@ _D33 = (
     "tells is a mean over the sensors with the model held as it was found, to compare sensors and campaigns with: "
     "value and interval differ somewhat."
 )
+_D33_NOT_TO_QUOTE = (
+    "Do not quote it: PVDF cannot have this value, or the error in the recordings is well above their noise."
+)
+_NO_D33 = "No d33 is given: each explanation that is left would mean another."
 _STYLE = """
 body { font: 17px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.1rem; font-weight: 600; color: #555; margin: 0; }
@@ -91,7 +96,8 @@ def body_of(report: Report, drawn: Drawn) -> str:
     parts = [
         f'<p class="first">{escape(readable(first.rstrip(".")))}.</p>',
         f'<p><span class="verdict">{escape(verdict)}</span></p>',
-        _paragraph("" if report["verdict"] == "explained" else readable(rest)),  # which stands under What
+        # Of what is explained the laws stand under What
+        _paragraph(readable(caveats(report["findings"]) if report["verdict"] == "explained" else rest)),
         _section("Where", _where(report, drawn)),
         _section("What", _what(report, drawn)),
         _section("How much better", _better(report, drawn)),
@@ -161,7 +167,9 @@ def _what(report: Report, drawn: Drawn) -> str:
     if report["d33"] is not None:
         one = report["d33"]
         parts.append(_paragraph(f"d33 under this explanation: {number(one['value'])} ({interval(one)}) {one['unit']}."))
-        parts.append(_note(_D33))
+        parts.append(_note(_D33 if one.get("quotable", True) else _D33_NOT_TO_QUOTE))
+    elif report["verdict"] in ("ambiguous", "unexplained"):
+        parts.append(_note(_NO_D33))
     if report["alternatives"]:
         rows = [
             (" + ".join(map(words, entry["mechanisms"])), in_percent(entry["probability"]), readable(entry["why_not"]))

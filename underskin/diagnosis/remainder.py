@@ -10,9 +10,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from underskin.diagnosis.axes import WORDS, order, preload_before, recording_axes
+from underskin.diagnosis.doubts import NOISY
 from underskin.diagnosis.explanation import Explanation, Workbench
 from underskin.diagnosis.finding import Finding
-from underskin.diagnosis.held_out import HeldOut, total
+from underskin.diagnosis.held_out import HeldOut, in_sample, total
 from underskin.diagnosis.line_process import frequency_bins
 from underskin.diagnosis.numbers import in_digits
 from underskin.diagnosis.recording_process import relative_place_slopes
@@ -24,6 +25,7 @@ from underskin.units import Floats
 _GRID = 40
 _LEAST_IN_ORDER = 8  # recordings
 _WORTH_TELLING, _LEAST_TOLD = 2.0, 3e-3  # times the noise, and of the largest force
+_LARGEST_FLOOR = 100.0  # % of what is predicted
 _ALONG_CURVES = {"displacement_mm": "mm", "time_s": "s"}
 _BEFORE = "the preload of the recording before over its own"
 _LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n", "load_cycles", "dwell_s", "frequency_hz", _BEFORE)
@@ -38,14 +40,12 @@ def describe(bench: Workbench, explanation: Explanation) -> str:
 
 def worth_telling(bench: Workbench, explanation: Explanation, groups: Sequence[HeldOut]) -> list[Finding]:
     """Of curves: what is left beyond the noise, and whether parts that were left out are predicted no better."""
-    lines = bench.lines
-    if lines.smooth is None:
+    if bench.lines.smooth is None:
         return []
     found = []
-    levels = explanation.best.at.marginal.levels
-    noise = levels.level * float(np.median(lines.deviation / lines.smooth.scale))
-    if levels.smooth > max(_WORTH_TELLING * noise, _LEAST_TOLD):
-        size = f"{100 * levels.smooth:.2g} % of the largest force, {levels.smooth / noise:.0f} times a sample's noise"
+    smooth, noise = _smooth_part(bench, explanation)
+    if _is_above_noise(smooth, noise):
+        size = f"{100 * smooth:.2g} % of the largest force, {smooth / noise:.0f} times a sample's noise"
         text = f"a smooth part of about {size}, is left that no mechanism here describes"
         found.append(Finding("remainder", "", "force_n", text))
     before, after = total(groups)
@@ -57,6 +57,29 @@ def worth_telling(bench: Workbench, explanation: Explanation, groups: Sequence[H
         )
         found.append(Finding("held_out_no_better", "", "force_n", text))
     return found
+
+
+def contradicts(bench: Workbench, null: Explanation, groups: Sequence[HeldOut]) -> bool:
+    """Whether the recordings cannot be said to agree with the null hypothesis, however improbable its rivals are: its
+    residual keeps structure above the noise (of curves a smooth part, of FRFs lines that scatter about the model far
+    more than about their neighbours), or what passes for noise is larger than what is measured."""
+    floors = [in_sample(bench, null), *(entry.before for entry in groups)]
+    if any(entry.floor_percent > _LARGEST_FLOOR for entry in floors):
+        return True
+    if bench.lines.smooth is None:
+        return null.best.at.marginal.levels.level > NOISY
+    return _is_above_noise(*_smooth_part(bench, null))
+
+
+def _smooth_part(bench: Workbench, explanation: Explanation) -> tuple[float, float]:
+    """Of curves: the size of what is left smoothly, and a sample's noise, both relative to the largest force."""
+    lines, levels = bench.lines, explanation.best.at.marginal.levels
+    assert lines.smooth is not None
+    return levels.smooth, levels.level * float(np.median(lines.deviation / lines.smooth.scale))
+
+
+def _is_above_noise(smooth: float, noise: float) -> bool:
+    return smooth > max(_WORTH_TELLING * noise, _LEAST_TOLD)
 
 
 def _along_curves(bench: Workbench, explanation: Explanation) -> tuple[float, str]:

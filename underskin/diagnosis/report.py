@@ -8,7 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from underskin import d33_findings
 from underskin.diagnosis import held_out
+from underskin.diagnosis.caveats import caveats
 from underskin.diagnosis.confounding import Confounding
 from underskin.diagnosis.doubts import doubts
 from underskin.diagnosis.effect import Effect
@@ -23,6 +25,7 @@ from underskin.diagnosis.statements import EXPLAINED, answer_statement, location
 SCHEMA = "report/1"
 _ALTERNATIVES = 6
 _LEAST_PROBABILITY = 0.005
+_REACHES_NOISE = 1.5  # times the noise floor: an error that noise alone explains
 
 
 @dataclass(frozen=True)
@@ -80,13 +83,16 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
     shown = search.shown_or_nothing(leader)
     fit = fit_summary(search, bench, diagnosis.groups, shown)
     named = leader.explanation if stated in ("explained", "ambiguous") else None
+    d33, implausible = _d33(bench, shown, stated, fit)
+    findings = _findings([*diagnosis.findings, *doubts(bench, shown), *implausible])
+    modulus = fit["after"].get("youngs_modulus")
+    statement = answer_statement(
+        search.answers, stated, diagnosis.shape, bench.kind, modulus, caveats=caveats(findings)
+    )
     return {
         **document,
         "probability": probability(leader.probability),
-        "statement": answer_statement(
-            search.answers, stated, diagnosis.shape, bench.kind, fit["after"].get("youngs_modulus")
-        )
-        + _mains_left_out(diagnosis.findings),
+        "statement": statement,
         "location": _location(diagnosis, bench, stated == "no_mismatch"),
         "mechanisms": [] if named is None else _mechanisms(search, bench, named),
         "alternatives": _alternatives(search.answers),
@@ -94,19 +100,29 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
             {"mechanism": entry.mechanism, "confounded_with": entry.confounded_with, "reason": entry.reason}
             for entry in diagnosis.confounded
         ],
-        "findings": _findings([*diagnosis.findings, *doubts(bench, shown)]),
+        "findings": findings,
         "fit": fit,
-        "d33": None if bench.lines.curves else parameter(shown, place_of(shown, "d33")),
+        "d33": d33,
         "next_experiment": dict(diagnosis.next_experiment) or None,
         "provenance": dict(diagnosis.provenance),
     }
 
 
-def _mains_left_out(found: Sequence[Finding]) -> str:
-    """What no answer says, since their lines were left out before."""
-    if all(entry.code != "mains_in_charge" for entry in found):
-        return ""
-    return " The charge holds mains pick-up, whose lines were left out before: see the findings."
+def _d33(
+    bench: Workbench, shown: Explanation, stated: str, fit: Mapping[str, Any]
+) -> tuple[dict[str, Any] | None, list[Finding]]:
+    """The d33 under the one answer that stands, and a finding where no PVDF has it; None where several answers are
+    left, or none: each would mean another d33.
+
+    `quotable`: it is plausible, and the answer fits the recordings to their noise.
+    """
+    if bench.lines.curves or stated not in ("explained", "no_mismatch"):
+        return None, []
+    d33 = parameter(shown, place_of(shown, "d33"))
+    slip = d33_findings.implausible(d33["value"])
+    reached = fit["after"]["rmse_percent"] <= _REACHES_NOISE * fit["noise_floor_percent"]
+    findings = [Finding("implausible_d33", "", "d33_pc_per_n", f"d33 comes out as {d33['value']:.4g} pC/N, {slip}")]
+    return {**d33, "quotable": reached and slip is None}, findings if slip else []
 
 
 def _findings(found: Sequence[Finding]) -> list[dict[str, str]]:

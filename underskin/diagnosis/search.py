@@ -44,11 +44,16 @@ class Answer:
 
 @dataclass(frozen=True)
 class Search:
-    """What was tried: explanations, processes on top of some of them, and what the campaign does not support."""
+    """What was tried: explanations, processes on top of some of them, and what the campaign does not support.
+
+    `null_contradicted`: under the null hypothesis the residual keeps structure, or its noise is no noise (see
+    remainder.py); its probability is then that of `none_of_these`.
+    """
 
     explanations: tuple[Explanation, ...]
     discrepancies: tuple[tuple[Explanation, Discrepancy], ...]
     unsupported: dict[str, str]
+    null_contradicted: bool = False
 
     @property
     def supported(self) -> int:
@@ -95,7 +100,15 @@ class Search:
         probabilities = (1 - _UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
         probabilities[-1] += _UNTHOUGHT
         rivals: list[Explanation | None] = [*kept, None]
-        answers = [Answer(entry, value) for entry, value in zip(rivals, probabilities.tolist(), strict=True)]
+        if self.null_contradicted:
+            null = next(number for number, entry in enumerate(kept) if not entry.names)
+            probabilities[-1] += probabilities[null]
+            probabilities[null] = 0.0
+        answers = [
+            Answer(entry, value)
+            for entry, value in zip(rivals, probabilities.tolist(), strict=True)
+            if entry is None or entry.names or not self.null_contradicted
+        ]
         return sorted(answers, key=lambda answer: -answer.probability)
 
 

@@ -26,17 +26,25 @@ SIMPLEST: Mapping[Kind, str] = {  # what the model to which nothing is added is 
 
 
 def answer_statement(
-    answers: Sequence[Answer], verdict: str, shape: str, kind: Kind = "frf", modulus: Mapping[str, Any] | None = None
+    answers: Sequence[Answer],
+    verdict: str,
+    shape: str,
+    kind: Kind = "frf",
+    modulus: Mapping[str, Any] | None = None,
+    caveats: str = "",
 ) -> str:
-    """Some plain sentences on what is missing; of curves also the modulus under the stated answer."""
-    said = _answer(answers, verdict, shape, SIMPLEST[kind])
-    if modulus is None or verdict == "unexplained":
-        return said
-    interval = f"95 %: {modulus['low']:.3g} to {modulus['high']:.3g}"
-    return f"{said} Young's modulus under this answer: {modulus['value']:.3g} {modulus['unit']} ({interval})."
+    """Some plain sentences: what is missing, what decides how far that can be trusted (`caveats`), the laws; of curves
+    also the modulus under the stated answer."""
+    first, rest = _answer(answers, verdict, shape, SIMPLEST[kind])
+    parts = [first, caveats, rest]
+    if modulus is not None and verdict != "unexplained":
+        interval = f"95 %: {modulus['low']:.3g} to {modulus['high']:.3g}"
+        parts.append(f"Young's modulus under this answer: {modulus['value']:.3g} {modulus['unit']} ({interval}).")
+    return " ".join(part for part in parts if part)
 
 
-def _answer(answers: Sequence[Answer], verdict: str, shape: str, model: str) -> str:
+def _answer(answers: Sequence[Answer], verdict: str, shape: str, model: str) -> tuple[str, str]:
+    """The verdict in one sentence, and what else there is to say of it."""
     leader = answers[0]
     percent = in_percent(leader.probability)
     rivals = [answer for answer in answers[1:4] if answer.probability > _WORTH_NAMING]
@@ -45,15 +53,14 @@ def _answer(answers: Sequence[Answer], verdict: str, shape: str, model: str) -> 
     if verdict == "no_mismatch":
         agree = f"Recordings and {model} agree within the noise (probability {percent})"
         if leader.probability >= EXPLAINED or not rivals:
-            return f"{agree}; nothing needs to be added."
-        return f"{agree}, but they do not rule out: {listed}. {_laws(tuple(mentioned))}".rstrip()
+            return f"{agree}; nothing needs to be added.", ""
+        return f"{agree}, but they do not rule out: {listed}.", _laws(tuple(mentioned))
     if verdict == "unexplained":
-        described = f" {shape}" if shape else ""
-        return f"Something is missing that none of the known mechanisms describes (probability {percent}).{described}"
+        return f"Something is missing that none of the known mechanisms describes (probability {percent}).", shape
     names = in_words(leader.names)
     if verdict == "explained":
-        return f"{model[0].upper()}{model[1:]} lacks {names} (probability {percent}). {_laws(leader.names)}"
-    return f"Best explained by {names} ({percent}), but these rivals remain: {listed}. {_laws(tuple(mentioned))}"
+        return f"{model[0].upper()}{model[1:]} lacks {names} (probability {percent}).", _laws(leader.names)
+    return f"Best explained by {names} ({percent}), but these rivals remain: {listed}.", _laws(tuple(mentioned))
 
 
 def _laws(names: Sequence[str]) -> str:
