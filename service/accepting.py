@@ -13,7 +13,7 @@ from service.reading import Arrived, Found, arrived_as, joined, read, require_fe
 from service.store import answers, campaigns, skins
 from service.store.engine import Database
 from service.uploads import Upload
-from underskin import InvalidInput
+from underskin import InvalidInput, campaign_findings
 from underskin.errors import FileError
 from underskin.recordings import fields
 from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription, from_dict
@@ -149,7 +149,8 @@ def _place(recording: str) -> str:
 
 def _kept(connection: Connection, found: Arrived, terms: Terms, rig: RigDescription | None) -> dict[str, Any]:
     refused = [{"id": entry["id"], "status": "refused", "errors": entry["errors"]} for entry in found.refused]
-    result = {"file": found.file, "errors": found.errors, "notes": found.notes}
+    findings = [] if found.campaign is None else list(campaign_findings.in_words(found.campaign))
+    result = {"file": found.file, "errors": found.errors, "notes": found.notes, "findings": findings}
     if found.campaign is None:
         return {**result, "status": "refused", "id": None, "skin_id": None, "recordings": refused}
     arrival = campaigns.Arrival(

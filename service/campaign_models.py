@@ -37,6 +37,9 @@ class CampaignResult(BaseModel):
     recordings: list[RecordingResult] = Field(description="One entry a recording: those kept, then those refused.")
     errors: list[Refused] = Field(description="Why the campaign as a whole was refused; empty where it was kept.")
     notes: list[str] = Field(description="What its reader remarked, such as a file that ends too early.")
+    findings: list[str] = Field(
+        description="What looks wrong in its times and its sensors' places, and is used all the same."
+    )
 
 
 class BatchResult(BaseModel):

@@ -19,10 +19,11 @@ from service.dependencies import CampaignId, Store, Table, authorised
 from service.made_files import made_file
 from service.store import campaigns
 from service.store.times import stored
+from service.unique_keys import JsonRoute
 from service.uploads import received
 from underskin import InvalidInput
 
-router = APIRouter(prefix="/v1", tags=["campaigns"])
+router = APIRouter(prefix="/v1", tags=["campaigns"], route_class=JsonRoute)
 
 WRITE = [Security(authorised, scopes=["write"])]
 # Reading a campaign takes memory many times its size: few at a time, the others wait.

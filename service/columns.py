@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, Validatio
 from pydantic_core import from_json
 
 from service.problems import Refusal, from_validation
+from service.unique_keys import require_unique_keys
 from underskin import InvalidInput
 from underskin.units import Floats
 
@@ -84,14 +85,19 @@ def parse(kind: type[Request], body: bytes, content_type: str) -> Request:
 
 
 def json_document(body: bytes, content_type: str, also: str = "") -> Any:
-    """What a JSON body holds; raises Refusal 400 (unreadable) or 415 (another type; `also` says what else is read)."""
+    """What a JSON body holds; raises Refusal 400 (unreadable), 422 (a key comes twice) or 415 (another type).
+
+    `also` says what else is read.
+    """
     media_type = _media_type(content_type)
     if media_type not in ("", "application/json"):
         raise Refusal(415, f"Content-Type {media_type!r} cannot be read; send application/json{also}.")
     try:
-        return from_json(body)  # reads NaN too, so that it is refused by field and row
+        document = from_json(body)  # reads NaN too, so that it is refused by field and row
     except ValueError as error:
         raise Refusal(400, f"The body is not JSON: {error}.") from None
+    require_unique_keys(body)
+    return document
 
 
 def _media_type(content_type: str) -> str:

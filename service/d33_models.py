@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 # Raised whenever the fields below, or the figures that underskin.inversion and underskin.recordings put into them,
 # change: what an earlier version kept is then computed anew.
-ANSWER_VERSION = 2
+ANSWER_VERSION = 3
 
 
 class D33Value(BaseModel):
@@ -112,7 +112,9 @@ class D33(BaseModel):
     sensors: list[SensorD33] = Field(description="One entry a sensor that was recorded.")
     cells: list[CellD33] = Field(description="One entry a sensor, indenter and preload that was recorded.")
     moduli: list[Modulus] = Field(description="One entry a recording of the elastomer alone.")
-    findings: list[str] = Field(description="What looked wrong and was used all the same, such as C/N taken for pC/N.")
+    findings: list[str] = Field(
+        description="What looked wrong and was used all the same, such as C/N taken for pC/N or a time still to come."
+    )
     left_out: list[LeftOut] = Field(description="What the figures do without.")
 
 

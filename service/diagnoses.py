@@ -11,9 +11,10 @@ from service.dependencies import CampaignId, Store, Table, authorised
 from service.diagnosing import Runner
 from service.once import IdempotentOnce
 from service.store import diagnoses
+from service.unique_keys import JsonRoute
 from underskin import __version__
 
-router = APIRouter(prefix="/v1", tags=["diagnoses"])
+router = APIRouter(prefix="/v1", tags=["diagnoses"], route_class=JsonRoute)
 
 WRITE = [Security(authorised, scopes=["write"])]
 DiagnosisId = Annotated[str, Path(description="Id of a diagnosis, as it was answered when it was asked for.")]

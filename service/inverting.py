@@ -156,6 +156,7 @@ def _computed(
 
 def _inverted(campaign: Campaign, table: SigmaTable, band_hz: Band | None) -> "tuple[dict[str, Any], Inversion | None]":
     # Imported here: statistics take half a second to load, which a start need not wait for.
+    from underskin import campaign_findings
     from underskin.inversion import invert
     from underskin.recordings import elastomer
 
@@ -165,7 +166,8 @@ def _inverted(campaign: Campaign, table: SigmaTable, band_hz: Band | None) -> "t
     except InvalidInput as error:
         if band_hz is not None and error.field == "band_hz":
             raise
-        return {**_none(str(error)), "moduli": moduli, "left_out": silent}, None
+        findings = list(campaign_findings.in_words(campaign))
+        return {**_none(str(error)), "findings": findings, "moduli": moduli, "left_out": silent}, None
     left_out = [{"recording": None, "reason": reason} for reason in found.left_out]
     return {**of_inversion(found), "moduli": moduli, "left_out": left_out + silent}, found
 

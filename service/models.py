@@ -15,8 +15,9 @@ from service.problems import Refusal
 from service.store import diagnoses, models, skins
 from service.store.errors import Conflict
 from service.store.tables import AnyRow
+from service.unique_keys import JsonRoute
 
-router = APIRouter(prefix="/v1", tags=["skins"])
+router = APIRouter(prefix="/v1", tags=["skins"], route_class=JsonRoute)
 
 WRITE = [Security(authorised, scopes=["write"])]
 

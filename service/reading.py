@@ -8,6 +8,7 @@ import orjson
 
 from service.problems import Refusal
 from service.store import skins
+from service.unique_keys import repeated
 from service.uploads import Upload
 from underskin import InvalidInput
 from underskin.errors import FileError
@@ -147,8 +148,9 @@ def _read_json(upload: Upload, most_bytes: int) -> list[Found]:
     if upload.path.stat().st_size > most_bytes:
         limit = f"{most_bytes / 1e6:g} MB (UNDERSKIN_MAX_BODY_MB)"
         raise Refusal(413, f"JSON may have up to {limit}; send more in several requests, or as HDF5.")
+    content = upload.path.read_bytes().removeprefix(_BOM)
     try:
-        document = orjson.loads(upload.path.read_bytes().removeprefix(_BOM))
+        document = orjson.loads(content)
     except orjson.JSONDecodeError as error:
         if not upload.in_form:
             raise Refusal(
@@ -156,6 +158,9 @@ def _read_json(upload: Upload, most_bytes: int) -> list[Found]:
             ) from None
         allowed = f"must be JSON; line {error.lineno}, column {error.colno}: {error.msg}"
         return [Found(upload.label, errors=[_error("file", upload.label, allowed)])]
+    twice = repeated(content)
+    if twice is not None:
+        return [Found(upload.label, errors=[_invalid(twice)])]
     if not isinstance(document, list):
         require_few(1, _recordings_in(document))
         return [_checked(upload.label, document)]

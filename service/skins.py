@@ -12,9 +12,10 @@ from service.dependencies import SkinId, Store, Table, authorised
 from service.problems import Refusal
 from service.store import skins
 from service.store.errors import Missing
+from service.unique_keys import JsonRoute
 from underskin import InvalidInput
 
-router = APIRouter(prefix="/v1", tags=["skins"])
+router = APIRouter(prefix="/v1", tags=["skins"], route_class=JsonRoute)
 
 WRITE = [Security(authorised, scopes=["write"])]
 

@@ -18,12 +18,13 @@ from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 from service.dependencies import Table
 from service.front import HotRoute, are_numbers
 from service.problems import Refusal
+from service.unique_keys import JsonRoute
 from underskin import Indenter, InvalidInput, Skin
 from underskin.prediction import frf_gradient, transmission
 from underskin.surrogate import SigmaTable
 from underskin.units import LAB, Floats, checked, to_lab
 
-router = APIRouter(prefix="/umbridge", tags=["umbridge"])
+router = APIRouter(prefix="/umbridge", tags=["umbridge"], route_class=JsonRoute)
 
 _Zero = Annotated[int, Field(strict=True, ge=0, le=0)]
 _Vector = list[Annotated[float, Field(strict=True, allow_inf_nan=False)]]
@@ -238,6 +239,7 @@ def hot_route(table: SigmaTable) -> HotRoute:
             (point,) = request["input"]
             plain = request["name"] == "sigma" and type(request.get("config", {})) is dict
             plain = plain and len(point) == 3 and are_numbers(point)
+            plain = plain and body.count(b":") == len(request)  # no key comes twice
             found = table.at(*point) if plain else None
         except (ValueError, TypeError, KeyError):
             return None

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from underskin import campaign_findings
 from underskin.columns import PIPED_WIDTH
 from underskin.digits import significant
 from underskin.errors import InvalidInput
@@ -51,11 +52,12 @@ class Told:
     def notes(self) -> list[str]:
         """In words: what looks wrong, and each recording or sensor that the figures do without."""
         notes = [f"look at: {warning}" for warning in self.reading.warnings]
-        if isinstance(self.found, Inversion):
-            notes += [f"look at: {finding}" for finding in self.found.findings]
-        elif not self.moduli:
+        campaign = self.reading.campaign
+        found = self.found.findings if isinstance(self.found, Inversion) else campaign_findings.in_words(campaign)
+        notes += [f"look at: {finding}" for finding in found]
+        if not isinstance(self.found, Inversion) and not self.moduli:
             refused = len(self.reading.problems)
-            all_refused = refused and not self.reading.campaign.recordings
+            all_refused = refused and not campaign.recordings
             why = f"none of the {refused} recordings can be used" if all_refused else self.found
             notes.append(f"no d33: {why}")
         for problem in self.reading.problems:

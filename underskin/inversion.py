@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin import inversion_findings, mixed_model, unusable_row
+from underskin import campaign_findings, inversion_findings, mixed_model, unusable_row
 from underskin.errors import InvalidInput
 from underskin.mixed_model import Estimate, MixedModel, Rows
 from underskin.offset import PositionedSigma, positioned_sigma
@@ -137,8 +137,11 @@ def invert(
         inside=inside,
     )
     found = _estimated(ids, rows, contact, zone)
-    looked_at = inversion_findings.in_words(recorded, measured, level, found.campaign_d33)
-    return replace(found, left_out=(*refused, *found.left_out), findings=looked_at)
+    looked_at = [
+        *campaign_findings.in_words(campaign),
+        *inversion_findings.in_words(recorded, measured, level, found.campaign_d33),
+    ]
+    return replace(found, left_out=(*refused, *found.left_out), findings=tuple(looked_at))
 
 
 def _none_usable(campaign: Campaign, refused: Sequence[str]) -> NoD33:

@@ -49,13 +49,22 @@ def _lines(content: bytes, name: str) -> tuple[list[Line], str]:
     except FileError as error:
         raise InvalidInput(_FIELD, name, f"must be a readable CSV file ({error.place}: {error.reason})") from None
     separator = next((sign for sign in ("\t", ";") if sign in told), ",")
-    decimal = "," if separator != "," and "," in told else "."
-    numbered = [(number, text.cells(line, separator)) for number, line in enumerate(text.lines(told), 1)]
+    numbered = [(number, _cells(line, separator, number, name)) for number, line in enumerate(text.lines(told), 1)]
+    decimal = text.decimal_mark([cells for _, cells in numbered], separator)
     return [(number, cells) for number, cells in numbered if any(cells)], decimal
+
+
+def _cells(line: str, separator: str, number: int, name: str) -> list[str]:
+    try:
+        return text.cells(line, separator)
+    except ValueError as error:
+        raise InvalidInput(_FIELD, line[:80], f"{error} (line {number} of {name})") from None
 
 
 def _number(cell: str, decimal: str, place: str) -> float:
     value = text.number(cell, decimal)
+    if value is None and text.is_grouped(cell):
+        raise InvalidInput(_FIELD, cell[:80], f"{text.ungrouped(cell)} ({place})")
     if value is None or not math.isfinite(value):
         raise InvalidInput(_FIELD, cell[:80], f"must be a {'number' if value is None else 'finite number'} ({place})")
     return value

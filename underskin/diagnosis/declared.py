@@ -2,20 +2,19 @@
 
 An unlikely magnitude looks like a slip of units: nothing in the campaign says otherwise, and every law of contact would
 be tried on a wrong force or modulus. It is named in any case, and nothing is concluded from it, until it is corrected
-or `units_checked` says that it is meant. Sensors that overlap cannot be meant.
+or `units_checked` says that it is meant.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.distance import pdist
 
 from underskin import units
+from underskin.campaign_findings import pitch_mm
 from underskin.diagnosis.axes import hours
 from underskin.diagnosis.finding import Finding
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf_estimation import lines_of
-from underskin.units import Floats
 
 _PRELOADS_N = (0.01, 150.0)  # the highest preload of a campaign, and the lowest
 _FREQUENCIES_HZ = (0.5, 2e4)  # the highest line of a campaign
@@ -45,7 +44,7 @@ def _of_skin(campaign: Campaign) -> list[Finding]:
     for name in _GEOMETRY:
         value = getattr(skin, name)
         found += [_slip(f"skin.{name}", entry.statement) for entry in units.findings(name, value or 1.0)]
-    pitch = _pitch_mm(campaign)
+    pitch = pitch_mm(campaign)
     if pitch is not None and pitch > _WIDEST_PITCH_MM:
         found.append(_slip("skin.sensors", f"no two sensors lie nearer than {pitch:g} mm: were places given in µm?"))
     return found
@@ -102,19 +101,3 @@ def _pause_s(entries: Sequence[FrfRecording]) -> float | None:
 
 def _slip(field: str, text: str) -> Finding:
     return Finding("units_off_by_1000", "", field, text)
-
-
-def overlapping(campaign: Campaign) -> list[Finding]:
-    """Sensors that would overlap."""
-    radius, pitch = campaign.skin.sensor_radius_mm, _pitch_mm(campaign)
-    if radius is None or pitch is None or pitch >= 2 * radius:
-        return []
-    guess = "were their places given in m" if _SLIP * pitch >= 2 * radius and pitch < 0.1 else "is it the diameter"
-    text = f"sensors of {radius:g} mm radius cannot lie {pitch:g} mm apart: {guess}, or a slip?"
-    return [Finding("impossible_geometry", "", "skin.sensor_radius_mm", text)]
-
-
-def _pitch_mm(campaign: Campaign) -> float | None:
-    """The distance of the two sensors that lie nearest to each other."""
-    places: Floats = np.array([(sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors])
-    return float(pdist(places).min()) if len(places) > 1 else None

@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 
 import underskin
+from underskin.campaign_findings import implausible
 from underskin.diagnosis import held_out
 from underskin.diagnosis.confounding import confounding, left_open
 from underskin.diagnosis.curve_findings import without_unusable
@@ -42,10 +43,16 @@ NO_LIMITS = Limits()
 def diagnose(
     campaign: Campaign, table: SigmaTable, progress: Progress = lambda _: None, limits: Limits = NO_LIMITS
 ) -> Diagnosis:
-    """What recordings and model disagree about, and what physics was left out. Deterministic.
+    """What recordings and model disagree about, and what physics was left out.
 
-    Raises InvalidInput where the campaign has no FRF recording.
+    Deterministic, but for a campaign that states times to come (underskin.campaign_findings). Raises InvalidInput where
+    the campaign has no FRF recording.
     """
+    found = _diagnosed(campaign, table, progress, limits)
+    return replace(found, findings=tuple(dict.fromkeys((*implausible(campaign), *found.findings))))
+
+
+def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits: Limits) -> Diagnosis:
     provenance = _provenance(table)
     progress(0.05)
     possible = without_extremes(campaign)

@@ -9,9 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from underskin.campaign_findings import overlapping_sensors
 from underskin.diagnosis.against_model import against_model
 from underskin.diagnosis.axes import recording_axes
-from underskin.diagnosis.declared import overlapping, unlikely
+from underskin.diagnosis.declared import unlikely
 from underskin.diagnosis.finding import Finding, Inspected
 from underskin.diagnosis.places import huddled, misplaced
 from underskin.diagnosis.series import as_given, as_lines
@@ -47,7 +48,7 @@ def _inspect_lines(
     entries = [entry for entry, wrong in zip(entries, off | astray, strict=True) if not wrong]
     if not entries:
         return _inspected(campaign, entries, found)
-    contradictory = [*loose_sphere(entries), *overlapping(campaign), *misgiven]
+    contradictory = [*loose_sphere(entries), *overlapping_sensors(campaign), *misgiven]
     doubtful = [*unlikely(campaign, entries), *huddled(campaign, entries)]
     found += [*doubtful, *contradictory]
     if contradictory or (doubtful and not campaign.units_checked):

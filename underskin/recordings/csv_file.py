@@ -2,7 +2,8 @@
 
 The separator (tab, semicolon or comma) and the decimal mark are those that make the longest run of rows a table of
 numbers. Headings name the channels and, in brackets or behind the last underscore, their units. Lines above the
-headings and under the numbers that hold a name and a value become properties. See Also csv_template.py, our own table.
+headings and under the numbers that hold a name and a value become properties, unless the name has two values. A cell in
+quotes may hold the separator. See Also csv_template.py, our own table.
 """
 
 import re
@@ -43,12 +44,17 @@ def read(stream: BinaryIO, file: str) -> Contents:
         )
     rows, end = _rows(lines, table, file)
     for index in range(end, len(lines)):
-        first = text.cells(lines[index], table.separator)[0]
+        first = lines[index].split(table.separator)[0].strip().strip('"')
         if text.number(first, table.decimal) is not None:
             raise _no_row(lines, index, table, file)
+    for index in range(table.start):
+        if _is_grouped_row(lines[index], table):
+            raise _no_row(lines, index, table, file)
     columns = np.array(rows, dtype=np.float64).T.copy()
-    channels = [Channel(*heading, column) for heading, column in zip(_headings(lines, table), columns, strict=True)]
-    return Contents((Block("", with_distinct_names(channels)),), _properties(lines[: table.start] + lines[end:]))
+    headings = _headings(lines, table, file)
+    channels = [Channel(*heading, column) for heading, column in zip(headings, columns, strict=True)]
+    properties, warnings = _properties(lines[: table.start] + lines[end:], table.separator)
+    return Contents((Block("", with_distinct_names(channels)),), properties, warnings)
 
 
 def _table(lines: list[str]) -> _Table | None:
@@ -69,15 +75,28 @@ def _longest_run(widths: list[int]) -> tuple[int, int]:
 
 
 def _numbers(line: str, separator: str, decimal: str) -> list[float] | None:
-    if separator not in line:
-        return None
     numbers = []
-    for cell in text.cells(line, separator):
+    for cell in _cells(line, separator):
         value = text.number(cell, decimal)
         if value is None:
             return None
         numbers.append(value)
     return numbers
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    """The cells of a line; none where it has one at most, or quotes that do not close."""
+    try:
+        return text.cells(line, separator) if separator in line else []
+    except ValueError:
+        return []
+
+
+def _is_grouped_row(line: str, table: _Table) -> bool:
+    """Whether a line above the table looks like a row of it but for numbers with their thousands apart."""
+    cells = _cells(line, table.separator)
+    ungrouped = [cell.replace(",", "") if text.is_grouped(cell) else cell for cell in cells]
+    return len(cells) == table.width and all(text.number(cell, table.decimal) is not None for cell in ungrouped)
 
 
 def _rows(lines: list[str], table: _Table, file: str) -> tuple[list[list[float]], int]:
@@ -100,10 +119,14 @@ def _no_row(lines: list[str], index: int, table: _Table, file: str) -> FileError
     return FileError(file, f"line {index + 1}", expected)
 
 
-def _headings(lines: list[str], table: _Table) -> list[tuple[str, str]]:
+def _headings(lines: list[str], table: _Table, file: str) -> list[tuple[str, str]]:
     """Names and units of the columns, from the line above the numbers, or from two: names, and units under them."""
-    above = [text.cells(line, table.separator) for line in lines[: table.start] if line.strip()]
-    last, before = ([[], [], *above][-1], [[], [], *above][-2])
+    above = [index for index in range(table.start) if lines[index].strip()]
+    try:
+        last = text.cells(lines[above[-1]], table.separator) if above else []
+    except ValueError as error:
+        raise FileError(file, f"line {above[-1] + 1}", str(error)) from None
+    before = _cells(lines[above[-2]], table.separator) if len(above) > 1 else []
     if not _is_heading(last, table.width):
         return [(f"column {number}", "") for number in range(1, table.width + 1)]
     if _is_heading(before, table.width) and any(unit(cell) for cell in last):
@@ -115,12 +138,18 @@ def _is_heading(cells: list[str], width: int) -> bool:
     return len(cells) == width and all(cells)
 
 
-def _properties(lines: list[str]) -> dict[str, str | float]:
-    """What lines that hold a name and a value say; a number is kept as text, as written."""
-    properties: dict[str, str | float] = {}
+def _properties(lines: list[str], separator: str) -> tuple[dict[str, str | float], tuple[str, ...]]:
+    """What lines that hold a name and a value say, a number as text, as written; and which have two values."""
+    values: dict[str, list[str]] = {}
     for line in lines:
-        cells = [cell.strip().strip('"') for cell in _SEPARATORS.split(line)]
+        quoted = _cells(line, separator) if '"' in line else []
+        cells = quoted or [cell.strip().strip('"') for cell in _SEPARATORS.split(line)]
         match [cell for cell in cells if cell]:
             case [name, value] if cells[0] == name:
-                properties[name] = value
-    return properties
+                values.setdefault(name, []).append(value)
+    twice = {name: different for name, said in values.items() if len(different := list(dict.fromkeys(said))) > 1}
+    warnings = [
+        f"{name!r} is given as {different[0]!r} and as {different[1]!r}: neither is used"
+        for name, different in twice.items()
+    ]
+    return {name: said[0] for name, said in values.items() if name not in twice}, tuple(warnings)

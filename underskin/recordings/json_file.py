@@ -6,6 +6,7 @@ import orjson
 
 from underskin.errors import FileError
 from underskin.recordings.campaign import Campaign, to_dict
+from underskin.repeated_keys import repeated_key
 
 _BOM = b"\xef\xbb\xbf"
 
@@ -17,11 +18,19 @@ def read(stream: BinaryIO, file: str) -> Any:
 
 
 def document(data: bytes, file: str) -> Any:
-    """The JSON document in `data`; raises FileError that names line and column. NaN and Infinity are not JSON."""
+    """The JSON document in `data`. NaN and Infinity are not JSON, and an object may have a key once.
+
+    Raises FileError that names line and column.
+    """
+    data = data.removeprefix(_BOM)
     try:
-        return orjson.loads(data.removeprefix(_BOM))
+        read = orjson.loads(data)
     except orjson.JSONDecodeError as error:
         raise FileError(file, f"line {error.lineno}, column {error.colno}", f"not JSON: {error.msg}") from None
+    repeated = repeated_key(data)
+    if repeated is not None:
+        raise FileError(file, repeated.place, f"the key {repeated.key!r} must be given once in its object")
+    return read
 
 
 def write(campaign: Campaign) -> bytes:

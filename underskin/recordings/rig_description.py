@@ -155,7 +155,7 @@ def _known(prefix: str, document: Mapping[str, Any], known: set[str]) -> Mapping
 
 
 class _PlainLoader(yaml.SafeLoader):
-    """Safe YAML without references and without dates; 1e-3 is a number, as in JSON."""
+    """Safe YAML without references, dates and keys that come twice; 1e-3 is a number, as in JSON."""
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         """Refuses references: a few lines of them can stand for any amount of data."""
@@ -163,6 +163,20 @@ class _PlainLoader(yaml.SafeLoader):
             mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
             raise yaml.composer.ComposerError(None, None, "references (*name) are not allowed", mark)
         return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+        """Refuses a key that comes twice: the last one would be taken."""
+        mapping = super().construct_mapping(node, deep=deep)
+        if len(mapping) == len(node.value):
+            return mapping
+        seen = set()
+        for entry, _ in node.value:
+            key = self.construct_object(entry, deep=True)
+            if key in seen:
+                problem = f"the key {key!r} (column {entry.start_mark.column + 1}) must be given once in its mapping"
+                raise yaml.constructor.ConstructorError(None, None, problem, entry.start_mark)
+            seen.add(key)
+        return mapping
 
 
 _FLOAT = "tag:yaml.org,2002:float"

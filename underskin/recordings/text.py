@@ -1,12 +1,15 @@
-"""Text as instruments write it: byte order marks, old code pages, decimal commas."""
+"""Text as instruments write it: byte order marks, old code pages, cells in quotes, decimal commas."""
 
+import csv
 import re
+from collections.abc import Sequence
 from typing import BinaryIO
 
 from underskin.errors import FileError
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _NUMBER = re.compile(r"[+-]?(\d+([.]\d*)?|[.]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
+_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 _BOMS = {b"\xef\xbb\xbf": "utf-8", b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 
 
@@ -46,11 +49,54 @@ def lines(text: str) -> list[str]:
 
 
 def cells(line: str, separator: str) -> list[str]:
-    """The cells of a line, without quotes and without the empty ones at its end; at least one."""
-    found = [cell.strip().strip('"') for cell in line.split(separator)]
+    """The cells of a line, without quotes and without the empty ones at its end; at least one.
+
+    A cell in quotes may hold the separator, and quotes, doubled; it ends on its line. Raises ValueError where it does
+    not.
+    """
+    found = [cell.strip() for cell in (_quoted(line, separator) if '"' in line else line.split(separator))]
     while len(found) > 1 and not found[-1]:
         found.pop()
     return found
+
+
+def _quoted(line: str, separator: str) -> list[str]:
+    try:
+        return next(csv.reader([line], delimiter=separator, skipinitialspace=True, strict=True))
+    except csv.Error:
+        raise ValueError(
+            "a cell in quotes must end on its line, before the next separator, with the quotes inside it doubled"
+        ) from None
+
+
+def decimal_mark(rows: Sequence[Sequence[str]], separator: str) -> str:
+    """The decimal mark of a table, by its cells.
+
+    A comma where a cell is a number only that way and cannot have its thousands apart instead. Beside semicolons, which
+    stand for commas that are decimal marks, any such cell says so; between commas none does where others have points.
+    """
+    if separator == "," and _has_number(rows, "."):
+        return "."
+    return "," if _has_number(rows, ",", grouped=separator == ";") else "."
+
+
+def _has_number(rows: Sequence[Sequence[str]], decimal: str, *, grouped: bool = False) -> bool:
+    """Whether a cell is a number with this decimal mark; `grouped`: even if that may part its thousands instead."""
+    return any(
+        decimal in cell and number(cell, decimal) is not None and (grouped or not is_grouped(cell))
+        for row in rows
+        for cell in row
+    )
+
+
+def is_grouped(cell: str) -> bool:
+    """Whether a cell such as 16,000 is a whole number with its thousands apart, or a number with a decimal comma."""
+    return _GROUPED.fullmatch(cell) is not None
+
+
+def ungrouped(cell: str) -> str:
+    """What is asked of a cell like that."""
+    return f"can be {cell.replace(',', '')} or {cell.replace(',', '.', 1)}: write it without a comma"
 
 
 def number(cell: str, decimal: str) -> float | None:

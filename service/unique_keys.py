@@ -1,0 +1,46 @@
+"""JSON bodies in which an object has a key twice are refused: the parsers would take the last and say nothing."""
+
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+
+from service.problems import invalid_input
+from underskin import InvalidInput
+from underskin.repeated_keys import repeated_key
+
+
+def repeated(body: bytes) -> InvalidInput | None:
+    """What is wrong with a valid JSON body in which a key comes twice in one object."""
+    found = repeated_key(body)
+    if found is None:
+        return None
+    return InvalidInput(found.key, "given twice", f"must be given once in its object; it comes again at {found.place}")
+
+
+def require_unique_keys(body: bytes) -> None:
+    """Raises Refusal (422) that names the key, its line and its column."""
+    error = repeated(body)
+    if error is not None:
+        raise invalid_input([error])
+
+
+class _JsonRequest(Request):
+    async def json(self) -> Any:
+        document = await super().json()
+        require_unique_keys(await self.body())
+        return document
+
+
+class JsonRoute(APIRoute):
+    """A route whose body FastAPI reads."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Have the body read by way of the check."""
+        answer = super().get_route_handler()
+
+        async def checked(request: Request) -> Response:
+            return await answer(_JsonRequest(request.scope, request.receive))
+
+        return checked

@@ -1,0 +1,91 @@
+"""Keys that come twice in one object of a JSON document: parsers take the last and say nothing.
+
+The search hops from one quotation mark to the next, so that the numbers between them cost little.
+"""
+
+import json
+import re
+from dataclasses import dataclass
+
+_ESCAPE = re.compile(rb'\\(["\\])')
+_AS_UNICODE = {b'"': rb"\u0022", b"\\": rb"\u005c"}
+_STRING = re.compile(rb'"((?:[^"\\]|\\.)*)"')
+_COLON = re.compile(rb"\s*:")
+
+
+@dataclass(frozen=True)
+class RepeatedKey:
+    """A key that its object has already, and where it comes again: line and column, both from 1."""
+
+    key: str
+    line: int
+    column: int
+
+    @property
+    def place(self) -> str:
+        """Line and column in words."""
+        return f"line {self.line}, column {self.column}"
+
+
+def repeated_key(document: bytes) -> RepeatedKey | None:
+    """The first key that comes again in its object, however it is escaped; None where there is none.
+
+    `document` must be valid JSON, in UTF-8, or in UTF-16 or UTF-32, which Python's own parser reads too.
+    """
+    document = _in_utf8(document)
+    number = _number_of_repeated(document)
+    if number is None:
+        return None
+    string = next(found for place, found in enumerate(_STRING.finditer(document)) if place == number)
+    before = document[: string.start()].decode("utf-8", "replace")
+    return RepeatedKey(_unescaped(string[1]), before.count("\n") + 1, len(before) - before.rfind("\n"))
+
+
+def _in_utf8(document: bytes) -> bytes:
+    encoding = json.detect_encoding(document)
+    if encoding == "utf-8":
+        return document
+    return document.decode(encoding, "surrogatepass").encode("utf-8", "surrogatepass")
+
+
+def _number_of_repeated(document: bytes) -> int | None:
+    """Which string of the document, from 0, is the first key that comes again."""
+    if b"\\" in document:  # then leave no quotation mark but those that begin and end strings
+        document = _ESCAPE.sub(lambda escape: _AS_UNICODE[escape[1]], document)
+    objects: list[set[bytes]] = []  # the keys of those that are open
+    number = behind = 0
+    while (start := document.find(b'"', behind)) >= 0:
+        if start - behind > 1 or not number:  # a single character is a colon or a comma
+            _follow(document, behind, start, objects)
+        end = document.find(b'"', start + 1)
+        behind = end + 1
+        follows = document[behind : behind + 1]
+        if follows == b":" or (follows.isspace() and _COLON.match(document, behind)):
+            key = document[start + 1 : end]
+            if b"\\" in key:
+                key = _unescaped(key).encode("utf-8", "surrogatepass")
+            if key in objects[-1]:
+                return number
+            objects[-1].add(key)
+        number += 1
+    return None
+
+
+def _follow(document: bytes, start: int, end: int, objects: list[set[bytes]]) -> None:
+    """Open and close `objects` as the braces between two strings do.
+
+    No object has a key between two strings, so that the last brace alone can open one that stays open.
+    """
+    opening, closing = document.find(b"{", start, end), document.find(b"}", start, end)
+    if opening < 0 and closing < 0:
+        return
+    opened = document.count(b"{", opening, end) if opening >= 0 else 0
+    closed = document.count(b"}", closing, end) if closing >= 0 else 0
+    stays_open = document.rfind(b"{", start, end) > document.rfind(b"}", start, end)
+    del objects[len(objects) - (closed - opened + stays_open) :]
+    if stays_open:
+        objects.append(set())
+
+
+def _unescaped(string: bytes) -> str:
+    return str(json.loads(b'"%b"' % string))
