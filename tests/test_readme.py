@@ -11,6 +11,7 @@ import pytest
 
 from service.settings import Settings
 from tests.conftest import running
+from tests.shown import is_as_shown
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -40,11 +41,6 @@ def sessions() -> list[tuple[str, str]]:
 def is_complete(command: str) -> bool:
     """Whether bash would wait for no further line; an unclosed here-document is only a warning."""
     return subprocess.run(["bash", "-n", "-c", command], capture_output=True).stderr == b""
-
-
-def pattern(shown: str) -> str:
-    """What is shown, with any white space and with … for anything, as a regular expression."""
-    return ".*".join(re.escape(re.sub(r"\s", "", piece)) for piece in shown.split("…"))
 
 
 Run = Callable[[list[str]], "subprocess.CompletedProcess[str]"]
@@ -78,8 +74,8 @@ def newcomer(folder: Path) -> Iterator[Run]:
 def test_command_prints_what_the_readme_shows(command: str, shown: str, newcomer: Run, folder: Path) -> None:
     answer = newcomer(["bash", "-euo", "pipefail", "-c", command])
     assert answer.returncode == 0, answer.stderr
-    printed = re.sub(r"\s", "", answer.stdout.replace(f"{folder}/", "/tmp/"))
-    assert re.fullmatch(pattern(shown), printed), f"{command}\nprints\n{answer.stdout}"
+    printed = answer.stdout.replace(f"{folder}/", "/tmp/")
+    assert is_as_shown(shown, printed), f"{command}\nprints\n{answer.stdout}"
 
 
 @pytest.mark.parametrize("block", blocks("python"))
@@ -88,7 +84,7 @@ def test_python_block_runs_and_prints_what_its_comment_says(block: str, newcomer
     (shown,) = re.findall(r"# prints (.*)", block)
     answer = newcomer([PYTHON, "-c", block])
     assert answer.returncode == 0, answer.stderr
-    assert re.fullmatch(pattern(shown), re.sub(r"\s", "", answer.stdout)), answer.stdout
+    assert is_as_shown(shown, answer.stdout), answer.stdout
 
 
 def test_links_lead_to_files() -> None:
