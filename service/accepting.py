@@ -16,6 +16,7 @@ from service.uploads import Upload
 from underskin import InvalidInput
 from underskin.errors import FileError
 from underskin.recordings import fields
+from underskin.recordings.campaign import Campaign
 from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription, from_dict
 from underskin.recordings.rig_description import parse as parse_rig
 
@@ -83,7 +84,7 @@ def accept(store: Database, uploads: Sequence[Upload], terms: Terms) -> tuple[di
 
 
 def _rig(store: Database, uploads: Sequence[Upload], terms: Terms) -> RigDescription | None:
-    """The rig description that was sent, or else the one kept with the skin."""
+    """The rig description that was sent, or else the one kept with the skin or with that of the corrected campaign."""
     for upload in uploads:
         if upload.field == RIG:
             try:
@@ -94,11 +95,12 @@ def _rig(store: Database, uploads: Sequence[Upload], terms: Terms) -> RigDescrip
             except InvalidInput as error:
                 label = f"{upload.label}: " if upload.label else f"{RIG}."
                 raise InvalidInput(f"{label}{error.field}", error.value, error.allowed) from None
-    if terms.skin is None:
-        return None
     with store.reading() as connection:
-        kept = skins.rig_of(connection, terms.skin)
-    return None if kept is None else from_dict(orjson.loads(kept))
+        names = [terms.skin] if terms.skin is not None else []
+        if terms.corrects is not None:
+            names.append(campaigns.find(connection, terms.corrects).skin_id)
+        kept = [rig for name in names if (rig := skins.rig_of(connection, name)) is not None]
+    return from_dict(orjson.loads(kept[0])) if kept else None
 
 
 def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, terms: Terms) -> list[Arrived]:
@@ -149,14 +151,27 @@ def _place(recording: str) -> str:
 
 def _kept(connection: Connection, found: Arrived, terms: Terms, rig: RigDescription | None) -> dict[str, Any]:
     refused = [{"id": entry["id"], "status": "refused", "errors": entry["errors"]} for entry in found.refused]
-    result = {"file": found.file, "errors": found.errors, "notes": found.notes}
+    result: dict[str, Any] = {"file": found.file, "errors": found.errors, "notes": found.notes}
     if found.campaign is None:
         return {**result, "status": "refused", "id": None, "skin_id": None, "recordings": refused}
+    notes = [*found.notes, *_stays(connection, found.campaign, terms)]
+    result["notes"] = notes
     arrival = campaigns.Arrival(
-        found.campaign, terms.skin, refused, found.notes, source=found.file, received_from=terms.sender
+        found.campaign, terms.skin, refused, notes, source=found.file, received_from=terms.sender
     )
     campaign_id, skin_id = campaigns.add(connection, arrival, corrects=terms.corrects, reason=terms.reason)
     if found.by_rig and rig is not None:
         skins.keep_rig(connection, skin_id, orjson.dumps(rig.document).decode())
     kept = [{"id": recording.id, "status": "ok", "errors": []} for recording in found.campaign.recordings]
     return {**result, "status": "ok", "id": campaign_id, "skin_id": skin_id, "recordings": kept + refused}
+
+
+def _stays(connection: Connection, campaign: Campaign, terms: Terms) -> list[str]:
+    """What is said of a correction that names another skin than that of the campaign it corrects."""
+    named = campaign.skin.id
+    if terms.corrects is None or terms.skin is not None or named is None:
+        return []
+    skin_id = campaigns.find(connection, terms.corrects).skin_id
+    if skins.are_one(connection, named, skin_id):
+        return []
+    return [f"it names skin {named!r}, and was kept on skin {skin_id!r}, as the campaign that it corrects"]

@@ -1,4 +1,5 @@
-"""What the reader of an upload should know before keeping it: that it is here already, and what its d33 will look like.
+"""What the reader of an upload should know before keeping it: that it is here already, that a correction names another
+skin, and what its d33 will look like.
 
 Nothing kept is ever deleted, so that afterwards is late.
 """
@@ -9,7 +10,7 @@ from fastapi import Request
 
 from service import inverting
 from service.reading import Look, arrived_as
-from service.store import repeated
+from service.store import campaigns, repeated, skins
 from service.store.engine import Database
 from underskin.recordings.campaign import Campaign
 
@@ -19,7 +20,13 @@ def worth_knowing(request: Request, look: Look, corrects: str | None) -> list[st
     store, table = request.app.state.store, request.app.state.table
     found = [one.campaign for one in map(arrived_as, look.found) if one.campaign is not None]
     return [
-        said for campaign in found for said in (*_kept(store, campaign, corrects), *inverting.foreseen(table, campaign))
+        said
+        for campaign in found
+        for said in (
+            *_kept(store, campaign, corrects),
+            *_elsewhere(store, campaign, corrects),
+            *inverting.foreseen(table, campaign),
+        )
     ]
 
 
@@ -29,4 +36,17 @@ def _kept(store: Database, campaign: Campaign, corrects: str | None) -> Iterator
     if row is not None and row.id != corrects:
         yield (
             f"these recordings are in campaign {row.name} of skin {row.skin_id} already (kept {row.received_at[:10]})."
+        )
+
+
+def _elsewhere(store: Database, campaign: Campaign, corrects: str | None) -> Iterator[str]:
+    if corrects is None or campaign.skin.id is None:
+        return
+    with store.reading() as connection:
+        skin_id = campaigns.find(connection, corrects).skin_id
+        same = skins.are_one(connection, campaign.skin.id, skin_id)
+    if not same:
+        yield (
+            f"the file names skin {campaign.skin.id}, not {skin_id}, that of the campaign that it corrects: the name "
+            "below decides."
         )

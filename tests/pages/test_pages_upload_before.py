@@ -10,10 +10,10 @@ from tests.pages.test_pages_upload import as_json
 from tests.store.server import Server, campaign
 
 
-def looked_at(server: Server, name: str, content: str) -> str:
+def looked_at(server: Server, name: str, content: str, **fields: str) -> str:
     """The page of an upload."""
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
-        form = {"form_token": token_of(client.get("/upload").text)}
+        form = {"form_token": token_of(client.get("/upload").text), **fields}
         answer = client.post("/upload", data=form, files={"file": (name, content.encode())}, follow_redirects=True)
     assert answer.status_code == 200, answer.text
     return answer.text
@@ -56,3 +56,10 @@ def test_recordings_that_are_here_already_are_named_with_their_campaign(server: 
     assert "already" not in looked_at(server, "other.json", as_json(document))
     server.http.post(f"/v1/campaigns/{kept['id']}/withdraw", json={"reason": "wrong skin"}).raise_for_status()
     assert told not in looked_at(server, "after.json", as_json(renamed))
+
+
+def test_a_correction_that_names_another_skin_is_offered_the_one_it_corrects(server: Server) -> None:
+    wrong = server.http.post("/v1/campaigns", json=campaign("slip", id="old"), params={"skin": "old"}).json()["id"]
+    page = looked_at(server, "right.json", as_json(campaign("right", id="new")), corrects=wrong)
+    assert "the file names skin new, not old, that of the campaign that it corrects" in page
+    assert 'id="keep-skin" name="skin" list="skins" value="old"' in page
