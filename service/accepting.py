@@ -8,6 +8,7 @@ from typing import Any
 import orjson
 from sqlalchemy import Connection
 
+from service import repeats
 from service.problems import Refusal
 from service.reading import Arrived, Found, arrived_as, joined, read, require_few
 from service.store import answers, campaigns, skins
@@ -154,7 +155,7 @@ def _kept(connection: Connection, found: Arrived, terms: Terms, rig: RigDescript
     result: dict[str, Any] = {"file": found.file, "errors": found.errors, "notes": found.notes}
     if found.campaign is None:
         return {**result, "status": "refused", "id": None, "skin_id": None, "recordings": refused}
-    notes = [*found.notes, *_stays(connection, found.campaign, terms)]
+    notes = [*found.notes, *_stays(connection, found.campaign, terms), *_repeats(connection, found.campaign, terms)]
     result["notes"] = notes
     arrival = campaigns.Arrival(
         found.campaign, terms.skin, refused, notes, source=found.file, received_from=terms.sender
@@ -175,3 +176,12 @@ def _stays(connection: Connection, campaign: Campaign, terms: Terms) -> list[str
     if skins.are_one(connection, named, skin_id):
         return []
     return [f"it names skin {named!r}, and was kept on skin {skin_id!r}, as the campaign that it corrects"]
+
+
+def _repeats(connection: Connection, campaign: Campaign, terms: Terms) -> list[str]:
+    """What is said of recordings that are here already."""
+    earlier = repeats.already_kept(connection, campaign, terms.corrects)
+    if earlier is None:
+        return []
+    said, campaign_id = earlier
+    return [f"{said} That is {campaign_id}; in the history of a skin, identical recordings count once."]

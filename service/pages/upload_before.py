@@ -8,9 +8,9 @@ from collections.abc import Iterator
 
 from fastapi import Request
 
-from service import inverting
+from service import inverting, repeats
 from service.reading import Look, arrived_as
-from service.store import campaigns, repeated, skins
+from service.store import campaigns, skins
 from service.store.engine import Database
 from underskin.recordings.campaign import Campaign
 
@@ -32,11 +32,9 @@ def worth_knowing(request: Request, look: Look, corrects: str | None) -> list[st
 
 def _kept(store: Database, campaign: Campaign, corrects: str | None) -> Iterator[str]:
     with store.reading() as connection:
-        row = repeated.campaign_with(connection, campaign)
-    if row is not None and row.id != corrects:
-        yield (
-            f"these recordings are in campaign {row.name} of skin {row.skin_id} already (kept {row.received_at[:10]})."
-        )
+        earlier = repeats.already_kept(connection, campaign, corrects)
+    if earlier is not None:
+        yield earlier[0]
 
 
 def _elsewhere(store: Database, campaign: Campaign, corrects: str | None) -> Iterator[str]:

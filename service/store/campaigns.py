@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from sqlalchemy import Connection, Select, func, insert, select, update
 
-from service.store import codec, skins
+from service.store import codec, digests, skins
 from service.store.engine import Database
 from service.store.errors import Conflict, Missing
 from service.store.tables import AnyRow, campaigns, recordings
@@ -82,6 +82,7 @@ def add(
     }
     number = connection.execute(insert(campaigns).returning(campaigns.c.number), row).scalar_one()
     connection.execute(insert(recordings), rows_of(number, campaign.recordings))
+    digests.keep(connection, number, campaign.recordings)
     if replaced is not None:
         _change(connection, replaced.number, corrected_by=campaign_id)
     return campaign_id, skin_id

@@ -53,6 +53,10 @@ def test_recordings_that_are_here_already_are_named_with_their_campaign(server: 
     for content in (document, renamed):
         assert told in looked_at(server, "again.json", as_json(content))
     document["recordings"][0]["frf_re_pc_per_n"][0] += 1e-9
+    in_part = "5 of these 6 recordings are in campaign first monday of skin twice already"
+    assert in_part in looked_at(server, "other.json", as_json(document))
+    for recording in document["recordings"][1:]:
+        recording["frf_re_pc_per_n"][0] += 1e-9
     assert "already" not in looked_at(server, "other.json", as_json(document))
     server.http.post(f"/v1/campaigns/{kept['id']}/withdraw", json={"reason": "wrong skin"}).raise_for_status()
     assert told not in looked_at(server, "after.json", as_json(renamed))
