@@ -52,7 +52,9 @@ def test_a_file_a_press_is_one_array(server: Server) -> None:
     assert answer.status_code == 201, answer.text
     (kept,) = answer.json()["campaigns"]
     assert (kept["skin_id"], kept["file"], kept["errors"]) == ("palm-3", None, [])
-    assert kept["notes"] == ["joined from press-0.json to press-5.json, 6 files"]
+    origin, already = kept["notes"]
+    assert origin == "joined from press-0.json to press-5.json, 6 files"
+    assert already.startswith("these recordings are in campaign whole")
     assert figures(server, kept["id"]) == figures(server, whole["id"])
     document = server.http.get(f"/v1/campaigns/{kept['id']}/document").json()
     sent = server.http.get(f"/v1/campaigns/{whole['id']}/document").json()
