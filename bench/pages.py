@@ -24,9 +24,9 @@ _WATCH = """new PerformanceObserver(list => list.getEntries().forEach(entry =>
 def measure() -> list[Figure]:
     """Server's time of each page, first view, weight, and the longest time that a browser's main thread is busy."""
     with tempfile.TemporaryDirectory() as folder, servers.underskin(Path(folder)) as server:
-        small = campaign(lines=20, sensors=4, preloads=2)
         for first in range(0, CAMPAIGNS, _AT_ONCE):
-            server.post(f"/v1/campaigns?skin=palm-{first // _AT_ONCE % SKINS}", [small] * _AT_ONCE)
+            small = [campaign(lines=20, sensors=4, preloads=2, seed=first + number) for number in range(_AT_ONCE)]
+            server.post(f"/v1/campaigns?skin=palm-{first // _AT_ONCE % SKINS}", small)
         whole = server.post("/v1/campaigns?skin=palm-3", campaign(lines=400))["id"]
         paths = {
             "Start": "/",

@@ -8,6 +8,7 @@ from typing import Any
 import orjson
 from sqlalchemy import Connection
 
+from service import repeats
 from service.problems import Refusal
 from service.reading import Arrived, Found, arrived_as, joined, read, require_few
 from service.store import answers, campaigns, skins
@@ -16,6 +17,7 @@ from service.uploads import Upload
 from underskin import InvalidInput, campaign_findings
 from underskin.errors import FileError
 from underskin.recordings import fields
+from underskin.recordings.campaign import Campaign
 from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription, from_dict
 from underskin.recordings.rig_description import parse as parse_rig
 
@@ -83,7 +85,7 @@ def accept(store: Database, uploads: Sequence[Upload], terms: Terms) -> tuple[di
 
 
 def _rig(store: Database, uploads: Sequence[Upload], terms: Terms) -> RigDescription | None:
-    """The rig description that was sent, or else the one kept with the skin."""
+    """The rig description that was sent, or else the one kept with the skin or with that of the corrected campaign."""
     for upload in uploads:
         if upload.field == RIG:
             try:
@@ -94,11 +96,12 @@ def _rig(store: Database, uploads: Sequence[Upload], terms: Terms) -> RigDescrip
             except InvalidInput as error:
                 label = f"{upload.label}: " if upload.label else f"{RIG}."
                 raise InvalidInput(f"{label}{error.field}", error.value, error.allowed) from None
-    if terms.skin is None:
-        return None
     with store.reading() as connection:
-        kept = skins.rig_of(connection, terms.skin)
-    return None if kept is None else from_dict(orjson.loads(kept))
+        names = [terms.skin] if terms.skin is not None else []
+        if terms.corrects is not None:
+            names.append(campaigns.find(connection, terms.corrects).skin_id)
+        kept = [rig for name in names if (rig := skins.rig_of(connection, name)) is not None]
+    return from_dict(orjson.loads(kept[0])) if kept else None
 
 
 def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, terms: Terms) -> list[Arrived]:
@@ -150,14 +153,36 @@ def _place(recording: str) -> str:
 def _kept(connection: Connection, found: Arrived, terms: Terms, rig: RigDescription | None) -> dict[str, Any]:
     refused = [{"id": entry["id"], "status": "refused", "errors": entry["errors"]} for entry in found.refused]
     findings = [] if found.campaign is None else list(campaign_findings.in_words(found.campaign))
-    result = {"file": found.file, "errors": found.errors, "notes": found.notes, "findings": findings}
+    result: dict[str, Any] = {"file": found.file, "errors": found.errors, "notes": found.notes, "findings": findings}
     if found.campaign is None:
         return {**result, "status": "refused", "id": None, "skin_id": None, "recordings": refused}
+    notes = [*found.notes, *_stays(connection, found.campaign, terms), *_repeats(connection, found.campaign, terms)]
+    result["notes"] = notes
     arrival = campaigns.Arrival(
-        found.campaign, terms.skin, refused, found.notes, source=found.file, received_from=terms.sender
+        found.campaign, terms.skin, refused, notes, source=found.file, received_from=terms.sender
     )
     campaign_id, skin_id = campaigns.add(connection, arrival, corrects=terms.corrects, reason=terms.reason)
     if found.by_rig and rig is not None:
         skins.keep_rig(connection, skin_id, orjson.dumps(rig.document).decode())
     kept = [{"id": recording.id, "status": "ok", "errors": []} for recording in found.campaign.recordings]
     return {**result, "status": "ok", "id": campaign_id, "skin_id": skin_id, "recordings": kept + refused}
+
+
+def _stays(connection: Connection, campaign: Campaign, terms: Terms) -> list[str]:
+    """What is said of a correction that names another skin than that of the campaign it corrects."""
+    named = campaign.skin.id
+    if terms.corrects is None or terms.skin is not None or named is None:
+        return []
+    skin_id = campaigns.find(connection, terms.corrects).skin_id
+    if skins.are_one(connection, named, skin_id):
+        return []
+    return [f"it names skin {named!r}, and was kept on skin {skin_id!r}, as the campaign that it corrects"]
+
+
+def _repeats(connection: Connection, campaign: Campaign, terms: Terms) -> list[str]:
+    """What is said of recordings that are here already."""
+    earlier = repeats.already_kept(connection, campaign, terms.corrects)
+    if earlier is None:
+        return []
+    said, campaign_id = earlier
+    return [f"{said} That is {campaign_id}; in the history of a skin, identical recordings count once."]

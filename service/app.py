@@ -3,7 +3,7 @@
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from fastapi import APIRouter, FastAPI, Security
+from fastapi import APIRouter, Depends, FastAPI, Security
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp
 
@@ -32,6 +32,7 @@ from service.front import Front
 from service.gate import Gate
 from service.handlers import install_handlers
 from service.pages.upload_shelf import Shelf
+from service.query import known_query
 from service.settings import Settings
 from service.store import Database
 from service.uploads import UploadFolder
@@ -72,7 +73,7 @@ def create_api(settings: Settings, table: SigmaTable, gate: Gate, store: Databas
     api.state.runner = Runner(store, terms)
     api.state.planner = Planner(store, terms)
     install_handlers(api)
-    v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"])])
+    v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"]), Depends(known_query)])
     for noun in (sigma, frf, d33, stress, design, tables, campaigns, diagnoses, exports, skins, models):
         v1.include_router(noun.router)
     for router in (v1, umbridge.router, health.router, metrics.router, openapi.router, pages.router):

@@ -1,12 +1,45 @@
 """What the routes of campaigns answer and take."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
+from underskin import InvalidInput
+
 State = Literal["current", "corrected", "withdrawn"]
 
 Reason = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=1000)]
+
+
+class SendOptions(BaseModel):
+    """What is said of campaigns beside them, in the query or as fields of the form that brings them."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    skin: str | None = Field(default=None, description="The skin that they are of, whatever they say.")
+    corrects: str | None = Field(
+        default=None,
+        description="The campaign that this one replaces; it stays, unused. The new one is of the same skin, whatever "
+        "it says, unless `skin` says otherwise.",
+    )
+    reason: Reason | None = Field(default=None, description="Why it is corrected.")
+    all_or_nothing: bool = Field(default=False, description="Keep nothing where any recording is refused.")
+    together: str | None = Field(
+        default=None,
+        description="Join all that is sent, such as a file a press, into one campaign of this name. All must be of "
+        "one skin; a file that cannot be read is a refused recording, by the file's name.",
+        examples=["palm 3 on Monday"],
+    )
+
+    def with_form(self, fields: Mapping[str, str]) -> "SendOptions":
+        """These, from the query, and those of a form; raises ValidationError, InvalidInput where the two differ."""
+        said = SendOptions.model_validate(fields)
+        for name in said.model_fields_set & self.model_fields_set:
+            if getattr(said, name) != getattr(self, name):
+                allowed = f"must be {getattr(self, name)!r}, as in the query, or be given once"
+                raise InvalidInput(name, fields[name], allowed)
+        return self.model_copy(update={name: getattr(said, name) for name in said.model_fields_set})
 
 
 class Refused(BaseModel):

@@ -1,22 +1,26 @@
 """Campaigns: sent, listed, read, withdrawn, corrected, their recordings excluded, their d33."""
 
 import asyncio
+from collections.abc import Mapping
 from functools import partial
 from typing import Annotated, Any, Literal
 
 import orjson
 from fastapi import APIRouter, Header, Query, Request, Response, Security
 from fastapi.responses import StreamingResponse
+from pydantic import ValidationError
 from sqlalchemy import Connection
 from starlette.concurrency import run_in_threadpool
 
 from service import campaign_models as models
 from service import documents, inverting
-from service.accepting import Terms, accept
+from service.accepting import RIG, Terms, accept
 from service.adopted import serving
 from service.d33_models import D33
 from service.dependencies import CampaignId, Store, Table, authorised
+from service.form_fields import FILE, split
 from service.made_files import made_file
+from service.problems import from_validation
 from service.store import campaigns
 from service.store.times import stored
 from service.unique_keys import JsonRoute
@@ -60,22 +64,25 @@ _BODY: dict[str, Any] = {
         "required": True,
         "description": "One campaign as JSON (`campaign/1`), a JSON list of them, one file as the whole body, or a "
         "form with any number of files; its part `rig` is a rig description, for files that do not say what their "
-        "channels are.",
+        "channels are. What the query says may be fields of the form instead; what both say must be the same. "
+        "Other fields that are no files are refused.",
         "content": {
             "application/json": {"schema": {"type": "object", "description": "campaign/1"}, "example": _EXAMPLE},
             "application/octet-stream": {**_FILE, "example": orjson.dumps(_EXAMPLE).decode()},
             "multipart/form-data": {
                 "schema": {
                     "type": "object",
-                    "description": "Files, and what their channels are.",
+                    "description": "Files, what their channels are, and the options of the query.",
                     "properties": {
-                        "file": {
+                        FILE: {
                             "type": "array",
                             "items": _FILE["schema"],
                             "description": "Files of campaigns, or as instruments write them.",
                         },
-                        "rig": {"type": "string", "description": "A rig description, `rig/1`, as YAML or JSON."},
+                        RIG: {"type": "string", "description": "A rig description, `rig/1`, as YAML or JSON."},
+                        **models.SendOptions.model_json_schema()["properties"],
                     },
+                    "additionalProperties": {**_FILE["schema"], "description": "More files, by any other names."},
                 }
             },
         },
@@ -96,18 +103,7 @@ async def post(
     request: Request,
     store: Store,
     table: Table,
-    skin: Annotated[str | None, Query(description="The skin that they are of, whatever they say.")] = None,
-    corrects: Annotated[str | None, Query(description="The campaign that this one replaces; it stays, unused.")] = None,
-    reason: Annotated[models.Reason | None, Query(description="Why it is corrected.")] = None,
-    all_or_nothing: Annotated[bool, Query(description="Keep nothing where any recording is refused.")] = False,
-    together: Annotated[
-        str | None,
-        Query(
-            description="Join all that is sent, such as a file a press, into one campaign of this name. All must be of "
-            "one skin; a file that cannot be read is a refused recording, by the file's name.",
-            examples=["palm 3 on Monday"],
-        ),
-    ] = None,
+    query: Annotated[models.SendOptions, Query()],
     idempotency_key: Annotated[
         str | None,
         Header(
@@ -125,12 +121,26 @@ async def post(
     settings = request.app.state.settings
     key = request.scope["key"]
     sender = None if key is None else key.name
-    terms = Terms(skin, corrects, reason, all_or_nothing, together, idempotency_key, sender, settings.max_body_bytes)
-    async with received(request, request.app.state.uploads) as uploads, heavy:
+    async with received(request, request.app.state.uploads) as parts, heavy:
+        fields, uploads = split(parts, list(models.SendOptions.model_fields), [RIG])
+        terms = Terms(
+            **_options(query, fields),
+            idempotency_key=idempotency_key,
+            sender=sender,
+            most_json_bytes=settings.max_body_bytes,
+        )
         answer, repeats = await run_in_threadpool(accept, store, uploads, terms)
         await run_in_threadpool(inverting.derive, store, table, _ids(answer))
     headers = {"Idempotency-Replayed": "true"} if repeats else {}
     return Response(orjson.dumps(answer), status_code=201, headers=headers, media_type="application/json")
+
+
+def _options(query: models.SendOptions, fields: Mapping[str, str]) -> dict[str, Any]:
+    """Those of the query and of the form; raises Refusal, InvalidInput."""
+    try:
+        return query.with_form(fields).model_dump()
+    except ValidationError as error:
+        raise from_validation(error) from None
 
 
 def _ids(answer: dict[str, Any]) -> list[str]:

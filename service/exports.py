@@ -9,6 +9,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service import skin_imports
 from service.dependencies import SkinId, Store, authorised
+from service.form_fields import split
 from service.made_files import made_file
 from service.problems import Refusal
 from service.skin_imports import Imported
@@ -49,7 +50,8 @@ def export_skin(skin_id: SkinId, request: Request, store: Store) -> FileResponse
 )
 async def import_skin(request: Request, store: Store) -> Imported:
     """To the same state; what is here already must be the same, and is left. After a failure, send the file again."""
-    async with received(request, request.app.state.uploads) as uploads:
+    async with received(request, request.app.state.uploads) as parts:
+        _, uploads = split(parts)
         if len(uploads) != 1:
             raise Refusal(422, f"One file is imported at a time, not {len(uploads)}.")
         async with skin_imports.one:

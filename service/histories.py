@@ -1,11 +1,11 @@
 """d33 of a skin's sensors over time: points, trends, and what they leave out."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
 
 from sqlalchemy import Connection
 
-from service import adopted, inverting
+from service import adopted, inverting, repeats
 from service import skin_models as models
 from service.store import campaigns, inversions, skins
 from service.store.engine import Database
@@ -51,11 +51,12 @@ def adopted_history(store: Database, table: SigmaTable, root: str) -> models.His
 def _history(
     connection: Connection, root: str, by_sensor: dict[str, list[models.Point]], unfit: Mapping[str, str]
 ) -> models.History:
-    for points in by_sensor.values():
-        points.sort(key=lambda point: point.time)
+    told = {(point.campaign_id, sensor) for sensor, points in by_sensor.items() for point in points}
+    repeated = repeats.left_out(connection, root, told)
+    by_sensor = _counted(by_sensor, repeated)
     names = sorted(by_sensor)
     used = {point.campaign_id for points in by_sensor.values() for point in points}
-    campaigns_out, recordings_out = _left_out(connection, root, used, unfit)
+    campaigns_out, recordings_out = _left_out(connection, root, used, unfit, repeats.of_campaigns(repeated))
     return models.History(
         skin_id=root,
         joined=[joined(row) for row in skins.joined_to(connection, root)],
@@ -64,8 +65,25 @@ def _history(
             for name, found in zip(names, _trends([by_sensor[name] for name in names]), strict=True)
         ],
         left_out_campaigns=campaigns_out,
+        left_out_points=[
+            models.LeftOutPoint(campaign_id=campaign_id, sensor=sensor, repeats=repeat.campaign_id, reason=repeat.words)
+            for (campaign_id, sensor), repeat in sorted(repeated.items())
+            if campaign_id in used
+        ],
         left_out_recordings=recordings_out,
     )
+
+
+def _counted(
+    by_sensor: Mapping[str, Sequence[models.Point]], repeated: Mapping[repeats.Point, repeats.Repeat]
+) -> dict[str, list[models.Point]]:
+    """The points that count, by time."""
+    return {
+        sensor: sorted(
+            (point for point in points if (point.campaign_id, sensor) not in repeated), key=lambda point: point.time
+        )
+        for sensor, points in by_sensor.items()
+    }
 
 
 def joined(row: AnyRow) -> models.JoinedSkin:
@@ -128,10 +146,18 @@ def _answer(line: Trend, adjusted: float) -> models.TrendAnswer:
 
 
 def _left_out(
-    connection: Connection, root: str, used: Iterable[str], unfit: Mapping[str, str]
+    connection: Connection,
+    root: str,
+    used: Collection[str],
+    unfit: Mapping[str, str],
+    repeated: Mapping[str, repeats.Repeat],
 ) -> tuple[list[models.LeftOutCampaign], list[models.LeftOutRecording]]:
     whole, single = [], []
     for row in campaigns.of_skin(connection, root):
+        if row.id in repeated and row.id not in used:
+            repeat = repeated[row.id]
+            whole.append(models.LeftOutCampaign(campaign_id=row.id, reason=repeat.words, repeats=repeat.campaign_id))
+            continue
         reason = unfit.get(row.id) or _why_unused(row, row.id in used)
         if reason is not None:
             whole.append(models.LeftOutCampaign(campaign_id=row.id, reason=reason))

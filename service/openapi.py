@@ -51,6 +51,12 @@ def methods(api: FastAPI, path: str) -> list[str]:
     return pages.methods(path) if known is None else [method.upper() for method in known]
 
 
+def query_parameters(api: FastAPI, path: str, method: str) -> list[str]:
+    """The query parameters of a route of the API, as they stand in the document."""
+    operation = _document(api)["paths"][path][method.lower()]
+    return [parameter["name"] for parameter in operation.get("parameters", []) if parameter["in"] == "query"]
+
+
 def _document(api: FastAPI) -> dict[str, Any]:
     return api.openapi_schema or _describe(api)
 

@@ -84,11 +84,10 @@ def hot_route(table: SigmaTable) -> HotRoute:
 
     def one(query: bytes) -> bytes | None:
         try:
-            point = {}
-            for part in query.split(b"&"):
-                name, _, value = part.partition(b"=")
-                point[name.decode()] = loads(value)
-            found = table.at(**point) if are_numbers(point.values()) else None
+            parts = [part.partition(b"=") for part in query.split(b"&")]
+            point = {name.decode(): loads(value) for name, _, value in parts}
+            plain = len(point) == len(parts) and are_numbers(point.values())
+            found = table.at(**point) if plain else None
         except (ValueError, TypeError):
             return None
         if found is None:

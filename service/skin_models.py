@@ -87,6 +87,18 @@ class LeftOutCampaign(BaseModel):
 
     campaign_id: str = Field(description="The campaign.")
     reason: str = Field(description="Why.")
+    repeats: str | None = Field(
+        default=None, description="The campaign that counts in its place, where it has recordings of that one."
+    )
+
+
+class LeftOutPoint(BaseModel):
+    """A campaign's d33 of a sensor that does not count, since recordings that it rests on count elsewhere."""
+
+    campaign_id: str = Field(description="The campaign, of which other sensors count.")
+    sensor: str = Field(description="The sensor.")
+    repeats: str = Field(description="The campaign in which they count.")
+    reason: str = Field(description="Why, in words.")
 
 
 class LeftOutRecording(BaseModel):
@@ -103,5 +115,10 @@ class History(BaseModel):
     skin_id: str = Field(description="The skin; the one it was joined to, where it was.")
     joined: list[JoinedSkin] = Field(description="Skins that are counted in.")
     sensors: list[SensorHistory] = Field(description="By id.")
-    left_out_campaigns: list[LeftOutCampaign] = Field(description="Withdrawn, corrected, or without d33.")
+    left_out_campaigns: list[LeftOutCampaign] = Field(
+        description="Withdrawn, corrected, without d33, or only with recordings that count in another campaign."
+    )
+    left_out_points: list[LeftOutPoint] = Field(
+        description="Those with recordings that count in another campaign, of campaigns that are used."
+    )
     left_out_recordings: list[LeftOutRecording] = Field(description="Excluded from campaigns that are used.")

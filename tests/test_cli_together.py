@@ -52,6 +52,15 @@ def test_files_together_tell_what_one_file_of_all_would(palm: Campaign, presses:
     assert [page.name for page in (tmp_path / "pages").iterdir()] == ["palm-3.html"]
 
 
+def test_a_copy_of_a_file_counts_once(presses: list[str], tmp_path: Path) -> None:
+    copy = tmp_path / "copy.json"
+    copy.write_bytes(Path(presses[0]).read_bytes())
+    once = run("d33", *presses, "--together", "palm", "--csv")
+    twice = run("d33", *presses, str(copy), "--together", "palm", "--csv")
+    assert (twice.returncode, figures(twice.stdout)) == (0, figures(once.stdout))
+    assert "recordings with the very numbers of others count once: 'copy r' is 'press-0 r'" in twice.stderr
+
+
 def test_an_unreadable_file_costs_only_itself(presses: list[str], tmp_path: Path) -> None:
     Path(presses[2]).write_text("{")
     answer = run("d33", *presses, str(tmp_path / "nowhere.json"), "--together", "palm")

@@ -118,16 +118,53 @@ def test_files_of_one_name_are_told_apart() -> None:
     names = ids(join("all", many))
     assert len(set(names)) == 6
     assert max(map(len, names)) <= LONGEST_NAME
-    taken = [("a.csv", reading(press("r"), press("x"))), ("b.csv", reading(press("r"), press("a r")))]
+    taken = [
+        ("a.csv", reading(press("r", level=7.1), press("x", level=7.2))),
+        ("b.csv", reading(press("r", level=7.3), press("a r", level=7.4))),
+    ]
     assert sorted(ids(join("all", taken))) == ["a r", "a r (2)", "b r", "x"]
 
 
-def test_warnings_are_told_once_and_copies_of_a_file_are_noticed() -> None:
-    twice = [(name, reading(press(name[0]), warnings=("cut short",))) for name in ("a.csv", "b.csv", "c.csv")]
-    assert join("all", twice).warnings == [
-        "a.csv and 2 more: cut short",
-        "2 recordings repeat the very numbers of others, and count again: 'b' those of 'a'",
+def test_warnings_are_told_once() -> None:
+    files = [
+        (f"{name}.csv", reading(press(name, level=level), warnings=("cut short",)))
+        for name, level in (("a", 7.1), ("b", 7.2), ("c", 7.3))
     ]
+    assert join("all", files).warnings == ["a.csv and 2 more: cut short"]
+
+
+def test_copies_of_a_recording_count_once() -> None:
+    found = join("all", [(f"{name}.csv", reading(press(name))) for name in "abcdefgh"])
+    assert ids(found) == ["a"]
+    (warning,) = found.warnings
+    assert warning == (
+        "recordings with the very numbers of others count once: 'b' is 'a', 'c' is 'a', 'd' is 'a', 'e' is 'a', "
+        "'f' is 'a', and 2 more"
+    )
+
+
+def test_a_recording_is_a_copy_by_its_numbers_its_sensor_and_its_contact() -> None:
+    noisy = np.random.default_rng(2).normal(7, 0.1, 20)
+    first = replace(
+        press("a"), frequency_hz=np.arange(1.0, 21), frf_re_pc_per_n=noisy, frf_im_pc_per_n=0.01 * noisy,
+        recorded_at="2017-05-03T09:00:00Z",
+    )  # fmt: skip
+    apart: list[dict[str, object]] = [
+        {"sensor": "s2"}, {"preload_n": 2.0}, {"indenter_radius_mm": 5.0}, {"frf_re_pc_per_n": noisy + 1e-9},
+        {"coherence": np.full(20, 0.9)},
+    ]  # fmt: skip
+    copies: list[dict[str, object]] = [{"recorded_at": None}, {"dwell_s": 3.0}, {"dynamic_force_n": 0.2}]
+    for changes, kept in [*((one, ["a", "b"]) for one in apart), *((one, ["a"]) for one in copies)]:
+        other = replace(first, id="b", **changes)  # type: ignore[arg-type]
+        assert ids(join("both", [("a.csv", reading(first)), ("b.csv", reading(other))])) == kept, changes
+
+
+def test_few_numbers_may_agree_by_chance_at_another_time() -> None:
+    first, again, later = (
+        reading(replace(press(name), recorded_at=f"2017-05-{day}T09:00:00Z"))
+        for name, day in (("a", "03"), ("b", "03"), ("c", "04"))
+    )
+    assert ids(join("all", [("a.csv", first), ("b.csv", again), ("c.csv", later)])) == ["a", "c"]
 
 
 def test_a_press_a_file_as_an_instrument_writes_it() -> None:
@@ -140,13 +177,14 @@ def test_a_press_a_file_as_an_instrument_writes_it() -> None:
         }
     )
     files = [
-        (f"press-{number}.tdms", read_file(tdms(number), f"press-{number}.tdms", description)) for number in (1, 2)
+        (f"press-{n}.tdms", read_file(tdms(n, group={"preload": float(n)}), f"press-{n}.tdms", description))
+        for n in (1, 2)
     ]
     found = join("palm", files)
     assert ids(found) == ["press-1", "press-2"]
     assert [recording.preload_n for recording in found.campaign.recordings if isinstance(recording, FrfRecording)] == [
         1.0,
-        1.0,
+        2.0,
     ]
 
 

@@ -12,7 +12,7 @@ from service import inverting, session
 from service.accepting import RIG
 from service.campaigns import heavy
 from service.dependencies import Store, Table
-from service.pages import requests, upload_alike, upload_before, upload_skin
+from service.pages import requests, upload_alike, upload_before, upload_rig, upload_skin
 from service.pages.figures import Drawn, csv_answer
 from service.pages.forms import TOKEN, WRITE, Form, require_own, see
 from service.pages.html import page
@@ -37,9 +37,7 @@ from service.store.engine import Database
 from service.store.errors import Missing
 from service.uploads import Upload, received
 from underskin import InvalidInput
-from underskin.errors import FileError
 from underskin.recordings import rig_description
-from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription
 
 router = APIRouter(prefix="/upload")
 
@@ -81,10 +79,11 @@ async def send(request: Request, store: Store) -> Response:
         rig = next((one for one in sent if one.field == RIG and one.label), None)
         if not given:
             raise Refusal(422, "No file came. Choose one, or drop it on the page.", title="No file")
-        found = await run_in_threadpool(_rig, store, rig, fields.get(SKIN_FIELD, ""))
+        corrects = fields.get(CORRECTS) or None
+        skin = fields.get(SKIN_FIELD) or await run_in_threadpool(upload_rig.skin_of, store, corrects)
+        found = await run_in_threadpool(upload_rig.rig, store, rig, skin)
         shelved = shelf.put(cookie, given)
-    shelved.skin = fields.get(SKIN_FIELD) or None
-    shelved.corrects = fields.get(CORRECTS) or None
+    shelved.skin, shelved.corrects = skin, corrects
     shelved.rig, shelved.refused = found
     shelved.rig_label = None if rig is None or shelved.rig is None else rig.label
     try:
@@ -247,22 +246,6 @@ def _look(request: Request, shelved: Shelved) -> None:
 
 def _draw(shelved: Shelved, number: int, found: Look) -> None:
     shelved.draw(number, figures(found, f"/upload/{shelved.id}/{number}/"))
-
-
-def _rig(store: Database, sent: Upload | None, skin: str) -> tuple[RigDescription | None, list[dict[str, Any]]]:
-    """The rig description that was sent, or that is kept with the skin; and what is wrong with the one sent."""
-    if sent is not None:
-        try:
-            with sent.path.open("rb") as file:
-                return rig_description.parse(file.read(LARGEST_BYTES + 1), sent.label or RIG), []
-        except (FileError, InvalidInput) as error:
-            return None, all_told(error)
-    if skin:
-        with store.reading() as connection:
-            kept = skins.rig_of(connection, skin)
-        if kept is not None:
-            return rig_description.from_dict(orjson.loads(kept)), []
-    return None, []
 
 
 def _latest(store: Database, skin: str | None) -> Mapping[str, Any]:

@@ -1,4 +1,5 @@
-"""What the reader of an upload should know before keeping it: that it is here already, and what its d33 will look like.
+"""What the reader of an upload should know before keeping it: that it is here already, that a correction names another
+skin, and what its d33 will look like.
 
 Nothing kept is ever deleted, so that afterwards is late.
 """
@@ -7,9 +8,9 @@ from collections.abc import Iterator
 
 from fastapi import Request
 
-from service import inverting
+from service import inverting, repeats
 from service.reading import Look, arrived_as
-from service.store import repeated
+from service.store import campaigns, skins
 from service.store.engine import Database
 from underskin.recordings.campaign import Campaign
 
@@ -19,14 +20,31 @@ def worth_knowing(request: Request, look: Look, corrects: str | None) -> list[st
     store, table = request.app.state.store, request.app.state.table
     found = [one.campaign for one in map(arrived_as, look.found) if one.campaign is not None]
     return [
-        said for campaign in found for said in (*_kept(store, campaign, corrects), *inverting.foreseen(table, campaign))
+        said
+        for campaign in found
+        for said in (
+            *_kept(store, campaign, corrects),
+            *_elsewhere(store, campaign, corrects),
+            *inverting.foreseen(table, campaign),
+        )
     ]
 
 
 def _kept(store: Database, campaign: Campaign, corrects: str | None) -> Iterator[str]:
     with store.reading() as connection:
-        row = repeated.campaign_with(connection, campaign)
-    if row is not None and row.id != corrects:
+        earlier = repeats.already_kept(connection, campaign, corrects)
+    if earlier is not None:
+        yield earlier[0]
+
+
+def _elsewhere(store: Database, campaign: Campaign, corrects: str | None) -> Iterator[str]:
+    if corrects is None or campaign.skin.id is None:
+        return
+    with store.reading() as connection:
+        skin_id = campaigns.find(connection, corrects).skin_id
+        same = skins.are_one(connection, campaign.skin.id, skin_id)
+    if not same:
         yield (
-            f"these recordings are in campaign {row.name} of skin {row.skin_id} already (kept {row.received_at[:10]})."
+            f"the file names skin {campaign.skin.id}, not {skin_id}, that of the campaign that it corrects: the name "
+            "below decides."
         )

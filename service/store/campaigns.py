@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from sqlalchemy import Connection, Select, func, insert, select, update
 
-from service.store import codec, skins
+from service.store import codec, digests, skins
 from service.store.engine import Database
 from service.store.errors import Conflict, Missing
 from service.store.tables import AnyRow, campaigns, recordings
@@ -57,10 +57,11 @@ class Excluded:
 def add(
     connection: Connection, arrival: Arrival, *, corrects: str | None = None, reason: str | None = None
 ) -> tuple[str, str]:
-    """Keep a campaign; its id and its skin's. A correction takes the place of the other and, unless told, its skin."""
+    """Keep a campaign; its id and its skin's. A correction takes the place of the other, on its skin unless
+    `arrival.skin_id` names another, whatever the campaign says of itself."""
     replaced = None if corrects is None else _changeable(connection, corrects)
     campaign = arrival.campaign
-    named = arrival.skin_id or campaign.skin.id or (replaced.skin_id if replaced else None)
+    named = arrival.skin_id or (replaced.skin_id if replaced else campaign.skin.id)
     campaign_id, skin_id = f"c-{secrets.token_hex(8)}", skins.require(connection, named)
     row = {
         "id": campaign_id,
@@ -81,6 +82,7 @@ def add(
     }
     number = connection.execute(insert(campaigns).returning(campaigns.c.number), row).scalar_one()
     connection.execute(insert(recordings), rows_of(number, campaign.recordings))
+    digests.keep(connection, number, campaign.recordings)
     if replaced is not None:
         _change(connection, replaced.number, corrected_by=campaign_id)
     return campaign_id, skin_id

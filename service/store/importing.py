@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from sqlalchemy import Connection, insert, select, update
 
+from service.store import digests
 from service.store.campaigns import rows_of
 from service.store.engine import Database
 from service.store.errors import Conflict
@@ -66,11 +67,11 @@ def add_skins(store: Database, checked: CheckedOverview) -> None:
 def add(store: Database, checked: CheckedCampaign) -> None:
     """Keep a campaign that is not there."""
     with store.writing() as connection:
-        number = connection.execute(insert(campaigns_table).returning(campaigns_table.c.number), checked.row)
+        made = connection.execute(insert(campaigns_table).returning(campaigns_table.c.number), checked.row)
+        number = made.scalar_one()
         kept = [
             {**columns, **entry.model_dump()}
-            for columns, entry in zip(
-                rows_of(number.scalar_one(), checked.campaign.recordings), checked.exclusions, strict=True
-            )
+            for columns, entry in zip(rows_of(number, checked.campaign.recordings), checked.exclusions, strict=True)
         ]
         connection.execute(insert(recordings), kept)
+        digests.keep(connection, number, checked.campaign.recordings)

@@ -1,38 +1,80 @@
-"""Recordings that come a second time."""
+"""Recordings that come a second time, by their digests (service/store/digests.py)."""
 
-import hashlib
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-import orjson
 from sqlalchemy import Connection, func, select
 
-from service.store import campaigns, codec
-from service.store.tables import AnyRow, recordings
-from service.store.tables import campaigns as kept
+from service.store import skins
+from service.store.campaigns import CURRENT
+from service.store.tables import AnyRow, campaigns, recording_digests, recordings
 from underskin.recordings.campaign import Campaign
+from underskin.recordings.repeats import digest
 
-_MOST_COMPARED = 20  # campaigns that hold the first recording's numbers
-_AT_A_TIME = 8  # recordings in memory at once
-
-
-def campaign_with(connection: Connection, campaign: Campaign) -> AnyRow | None:
-    """The latest current campaign that has all recordings of this one, number for number, whatever their ids."""
-    rows = [codec.recording_columns(recording) for recording in campaign.recordings]
-    coming = [_content(row["kind"], row["scalars"], row["arrays"]) for row in rows]
-    first = rows[0]["arrays"]
-    # By length before content: a length is read without the arrays.
-    alike = (func.length(recordings.c.arrays) == len(first)) & (recordings.c.arrays == first)
-    query = select(kept).where(campaigns.CURRENT, kept.c.recordings >= len(rows))
-    query = query.where(kept.c.number.in_(select(recordings.c.campaign).where(alike)))
-    for row in connection.execute(query.order_by(kept.c.number.desc()).limit(_MOST_COMPARED)).all():
-        held = select(recordings.c.kind, recordings.c.scalars, recordings.c.arrays)
-        held = held.where(recordings.c.campaign == row.number).execution_options(yield_per=_AT_A_TIME)
-        here = {_content(*one) for one in connection.execute(held)}
-        if here.issuperset(coming):
-            return row
-    return None
+_AT_A_TIME = 1000  # digests in one query: databases limit their number
+_IN_FIGURES = (recordings.c.excluded_at.is_(None), recordings.c.kind == "frf")
 
 
-def _content(kind: str, scalars: dict[str, object], arrays: bytes) -> tuple[str, str, bytes]:
-    """All of a recording but its id."""
-    told = {name: value for name, value in scalars.items() if name != "id"}
-    return kind, orjson.dumps(told, option=orjson.OPT_SORT_KEYS).decode(), hashlib.sha256(arrays).digest()
+@dataclass(frozen=True)
+class Earlier:
+    """A campaign of the store that has recordings of another one: how many, of how many different ones."""
+
+    row: AnyRow
+    identical: int
+    of: int
+
+
+def most_alike(connection: Connection, campaign: Campaign, corrects: str | None) -> Earlier | None:
+    """The current campaign with the most recordings of this one, whatever their ids, the latest of several.
+
+    `corrects`: the id of a campaign that is passed over, as this one takes its place.
+    """
+    coming = sorted({digest(recording) for recording in campaign.recordings})
+    alike: Counter[int] = Counter()
+    for start in range(0, len(coming), _AT_A_TIME):
+        these = recording_digests.c.digest.in_(coming[start : start + _AT_A_TIME])
+        query = select(campaigns.c.number, func.count(recording_digests.c.digest.distinct()))
+        query = query.join(recording_digests, recording_digests.c.campaign == campaigns.c.number)
+        query = query.where(these, CURRENT, campaigns.c.id != (corrects or "")).group_by(campaigns.c.number)
+        for number, count in connection.execute(query):
+            alike[number] += count
+    if not alike:
+        return None
+    number = max(alike, key=lambda number: (alike[number], number))
+    row = connection.execute(select(campaigns).where(campaigns.c.number == number)).one()
+    return Earlier(row, alike[number], len(coming))
+
+
+def shared(connection: Connection, root: str) -> Sequence[AnyRow]:
+    """Recordings that several current campaigns of a skin have, and of those joined to it: id and number of the
+    campaign, sensor, digest. Without those that figures leave out, and the elastomer's."""
+    of_skin = (CURRENT, campaigns.c.skin_id.in_(skins.members(root)))
+    several = (
+        select(recording_digests.c.digest)
+        .join(campaigns, campaigns.c.number == recording_digests.c.campaign)
+        .where(*of_skin)
+        .group_by(recording_digests.c.digest)
+        .having(func.count(recording_digests.c.campaign.distinct()) > 1)
+    )
+    same = (recordings.c.campaign == recording_digests.c.campaign) & (
+        recordings.c.position == recording_digests.c.position
+    )
+    query = (
+        select(campaigns.c.id, campaigns.c.number, recordings.c.sensor, recording_digests.c.digest)
+        .join(recording_digests, recording_digests.c.campaign == campaigns.c.number)
+        .join(recordings, same)
+        .where(*of_skin, *_IN_FIGURES, recording_digests.c.digest.in_(several))
+    )
+    return connection.execute(query).all()
+
+
+def recordings_by_sensor(connection: Connection, root: str) -> dict[tuple[str, str], int]:
+    """How many recordings figures use of each campaign's id and sensor, of the same campaigns."""
+    query = (
+        select(campaigns.c.id, recordings.c.sensor, func.count())
+        .join(recordings, recordings.c.campaign == campaigns.c.number)
+        .where(CURRENT, campaigns.c.skin_id.in_(skins.members(root)), *_IN_FIGURES)
+        .group_by(campaigns.c.id, recordings.c.sensor)
+    )
+    return {(campaign_id, sensor): count for campaign_id, sensor, count in connection.execute(query)}

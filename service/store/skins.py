@@ -44,6 +44,12 @@ def require_root(connection: Connection, skin_id: str) -> str:
     return str(row.root_id)
 
 
+def are_one(connection: Connection, first: str, second: str) -> bool:
+    """Whether two ids mean one skin: they are the same, or were joined."""
+    rows = [(name, find(connection, name)) for name in (first, second)]
+    return len({name if row is None else row.root_id for name, row in rows}) == 1
+
+
 def root_of(skin_id: str) -> ScalarSelect[Any]:
     """The id of the skin that `skin_id` was joined to in the end, or its own."""
     return select(skins.c.root_id).where(skins.c.id == skin_id).scalar_subquery()

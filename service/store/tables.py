@@ -92,6 +92,17 @@ recordings = Table(
     UniqueConstraint("campaign", "id", name="recording_of_campaign"),
 )
 
+# Derived from what a recording holds: identical ones have the same (underskin.recordings.repeats).
+recording_digests = Table(
+    "recording_digests",
+    metadata,
+    Column("campaign", _Number, ForeignKey("campaigns.number"), primary_key=True),
+    Column("position", Integer, primary_key=True),  # as in `recordings`
+    Column("digest", String, nullable=False),
+    Index("recordings_by_digest", "digest"),
+    sqlite_with_rowid=False,
+)
+
 # Derived from a campaign at one revision, with one table of σ, by one version of the answer; computed again when any of
 # them has changed.
 inversions = Table(

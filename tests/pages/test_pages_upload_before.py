@@ -10,10 +10,10 @@ from tests.pages.test_pages_upload import as_json
 from tests.store.server import Server, campaign
 
 
-def looked_at(server: Server, name: str, content: str) -> str:
+def looked_at(server: Server, name: str, content: str, **fields: str) -> str:
     """The page of an upload."""
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
-        form = {"form_token": token_of(client.get("/upload").text)}
+        form = {"form_token": token_of(client.get("/upload").text), **fields}
         answer = client.post("/upload", data=form, files={"file": (name, content.encode())}, follow_redirects=True)
     assert answer.status_code == 200, answer.text
     return answer.text
@@ -53,6 +53,17 @@ def test_recordings_that_are_here_already_are_named_with_their_campaign(server: 
     for content in (document, renamed):
         assert told in looked_at(server, "again.json", as_json(content))
     document["recordings"][0]["frf_re_pc_per_n"][0] += 1e-9
+    in_part = "5 of these 6 recordings are in campaign first monday of skin twice already"
+    assert in_part in looked_at(server, "other.json", as_json(document))
+    for recording in document["recordings"][1:]:
+        recording["frf_re_pc_per_n"][0] += 1e-9
     assert "already" not in looked_at(server, "other.json", as_json(document))
     server.http.post(f"/v1/campaigns/{kept['id']}/withdraw", json={"reason": "wrong skin"}).raise_for_status()
     assert told not in looked_at(server, "after.json", as_json(renamed))
+
+
+def test_a_correction_that_names_another_skin_is_offered_the_one_it_corrects(server: Server) -> None:
+    wrong = server.http.post("/v1/campaigns", json=campaign("slip", id="old"), params={"skin": "old"}).json()["id"]
+    page = looked_at(server, "right.json", as_json(campaign("right", id="new")), corrects=wrong)
+    assert "the file names skin new, not old, that of the campaign that it corrects" in page
+    assert 'id="keep-skin" name="skin" list="skins" value="old"' in page

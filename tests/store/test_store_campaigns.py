@@ -188,6 +188,22 @@ def test_a_correction_replaces_and_the_original_stays(server: Server) -> None:
     assert server.http.post("/v1/campaigns", json=right, params={"corrects": corrected["id"]}).status_code == 422
 
 
+def test_a_correction_stays_on_its_skin_whatever_its_file_says(server: Server) -> None:
+    wrong = post(server, campaign("monday"), skin="palm")["id"]
+    right = campaign("monday again", id="finger")
+    corrected = post(server, right, corrects=wrong, reason="cable")
+    (note,) = corrected["notes"]
+    assert "'finger'" in note
+    assert "kept on skin 'palm'" in note
+    assert corrected["skin_id"] == "palm"
+    assert server.http.get(f"/v1/campaigns/{corrected['id']}").json()["notes"] == [note]
+    moved = post(server, right, corrects=corrected["id"], reason="of the finger after all", skin="finger")
+    assert (moved["skin_id"], moved["notes"]) == ("finger", [])
+    server.http.post("/v1/skins/palm/join", json={"skin_id": "finger", "reason": "one skin"}).raise_for_status()
+    same = post(server, campaign("last", id="palm"), corrects=moved["id"], reason="cable")
+    assert (same["skin_id"], same["notes"]) == ("finger", [])
+
+
 def test_two_corrections_at_once_leave_one_current(server: Server) -> None:
     original = post(server, campaign("first"), skin="palm")["id"]
     query = {"corrects": original, "reason": "both noticed"}

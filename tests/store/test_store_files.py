@@ -58,6 +58,21 @@ def test_a_rig_description_is_kept_with_the_skin_and_used_again(server: Server) 
     assert server.http.post("/v1/campaigns", files=[("file", ("next.csv", CSV))]).status_code == 422
 
 
+def test_a_correction_is_read_with_the_rig_of_the_campaign_that_it_corrects(server: Server) -> None:
+    form = [("rig", ("bench.yaml", RIG)), ("file", ("cut.csv", CSV))]
+    wrong = server.http.post("/v1/campaigns?skin=gel", files=form).raise_for_status().json()["campaigns"][0]["id"]
+    named = [("file", ("cut.csv", CSV.replace("2,6", "2,7")))]
+    right = server.http.post("/v1/campaigns", params={"corrects": wrong, "reason": "slip"}, files=named)
+    assert right.status_code == 201, right.text
+    (entry,) = right.json()["campaigns"]
+    assert entry["skin_id"] == "gel"
+    query = {"corrects": entry["id"], "reason": "another skin", "skin": "rubber"}
+    assert server.http.post("/v1/campaigns", params=query, files=named).status_code == 201
+    assert server.http.get("/v1/skins/rubber").json()["rig"]["kind"] == "indentation"
+    absent = server.http.post("/v1/campaigns", params={"corrects": "c-0", "reason": "slip"}, files=named)
+    assert absent.status_code == 404
+
+
 def test_a_bad_rig_description_says_where(server: Server) -> None:
     bad = RIG.replace("kind: indentation", "kind: bending")
     answer = server.http.post("/v1/campaigns", files=[("rig", ("r.yaml", bad)), ("file", ("cut.csv", CSV))])

@@ -52,7 +52,9 @@ def test_a_file_a_press_is_one_array(server: Server) -> None:
     assert answer.status_code == 201, answer.text
     (kept,) = answer.json()["campaigns"]
     assert (kept["skin_id"], kept["file"], kept["errors"]) == ("palm-3", None, [])
-    assert kept["notes"] == ["joined from press-0.json to press-5.json, 6 files"]
+    origin, already = kept["notes"]
+    assert origin == "joined from press-0.json to press-5.json, 6 files"
+    assert already.startswith("these recordings are in campaign whole")
     assert figures(server, kept["id"]) == figures(server, whole["id"])
     document = server.http.get(f"/v1/campaigns/{kept['id']}/document").json()
     sent = server.http.get(f"/v1/campaigns/{whole['id']}/document").json()
@@ -131,7 +133,8 @@ def test_instrument_files_of_two_formats_and_their_rig(server: Server) -> None:
     answer = server.http.post("/v1/campaigns?skin=gel&together=Monday", files=form)
     assert answer.status_code == 201, answer.text
     (kept,) = answer.json()["campaigns"]
-    assert [entry["id"] for entry in kept["recordings"]] == ["one", "two", "three"]
+    assert [entry["id"] for entry in kept["recordings"]] == ["one", "three"]
+    assert kept["notes"][-1] == "recordings with the very numbers of others count once: 'two' is 'one'"
     recordings = server.http.get(f"/v1/campaigns/{kept['id']}/document").json()["recordings"]
     for recording in recordings:
         assert recording["force_n"] == pytest.approx(FORCE.tolist())

@@ -113,3 +113,5 @@ def test_an_older_store_is_taken_up_with_all_that_it_holds(older: Place, rows: R
     with running(older, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
         names = {entry["name"] for entry in server.http.get("/v1/campaigns?state=all").json()["campaigns"]}
         assert names == {"explained", "gone", "stays"}
+        again = server.http.post("/v1/campaigns?skin=finger", json=campaign("stays")).raise_for_status().json()
+        assert again["notes"][0].startswith("these recordings are in campaign stays of skin finger already")

@@ -1,22 +1,21 @@
 """Files of one rig, such as a file a press, as one campaign."""
 
-import hashlib
 import itertools
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import PurePath
 from typing import Any
 
-import numpy as np
-
 from underskin.errors import InvalidInput
 from underskin.recordings import fields as field
-from underskin.recordings.campaign import COLUMNS, Campaign, Recording, SkinDescription
+from underskin.recordings.campaign import Campaign, Recording, SkinDescription
 from underskin.recordings.reading import Reading
+from underskin.recordings.repeats import digest
 
 _ROUNDING = 1e-6  # relative, and of positions [mm]: single precision, and conversions of units
+_MOST_LISTED = 5  # repeats in a warning
 _PLACE = "recordings["  # how a refused recording without an id is named
 
 Files = Sequence[tuple[str, Reading]]  # what each file is called, and what was read from it
@@ -27,17 +26,20 @@ def join(name: str, files: Files, skin_id: str | None = None) -> Reading:
 
     The files must be of one skin: what one says of it, each other says too or leaves out, and the sensors of all are
     its sensors. `skin_id` is the skin's id whatever the files say. A recording's id that two files have is led by the
-    file's name. Raises InvalidInput that names the field and the two files where they differ.
+    file's name. Of identical recordings (repeats.digest) only the first is there, and a warning names the others.
+    Raises InvalidInput that names the field and the two files where they differ.
     """
     name = field.name("name", name, False)
     if not files:
         raise InvalidInput("files", "none", "must be at least one")
     skin = _skin(files, skin_id)
     names = _names(files)
-    recordings = tuple(
-        replace(recording, id=new[recording.id])
-        for new, (_, reading) in zip(names, files, strict=True)
-        for recording in reading.campaign.recordings
+    recordings, repeats = _once(
+        [
+            replace(recording, id=new[recording.id])
+            for new, (_, reading) in zip(names, files, strict=True)
+            for recording in reading.campaign.recordings
+        ]
     )
     problems = [
         replace(problem, recording=new[problem.recording])
@@ -45,8 +47,8 @@ def join(name: str, files: Files, skin_id: str | None = None) -> Reading:
         for problem in reading.problems
     ]
     units_checked = any(reading.campaign.units_checked for _, reading in files)
-    warnings = [*_warnings(files), *_renamed(files, names), *_repeated(recordings)]
-    return Reading(Campaign(name, skin, recordings, units_checked), problems, warnings)
+    warnings = [*_warnings(files), *_renamed(files, names), *_repeated(repeats)]
+    return Reading(Campaign(name, skin, tuple(recordings), units_checked), problems, warnings)
 
 
 def _skin(files: Files, skin_id: str | None) -> SkinDescription:
@@ -140,15 +142,19 @@ def _renamed(files: Files, names: Sequence[dict[str, str]]) -> Iterator[str]:
         yield f"{len(changed)} recordings have ids that several files use, and are called after their file: {example}"
 
 
-def _repeated(recordings: Sequence[Recording]) -> Iterator[str]:
-    """A file that was given twice, by copies of it, would pass for more recordings than were made."""
-    seen: dict[bytes, str] = {}
-    same = []
+def _once(recordings: Sequence[Recording]) -> tuple[list[Recording], dict[str, str]]:
+    """Without those that are identical to an earlier one; of these each one's id, and the earlier one's."""
+    first: dict[str, Recording] = {}
+    repeats = {}
     for recording in recordings:
-        columns = [getattr(recording, name, None) for name in COLUMNS]
-        numbers = b"|".join(column.tobytes() if isinstance(column, np.ndarray) else b"" for column in columns)
-        first = seen.setdefault(hashlib.sha256(numbers).digest(), recording.id)
-        if first != recording.id:
-            same.append(f"{recording.id!r} those of {first!r}")
-    if same:
-        yield f"{len(same)} recordings repeat the very numbers of others, and count again: {same[0]}"
+        earlier = first.setdefault(digest(recording), recording)
+        if earlier is not recording:
+            repeats[recording.id] = earlier.id
+    return list(first.values()), repeats
+
+
+def _repeated(repeats: Mapping[str, str]) -> Iterator[str]:
+    if repeats:
+        listed = [f"{name!r} is {earlier!r}" for name, earlier in repeats.items()][:_MOST_LISTED]
+        more = f", and {len(repeats) - len(listed)} more" if len(repeats) > len(listed) else ""
+        yield f"recordings with the very numbers of others count once: {', '.join(listed)}{more}"

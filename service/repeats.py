@@ -1,0 +1,81 @@
+"""Identical recordings in several campaigns: told when they come, counted once in histories."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+from sqlalchemy import Connection
+
+from service.store import repeated
+from underskin.recordings.campaign import Campaign
+
+Point = tuple[str, str]  # of a history: id of the campaign, sensor
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """Why a point does not count: how many of its recordings count in the points of another campaign."""
+
+    campaign_id: str
+    identical: int
+    of: int
+
+    @property
+    def words(self) -> str:
+        """The same in words."""
+        which = (
+            "its recordings count"
+            if self.identical == self.of
+            else f"{self.identical} of its {self.of} recordings count"
+        )
+        return f"{which} in campaign {self.campaign_id}: identical recordings count once"
+
+
+def already_kept(connection: Connection, campaign: Campaign, corrects: str | None) -> tuple[str, str] | None:
+    """In which campaign a campaign's recordings are already, as a sentence, and its id; `corrects` is not looked at."""
+    earlier = repeated.most_alike(connection, campaign, corrects)
+    if earlier is None:
+        return None
+    some = f"{earlier.identical} of these {earlier.of} recordings {'is' if earlier.identical == 1 else 'are'}"
+    which = "these recordings are" if earlier.identical == earlier.of else some
+    row = earlier.row
+    said = f"{which} in campaign {row.name} of skin {row.skin_id} already (kept {row.received_at[:10]})."
+    return said, row.id
+
+
+def left_out(connection: Connection, root: str, points: Collection[Point]) -> dict[Point, Repeat]:
+    """The points of a skin's history that do not count, since no recording counts in two.
+
+    Of points that share a recording, the one of more recordings counts; of equal ones that of the campaign that came
+    first.
+    """
+    rows = [row for row in repeated.shared(connection, root) if (row.id, row.sensor) in points]
+    if not rows:
+        return {}
+    count = repeated.recordings_by_sensor(connection, root)
+    digests: dict[Point, list[str]] = {}
+    for row in sorted(rows, key=lambda row: (-count[row.id, row.sensor], row.number)):
+        digests.setdefault((row.id, row.sensor), []).append(row.digest)
+    counted: dict[str, str] = {}  # by digest, the campaign
+    repeats: dict[Point, Repeat] = {}
+    for point, held in digests.items():
+        there = [counted[digest] for digest in held if digest in counted]
+        if there:
+            repeats[point] = Repeat(max(there, key=there.count), len(there), count[point])
+        else:
+            counted.update(dict.fromkeys(held, point[0]))
+    return repeats
+
+
+def of_campaigns(repeats: Mapping[Point, Repeat]) -> dict[str, Repeat]:
+    """The same of all points of a campaign together, by its id."""
+    by_campaign: dict[str, list[Repeat]] = {}
+    for (campaign_id, _), repeat in repeats.items():
+        by_campaign.setdefault(campaign_id, []).append(repeat)
+    return {
+        campaign_id: Repeat(
+            max(some, key=lambda repeat: repeat.identical).campaign_id,
+            sum(repeat.identical for repeat in some),
+            sum(repeat.of for repeat in some),
+        )
+        for campaign_id, some in by_campaign.items()
+    }
