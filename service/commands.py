@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from service import data_folder
 from service.app import create_app
 from service.gate import LOOPBACK_NAMES, Gate
+from service.http_protocol import LimitedHttpProtocol
 from service.keys import KeyStore, Scope
 from service.log import configure_logging
 from service.settings import Settings
@@ -59,6 +60,7 @@ def serve(
         log_config=None,
         server_header=False,
         proxy_headers=False,
+        http=LimitedHttpProtocol,
         timeout_graceful_shutdown=10,
     )
     uvicorn.Server(config).run(sockets=[listener])

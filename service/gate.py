@@ -11,6 +11,7 @@ LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 OPEN = frozenset({"/health", "/ready"})
 _OPEN_PAGES = ("/login", "/static/")
 _UPLOADS = frozenset({"/v1/campaigns", "/v1/skins/import", "/upload"})
+_MOST_OPEN_BYTES = 8000  # of a body that anybody may send: a key and a path fit
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
@@ -43,29 +44,28 @@ class Gate:
             )
         if method not in _SAFE:
             _check_origin(headers.get(b"origin"), host)
-            self.check_size(_number(headers.get(b"content-length", b"")), self.takes_files(path, headers))
+            self.check_size(_number(headers.get(b"content-length", b"")), path, headers)
         return None if path in OPEN else self._check_key(method, path, headers)
 
     def keys_needed(self) -> bool:
         """Whether a request without a key is refused."""
         return self._keys_always or self._keys.in_use()
 
-    def takes_files(self, path: str, headers: Mapping[bytes, bytes]) -> bool:
-        """Whether a body may be as large as uploads may: files do not go through memory, JSON does."""
-        return path in _UPLOADS and not headers.get(b"content-type", b"").startswith(b"application/json")
-
-    def check_size(self, size: int, files: bool) -> None:
-        """Refuses a body of more bytes than allowed.
+    def check_size(self, size: int, path: str, headers: Mapping[bytes, bytes]) -> None:
+        """Refuses a body of more bytes than `path` takes.
 
         The connection stays open, so that the server reads and drops what is still under way: a client, or a proxy,
         that cannot finish sending would report a broken connection instead of the refusal.
         """
-        if size > (self._max_upload_bytes if files else self._max_body_bytes):
-            if files:
-                limit, smaller = f"{self._max_upload_bytes / 1e6:g} MB (UNDERSKIN_MAX_UPLOAD_MB)", "fewer files"
-            else:
-                limit, smaller = f"{self._max_body_bytes / 1e6:g} MB (UNDERSKIN_MAX_BODY_MB)", "fewer rows"
-            raise Refusal(413, f"The body exceeds {limit}; send {smaller} a request.", title="Body too large")
+        if path in OPEN or path.startswith(_OPEN_PAGES):
+            most, setting, smaller = _MOST_OPEN_BYTES, "", "a key and nothing else"
+        elif _takes_files(path, headers):
+            most, setting, smaller = self._max_upload_bytes, " (UNDERSKIN_MAX_UPLOAD_MB)", "fewer files a request"
+        else:
+            most, setting, smaller = self._max_body_bytes, " (UNDERSKIN_MAX_BODY_MB)", "fewer rows a request"
+        if size > most:
+            limit = f"{most / 1e6:g} MB{setting}"
+            raise Refusal(413, f"The body exceeds {limit}; send {smaller}.", title="Body too large")
 
     def key_of_login(self, token: str) -> Key | None:
         """The key that somebody typed, None where it is not known."""
@@ -90,6 +90,11 @@ class Gate:
         if method not in _SAFE and b"origin" not in headers:
             return None
         return session.key_of(session.cookie_in(headers), self._keys)
+
+
+def _takes_files(path: str, headers: Mapping[bytes, bytes]) -> bool:
+    """Whether a body may be as large as uploads may: files do not go through memory, JSON does."""
+    return path in _UPLOADS and not headers.get(b"content-type", b"").startswith(b"application/json")
 
 
 def _login_first(method: str, path: str) -> Refusal:
