@@ -12,7 +12,7 @@ OPEN = frozenset({"/health", "/ready"})
 _OPEN_PAGES = ("/login", "/static/")
 _UPLOADS = frozenset({"/v1/campaigns", "/v1/skins/import", "/upload"})
 _MOST_OPEN_BYTES = 8000  # of a body that anybody may send: a key and a path fit
-_SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
+SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
 class Gate:
@@ -42,7 +42,7 @@ class Gate:
             raise Refusal(
                 421, f"The service is not known as {host.decode('latin-1')!r}; UNDERSKIN_HOSTS lists its names."
             )
-        if method not in _SAFE:
+        if method not in SAFE:
             _check_origin(headers.get(b"origin"), host)
             self.check_size(_number(headers.get(b"content-length", b"")), path, headers)
         return None if path in OPEN else self._check_key(method, path, headers)
@@ -87,7 +87,7 @@ class Gate:
 
     def _key_of_session(self, method: str, headers: Mapping[bytes, bytes]) -> Key | None:
         """A browser sends its cookie by itself, so a request that changes something must say whose page it is of."""
-        if method not in _SAFE and b"origin" not in headers:
+        if method not in SAFE and b"origin" not in headers:
             return None
         return session.key_of(session.cookie_in(headers), self._keys)
 

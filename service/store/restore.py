@@ -16,6 +16,7 @@ def restore(store: Database, file: Path, before: Path) -> None:
     """
     backup.verify(store, file)
     require_known(_version(store, file))
+    store.make()
     with store.without_writers():  # what is acknowledged after the backup would be lost
         if version(store) is not None:
             backup.make(store, before)
