@@ -178,7 +178,7 @@ def test_what_is_acknowledged_while_the_file_comes_and_goes_is_there(server: Ser
     server.kill()
     with running(server.place, UNDERSKIN_DIAGNOSIS_WORKERS="0") as later:
         kept: set[str] = set()
-        cursor = ""
+        cursor: str | None = ""
         while cursor is not None:
             page = later.http.get("/v1/campaigns?limit=200", params={"cursor": cursor} if cursor else {}).json()
             kept |= {entry["name"] for entry in page["campaigns"]}
