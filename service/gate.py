@@ -1,11 +1,16 @@
 """Who may pass: known Host, own Origin, a key where keys are needed, a body within the limit."""
 
-from collections.abc import Mapping
+import logging
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from urllib.parse import quote
 
 from service import session
-from service.keys import Key, KeyStore
-from service.problems import Refusal, is_browsing
+from service.key_requirement import KeyRequirement
+from service.keys import Key, KeyStore, KeysUnreadable
+from service.problems import RETRY_LATER, Refusal, is_browsing
+
+logger = logging.getLogger("underskin")
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 OPEN = frozenset({"/health", "/ready"})
@@ -23,14 +28,17 @@ class Gate:
         *,
         host_names: frozenset[str],
         keys: KeyStore,
+        requirement: KeyRequirement,
         keys_always: bool,
         max_body_bytes: int,
         max_upload_bytes: int,
     ) -> None:
         """`keys_always`: to be reached from other machines, so that no request passes without a key; otherwise
-        keys are needed once one has been made."""
+        keys are needed once one has been made, by `requirement`."""
         self._hosts = frozenset(name.encode() for name in host_names | LOOPBACK_NAMES)
         self._keys = keys
+        self.requirement = requirement
+        self._damage = ""  # of keys.json, as it was logged last
         self._keys_always = keys_always
         self._max_body_bytes = max_body_bytes
         self._max_upload_bytes = max_upload_bytes
@@ -49,7 +57,11 @@ class Gate:
 
     def keys_needed(self) -> bool:
         """Whether a request without a key is refused."""
-        return self._keys_always or self._keys.in_use()
+        return self._keys_always or self.requirement.needed or self._keys.in_use()
+
+    def keys_missing(self) -> bool:
+        """Whether keys are needed and keys.json is not there."""
+        return self.keys_needed() and not self._keys.in_use()
 
     def check_size(self, size: int, path: str, headers: Mapping[bytes, bytes]) -> None:
         """Refuses a body of more bytes than `path` takes.
@@ -68,18 +80,41 @@ class Gate:
             raise Refusal(413, f"The body exceeds {limit}; send {smaller}.", title="Body too large")
 
     def key_of_login(self, token: str) -> Key | None:
-        """The key that somebody typed, None where it is not known."""
-        return self._keys.find(token.strip().encode())
+        """The key that somebody typed, None where it is not known; raises Refusal."""
+        with self._readable_keys():
+            return self._keys.find(token.strip().encode())
 
     def _check_key(self, method: str, path: str, headers: Mapping[bytes, bytes]) -> Key | None:
         if not self.keys_needed():
             return None
+        is_open = path.startswith(_OPEN_PAGES)
         authorization = headers.get(b"authorization", b"")
-        key = self._key_of_session(method, headers) if not authorization else self._key_of(authorization)
-        if key is None and not path.startswith(_OPEN_PAGES):
+        try:
+            with self._readable_keys():
+                key = self._key_of_session(method, headers) if not authorization else self._key_of(authorization)
+        except Refusal:
+            if is_open:
+                return None
+            raise
+        if key is None and not is_open:
             browsing = is_browsing(path, headers.get(b"accept", b"").decode("latin-1"))
-            raise _login_first(method, path) if browsing else _key_first(authorization)
+            raise _login_first(method, path) if browsing else _key_first(authorization, self.keys_missing())
         return key
+
+    @contextmanager
+    def _readable_keys(self) -> Iterator[None]:
+        """Refuses a request that needs the keys while they cannot be read; the log says why, once a change."""
+        try:
+            self._keys.entries()
+            self._damage = ""
+            yield
+        except KeysUnreadable as error:
+            if str(error) != self._damage:
+                self._damage = str(error)
+                logger.error("%s", error)
+            raise Refusal(
+                503, "The API keys of this service cannot be read; its log says why.", headers=RETRY_LATER
+            ) from error
 
     def _key_of(self, authorization: bytes) -> Key | None:
         scheme, _, token = authorization.partition(b" ")
@@ -102,11 +137,16 @@ def _login_first(method: str, path: str) -> Refusal:
     return Refusal(303, "Log in with a key first.", headers={"Location": f"/login?next={back}"})
 
 
-def _key_first(authorization: bytes) -> Refusal:
+def _key_first(authorization: bytes, missing: bool) -> Refusal:
     known = "This key is not known; it may have been revoked." if authorization else "A key is needed."
+    if missing:
+        known = (
+            "A key is needed, and the service knows none: keys.json is missing from its data folder. "
+            "Put it back, or make a key."
+        )
     return Refusal(
         401,
-        f"{known} Send Authorization: Bearer KEY (`underskin key create` makes one).",
+        f"{known} Send Authorization: Bearer KEY (`underskin key create NAME` makes one).",
         headers={"WWW-Authenticate": "Bearer"},
     )
 

@@ -10,7 +10,7 @@ from starlette.requests import ClientDisconnect
 
 from service.openapi import methods
 from service.pages.problem import problem_page
-from service.problems import Refusal, from_validation, invalid_input, is_browsing, unexpected
+from service.problems import RETRY_LATER, Refusal, from_validation, invalid_input, is_browsing, unexpected
 from service.store.answers import OtherRequest
 from service.store.engine import StorageFull
 from service.store.errors import Conflict, Missing, StoreMoved
@@ -68,7 +68,6 @@ def _unreadable(error: RequestValidationError) -> Refusal | None:
     return Refusal(400, f"The body is not JSON: {found[0]['ctx']['error']}.") if found else None
 
 
-RETRY_LATER = {"Retry-After": "5"}  # seconds
 _STATUS = {Missing: 404, Conflict: 409, OtherRequest: 422}
 
 

@@ -10,9 +10,9 @@ from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.diagnosing.lasting_failure import LastingFailure
 from service.diagnosing.process import Worker
 from service.diagnosing.worker import Job
+from service.lasting_failure import LastingFailure
 from service.store import diagnoses
 from service.store.engine import Database, StorageFull
 from service.store.errors import StoreMoved

@@ -47,6 +47,10 @@ class Database:
         if self._files is not None:
             self._files.make()
 
+    def is_made(self) -> bool:
+        """Whether an SQLite file is there; PostgreSQL's databases are made by others."""
+        return self._files is None or self._files.is_made()
+
     def require_in_place(self) -> None:
         """Raises StoreMoved where an SQLite store's files are not, or not any more, those on the disk."""
         if self._files is not None:

@@ -11,7 +11,15 @@ from sqlalchemy import Connection, inspect, text
 from service.store import backup
 from service.store.engine import Database, StoreError
 
-VERSIONS = ("0001", "0002", "0003", "0004", "0005", "0006")  # oldest first; one file each in migrations/versions
+VERSIONS = (
+    "0001",
+    "0002",
+    "0003",
+    "0004",
+    "0005",
+    "0006",
+    "0007",
+)  # oldest first; one file each in migrations/versions
 SCRIPTS = Path(__file__).parent / "migrations"
 _LOCK = 7236411  # any number, the same for all servers of a database
 

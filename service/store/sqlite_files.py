@@ -30,8 +30,12 @@ class SqliteFiles:
 
     def make(self) -> None:
         """Make the database, empty, where it is missing."""
-        if not self._path.exists():
+        if not self.is_made():
             self._path.touch()
+
+    def is_made(self) -> bool:
+        """Whether the database is there."""
+        return self._path.exists()
 
     def connect(self) -> sqlite3.Connection:
         """A connection to the files that were opened first; raises StoreMoved where the disk has others."""
