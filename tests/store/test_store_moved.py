@@ -174,7 +174,7 @@ def test_what_is_acknowledged_while_the_file_comes_and_goes_is_there(server: Ser
     for thread in senders:
         thread.join()
     assert acknowledged
-    assert set(refused) == {503}
+    assert set(refused) <= {503}
     server.kill()
     with running(server.place, UNDERSKIN_DIAGNOSIS_WORKERS="0") as later:
         kept: set[str] = set()
