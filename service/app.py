@@ -45,8 +45,10 @@ async def _lifespan(api: FastAPI) -> AsyncIterator[None]:
     state = api.state
     state.uploads = UploadFolder(state.settings.data)
     state.shelf = Shelf(state.uploads.path, state.settings.max_upload_bytes)
+    state.gate.requirement.start()
     state.runner.start()
     yield
+    await run_in_threadpool(state.gate.requirement.stop)
     await run_in_threadpool(state.runner.stop)
     await run_in_threadpool(state.planner.stop)
     state.uploads.close()

@@ -8,6 +8,7 @@ import typer
 
 from service import data_folder
 from service.commands import read_settings
+from service.keys import KeyStore
 from service.store import StoreError, database
 from service.store import backup as backups
 from service.store import restore as restoring
@@ -37,6 +38,19 @@ def restore(
         stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
         before = settings.data / "backups" / f"before-restore-{stamp}{backups.suffix(store)}"
         restoring.restore(store, file, before)
+        needed = restoring.keys_needed(store)
     except (StoreError, OSError) as error:
         raise UnderskinError(str(error)) from error
     typer.echo(f"restored {file}" + (f"; what was there before is in {before}" if before.exists() else ""))
+    if needed:
+        typer.echo(_of_keys(KeyStore(settings.data)))
+
+
+def _of_keys(keys: KeyStore) -> str:
+    """What whoever restored a store in which keys are needed is told."""
+    if keys.file_exists():
+        return f"keys are needed: those in {keys.path}"
+    return (
+        f"keys are needed, and {keys.path}, which no backup holds, is missing: put it back, or make a key with "
+        "`underskin key create NAME`"
+    )

@@ -4,24 +4,34 @@ import errno
 import ipaddress
 import socket
 import tempfile
+from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated, NoReturn
 
 import typer
 import uvicorn
 from pydantic import ValidationError
+from sqlalchemy import Connection
+from sqlalchemy.exc import DBAPIError
 
 from service import data_folder
 from service.app import create_app
 from service.gate import LOOPBACK_NAMES, Gate
+from service.http_protocol import LimitedHttpProtocol
+from service.key_requirement import KeyRequirement
 from service.keys import KeyStore, Scope
 from service.log import configure_logging
 from service.settings import Settings
-from service.store import StoreError, open_store
+from service.store import StoreError, database, key_requirement, open_store
+from service.store.engine import StorageFull
+from service.store.errors import StoreMoved
 from underskin import TableError, UnderskinError
 from underskin.surrogate import SIGMA_TABLE, load_table
 
-key = typer.Typer(help="API keys: create, list, revoke.", no_args_is_help=True)
+_STORE_FAILED = (StoreError, StoreMoved, StorageFull, DBAPIError)
+
+key = typer.Typer(help="API keys: create, list, revoke; open: do without.", no_args_is_help=True)
 
 
 def serve(
@@ -41,14 +51,17 @@ def serve(
             _fail(f"refusing to serve {where} without API keys: make one with `underskin key create NAME`")
         table = load_table(settings.tables / SIGMA_TABLE)
         store = open_store(settings.database_url, settings.data)
+        requirement = KeyRequirement(keys, store)
+        requirement.look()
         listener = _listen(host, port)
-    except (TableError, StoreError, OSError, ValueError) as error:
+    except (TableError, *_STORE_FAILED, OSError, ValueError) as error:
         _fail(str(error))
     configure_logging()
     typer.echo(f"underskin serves on http://{_host_name(host)}:{listener.getsockname()[1]} (Ctrl+C ends it)")
     gate = Gate(
         host_names=settings.host_names | {_host_name(host)},
         keys=keys,
+        requirement=requirement,
         keys_always=not private,
         max_body_bytes=settings.max_body_bytes,
         max_upload_bytes=settings.max_upload_bytes,
@@ -59,6 +72,7 @@ def serve(
         log_config=None,
         server_header=False,
         proxy_headers=False,
+        http=LimitedHttpProtocol,
         timeout_graceful_shutdown=10,
     )
     uvicorn.Server(config).run(sockets=[listener])
@@ -69,11 +83,16 @@ def create_key(
     name: Annotated[str, typer.Argument(help="Who or what will use it.")],
     scope: Annotated[Scope, typer.Option(help="read computes and reads; write changes what is kept.")] = "read",
 ) -> None:
-    """Make a key and print it: it is shown this once."""
+    """Make a key and print it: it is shown this once. From the first one on, the service asks for a key."""
+    settings = read_settings()
     try:
-        typer.echo(_keys().create(name, scope))
+        typer.echo(KeyStore(settings.data).create(name, scope))
     except (UnderskinError, OSError, ValueError) as error:
         _fail(str(error))
+    try:
+        _note(settings, key_requirement.require)
+    except (*_STORE_FAILED, OSError) as error:
+        typer.echo(f"underskin: the key is made; the store will note it when the service runs: {error}", err=True)
 
 
 @key.command("list")
@@ -93,6 +112,43 @@ def revoke_key(name: Annotated[str, typer.Argument(help="As it was created.")]) 
         _keys().revoke(name)
     except (UnderskinError, OSError, ValueError) as error:
         _fail(str(error))
+
+
+@key.command("open")
+def open_to_all(
+    yes: Annotated[bool, typer.Option("--yes", help="Do it; without this nothing changes.")] = False,
+) -> None:
+    """Revoke all keys, and let requests in without one again.
+
+    For a service that listens on this machine alone: whoever reaches it may then read and change all that it keeps. One
+    that other machines reach (--host, UNDERSKIN_HOSTS) asks for a key all the same, and does not start without one;
+    this command cannot know how the service is run.
+    """
+    settings = read_settings()
+    keys = KeyStore(settings.data)
+    if not yes:
+        typer.echo(
+            f"underskin: this revokes all keys in {keys.path} and lets whoever reaches the service in without one; "
+            "to do it: underskin key open --yes",
+            err=True,
+        )
+        raise typer.Exit(2)
+    try:
+        keys.remove()
+        _note(settings, key_requirement.lift)
+    except (*_STORE_FAILED, OSError) as error:
+        _fail(f"all keys are revoked, but the store still says that keys are needed; do it again: {error}")
+    typer.echo("all keys are revoked; a service that listens on this machine alone answers without one")
+
+
+def _note(settings: Settings, change: Callable[[Connection], None]) -> None:
+    """Keep in the store whether keys are needed; where it is still to be made or upgraded, the service does so."""
+    with closing(database(settings.database_url, settings.data)) as store:
+        if not store.is_made():
+            return
+        with store.writing() as connection:
+            if key_requirement.is_known(connection):
+                change(connection)
 
 
 def _fail(reason: str) -> NoReturn:

@@ -10,6 +10,7 @@ from fastapi.security import SecurityScopes
 
 from service.answers import Accept, Columns, respond
 from service.columns import ColumnsRequest, parse
+from service.gate import SAFE
 from service.keys import Key
 from service.problems import Refusal
 from service.store import Database
@@ -25,7 +26,10 @@ Table = Annotated[SigmaTable, Depends(_table)]
 
 
 def _store(request: Request) -> Database:
+    """The store; for requests that may change it, only where it keeps what it is told: otherwise StoreMoved."""
     store: Database = request.app.state.store
+    if request.method not in SAFE:
+        store.require_in_place()
     return store
 
 

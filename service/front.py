@@ -87,18 +87,18 @@ class Front:
         method, path = scope["method"], scope["path"]
         scope["key"] = self._gate.check(method, path, headers)
         hot = self._hot.get((method, path))
+        limited = self._limited(receive, path, headers)
         if hot is None or not _plain(method, headers):
-            files = self._gate.takes_files(path, headers)
-            await self._api(scope, self._limited(receive, files), exchange.send)
+            await self._api(scope, limited, exchange.send)
             return
-        body = b"" if method == "GET" else await _whole_body(self._limited(receive, files=False))
+        body = b"" if method == "GET" else await _whole_body(limited)
         content = hot(body or scope["query_string"])
         if content is None:
             await self._api(scope, _replay(body, receive), exchange.send)
         else:
             await exchange.answer(content)
 
-    def _limited(self, receive: Receive, files: bool) -> Receive:
+    def _limited(self, receive: Receive, path: str, headers: Mapping[bytes, bytes]) -> Receive:
         """`receive`, refusing the body once it exceeds the limit, whatever its Content-Length said."""
         size = 0
 
@@ -106,7 +106,7 @@ class Front:
             nonlocal size
             message = await receive()
             size += len(message.get("body", b""))
-            self._gate.check_size(size, files)
+            self._gate.check_size(size, path, headers)
             return message
 
         return counted

@@ -10,10 +10,10 @@ from starlette.requests import ClientDisconnect
 
 from service.openapi import methods
 from service.pages.problem import problem_page
-from service.problems import Refusal, from_validation, invalid_input, is_browsing, unexpected
+from service.problems import RETRY_LATER, Refusal, from_validation, invalid_input, is_browsing, unexpected
 from service.store.answers import OtherRequest
 from service.store.engine import StorageFull
-from service.store.errors import Conflict, Missing
+from service.store.errors import Conflict, Missing, StoreMoved
 from underskin import InvalidInput
 
 logger = logging.getLogger("underskin")
@@ -25,7 +25,7 @@ def install_handlers(api: FastAPI) -> None:
     api.add_exception_handler(InvalidInput, _handle)
     api.add_exception_handler(RequestValidationError, _handle)
     api.add_exception_handler(HTTPException, _handle)
-    for kind in (*_STATUS, StorageFull, DataError, IntegrityError, OperationalError, Exception):
+    for kind in (*_STATUS, StorageFull, StoreMoved, DataError, IntegrityError, OperationalError, Exception):
         api.add_exception_handler(kind, _handle)
 
 
@@ -77,11 +77,13 @@ def _of_the_store(request: Request, error: Exception) -> Refusal:
         return Refusal(_STATUS[type(error)], str(error))
     if isinstance(error, StorageFull):
         return Refusal(507, "The disk is full: nothing of this request was kept. What is kept can be read.")
+    if isinstance(error, StoreMoved):
+        return Refusal(503, str(error), headers=RETRY_LATER)
     if isinstance(error, DataError):
         return Refusal(422, "A text has a character that cannot be kept, such as NUL.")
     if isinstance(error, IntegrityError):
         return Refusal(409, "Another request kept the same at the same time: look at what is there, and send it again.")
     if isinstance(error, OperationalError):
         logger.error("the store failed: %s", error, extra={"fields": {"request_id": request.scope["request_id"]}})
-        return Refusal(503, "The store does not answer; try again in a while.", headers={"Retry-After": "5"})
+        return Refusal(503, "The store does not answer; try again in a while.", headers=RETRY_LATER)
     return unexpected()

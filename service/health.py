@@ -35,13 +35,14 @@ async def health() -> Health:
 
 @router.get("/ready", operation_id="ready", summary="Can it do its work?")
 def ready(request: Request, table: Table, store: Store) -> Ready:
-    """Table loaded, data folder writable and the store answering; 503 where not."""
+    """Table loaded, data folder writable, the store answering and its files those on the disk; 503 where not."""
     folder = request.app.state.settings.data
     if not os.access(folder, os.W_OK):
-        raise Refusal(503, f"The data folder {folder} is not writable.")
+        raise Refusal(503, f"The data folder {folder} is not there, or not writable.")
     try:
         with store.reading() as connection:
             connection.execute(text("SELECT 1"))
+        store.require_in_place()
     except DBAPIError:
         raise Refusal(503, "The store does not answer.") from None
     return Ready(status="ready", table_sha256=table.sha256)

@@ -13,7 +13,7 @@ from service.d33_models import D33, of_inversion, of_moduli
 from service.problems import Refusal
 from service.store import campaigns, inversions
 from service.store.engine import Database, StorageFull
-from service.store.errors import Conflict
+from service.store.errors import Conflict, StoreMoved
 from service.store.tables import AnyRow
 from underskin import InvalidInput
 from underskin.recordings.campaign import Campaign
@@ -73,8 +73,8 @@ def adopted_answer(
         try:
             with store.writing() as connection:
                 inversions.keep_adopted(connection, row, serving.model_id, table.sha256, document)
-        except StorageFull:
-            logger.warning("no room to keep the d33 of a campaign", extra={"fields": {"campaign": row.id}})
+        except (StorageFull, StoreMoved) as error:
+            _not_kept(row, error)
     return document
 
 
@@ -185,5 +185,10 @@ def _keep(store: Database, row: AnyRow, document: dict[str, Any], numbers: dict[
     try:
         with store.writing() as connection:
             inversions.keep(connection, row, document["table_sha256"], document, numbers, sensors)
-    except StorageFull:
-        logger.warning("no room to keep the d33 of a campaign", extra={"fields": {"campaign": row.id}})
+    except (StorageFull, StoreMoved) as error:
+        _not_kept(row, error)
+
+
+def _not_kept(row: AnyRow, error: Exception) -> None:
+    """The answer is given all the same."""
+    logger.warning("the d33 of a campaign was not kept: %s", error, extra={"fields": {"campaign": row.id}})

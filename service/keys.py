@@ -24,6 +24,10 @@ _FRESH_S = 0.5
 Scope = Literal["read", "write"]
 
 
+class KeysUnreadable(ValueError):
+    """keys.json is damaged, or may not be read."""
+
+
 @dataclass(frozen=True)
 class Key:
     """A key as it is kept. Scope `write` includes `read`."""
@@ -40,33 +44,48 @@ class KeyStore:
     def __init__(self, folder: Path) -> None:
         """Nothing is read yet."""
         self.path = folder / "keys.json"
-        self._stamp: tuple[int, int, int] | None = None
+        self._stamp: tuple[int, ...] | None = None  # of the file that was read; empty if damaged, None if missing
         self._keys: tuple[Key, ...] = ()
+        self._damage = ""
         self._fresh_until = 0.0
 
+    def file_exists(self) -> bool:
+        """Whether there is a file of keys, now."""
+        return self.path.exists()
+
     def in_use(self) -> bool:
-        """Whether a key was ever made here: revoking the last one must not open the service to all."""
-        self.entries()
+        """Whether there is a file of keys: revoking the last one, or damaging the file, opens nothing."""
+        self._keep_fresh()
         return self._stamp is not None
 
     def entries(self) -> tuple[Key, ...]:
-        """All keys; raises ValueError when the file is damaged."""
+        """All keys; raises KeysUnreadable."""
+        self._keep_fresh()
+        return self._readable()
+
+    def _keep_fresh(self) -> None:
         now = time.monotonic()
         if now >= self._fresh_until:
             self._refresh()
             self._fresh_until = now + _FRESH_S
-        return self._keys
 
     def _refresh(self) -> None:
+        stamp: tuple[int, ...] | None
         try:
             status = self.path.stat()
+            stamp = (status.st_mtime_ns, status.st_ctime_ns, status.st_ino, status.st_size)
+            if stamp != self._stamp:
+                self._keys, self._damage = _read(self.path), ""
         except FileNotFoundError:
-            self._stamp, self._keys = None, ()
-            return
-        stamp = (status.st_mtime_ns, status.st_ino, status.st_size)
-        if stamp != self._stamp:
-            self._keys = _read(self.path)
-            self._stamp = stamp
+            stamp, self._keys, self._damage = None, (), ""
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            stamp, self._damage = (), f"the keys in {self.path} cannot be read: {error!r}"
+        self._stamp = stamp
+
+    def _readable(self) -> tuple[Key, ...]:
+        if self._damage:
+            raise KeysUnreadable(self._damage)
+        return self._keys
 
     def find(self, token: bytes) -> Key | None:
         """The key that `token` is, compared in constant time."""
@@ -95,23 +114,34 @@ class KeyStore:
                 raise InvalidInput("name", name, f"must be one of {[key.name for key in keys]}")
             keys[:] = kept
 
+    def remove(self) -> None:
+        """Forget all keys, and that there were any; a damaged file goes, too."""
+        with self._locked():
+            self.path.unlink(missing_ok=True)
+
     @contextmanager
     def _changing(self) -> Iterator[list[Key]]:
         """The keys, to be changed in place by one process at a time; written whole or not at all."""
-        data_folder.make(self.path.parent)
-        with self.path.with_suffix(".lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+        with self._locked():
             self._refresh()
-            keys = list(self._keys)
+            keys = list(self._readable())
             yield keys
             _write(self.path, keys)
 
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        data_folder.make(self.path.parent)
+        with self.path.with_suffix(".lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield
+
 
 def _read(path: Path) -> tuple[Key, ...]:
-    try:
-        return tuple(Key(**entry) for entry in json.loads(path.read_text())["keys"])
-    except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"the keys in {path} cannot be read: {error!r}") from error
+    keys = tuple(Key(**entry) for entry in json.loads(path.read_text())["keys"])
+    for key in keys:
+        if not (isinstance(key.name, str) and len(bytes.fromhex(key.sha256)) == sha256().digest_size):
+            raise ValueError(f"key {key.name!r} has no digest")
+    return keys
 
 
 def _write(path: Path, keys: list[Key]) -> None:

@@ -7,12 +7,15 @@ from pathlib import Path
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
-from service.uploads import UploadFolder, full_disk_said
+from service.uploads import UploadFolder, disk_errors_said
 
 
 def made_file(folder: UploadFolder, name: str, media_type: str, write: Callable[[Path], object]) -> FileResponse:
-    """The answer that sends what `write` wrote, removed afterwards; raises StorageFull where the disk is full."""
-    with full_disk_said():
+    """The answer that sends what `write` wrote, removed afterwards.
+
+    Raises StorageFull where the disk is full, StoreMoved where the folder is gone.
+    """
+    with disk_errors_said(folder):
         with tempfile.NamedTemporaryFile(dir=folder.path, delete=False) as file:
             path = Path(file.name)
         try:

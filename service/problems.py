@@ -12,6 +12,7 @@ from pydantic import BaseModel, Field, ValidationError
 from underskin import InvalidInput
 
 _MOST_LOGGED = 3
+RETRY_LATER = {"Retry-After": "5"}  # seconds
 MEDIA_TYPE = "application/problem+json"
 
 

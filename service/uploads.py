@@ -21,6 +21,7 @@ from python_multipart.multipart import parse_options_header
 
 from service.problems import Refusal
 from service.store.engine import StorageFull, is_full
+from service.store.errors import StoreMoved
 
 if TYPE_CHECKING:
     from python_multipart.multipart import MultipartCallbacks
@@ -79,7 +80,7 @@ async def received(request: Request, parent: UploadFolder, most_bytes: float = m
     Raises Refusal where a form cannot be read (400), is of the other kind (415) or the body has more than `most_bytes`,
     besides the limit of all uploads (413), StorageFull where the disk is full.
     """
-    with full_disk_said(), tempfile.TemporaryDirectory(dir=parent.path) as folder:
+    with disk_errors_said(parent), tempfile.TemporaryDirectory(dir=parent.path) as folder:
         content_type, options = parse_options_header(request.headers.get("content-type", ""))
         if content_type == b"application/x-www-form-urlencoded":
             raise Refusal(415, "Files come as they are (application/octet-stream) or as a form of multipart/form-data.")
@@ -90,11 +91,16 @@ async def received(request: Request, parent: UploadFolder, most_bytes: float = m
 
 
 @contextmanager
-def full_disk_said() -> Iterator[None]:
-    """Turns the system's error for a full disk into StorageFull."""
+def disk_errors_said(folder: UploadFolder) -> Iterator[None]:
+    """Turns the system's error for a full disk into StorageFull, and for uploads' folder gone into StoreMoved."""
     try:
         yield
     except OSError as error:
+        if not folder.path.is_dir():
+            raise StoreMoved(
+                f"The folder {folder.path} was removed while the service runs: put the data folder back, or restart "
+                "the service."
+            ) from error
         if is_full(error):
             raise StorageFull(str(error)) from error
         raise

@@ -14,6 +14,7 @@ import pytest
 
 from service.app import create_api
 from service.gate import Gate
+from service.key_requirement import KeyRequirement
 from service.keys import KeyStore
 from service.settings import Settings
 from service.store import open_store
@@ -96,10 +97,16 @@ def test_operation_ids_are_stable(document: dict[str, Any]) -> None:
 
 
 def test_every_route_of_the_application_is_in_the_document(document: dict[str, Any], tmp_path: Path) -> None:
-    gate = Gate(
-        host_names=frozenset(), keys=KeyStore(tmp_path), keys_always=False, max_body_bytes=1, max_upload_bytes=1
-    )
     store = open_store("", tmp_path)
+    keys = KeyStore(tmp_path)
+    gate = Gate(
+        host_names=frozenset(),
+        keys=keys,
+        requirement=KeyRequirement(keys, store),
+        keys_always=False,
+        max_body_bytes=1,
+        max_upload_bytes=1,
+    )
     api = create_api(Settings(data=tmp_path), load_table(), gate, store)
     store.close()
     assert set(api.openapi()["paths"]) == set(document["paths"])

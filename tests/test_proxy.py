@@ -1,6 +1,7 @@
 """The site file that docs/deploy.md hands out, in a real nginx with TLS in front of a real server."""
 
 import os
+import re
 import shutil
 import socket
 import ssl
@@ -9,12 +10,16 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
 
+from service.settings import Settings
+
 SITE = Path(__file__).parents[1] / "deploy" / "nginx.conf"
 NAME = "skin.example.org"
+TIMEOUT_S = 2  # instead of the site file's, which are longer
 NGINX = shutil.which("nginx", path=os.environ["PATH"] + os.pathsep + "/usr/sbin")
 OPENSSL = shutil.which("openssl")
 
@@ -72,7 +77,7 @@ def make_certificate(folder: Path) -> None:
 
 
 def site(folder: Path, service: int, tls: int, plain: int) -> str:
-    """The site file with this test's ports and certificate in place of a real machine's."""
+    """The site file with this test's ports, certificate and timeouts in place of a real machine's."""
     text = SITE.read_text()
     places = {
         "server 127.0.0.1:8000;": f"server 127.0.0.1:{service};",
@@ -80,6 +85,8 @@ def site(folder: Path, service: int, tls: int, plain: int) -> str:
         "listen [::]:443 ssl http2;": "",
         "listen 80;": f"listen 127.0.0.1:{plain};",
         "listen [::]:80;": "",
+        "client_header_timeout     10s;": f"client_header_timeout {TIMEOUT_S}s;",
+        "client_body_timeout       30s;": f"client_body_timeout {TIMEOUT_S}s;",
         "/etc/ssl/underskin/": f"{folder}/",
     }
     for there, here in places.items():
@@ -101,7 +108,7 @@ def proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[httpx.Clie
     serve = [str(Path(sys.executable).with_name("underskin")), "serve", "--port", str(service)]
     nginx = [str(NGINX), "-e", "stderr", "-p", str(folder), "-c", str(folder / "nginx.conf")]
     trust = ssl.create_default_context(cafile=folder / "fullchain.pem")
-    make_key = [str(Path(sys.executable).with_name("underskin")), "key", "create", "proxy"]
+    make_key = [str(Path(sys.executable).with_name("underskin")), "key", "create", "proxy", "--scope", "write"]
     key = subprocess.run(make_key, env=os.environ | settings, check=True, capture_output=True, text=True).stdout.strip()
     headers = {"Host": NAME, "Authorization": f"Bearer {key}"}
     with subprocess.Popen(serve, env=os.environ | settings) as server, subprocess.Popen(nginx) as front:
@@ -158,6 +165,63 @@ def test_a_batch_under_the_limit_passes(proxy: tuple[httpx.Client, int]) -> None
     client, _ = proxy
     answer = ask(client, "POST", "/v1/sigma", json={"a_over_h": [0.3] * 100_000, "rt_over_h": 0.6})
     assert len(answer.json()["sigma"]) == 100_000
+
+
+def too_large(answer: httpx.Response) -> dict[str, Any]:
+    """The problem that both nginx and the service answer where a body is too large."""
+    assert (answer.status_code, answer.headers["Content-Type"]) == (413, "application/problem+json")
+    problem: dict[str, Any] = answer.json()
+    assert set(problem) == {"type", "title", "status", "detail", "request_id", "errors"}
+    assert problem["type"] == "urn:underskin:problem:body-too-large"
+    return problem
+
+
+@pytest.mark.parametrize("chunked", [False, True])
+def test_the_proxy_passes_on_no_login_form_that_is_too_long(proxy: tuple[httpx.Client, int], chunked: bool) -> None:
+    client, _ = proxy
+    form = b"key=" + b"k" * 10_000
+    content = (piece for piece in (form[:1000], form[1000:])) if chunked else form
+    headers = {"Content-Type": "application/x-www-form-urlencoded", "Accept": "application/json"}
+    answer = ask(client, "POST", "/login", content=content, headers=headers)
+    assert "what the proxy passes on" in too_large(answer)["detail"]
+
+
+def test_the_proxy_passes_on_uploads_beyond_the_limit_of_other_bodies(proxy: tuple[httpx.Client, int]) -> None:
+    client, _ = proxy
+    document = b" " * 70_000_000
+    assert ask(client, "POST", "/v1/campaigns", files={"file": ("blank.json", document)}).status_code == 422
+    assert "the proxy" in too_large(ask(client, "POST", "/v1/sigma", content=document))["detail"]
+
+
+def test_the_site_s_limits_are_those_of_the_settings() -> None:
+    sizes = dict(re.findall(r"client_max_body_size +(\d+)(m);", SITE.read_text()))
+    assert set(sizes) == {f"{Settings.model_fields[name].default:g}" for name in ("max_body_mb", "max_upload_mb")}
+
+
+def test_the_proxy_takes_the_longest_address_of_a_page_and_no_longer_header(proxy: tuple[httpx.Client, int]) -> None:
+    client, _ = proxy
+    assert ask(client, "GET", f"/v1/sigma?a_over_h=0.3&rt_over_h={'0' * 50_000}0.6").status_code == 200
+    assert ask(client, "GET", "/health", headers={"X-Long": "k" * 70_000}).status_code == 400
+
+
+@pytest.mark.parametrize(
+    "begun", ["GET /health HTTP/1.1\r\n", f"POST /login HTTP/1.1\r\nHost: {NAME}\r\nContent-Length: 9\r\n\r\nkey="]
+)
+def test_who_does_not_go_on_is_disconnected(proxy: tuple[httpx.Client, int], begun: str) -> None:
+    client, _ = proxy
+    trust = ssl.create_default_context()
+    trust.check_hostname, trust.verify_mode = False, ssl.CERT_NONE
+    with (
+        socket.create_connection(("127.0.0.1", client.base_url.port or 0), timeout=TIMEOUT_S + 20) as plain,
+        trust.wrap_socket(plain, server_hostname=NAME) as connection,
+    ):
+        connection.sendall(begun.encode())
+        start = time.monotonic()
+        try:
+            connection.recv(1)  # b"", or the start of a refusal
+        except OSError as error:
+            assert not isinstance(error, TimeoutError)  # noqa: PT017 -- reset is as good as closed
+        assert TIMEOUT_S - 0.5 < time.monotonic() - start < TIMEOUT_S + 15
 
 
 def test_plain_http_is_sent_to_tls(proxy: tuple[httpx.Client, int]) -> None:

@@ -12,6 +12,7 @@ import pytest
 from service.app import create_api
 from service.front import Front
 from service.gate import Gate
+from service.key_requirement import KeyRequirement
 from service.keys import KeyStore
 from service.problems import Problem
 from service.settings import Settings
@@ -216,10 +217,16 @@ def test_values_too_large_for_a_double_are_outside_not_a_failure(http: httpx.Cli
 def test_what_nobody_expected_is_a_problem_with_the_traceback_in_the_log(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    gate = Gate(
-        host_names=frozenset(), keys=KeyStore(tmp_path), keys_always=False, max_body_bytes=1000, max_upload_bytes=1000
-    )
     store = open_store("", tmp_path)
+    keys = KeyStore(tmp_path)
+    gate = Gate(
+        host_names=frozenset(),
+        keys=keys,
+        requirement=KeyRequirement(keys, store),
+        keys_always=False,
+        max_body_bytes=1000,
+        max_upload_bytes=1000,
+    )
     api = create_api(Settings(data=tmp_path), load_table(), gate, store)
 
     @api.get("/fails")

@@ -14,6 +14,7 @@ import httpx
 import pytest
 
 from service.keys import KeyStore
+from service.session import COOKIE, logged_in
 from tests.conftest import UNDERSKIN, Server, running
 from tests.test_service_errors import SIGMA, all_routes, problem_of
 from tests.test_service_limits import BODIES
@@ -248,18 +249,34 @@ def test_keys_are_told_apart_by_name(keyed: Keyed) -> None:
 def test_a_damaged_file_of_keys_opens_nothing(tmp_path: Path) -> None:
     token = keys_in(tmp_path).create("lab", "read")
     kept = tmp_path / "data" / "keys.json"
+    (key,) = keys_in(tmp_path).entries()
+    cookie = logged_in(key)
     with running(tmp_path) as started:
         text = kept.read_text()
         kept.write_text(text[: len(text) // 2])
-        assert status_within_a_second(started.url, bearer(token), 500) == 500
-        refused = httpx.get(started.url + ONE_SIGMA, headers={"X-Request-ID": "damaged"})
-        assert "keys" not in problem_of(refused, 500)["detail"]
-        assert httpx.get(started.url + "/health").status_code == 200
+        assert status_within_a_second(started.url, bearer(token), 503) == 503
+        for headers in (bearer(token), bearer("x"), {}, {"Cookie": f"{COOKIE}={cookie}"}):
+            refused = httpx.get(started.url + ONE_SIGMA, headers=headers)
+            assert refused.headers["retry-after"] == "5"
+            assert "keys of this service cannot be read" in problem_of(refused, 503)["detail"]
+        for path in ("/health", "/ready", "/login", "/static/underskin.css"):
+            assert httpx.get(started.url + path, headers={"Cookie": f"{COOKIE}={cookie}"}).status_code == 200, path
+        time.sleep(1.2)  # the file is looked at again
+        problem_of(httpx.get(started.url + ONE_SIGMA), 503)
         kept.write_text(text)
         assert status_within_a_second(started.url, bearer(token), 200) == 200
     records = [json.loads(line) for line in started.log.read_text().splitlines() if line.startswith("{")]
-    (record,) = [each for each in records if each.get("request_id") == "damaged" and each["level"] == "error"]
-    assert f"the keys in {kept} cannot be read" in record["exception"]
+    (record,) = [each for each in records if each["level"] == "error"]
+    assert f"the keys in {kept} cannot be read" in record["message"]
+    assert "Traceback" not in started.log.read_text()
+
+
+@pytest.mark.parametrize("text", ["{}", "[]", '{"keys": [{"name": "a", "scope": "read", "created": "", "sha256": 5}]}'])
+def test_a_file_of_keys_of_another_shape_opens_nothing(tmp_path: Path, text: str) -> None:
+    token = keys_in(tmp_path).create("lab", "read")
+    with running(tmp_path) as started:
+        (tmp_path / "data" / "keys.json").write_text(text)
+        assert status_within_a_second(started.url, bearer(token), 503) == 503
 
 
 # Reached from other machines

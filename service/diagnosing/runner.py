@@ -12,8 +12,10 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from service.diagnosing.process import Worker
 from service.diagnosing.worker import Job
+from service.lasting_failure import LastingFailure
 from service.store import diagnoses
 from service.store.engine import Database, StorageFull
+from service.store.errors import StoreMoved
 from service.store.tables import AnyRow
 from underskin import __version__
 from underskin.recordings import json_file
@@ -23,7 +25,7 @@ logger = logging.getLogger("underskin")
 _POLL_S = 2.0  # how often the queue is looked at: another server may have put something in
 _BEAT_S = 2.0  # how often a running one is kept alive and its progress kept
 _JOIN_S = 10.0
-_STORE_FAILED = (SQLAlchemyError, StorageFull, OSError)
+_STORE_FAILED = (SQLAlchemyError, StorageFull, StoreMoved, OSError)
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,7 @@ class Runner:
         self._stirred = threading.Event()
         self._jobs: dict[threading.Thread, Worker | None] = {}
         self._lock = threading.Lock()
+        self._failure = LastingFailure(logger)
         self._dispatcher = threading.Thread(target=self._dispatch, name="diagnosing", daemon=True)
 
     def start(self) -> None:
@@ -80,16 +83,21 @@ class Runner:
                         self._jobs[thread] = None
                     thread.start()
             except _STORE_FAILED as error:
-                logger.warning("no diagnosis can be claimed: %s", error)
+                self._failure.log("no diagnosis can be claimed", error)
             self._stirred.wait(_POLL_S)
 
     def _claim(self) -> AnyRow | None:
         with self._store.writing() as connection:
-            return diagnoses.claim(connection, self._server, self._terms.table_sha256, __version__)
+            row = diagnoses.claim(connection, self._server, self._terms.table_sha256, __version__)
+        self._failure.is_over()
+        return row
 
     def _job(self, row: AnyRow) -> None:
         try:
             self._run(row)
+        except StoreMoved as error:
+            self._failure.log("a diagnosis cannot be run now", error)
+            self._release(row)
         except Exception as error:  # nobody else would hear of it
             logger.exception("a diagnosis could not be run", extra={"fields": {"diagnosis": row.id}})
             self._end(row, None, f"{type(error).__name__}: {error}")
@@ -126,10 +134,12 @@ class Runner:
         """Say that it runs; whether it was neither cancelled nor taken by another server. A silent store says yes."""
         try:
             with self._store.writing() as connection:
-                return diagnoses.keep_alive(connection, row.number, self._server, worker.progress)
+                ours = diagnoses.keep_alive(connection, row.number, self._server, worker.progress)
         except _STORE_FAILED as error:
-            logger.warning("a diagnosis could not be kept alive: %s", error)
+            self._failure.log("a diagnosis cannot be kept alive", error)
             return True
+        self._failure.is_over()
+        return ours
 
     def _end(
         self, row: AnyRow, report: dict[str, Any] | None, reason: str, figures: dict[str, str] | None = None
@@ -144,7 +154,7 @@ class Runner:
                         diagnoses.fail(connection, row.number, self._server, reason)
                 return
             except _STORE_FAILED as error:
-                logger.warning("what came of a diagnosis could not be kept: %s", error)
+                self._failure.log("what came of a diagnosis cannot be kept", error)
                 if self._ending.wait(_POLL_S):
                     return
 
@@ -153,4 +163,4 @@ class Runner:
             with self._store.writing() as connection:
                 diagnoses.release(connection, row.number, self._server)
         except _STORE_FAILED as error:
-            logger.warning("a diagnosis could not be put back into the queue: %s", error)
+            self._failure.log("a diagnosis cannot be put back into the queue", error)

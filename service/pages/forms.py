@@ -19,9 +19,11 @@ _MOST_FIELDS = 500  # a file of many channels has a row of fields for each
 
 async def _fields(request: Request) -> dict[str, str]:
     """The fields of a form, the first of each name; raises Refusal where another site may have made it."""
-    body = await request.body()
-    if len(body) > _LARGEST_BYTES:
-        raise Refusal(413, "The form is too long.")
+    body = b""
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > _LARGEST_BYTES:
+            raise Refusal(413, f"The form exceeds {_LARGEST_BYTES / 1e6:g} MB.", title="Body too large")
     try:
         values = parse_qs(body.decode("utf-8", "replace"), keep_blank_values=True, max_num_fields=_MOST_FIELDS)
     except ValueError:

@@ -19,7 +19,7 @@ def form(request: Request, back: Annotated[str, Query(alias="next")] = "/") -> R
     gate: Gate = request.app.state.gate
     if not gate.keys_needed():
         return see("/")
-    return page(request, "login.html", back=back, refused=False)
+    return page(request, "login.html", back=back, refused=False, missing=gate.keys_missing())
 
 
 @router.post("/login")
@@ -30,7 +30,7 @@ def login(request: Request, sent: Form) -> Response:
     back = sent.get("next", "/")
     if key is None:
         request.scope["why"] = "the key that was typed is not known"
-        return page(request, "login.html", status=401, back=back, refused=True)
+        return page(request, "login.html", status=401, back=back, refused=True, missing=gate.keys_missing())
     answer = see(_own(back))
     set_session(request, answer, session.logged_in(key))
     return answer

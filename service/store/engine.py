@@ -12,8 +12,9 @@ import orjson
 from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url, text
 from sqlalchemy.exc import ArgumentError, DBAPIError
 
+from service.store.sqlite_files import SqliteFiles
+
 SQLITE_FILE = "underskin.sqlite3"
-_BUSY_S = 60.0  # how long a write waits for another process's write
 _PG_DISK_FULL = "53100"
 _PG_WRITING = 7236412  # any number, the same for all servers of a database; a migration has another
 _SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
@@ -33,12 +34,35 @@ class Database:
     def __init__(self, url: URL) -> None:
         """Opens no connection yet."""
         self.url = url
-        self.is_sqlite = url.get_backend_name() == "sqlite"
-        self.engine = _engine(url)
+        self._files = SqliteFiles(Path(url.database or "")) if url.get_backend_name() == "sqlite" else None
+        self.engine = _engine(url, self._files)
+
+    @property
+    def is_sqlite(self) -> bool:
+        """Whether it is a file; otherwise it is PostgreSQL."""
+        return self._files is not None
+
+    def make(self) -> None:
+        """Make an SQLite file, empty, where there is none; all else here requires one."""
+        if self._files is not None:
+            self._files.make()
+
+    def is_made(self) -> bool:
+        """Whether an SQLite file is there; PostgreSQL's databases are made by others."""
+        return self._files is None or self._files.is_made()
+
+    def require_in_place(self) -> None:
+        """Raises StoreMoved where an SQLite store's files are not, or not any more, those on the disk."""
+        if self._files is not None:
+            self._files.require_in_place()
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
-        """A connection that sees one state of the store."""
+        """A connection that sees one state of the store.
+
+        Of an SQLite store whose files were removed or replaced, connections that are open go on reading them, so that
+        what is in them can be saved; for others it raises StoreMoved.
+        """
         with self.engine.connect() as connection:
             if not self.is_sqlite:
                 connection.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
@@ -46,7 +70,11 @@ class Database:
 
     @contextmanager
     def writing(self) -> Iterator[Connection]:
-        """A transaction that commits at the end of the block; raises StorageFull where there was no room."""
+        """A transaction that commits at the end of the block.
+
+        Raises StorageFull where there was no room, StoreMoved where it would be kept in a file that is not the one on
+        the disk.
+        """
         sole_writer = self._locked_file() if self.is_sqlite else nullcontext()
         try:
             with (
@@ -57,6 +85,8 @@ class Database:
                 if not self.is_sqlite:
                     connection.execute(text("SELECT pg_advisory_xact_lock_shared(:number)"), {"number": _PG_WRITING})
                 yield connection
+                self.require_in_place()
+            self.require_in_place()  # what was moved during the commit is not acknowledged either
         except (DBAPIError, OSError) as error:
             if is_full(error):
                 raise StorageFull(str(error)) from error
@@ -79,6 +109,7 @@ class Database:
     @contextmanager
     def _locked_file(self) -> Iterator[None]:
         """SQLite has one writer at a time anyway; this lock also covers what SQLite's own cannot span, a restore."""
+        self.require_in_place()  # a lock elsewhere, made anew, would keep nobody out
         with Path(f"{self.url.database}.lock").open("a") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             yield
@@ -86,6 +117,8 @@ class Database:
     def close(self) -> None:
         """Close all connections."""
         self.engine.dispose()
+        if self._files is not None:
+            self._files.close()
 
 
 def database(database_url: str, folder: Path) -> Database:
@@ -111,7 +144,7 @@ def is_full(error: BaseException) -> bool:
     return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
-def _engine(url: URL) -> Engine:
+def _engine(url: URL, files: SqliteFiles | None) -> Engine:
     def deserialise(document: str) -> Any:
         return orjson.loads(document)
 
@@ -119,26 +152,13 @@ def _engine(url: URL) -> Engine:
         return orjson.dumps(value).decode()
 
     options: dict[str, Any] = {"json_serializer": serialise, "json_deserializer": deserialise}
-    if url.get_backend_name() == "sqlite":
-        engine = create_engine(url, connect_args={"timeout": _BUSY_S}, **options)
-        event.listen(engine, "connect", _prepare_sqlite)
+    if files is not None:
+        engine = create_engine(url, creator=files.connect, **options)
         event.listen(engine, "begin", _begin_sqlite)
         return engine
     # A commit waits for the disk whatever the server's default. No statement is prepared: a restore replaces tables.
     durable = {"options": "-c synchronous_commit=on -c timezone=UTC", "prepare_threshold": None, "connect_timeout": 10}
     return create_engine(url, connect_args=durable, pool_pre_ping=True, **options)
-
-
-def _prepare_sqlite(connection: sqlite3.Connection, _: object) -> None:
-    connection.isolation_level = None  # we say BEGIN ourselves: Python would say it too late
-    for pragma in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
-        connection.execute(f"PRAGMA {pragma}")
-    # SQLite's own knows the letters of ASCII only.
-    connection.create_function("lower", 1, _lower, deterministic=True)
-
-
-def _lower(value: str | None) -> str | None:
-    return None if value is None else value.lower()
 
 
 def _begin_sqlite(connection: Connection) -> None:

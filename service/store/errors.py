@@ -7,3 +7,7 @@ class Missing(LookupError):
 
 class Conflict(ValueError):
     """What was asked does not fit the state of what is kept."""
+
+
+class StoreMoved(Exception):
+    """The disk has other files under the store's names than those that are open; nothing is kept there."""

@@ -19,13 +19,18 @@ VERSIONS = (
     "0005",
     "0006",
     "0007",
+    "0008",
 )  # oldest first; one file each in migrations/versions
 SCRIPTS = Path(__file__).parent / "migrations"
 _LOCK = 7236411  # any number, the same for all servers of a database
 
 
 def migrate(database: Database, folder: Path) -> None:
-    """Bring the schema to the newest version; raises StoreError where that cannot be done safely."""
+    """Bring the schema to the newest version, of a store that is to be made too.
+
+    Raises StoreError where that cannot be done safely.
+    """
+    database.make()
     if version(database) == VERSIONS[-1]:
         return
     with _one_at_a_time(database, folder):

@@ -185,6 +185,15 @@ models = Table(
     UniqueConstraint("skin_id", "version", name="version_of_skin"),
 )
 
+# Whether requests need a key. At most one row; none where no key was ever made.
+key_requirement = Table(
+    "key_requirement",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=False),
+    Column("needed_since", String, nullable=False),
+    Column("lifted_at", String),  # by `underskin key open`; null while keys are needed
+)
+
 # What was answered to a POST that carried an Idempotency-Key.
 answers = Table(
     "answers",

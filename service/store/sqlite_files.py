@@ -1,0 +1,100 @@
+"""The files of an SQLite store: held open, and compared with those that the disk has under their names.
+
+A file that was removed or replaced goes on taking writes from whoever has it open, and is gone with the process. SQLite
+does not look: so a commit must, and a new connection, which would open, or make, another file of that name.
+"""
+
+import sqlite3
+import threading
+from pathlib import Path
+
+from service.store.errors import StoreMoved
+
+_BUSY_S = 60.0  # how long a write waits for another process's write
+_SUFFIXES = ("", "-wal", "-shm")  # the database, its write-ahead log, and the log's index
+
+_Identity = tuple[int, int] | None  # device and inode; None where there is no such file
+
+
+class SqliteFiles:
+    """Those of one database, as this process found them when it opened them first. For any number of threads."""
+
+    def __init__(self, path: Path) -> None:
+        """Opens nothing yet."""
+        self._path = path.absolute()
+        self._lock = threading.Lock()
+        # Open as long as others may be: the last one to be closed removes the write-ahead log, and the next one to be
+        # opened would make another.
+        self._first: sqlite3.Connection | None = None
+        self._held: list[_Identity] = []
+
+    def make(self) -> None:
+        """Make the database, empty, where it is missing."""
+        if not self.is_made():
+            self._path.touch()
+
+    def is_made(self) -> bool:
+        """Whether the database is there."""
+        return self._path.exists()
+
+    def connect(self) -> sqlite3.Connection:
+        """A connection to the files that were opened first; raises StoreMoved where the disk has others."""
+        with self._lock:
+            if self._first is None:
+                first = _open(self._path)
+                self._held = self._on_disk()
+                self._first = first
+        self.require_in_place()
+        connection = _open(self._path)
+        try:
+            self.require_in_place()
+        except StoreMoved:
+            connection.close()
+            raise
+        return connection
+
+    def require_in_place(self) -> None:
+        """Raises StoreMoved where the disk has other files, or none, under the names of those that are open."""
+        if self._first is None:
+            return
+        for suffix, held, there in zip(_SUFFIXES, self._held, self._on_disk(), strict=True):
+            if there != held:
+                happened = "was removed" if there is None else "was replaced by another file"
+                raise StoreMoved(
+                    f"{self._path}{suffix} {happened} while the service runs: nothing is kept until the file that was "
+                    "there is back, or the service is restarted with what is there now."
+                )
+
+    def close(self) -> None:
+        """After all other connections."""
+        with self._lock:
+            if self._first is not None:
+                self._first.close()
+                self._first = None
+
+    def _on_disk(self) -> list[_Identity]:
+        return [_identity(Path(f"{self._path}{suffix}")) for suffix in _SUFFIXES]
+
+
+def _identity(file: Path) -> _Identity:
+    try:
+        status = file.stat()
+    except OSError:  # its folder may be gone, or the disk
+        return None
+    return status.st_dev, status.st_ino
+
+
+def _open(path: Path) -> sqlite3.Connection:
+    """Never makes the file: an empty one in the place of one that was removed would pass for a store."""
+    connection = sqlite3.connect(f"{path.as_uri()}?mode=rw", uri=True, timeout=_BUSY_S, check_same_thread=False)
+    connection.isolation_level = None  # we say BEGIN ourselves: Python would say it too late
+    for pragma in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
+        connection.execute(f"PRAGMA {pragma}")
+    connection.execute("SELECT count(*) FROM sqlite_master").fetchall()  # the log is opened with the first read
+    # SQLite's own knows the letters of ASCII only.
+    connection.create_function("lower", 1, _lower, deterministic=True)
+    return connection
+
+
+def _lower(value: str | None) -> str | None:
+    return None if value is None else value.lower()
