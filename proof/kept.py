@@ -18,6 +18,7 @@ import rig
 import underskin
 from proof.cases import Case
 from underskin.processes import processes
+from underskin.source_digest import source_digest
 
 Item = TypeVar("Item")
 FAILED = "failed"
@@ -33,15 +34,14 @@ class Work:
 
 
 def sources(*packages: str) -> str:
-    """A digest of the Python sources of packages of this project, or of single files under them."""
+    """A digest of what packages of this project compute, or single files under them (see underskin.source_digest)."""
     roots = {module.__name__: Path(str(module.__file__)).parent for module in (underskin, rig, proof)}
-    digest = hashlib.sha256()
-    for package in packages:
-        name, _, file = package.partition("/")
-        for path in sorted(roots[name].rglob(file or "*.py")):
-            digest.update(path.relative_to(roots[name]).as_posix().encode())
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+    files = [
+        path
+        for name, _, file in (package.partition("/") for package in packages)
+        for path in roots[name].rglob(file or "*.py")
+    ]
+    return source_digest(path.read_text(encoding="utf-8") for path in files)[:16]
 
 
 def digest_of(document: Any) -> str:

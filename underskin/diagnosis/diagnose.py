@@ -20,6 +20,7 @@ from underskin.diagnosis.explanation import Workbench
 from underskin.diagnosis.extremes import without_extremes
 from underskin.diagnosis.finding import Finding
 from underskin.diagnosis.findings import inspect
+from underskin.diagnosis.fit_summary import without_idle
 from underskin.diagnosis.locate import SEED, in_region, locate, region
 from underskin.diagnosis.noise_refinement import frf_workbench
 from underskin.diagnosis.plan import plan
@@ -96,6 +97,7 @@ def _work_out(
 ) -> Diagnosis:
     """All steps after the search."""
     progress(0.65)
+    result = without_idle(result, bench)
     confounded = confounding(bench)
     progress(0.7)
     leader = result.answers[0]
