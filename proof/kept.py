@@ -17,7 +17,7 @@ import proof
 import rig
 import underskin
 from proof.cases import Case
-from underskin.processes import processes
+from underskin.parallel import processes
 from underskin.source_digest import source_digest
 
 Item = TypeVar("Item")
@@ -81,7 +81,7 @@ def of_each(
 
 def reports(work: Work, cases: Sequence[Case], tell: Callable[[str], None]) -> list[dict[str, Any]]:
     """The report (`report/1`) of each case."""
-    from underskin.surrogate import load_table
+    from underskin.surrogate.sigma_table import load_table
 
     version = f"{sources('underskin')} {load_table().sha256}"
     return of_each(work, cases, partial(_report, work.folder / "reports", version), tell)
@@ -93,9 +93,9 @@ def _report(folder: Path, version: str, case: Case) -> dict[str, Any]:
 
 
 def _diagnosed(document: dict[str, Any]) -> dict[str, Any]:
-    from underskin.diagnosis.diagnose import diagnosis_report
+    from underskin.diagnosis.pipeline import diagnosis_report
     from underskin.recordings.campaign import from_dict
-    from underskin.surrogate import load_table
+    from underskin.surrogate.sigma_table import load_table
 
     try:
         campaign, refused = from_dict(document)

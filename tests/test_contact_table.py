@@ -13,12 +13,13 @@ from scipy.interpolate import CubicSpline
 from tablegen.contact_column import press_spheres
 from tests import felupe_contact
 from tests.oracle import NEEDS_ORACLE
-from underskin import TableError, hertz, linear_layer
-from underskin.contact import SphereOnLayer
-from underskin.contact_table import ContactTable, load_contact
-from underskin.hankel import normal_stress
-from underskin.layer import Layer
-from underskin.surrogate import load_table, tables_folder
+from underskin import TableError
+from underskin.physics import hertz, linear_layer
+from underskin.physics.elastic_layer import Layer
+from underskin.physics.hankel_transform import normal_stress
+from underskin.physics.sphere_contact import SphereOnLayer
+from underskin.surrogate.contact_table import ContactTable, load_contact
+from underskin.surrogate.sigma_table import load_table, tables_folder
 
 TABLE = load_contact()
 RHO = [0.2, 0.6, 1.0]

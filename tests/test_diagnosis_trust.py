@@ -9,13 +9,13 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.diagnosis_campaigns import Made, campaign
-from underskin.diagnosis.diagnose import diagnosis_report
-from underskin.diagnosis.page import page
-from underskin.diagnosis.search import NOTHING_MISSING
-from underskin.mechanisms.catalogue import CATALOGUE
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.reporting.html_report import page
+from underskin.diagnosis.selection.search import NOTHING_MISSING
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings import read_file
 from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, SkinDescription
-from underskin.surrogate import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Floats
 
 EXAMPLE = Path(__file__).parent.parent / "service" / "pages" / "example" / "2024-11.json"

@@ -11,9 +11,10 @@ import pytest
 
 from tablegen.sigma import Nodes, solve_column
 from tests.oracle import NEEDS_ORACLE, linear_layer_values
-from underskin import TableError, linear_layer, load_table
-from underskin.surrogate import SigmaTable, tables_folder
-from underskin.table_format import data_hash, read_table
+from underskin import TableError, load_table
+from underskin.physics import linear_layer
+from underskin.surrogate.hdf5_format import data_hash, read_table
+from underskin.surrogate.sigma_table import SigmaTable, tables_folder
 
 TABLE = load_table()
 GENERATOR = np.random.default_rng(2018)

@@ -9,8 +9,8 @@ import pytest
 
 from tablegen import contact_table, influence_table, sigma_table
 from tablegen.sweep import sources_hash
-from underskin.contact_table import ContactTable
-from underskin.surrogate import tables_folder
+from underskin.surrogate.contact_table import ContactTable
+from underskin.surrogate.sigma_table import tables_folder
 
 MADE_BY = {"sigma.h5": sigma_table, "influence.h5": influence_table, "contact.h5": contact_table}
 

@@ -81,7 +81,7 @@ def one_file(diagnosis_id: DiagnosisId, store: Store) -> Response:
     """The whole as one file that needs nothing else, to be kept or sent."""
     import plotly.io
 
-    from underskin.diagnosis import page as file
+    from underskin.diagnosis.reporting import html_report as file
 
     row, report, texts = _done(store, diagnosis_id)
     try:
@@ -129,7 +129,7 @@ def adopt(request: Request, diagnosis_id: DiagnosisId, sent: Form, store: Store)
 
 def _not_adopted(report: Mapping[str, Any]) -> str | None:
     """Why a report cannot become a model, and what to do; None where it can."""
-    from underskin.adopted import NOT_ADOPTED
+    from underskin.prediction.adopted_model import NOT_ADOPTED
 
     if report["verdict"] == "explained":
         return None if report["d33"] is not None else "it is of curves, which have no d33: a model of a skin is of FRFs"
@@ -148,7 +148,7 @@ def _done(store: Database, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any], d
 
 def _shown(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> tuple[Markup, Markup]:
     """The report, worded as the file has it, with the figures of a page; and with what it was made."""
-    from underskin.diagnosis import page as file
+    from underskin.diagnosis.reporting import html_report as file
 
     try:
         figures = _drawn(row, report, texts)
@@ -160,7 +160,7 @@ def _shown(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> 
 
 
 def _drawn(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> dict[str, Drawn]:
-    from underskin.diagnosis.page import of_report
+    from underskin.diagnosis.reporting.html_report import of_report
 
     def numbers(name: str) -> str:
         return f"/diagnoses/{row.id}/{name}.csv"
