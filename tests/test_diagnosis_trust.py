@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.diagnosis_campaigns import Made, campaign
+from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.reporting.html_report import page
-from underskin.diagnosis.selection.search import NOTHING_MISSING
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings import read_file
 from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, SkinDescription

@@ -16,11 +16,12 @@ from underskin.errors import (
 if TYPE_CHECKING:
     from underskin.client.service_client import Client
     from underskin.inversion.invert import Inversion, invert
+    from underskin.physics.charge_response import Sigma
     from underskin.physics.skin import Indenter, Skin
     from underskin.prediction.pressed_skin import Transmission, transmission
     from underskin.recordings.campaign import Campaign
     from underskin.recordings.reading import Reading, read_file
-    from underskin.surrogate.sigma_table import Sigma, SigmaTable, load_table
+    from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 __version__ = "0.1.0"
 
@@ -54,7 +55,7 @@ _MODULES = {
     "Indenter": "physics.skin",
     "Inversion": "inversion.invert",
     "Reading": "recordings.reading",
-    "Sigma": "surrogate.sigma_table",
+    "Sigma": "physics.charge_response",
     "SigmaTable": "surrogate.sigma_table",
     "Skin": "physics.skin",
     "Transmission": "prediction.pressed_skin",

@@ -10,12 +10,11 @@ import scipy
 
 import underskin
 from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.data.finding import Finding
 from underskin.diagnosis.inference.explanation import Workbench
+from underskin.diagnosis.inference.residuals import residuals, whole_prediction
 from underskin.diagnosis.localisation.effect_size import effect
 from underskin.diagnosis.localisation.permutation_test import SEED, in_region, locate, region
 from underskin.diagnosis.localisation.residual_shape import contradicts, describe, worth_telling
-from underskin.diagnosis.localisation.residuals import residuals, whole_prediction
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import Limits
 from underskin.diagnosis.reporting.goodness_of_fit import without_idle
@@ -31,6 +30,7 @@ from underskin.diagnosis.validation.identifiability import confounding, left_ope
 from underskin.diagnosis.validation.platen_seating import without_seating
 from underskin.mechanisms.base import Kind
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
+from underskin.recordings.finding import Finding
 from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
 

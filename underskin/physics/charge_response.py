@@ -4,11 +4,22 @@ All in SI, scalars or arrays that broadcast. FRF means charge over force at the 
 positive in compression for a positive d33; in the base model it is real and flat over frequency.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from underskin.errors import InvalidInput
 from underskin.units import Floats
+
+
+@dataclass(frozen=True)
+class Sigma:
+    """σ, the bound on its relative error, and which rows lie inside the domain (NaN outside); equal shapes."""
+
+    sigma: Floats
+    rel_error: Floats
+    inside: NDArray[np.bool_]
 
 
 def gain(sigma: ArrayLike, rt_over_h: ArrayLike) -> Floats:

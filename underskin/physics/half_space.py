@@ -7,8 +7,8 @@ sections 3.2 and 3.6.
 import numpy as np
 from numpy.typing import ArrayLike
 
+from underskin.physics.charge_response import Sigma
 from underskin.physics.hankel_transform import hertz_transform, normal_stress, tangential_stress
-from underskin.surrogate.sigma_table import Sigma
 from underskin.units import Floats
 
 # The integral is done anew for each row, at a cost that grows with a/h and rT/h.

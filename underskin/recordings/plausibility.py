@@ -11,8 +11,8 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 from scipy.spatial import KDTree
 
-from underskin.diagnosis.data.finding import Finding
 from underskin.recordings.campaign import Campaign
+from underskin.recordings.finding import Finding
 from underskin.units import Floats
 
 _EARLIEST = datetime(1990, 1, 1, tzinfo=UTC)  # clocks that were never set begin in 1904, 1970 or 1980

@@ -7,28 +7,19 @@ proportional to the strain (a/R, Seminara 2018, equation 16). Rows outside the d
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import NdBSpline, make_interp_spline
 
+from underskin.physics.charge_response import Sigma
 from underskin.surrogate.hdf5_format import SIGMA_SCHEMA
 from underskin.surrogate.point_spline import PointSpline, cell_of
 from underskin.surrogate.table_file import Table
 from underskin.units import Floats
 
 SIGMA_TABLE = "sigma.h5"
-
-
-@dataclass(frozen=True)
-class Sigma:
-    """σ, the bound on its relative error, and which rows lie inside the domain (NaN outside); equal shapes."""
-
-    sigma: Floats
-    rel_error: Floats
-    inside: NDArray[np.bool_]
 
 
 class SigmaTable(Table):

@@ -16,8 +16,8 @@ from underskin.diagnosis.inference.evidence import Evidence, around, integrated
 from underskin.diagnosis.inference.hypothesis import Hypothesis, Point
 from underskin.diagnosis.inference.likelihood import Curvature
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
+from underskin.diagnosis.inference.position_curvature import curvature
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, NO_POSITION, POSITION
-from underskin.diagnosis.noise.position_curvature import curvature
 from underskin.mechanisms.models.composed import Model, compose
 from underskin.mechanisms.models.composition import parameters_together
 from underskin.mechanisms.registry import CATALOGUE

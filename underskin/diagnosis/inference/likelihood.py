@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
+from underskin.diagnosis.inference.pickup_rows import PickedRows
 from underskin.diagnosis.noise.noise_levels import NoiseLevels, SeveralLevels
-from underskin.diagnosis.noise.pickup_rows import PickedRows
 from underskin.mechanisms.autodiff import Array
 from underskin.mechanisms.models.composed import Prediction
 from underskin.units import Floats

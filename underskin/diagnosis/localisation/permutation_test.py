@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.localisation.residuals import Residuals
+from underskin.diagnosis.inference.residuals import Residuals
 from underskin.diagnosis.selection.frequency_gp import frequency_bins
 from underskin.mechanisms.autodiff import Array
 from underskin.units import Floats

@@ -10,21 +10,21 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from underskin.diagnosis.data.axes import WORDS, order, preload_before, recording_axes
-from underskin.diagnosis.data.finding import Finding
+from underskin.diagnosis.data.names import in_words
 from underskin.diagnosis.inference.explanation import Explanation, Workbench
-from underskin.diagnosis.localisation.residuals import Residuals, residuals, whole_prediction
-from underskin.diagnosis.reporting.fit_warnings import NOISY
-from underskin.diagnosis.reporting.numbers import in_digits
-from underskin.diagnosis.reporting.statements import in_words
+from underskin.diagnosis.inference.residuals import Residuals, residuals, whole_prediction
 from underskin.diagnosis.selection.frequency_gp import frequency_bins
 from underskin.diagnosis.selection.recording_gp import relative_place_slopes
 from underskin.diagnosis.validation.cross_validation import HeldOut, in_sample, total
+from underskin.formatting import in_digits
 from underskin.recordings.campaign import Campaign
+from underskin.recordings.finding import Finding
 from underskin.units import Floats
 
 _GRID = 40
 _LEAST_IN_ORDER = 8  # recordings
 _WORTH_TELLING, _LEAST_TOLD = 2.0, 3e-3  # times the noise, and of the largest force
+NOISY = 2.0  # times what the lines' own roughness says
 _LARGEST_FLOOR = 100.0  # % of what is predicted
 _ALONG_CURVES = {"displacement_mm": "mm", "time_s": "s"}
 _BEFORE = "the preload of the recording before over its own"

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.data.axes import WORDS
+from underskin.diagnosis.data.names import in_words
 from underskin.diagnosis.inference.explanation import Workbench
 from underskin.diagnosis.planning.rig_limits import Limits, candidates, inferred, wider
-from underskin.diagnosis.reporting.statements import in_words
 from underskin.diagnosis.selection.search import Answer, Search
 from underskin.formatting import in_percent
 from underskin.mechanisms.base import Unsupported

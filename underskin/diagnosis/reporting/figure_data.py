@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, Workbench, needs_lines
+from underskin.diagnosis.inference.residuals import whole_prediction
 from underskin.diagnosis.localisation.permutation_test import axis_values
-from underskin.diagnosis.localisation.residuals import whole_prediction
 from underskin.diagnosis.reporting.report import Diagnosis
 from underskin.mechanisms.autodiff import Array
 from underskin.units import Complexes, Floats

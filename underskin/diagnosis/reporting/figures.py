@@ -12,11 +12,11 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from underskin.diagnosis.data.axes import WORDS
+from underskin.diagnosis.data.names import SIMPLEST
 from underskin.diagnosis.inference.explanation import Explanation, Workbench, own_places
 from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT
 from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned
 from underskin.diagnosis.reporting.report import Diagnosis
-from underskin.diagnosis.reporting.statements import SIMPLEST
 from underskin.formatting import in_percent
 from underskin.units import Floats
 

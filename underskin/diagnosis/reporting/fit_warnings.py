@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from underskin.diagnosis.data.finding import Finding
+from underskin.diagnosis.data.names import SIMPLEST, in_words
 from underskin.diagnosis.inference.explanation import Explanation, Workbench, at_recording, own_places
-from underskin.diagnosis.reporting.numbers import in_digits
-from underskin.diagnosis.reporting.statements import SIMPLEST, in_words
-
-NOISY = 2.0  # times what the lines' own roughness says
+from underskin.diagnosis.localisation.residual_shape import NOISY
+from underskin.formatting import in_digits
+from underskin.recordings.finding import Finding
 
 
 def doubts(bench: Workbench, explanation: Explanation) -> list[Finding]:

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, Workbench
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
-from underskin.diagnosis.selection.search import NOTHING_MISSING, Search
+from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation import cross_validation
 from underskin.mechanisms.models.pickup import PICKUP_NAMES
 from underskin.mechanisms.registry import CATALOGUE

@@ -22,11 +22,6 @@ def probability(value: float) -> float:
     return round(value, 3)
 
 
-def in_digits(value: float, digits: int = 4) -> str:
-    """To significant digits, never as a power of ten."""
-    return np.format_float_positional(float(f"{value:.{digits}g}"), trim="-")
-
-
 def place_of(explanation: Explanation, name: str) -> int:
     """Where in its model's parameters one is."""
     return [entry.name for entry in explanation.model.parameters].index(name)

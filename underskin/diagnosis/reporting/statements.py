@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.data.axes import WORDS
+from underskin.diagnosis.data.names import SIMPLEST, in_words
 from underskin.diagnosis.localisation.effect_size import Effect
 from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT, AxisResult
-from underskin.diagnosis.reporting.numbers import in_digits
-from underskin.diagnosis.selection.search import NONE_OF_THESE, NOTHING_MISSING, Answer
-from underskin.formatting import in_percent
+from underskin.diagnosis.selection.search import Answer
+from underskin.formatting import in_digits, in_percent
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE
 
@@ -18,11 +18,6 @@ EXPLAINED = 0.8  # least probability of an answer that is stated without its riv
 _WORTH_NAMING = 0.02
 _UNTHOUGHT_AT_MOST = 0.016  # of none_of_these, where no process shows
 _IN_PERCENT = 90.0  # beyond it an effect is said as a factor
-SIMPLEST: Mapping[Kind, str] = {  # what the model to which nothing is added is called, of each kind of recording
-    "frf": "the paper's model",
-    "indentation": "Hertz's law",
-    "compression": "Hooke's law",
-}
 
 
 def answer_statement(
@@ -66,12 +61,6 @@ def _answer(answers: Sequence[Answer], verdict: str, shape: str, model: str) -> 
 def _laws(names: Sequence[str]) -> str:
     """What each mechanism is, a sentence each."""
     return " ".join(f"{in_words([name]).capitalize()}: {CATALOGUE[name].plain.rstrip('.')}." for name in names)
-
-
-def in_words(names: Sequence[str]) -> str:
-    """An answer's names as a sentence has them."""
-    special = {NOTHING_MISSING: "nothing missing", NONE_OF_THESE: "something without a name"}
-    return " and ".join(special.get(name, name.replace("_", " ")) for name in names)
 
 
 def why_not(answer: Answer, leader: Answer) -> str:

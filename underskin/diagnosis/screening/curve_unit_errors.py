@@ -9,9 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from underskin.diagnosis.data.finding import Finding, Inspected
+from underskin.diagnosis.data.inspected import Inspected
 from underskin.mechanisms.base import Kind
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, SkinDescription
+from underskin.recordings.finding import Finding
 from underskin.units import Floats
 
 _SOFTEST_MPA, _HARDEST_MPA = 0.003, 300.0

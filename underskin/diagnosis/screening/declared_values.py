@@ -11,8 +11,8 @@ import numpy as np
 
 from underskin import units
 from underskin.diagnosis.data.axes import hours
-from underskin.diagnosis.data.finding import Finding
 from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.finding import Finding
 from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.plausibility import pitch_mm
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.diagnosis.data.axes import recording_axes
-from underskin.diagnosis.data.finding import Finding, Inspected
+from underskin.diagnosis.data.inspected import Inspected
 from underskin.diagnosis.screening.declared_values import unlikely
 from underskin.diagnosis.screening.model_consistency import against_model
 from underskin.diagnosis.screening.position_errors import huddled, misplaced
@@ -18,6 +18,7 @@ from underskin.diagnosis.screening.time_series import as_given, as_lines
 from underskin.diagnosis.screening.unit_errors import faint_oscillation, lone_slips, loose_sphere
 from underskin.mechanisms.models.frf_design import frf_recordings
 from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.finding import Finding
 from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.plausibility import overlapping_sensors
 from underskin.surrogate.sigma_table import SigmaTable

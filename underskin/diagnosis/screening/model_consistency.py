@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.diagnosis.data.finding import Finding
 from underskin.diagnosis.screening.no_response import dead, silence
 from underskin.diagnosis.screening.table_domain import in_reach
 from underskin.mechanisms.models.composed import Model, compose
 from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.finding import Finding
 from underskin.recordings.frf.estimation import lines_of
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.diagnosis.data.finding import Finding
 from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.finding import Finding
 from underskin.recordings.frf.estimation import lines_of
 from underskin.units import Floats
 

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.diagnosis.data.finding import Finding
 from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.finding import Finding
 from underskin.units import Floats
 
 _SLIPS = (

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.diagnosis.data.finding import Finding
 from underskin.mechanisms.models.composed import Model, compose
 from underskin.physics import hertz
 from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.finding import Finding
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import to_si
 

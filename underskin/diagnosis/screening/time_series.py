@@ -5,12 +5,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from underskin.diagnosis.data.finding import Finding
 from underskin.diagnosis.screening.select_lines import Choice, telling
 from underskin.diagnosis.screening.time_series_units import Slip, slip_of
 from underskin.errors import InvalidInput
 from underskin.formatting import significant
 from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.finding import Finding
 from underskin.recordings.frf.estimation import lines_of
 from underskin.units import Floats, to_lab
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.diagnosis.data.finding import Finding
 from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.finding import Finding
 from underskin.recordings.frf.estimation import lines_of
 
 _SLIP, _WITHIN = 1000.0, 3.0  # a value is back among the others, within this factor, once the slip is undone

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.data.finding import Finding
 from underskin.diagnosis.screening.curve_unit_errors import is_reversed
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Kind
 from underskin.recordings import elastomer
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.finding import Finding
 
 
 def without_unusable(campaign: Campaign, kind: Kind) -> tuple[Campaign, list[Finding]]:

@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 
 from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, Workbench
-from underskin.diagnosis.localisation.residuals import line_residuals
+from underskin.diagnosis.inference.residuals import line_residuals
 from underskin.diagnosis.noise.noise_priors import Bell, level_prior
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, matern, normalised
 from underskin.mechanisms.autodiff import Array

@@ -10,13 +10,13 @@ from functools import cached_property
 
 import numpy as np
 
+from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, Workbench
 from underskin.diagnosis.selection.occam_correction import without_occam
 from underskin.diagnosis.selection.unnamed_rivals import Discrepancy, discrepancy
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.registry import CATALOGUE
 
-NOTHING_MISSING, NONE_OF_THESE = "nothing_missing", "none_of_these"
 # "Nothing" stands for all that does not show as well, which is every other campaign.
 PRIORS = {"nothing_missing": 0.45, "one": 0.34, "two": 0.14, "three": 0.02, "none_of_these": 0.05}
 _PARENTS = 3

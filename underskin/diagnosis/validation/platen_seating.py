@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.data.finding import Finding
 from underskin.diagnosis.inference.explanation import Workbench
 from underskin.diagnosis.selection.search import SHOWS
 from underskin.recordings.campaign import Campaign, CompressionRecording, Recording
+from underskin.recordings.finding import Finding
 from underskin.surrogate.sigma_table import SigmaTable
 
 _BEGINNING = 0.1  # of each curve's displacement

@@ -1,20 +1,11 @@
-"""A finding: what is wrong with the recordings themselves, or noteworthy about their diagnosis."""
+"""The recordings that a diagnosis uses, and what was found on the way to them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from underskin.recordings.campaign import Campaign
+from underskin.recordings.finding import Finding
 from underskin.units import Floats
-
-
-@dataclass(frozen=True)
-class Finding:
-    """`recording` and `field` name the place (recording empty: the whole campaign)."""
-
-    code: str
-    recording: str
-    field: str
-    statement: str
 
 
 @dataclass(frozen=True)
