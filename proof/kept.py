@@ -36,12 +36,12 @@ class Work:
 def sources(*packages: str) -> str:
     """A digest of what packages of this project compute, or single files under them (see underskin.source_digest)."""
     roots = {module.__name__: Path(str(module.__file__)).parent for module in (underskin, rig, proof)}
-    files = [
-        path
+    texts = {
+        ".".join([name, *path.relative_to(roots[name]).with_suffix("").parts]): path.read_text(encoding="utf-8")
         for name, _, file in (package.partition("/") for package in packages)
         for path in roots[name].rglob(file or "*.py")
-    ]
-    return source_digest(path.read_text(encoding="utf-8") for path in files)[:16]
+    }
+    return source_digest(texts)[:16]
 
 
 def digest_of(document: Any) -> str:

@@ -14,10 +14,14 @@ from underskin.diagnosis.inference.explanation import Workbench
 from underskin.diagnosis.inference.residuals import residuals, whole_prediction
 from underskin.diagnosis.localisation.effect_size import effect
 from underskin.diagnosis.localisation.permutation_test import SEED, in_region, locate, region
-from underskin.diagnosis.localisation.residual_shape import contradicts, describe, worth_telling
+from underskin.diagnosis.localisation.residual_shape import (
+    contradicts,
+    describe,
+    largest_floor_percent,
+    worth_telling,
+)
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import Limits
-from underskin.diagnosis.reporting.goodness_of_fit import without_idle
 from underskin.diagnosis.reporting.report import Diagnosis, report
 from underskin.diagnosis.screening.curve_unit_errors import without_slips
 from underskin.diagnosis.screening.inspection import inspect
@@ -35,6 +39,7 @@ from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
 
 _CURVES: tuple[Kind, ...] = ("indentation", "compression")
+_LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
 _GAIN = 0.022  # the scatter that is expected of recordings before any explanation
 
 Progress = Callable[[float], None]
@@ -97,7 +102,6 @@ def _work_out(
 ) -> Diagnosis:
     """All steps after the search."""
     progress(0.65)
-    result = without_idle(result, bench)
     confounded = confounding(bench)
     progress(0.7)
     leader = result.answers[0]
@@ -113,10 +117,14 @@ def _work_out(
     ranked = [answer.explanation for answer in result.answers if answer.explanation is not None]
     groups = cross_validation.hold_out(bench, ranked, nothing, result.supported)
     progress(0.95)
-    if contradicts(bench, nothing, groups):
+    if contradicts(bench, nothing):
         result = replace(result, null_contradicted=True)
         leader = result.answers[0]
         shown = result.shown_or_nothing(leader)
+    floor = largest_floor_percent(bench, nothing, groups)
+    if leader.explanation is nothing and floor > _LARGEST_FLOOR:
+        lacking = f"a response that stands out of its noise, which is {floor:.0f} % of what is predicted"
+        return Diagnosis(name, found, provenance, lacking=lacking)
     shape = describe(bench, shown) if leader.explanation is None else ""
     return Diagnosis(
         name,

@@ -19,6 +19,7 @@ from underskin.mechanisms.models.composition import chosen, parameters_together
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.models.frf_design import frf_recordings, offsets
 from underskin.mechanisms.registry import CATALOGUE
+from underskin.prediction import plausibility
 from underskin.recordings.campaign import Campaign, FrfRecording, SkinDescription
 from underskin.recordings.frf.estimation import lines_of
 from underskin.surrogate.sigma_table import SigmaTable
@@ -153,6 +154,9 @@ def adopted(report: Mapping[str, Any], campaign: Campaign) -> AdoptedModel:
         raise InvalidInput(
             "diagnosis_id", f"a diagnosis of verdict {report['verdict']}", NOT_ADOPTED[report["verdict"]]
         )
+    implausible = report["d33"] and plausibility.implausible(report["d33"]["value"])
+    if implausible:
+        raise InvalidInput("diagnosis_id", f"a d33 of {report['d33']['value']} pC/N", implausible)
     if not any(isinstance(entry, FrfRecording) for entry in campaign.recordings):
         raise InvalidInput("diagnosis_id", "a diagnosis of curves", "must be of a campaign with recordings of kind frf")
     parameters = {

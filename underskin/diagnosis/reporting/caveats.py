@@ -5,6 +5,7 @@ from itertools import groupby
 
 _DECISIVE = (
     "no_response",
+    "impossible_geometry",
     "no_finite_line",
     "refused",
     "impossible_number",
@@ -15,8 +16,11 @@ _DECISIVE = (
     "mains_in_charge",
     "out_of_domain",
     "implausible_d33",
+    "duplicated_recording",
+    "remainder",
+    "held_out_no_better",
 )
-_MOST = 2  # findings of one code that are told in full
+_MOST = 6  # findings of one code that are told in full
 
 
 def caveats(findings: Sequence[Mapping[str, str]]) -> str:

@@ -1,8 +1,9 @@
 """How much better the recordings are described: errors before and after, in sample and on groups held out."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, Workbench
@@ -16,33 +17,30 @@ from underskin.mechanisms.registry import CATALOGUE
 def explains_percent(
     search: Search, bench: Workbench, explanation: Explanation, name: str, whole: cross_validation.Prediction
 ) -> float | None:
-    """How much of the misfit beyond noise, without the mechanism, it takes away [%]; 100 where it takes away more.
+    """How much of the misfit beyond noise, without the mechanism, it takes away [%].
 
-    A mechanism that adds variance (mains pick-up) takes none away: what it expects counts, where the misfit without it
-    is beyond the rest of the noise. None where the set without it was not fitted.
+    None where the set without it was not fitted, or where the misfit without it is no larger than noise makes it: an
+    effect that only many recordings together tell. A mechanism that adds variance takes nothing away (see
+    `_share_of_variance`).
     """
+    if any(entry.name in PICKUP_NAMES for entry in CATALOGUE[name].parameters(bench.lines.campaign, bench.kind)):
+        return round(100 * _share_of_variance(explanation), 1)
     rest = tuple(entry for entry in explanation.names if entry != name)
     without = next((entry for entry in search.explanations if entry.names == rest), None)
     if without is None:
         return None
     misfit = cross_validation.in_sample(bench, without)
-    picks_up = any(entry.name in PICKUP_NAMES for entry in CATALOGUE[name].parameters(bench.lines.campaign, bench.kind))
-    floor = (whole.noise - whole.pickup if picks_up else whole.noise) / whole.size
-    beyond = misfit.square / misfit.size - floor
-    taken = whole.pickup / whole.size if picks_up else misfit.square / misfit.size - whole.square / whole.size
-    if taken <= 0 or (picks_up and beyond <= 0):
-        return 0.0
-    return round(100 * float(min(taken / beyond, 1.0) if beyond > 0 else 1.0), 1)
+    beyond = misfit.square / misfit.size - whole.noise / whole.size
+    left = whole.square / whole.size - whole.noise / whole.size
+    return round(100 * float(np.clip(1 - max(left, 0.0) / beyond, 0.0, 1.0)), 1) if beyond > 0 else None
 
 
-def without_idle(search: Search, bench: Workbench) -> Search:
-    """Without leading sets of which a mechanism accounts for nothing: the set without it says the same."""
-    while (leader := search.answers[0].explanation) is not None and leader.names:
-        whole = cross_validation.in_sample(bench, leader)
-        if all(explains_percent(search, bench, leader, name, whole) != 0.0 for name in leader.names):
-            break
-        search = replace(search, explanations=tuple(entry for entry in search.explanations if entry is not leader))
-    return search
+def _share_of_variance(explanation: Explanation) -> float:
+    """What mains pick-up is of the lines' variance where it acts: Σ q² · q²/(q² + n²) / Σ q², n a line's own noise."""
+    at = explanation.best.at
+    pickup = at.pickup_variance
+    noise = (at.marginal.levels.level * explanation.best.fitter.hypothesis.lines.deviation) ** 2
+    return float((pickup**2 / (pickup + noise)).sum() / pickup.sum())
 
 
 def fit_summary(

@@ -168,7 +168,7 @@ def _what(report: Report, drawn: Drawn) -> str:
         one = report["d33"]
         parts.append(_paragraph(f"d33 under this explanation: {number(one['value'])} ({interval(one)}) {one['unit']}."))
         parts.append(_note(_D33 if one.get("quotable", True) else _D33_NOT_TO_QUOTE))
-    elif report["verdict"] in ("ambiguous", "unexplained"):
+    elif report["fit"] is not None and "youngs_modulus" not in report["fit"]["after"]:
         parts.append(_note(_NO_D33))
     if report["alternatives"]:
         rows = [

@@ -1,7 +1,7 @@
 """The report (`report/1`): what the steps found, in one document with numbers rounded to stated digits.
 
-Four significant digits for values, three decimals for probabilities and p-values: enough for any use, and the same on
-every machine.
+Four significant digits for values, three decimals for probabilities and p-values: enough for any use. The same input
+gives the same report on one machine; on a processor that rounds differently a last digit may differ.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,6 +12,7 @@ from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, Workbench, own_places
 from underskin.diagnosis.localisation.effect_size import Effect
 from underskin.diagnosis.localisation.permutation_test import AxisResult, reaches_all_along
+from underskin.diagnosis.localisation.residual_shape import REACHES_NOISE
 from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.fit_warnings import doubts
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
@@ -26,7 +27,6 @@ from underskin.recordings.finding import Finding
 SCHEMA = "report/1"
 _ALTERNATIVES = 6
 _LEAST_PROBABILITY = 0.005
-_REACHES_NOISE = 1.5  # times the noise floor: an error that noise alone explains
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
     shown = search.shown_or_nothing(leader)
     fit = fit_summary(search, bench, diagnosis.groups, shown)
     named = leader.explanation if stated in ("explained", "ambiguous") else None
-    d33, implausible = _d33(bench, shown, stated, fit)
+    d33, implausible = _d33(bench, shown, leader, fit)
     findings = _findings([*diagnosis.findings, *doubts(bench, shown), *implausible])
     modulus = fit["after"].get("youngs_modulus")
     statement = answer_statement(
@@ -110,18 +110,18 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _d33(
-    bench: Workbench, shown: Explanation, stated: str, fit: Mapping[str, Any]
+    bench: Workbench, shown: Explanation, leader: Answer, fit: Mapping[str, Any]
 ) -> tuple[dict[str, Any] | None, list[Finding]]:
     """The d33 under the one answer that stands, and a finding where no PVDF has it; None where several answers are
     left, or none: each would mean another d33.
 
     `quotable`: it is plausible, and the answer fits the recordings to their noise.
     """
-    if bench.lines.curves or stated not in ("explained", "no_mismatch"):
+    if bench.lines.curves or leader.explanation is None or leader.probability < EXPLAINED:
         return None, []
     d33 = parameter(shown, place_of(shown, "d33"))
     slip = plausibility.implausible(d33["value"])
-    reached = fit["after"]["rmse_percent"] <= _REACHES_NOISE * fit["noise_floor_percent"]
+    reached = fit["after"]["rmse_percent"] <= REACHES_NOISE * fit["noise_floor_percent"]
     findings = [Finding("implausible_d33", "", "d33_pc_per_n", f"d33 comes out as {d33['value']:.4g} pC/N, {slip}")]
     return {**d33, "quotable": reached and slip is None}, findings if slip else []
 

@@ -30,7 +30,7 @@ def answer_statement(
 ) -> str:
     """Some plain sentences: what is missing, what decides how far that can be trusted (`caveats`), the laws; of curves
     also the modulus under the stated answer."""
-    first, rest = _answer(answers, verdict, shape, SIMPLEST[kind])
+    first, rest = _answer(answers, verdict, shape, SIMPLEST[kind], all_used=not caveats)
     parts = [first, caveats, rest]
     if modulus is not None and verdict != "unexplained":
         interval = f"95 %: {modulus['low']:.3g} to {modulus['high']:.3g}"
@@ -38,7 +38,7 @@ def answer_statement(
     return " ".join(part for part in parts if part)
 
 
-def _answer(answers: Sequence[Answer], verdict: str, shape: str, model: str) -> tuple[str, str]:
+def _answer(answers: Sequence[Answer], verdict: str, shape: str, model: str, *, all_used: bool) -> tuple[str, str]:
     """The verdict in one sentence, and what else there is to say of it."""
     leader = answers[0]
     percent = in_percent(leader.probability)
@@ -48,7 +48,7 @@ def _answer(answers: Sequence[Answer], verdict: str, shape: str, model: str) -> 
     if verdict == "no_mismatch":
         agree = f"Recordings and {model} agree within the noise (probability {percent})"
         if leader.probability >= EXPLAINED or not rivals:
-            return f"{agree}; nothing needs to be added.", ""
+            return f"{agree}; nothing needs to be added{'' if all_used else ' for those that were used'}.", ""
         return f"{agree}, but they do not rule out: {listed}.", _laws(tuple(mentioned))
     if verdict == "unexplained":
         return f"Something is missing that none of the known mechanisms describes (probability {percent}).", shape

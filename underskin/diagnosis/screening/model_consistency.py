@@ -44,6 +44,7 @@ def against_model(
     turned = np.where(_one_sided(entries), ratio, np.nan)
     if len(entries) == 2 and _contradict(ratio, turned, found):
         return [], "two recordings that contradict each other (see findings); a third would tell which is off"
+    ratio, turned = np.where(kept, ratio, np.nan), np.where(kept, turned, np.nan)
     kept &= ~_off_by_1000(entries, ratio, found)
     _of_all(ratio, campaign.skin.d33_pc_per_n, found)
     signs = _signs(entries, turned, kept, found)

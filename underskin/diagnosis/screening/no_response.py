@@ -18,6 +18,7 @@ from underskin.units import Floats
 
 _LEAST_LINES = 4
 _MEAN, _LINES = 9.0, 3.0  # over their variance
+_FAINT = 0.1  # of the level to be expected: what else a sensor shows that is silent in most of its recordings
 _AUDIBLE = 16.0  # of the response that the others let expect: only then is a silent recording no recording
 
 Mask = NDArray[np.bool_]
@@ -44,13 +45,15 @@ def dead(
     entries: Sequence[FrfRecording], silent: Mask, variance: Floats, expected: Floats, found: list[Finding]
 ) -> Mask:
     """Which recordings are silent though the others let expect a response well above their noise; each is named, or
-    its sensor where all of that sensor's are."""
+    its sensor where that is silent in most of its recordings and faint in the others, which noise alone does."""
     lost: Mask = silent & (expected**2 > _AUDIBLE * variance)
     sensors = np.array([entry.sensor for entry in entries])
+    level = np.array([float(np.abs(np.nanmean(lines_of(entry).values))) for entry in entries])
     for name in dict.fromkeys(sensors[lost].tolist()):
         own = sensors == name
-        if lost[own].all() and own.sum() > 1:
+        if own.sum() > 1 and 2 * lost[own].sum() > own.sum() and (lost | (level < _FAINT * expected))[own].all():
             text = f"none of the {own.sum()} recordings of sensor {name!r} shows a response above its noise: left out"
+            lost = lost | own
             found.append(Finding("no_response", entries[int(np.flatnonzero(own)[0])].id, "frf_re_pc_per_n", text))
             continue
         for number in np.flatnonzero(lost & own).tolist():

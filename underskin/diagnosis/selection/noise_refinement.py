@@ -4,8 +4,8 @@ Between two lines on the flank of a resonance an FRF bends, and the noise that i
 (line_noise.py) comes out too large there, several times so where the flank moves with the preload. The level that all
 lines share then falls, the others seem too noisy, and a law that adds variance (`mains_pickup`) is credited with the
 difference. So the single mechanisms that act along frequency are fitted first; where one of them describes the lines,
-the roughness is that of what its prediction leaves. A prediction that is smooth takes nothing of the noise away, and no
-mechanism is preferred by it: all are compared anew under the same noise.
+the roughness is that of what its prediction leaves. A prediction that is smooth takes nothing of the noise away; all
+mechanisms are then compared anew under this one noise, though it was estimated beside one of them.
 """
 
 from collections.abc import Mapping
