@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from docs.tour.steps import VERDICT
 from tests.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.laplace import levels_covariance
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.reporting.html_report import page
+from underskin.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings import read_file
 from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, SkinDescription
@@ -87,6 +89,8 @@ def test_the_example_is_explained_by_its_heavy_tip(table: SigmaTable) -> None:
     assert report["verdict"] == "explained"
     assert [entry["name"] for entry in report["mechanisms"]] == ["contact_resonance"]
     tip_mass, _ = report["mechanisms"][0]["parameters"]
+    sure = in_percent(report["probability"])
+    assert f"a contact resonance with a tip mass of {tip_mass['value']:.2f} g, at a probability of {sure}" == VERDICT
     assert tip_mass["value"] == pytest.approx(6.0, rel=0.05)
     assert report["d33"]["low"] < 13.1 < report["d33"]["high"]
     assert report["d33"]["quotable"]
