@@ -5,7 +5,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -133,16 +133,17 @@ def finding_codes() -> set[str]:
     codes: set[str] = set()
     for source in (*(ROOT / "underskin").rglob("*.py"), *(ROOT / "service").rglob("*.py")):
         for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
-            candidates: list[ast.expr | None] = []
+            candidates: Sequence[ast.expr | None] = ()
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 4:
-                candidates = {"Finding": node.args[:1], "Slip": node.args[3:]}.get(node.func.id, [])
+                candidates = {"Finding": node.args[:1], "Slip": node.args[3:]}.get(node.func.id, ())
             elif isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "code":
                 candidates = [node.value]
             elif isinstance(node, ast.Dict):
                 keys = [ast.unparse(key) for key in node.keys if key is not None]
                 if {"'code'", "'recording'", "'statement'"} <= set(keys):
                     candidates = [node.values[keys.index("'code'")]]
-            codes |= {entry.value for entry in candidates if isinstance(entry, ast.Constant) if entry.value}
+            values = (entry.value for entry in candidates if isinstance(entry, ast.Constant))
+            codes |= {value for value in values if isinstance(value, str) and value}
     return codes
 
 
