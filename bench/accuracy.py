@@ -7,8 +7,8 @@ import numpy as np
 from bench.figures import Figure
 from tablegen.sigma import Nodes, solve_column
 from tests.oracle import linear_layer_values
-from underskin import linear_layer
-from underskin.surrogate import SigmaTable, load_table
+from underskin.physics import linear_layer
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 FRESH_POINTS = 50
 REFERENCE = ([1e-3, 1e-2, 3e-2, 1e-1], [1.01293, 1.02966, 1.04522, 1.07489])  # Richardson, ± 5e-5

@@ -20,7 +20,7 @@ ROUNDS = 3
 _ONE = """
 import json, resource, sys, time
 from bench.diagnosed import recorded
-from underskin.diagnosis.diagnose import diagnosis_report
+from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.surrogate import load_table
 
 preloads_n = 0.3, 0.5, 0.7, 1, 1.3, 1.6, 2, 2.3, 2.6, 3

@@ -15,12 +15,12 @@ from threadpoolctl import threadpool_limits
 from bench.diagnosed import Effects, recorded
 from bench.figures import Figure
 from tests.nested_sampling import Posterior, Sampled, nested
-from underskin.diagnosis.explanation import Explanation, Workbench
-from underskin.diagnosis.fit import Fitter
-from underskin.diagnosis.lines import lines
-from underskin.diagnosis.scatter import NO_POSITION
-from underskin.diagnosis.search import log_prior
-from underskin.surrogate import load_table
+from underskin.diagnosis.data.dataset import lines
+from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.optimizer import Fitter
+from underskin.diagnosis.noise.noise_priors import NO_POSITION
+from underskin.diagnosis.selection.search import log_prior
+from underskin.surrogate.sigma_table import load_table
 
 HIDDEN: dict[str, Effects] = {
     "nothing": {},

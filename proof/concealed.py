@@ -13,7 +13,7 @@ from typing import Any
 from proof.cases import FileCase
 from proof.judge import Judged, judge
 from proof.kept import Work, reports
-from underskin.cli_diagnose import write_report
+from underskin.cli.diagnose import write_report
 
 
 def judge_open(work: Work, campaigns: Path, tell: Callable[[str], None]) -> dict[str, Any]:

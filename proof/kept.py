@@ -17,7 +17,8 @@ import proof
 import rig
 import underskin
 from proof.cases import Case
-from underskin.processes import processes
+from underskin.parallel import processes
+from underskin.source_digest import source_digest
 
 Item = TypeVar("Item")
 FAILED = "failed"
@@ -33,15 +34,14 @@ class Work:
 
 
 def sources(*packages: str) -> str:
-    """A digest of the Python sources of packages of this project, or of single files under them."""
+    """A digest of what packages of this project compute, or single files under them (see underskin.source_digest)."""
     roots = {module.__name__: Path(str(module.__file__)).parent for module in (underskin, rig, proof)}
-    digest = hashlib.sha256()
-    for package in packages:
-        name, _, file = package.partition("/")
-        for path in sorted(roots[name].rglob(file or "*.py")):
-            digest.update(path.relative_to(roots[name]).as_posix().encode())
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+    texts = {
+        ".".join([name, *path.relative_to(roots[name]).with_suffix("").parts]): path.read_text(encoding="utf-8")
+        for name, _, file in (package.partition("/") for package in packages)
+        for path in roots[name].rglob(file or "*.py")
+    }
+    return source_digest(texts)[:16]
 
 
 def digest_of(document: Any) -> str:
@@ -81,7 +81,7 @@ def of_each(
 
 def reports(work: Work, cases: Sequence[Case], tell: Callable[[str], None]) -> list[dict[str, Any]]:
     """The report (`report/1`) of each case."""
-    from underskin.surrogate import load_table
+    from underskin.surrogate.sigma_table import load_table
 
     version = f"{sources('underskin')} {load_table().sha256}"
     return of_each(work, cases, partial(_report, work.folder / "reports", version), tell)
@@ -93,9 +93,9 @@ def _report(folder: Path, version: str, case: Case) -> dict[str, Any]:
 
 
 def _diagnosed(document: dict[str, Any]) -> dict[str, Any]:
-    from underskin.diagnosis.diagnose import diagnosis_report
+    from underskin.diagnosis.pipeline import diagnosis_report
     from underskin.recordings.campaign import from_dict
-    from underskin.surrogate import load_table
+    from underskin.surrogate.sigma_table import load_table
 
     try:
         campaign, refused = from_dict(document)

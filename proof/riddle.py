@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from underskin import response
-from underskin.prediction import transmission
-from underskin.skin import Indenter, Skin
-from underskin.surrogate import load_table
+from underskin.physics import charge_response
+from underskin.physics.skin import Indenter, Skin
+from underskin.prediction.pressed_skin import transmission
+from underskin.surrogate.sigma_table import load_table
 
 THICKNESS_MM, MODULUS_MPA, SENSOR_RADIUS_MM, PITCH_MM = 2.5, 16.0, 1.5, 8.0
 LOWER, HIGHER = 14.0, 22.0  # pC/N, at 1 N over 12 sensors and at 3 N over 41
@@ -70,7 +70,7 @@ def _campaign(name: str, rows: Iterable[Pressed]) -> dict[str, Any]:
         felt = transmission(
             table, skin, Indenter.from_lab(indenter_radius_mm=row.indenter_mm), np.array([row.preload_n])
         )
-        level = row.d33_pc_per_n * float(response.gain(felt.sigma, float(skin.rt_over_h))[0])
+        level = row.d33_pc_per_n * float(charge_response.gain(felt.sigma, float(skin.rt_over_h))[0])
         level *= float(np.exp(_GAIN * random.normal()))
         noise = _LINE * level * random.normal(size=(2, len(_FREQUENCY)))
         recordings.append(

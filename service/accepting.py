@@ -14,9 +14,9 @@ from service.reading import Arrived, Found, arrived_as, joined, read, require_fe
 from service.store import answers, campaigns, skins
 from service.store.engine import Database
 from service.uploads import Upload
-from underskin import InvalidInput, campaign_findings
+from underskin import InvalidInput
 from underskin.errors import FileError
-from underskin.recordings import fields
+from underskin.recordings import plausibility, validation
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription, from_dict
 from underskin.recordings.rig_description import parse as parse_rig
@@ -46,7 +46,7 @@ class Terms:
         if self.skin is not None:
             skins.require_usable("skin", self.skin)
         if self.together is not None:
-            fields.name("together", self.together, False)
+            validation.name("together", self.together, False)
 
     def request(self, uploads: Sequence[Upload]) -> answers.Request | None:
         """What makes a repetition of this request recognisable."""
@@ -152,7 +152,7 @@ def _place(recording: str) -> str:
 
 def _kept(connection: Connection, found: Arrived, terms: Terms, rig: RigDescription | None) -> dict[str, Any]:
     refused = [{"id": entry["id"], "status": "refused", "errors": entry["errors"]} for entry in found.refused]
-    findings = [] if found.campaign is None else list(campaign_findings.in_words(found.campaign))
+    findings = [] if found.campaign is None else list(plausibility.in_words(found.campaign))
     result: dict[str, Any] = {"file": found.file, "errors": found.errors, "notes": found.notes, "findings": findings}
     if found.campaign is None:
         return {**result, "status": "refused", "id": None, "skin_id": None, "recordings": refused}

@@ -15,14 +15,14 @@ from service.store.engine import Database
 from service.store.errors import Conflict
 from service.store.tables import AnyRow
 from underskin import InvalidInput
-from underskin.answers import pressed
-from underskin.response import gain
-from underskin.surrogate import SigmaTable
+from underskin.physics.charge_response import gain
+from underskin.prediction.answers import pressed
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats, finite, non_negative
 
 # Imported where it is needed: signal processing takes a second to load, which a start need not wait for.
 if TYPE_CHECKING:
-    from underskin.adopted import AdoptedModel
+    from underskin.prediction.adopted_model import AdoptedModel
 
 _LARGEST_LINES = 100_000  # distinct rows times frequencies: some seconds
 _MOST_KNOWN = 100
@@ -56,7 +56,7 @@ def serving(store: Database, skin_id: str) -> Serving:
 
 def of_row(connection: Connection, row: AnyRow) -> "AdoptedModel":
     """The model of a diagnosis that is done; raises InvalidInput where it cannot serve."""
-    from underskin.adopted import adopted
+    from underskin.prediction.adopted_model import adopted
 
     if row.id not in _known:
         report = diagnoses.report_of(connection, row.number)
@@ -146,7 +146,7 @@ def _response(
     frequency_hz: Floats | None,
 ) -> tuple[Complexes, NDArray[np.bool_]]:
     """FRF over d33 (rows, lines), on the plateau where there are no frequencies, and which rows are inside."""
-    from underskin.adopted import pressed_campaign
+    from underskin.prediction.adopted_model import pressed_campaign
 
     lines = _ANY_LINE if frequency_hz is None else frequency_hz
     count = len(rows["preload_n"])

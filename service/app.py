@@ -37,7 +37,7 @@ from service.settings import Settings
 from service.store import Database
 from service.uploads import UploadFolder
 from underskin import __version__
-from underskin.surrogate import SIGMA_TABLE, SigmaTable
+from underskin.surrogate.sigma_table import SIGMA_TABLE, SigmaTable
 
 
 @asynccontextmanager

@@ -13,9 +13,9 @@ from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.units import to_lab
 
 if TYPE_CHECKING:
-    from underskin.frf_summary import FrfSpread
-    from underskin.inversion import Inversion
-    from underskin.recordings.frf_estimation import Frf
+    from underskin.inversion.invert import Inversion
+    from underskin.recordings.frf.estimation import Frf
+    from underskin.recordings.frf.summary import FrfSpread
 
 MOST_SINGLE = 48  # recordings whose lines are drawn one by one, from the recordings
 _RANGES = ("magnitude_pc_per_n", "phase_deg", "coherence")
@@ -32,7 +32,7 @@ def numbers(campaign: Campaign, found: "Inversion | None", known: list[dict[str,
 
 def measured(campaign: Campaign, show: str = "") -> list[tuple[FrfRecording, "Frf"]]:
     """The FRF recordings that have an FRF, or those of them that are called `show` or of the sensor of that name."""
-    from underskin.recordings.frf_estimation import lines_of
+    from underskin.recordings.frf.estimation import lines_of
 
     found = []
     for recording in campaign.recordings:
@@ -46,7 +46,7 @@ def measured(campaign: Campaign, show: str = "") -> list[tuple[FrfRecording, "Fr
 
 def spreads(kept: Sequence[Mapping[str, Any]]) -> "list[FrfSpread]":
     """Those of `numbers` again."""
-    from underskin.frf_summary import FrfSpread
+    from underskin.recordings.frf.summary import FrfSpread
 
     return [
         FrfSpread(
@@ -62,7 +62,7 @@ def spreads(kept: Sequence[Mapping[str, Any]]) -> "list[FrfSpread]":
 
 def _preload_columns(campaign: Campaign, found: "Inversion") -> dict[str, list[Any]]:
     """FRF in the flat zone against preload, a row a recording."""
-    from underskin.campaign_figures import model_frf
+    from underskin.figures.campaign_figures import model_frf
 
     rows = found.recordings
     return {
@@ -78,10 +78,10 @@ def _preload_columns(campaign: Campaign, found: "Inversion") -> dict[str, list[A
 
 def spreads_of(found: "Sequence[tuple[FrfRecording, Frf]]") -> "list[FrfSpread]":
     """FRFs of recordings alike."""
-    from underskin import frf_summary
+    from underskin.recordings.frf import summary
 
     conditions = [(recording.indenter_radius_mm, recording.preload_n) for recording, _ in found]
-    return frf_summary.spreads([frf for _, frf in found], conditions)
+    return summary.spreads([frf for _, frf in found], conditions)
 
 
 def _kept_spreads(lines: "Sequence[tuple[FrfRecording, Frf]]") -> list[dict[str, Any]] | None:

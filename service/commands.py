@@ -27,7 +27,7 @@ from service.store import StoreError, database, key_requirement, open_store
 from service.store.engine import StorageFull
 from service.store.errors import StoreMoved
 from underskin import TableError, UnderskinError
-from underskin.surrogate import SIGMA_TABLE, load_table
+from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
 
 _STORE_FAILED = (StoreError, StoreMoved, StorageFull, DBAPIError)
 

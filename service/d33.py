@@ -21,9 +21,11 @@ from service.skin_columns import (
     require_paper,
 )
 from service.store import Database
-from underskin import InvalidInput, d33_findings, response
-from underskin.answers import lab_columns, pressed
-from underskin.surrogate import SigmaTable
+from underskin import InvalidInput
+from underskin.physics import charge_response
+from underskin.prediction import plausibility
+from underskin.prediction.answers import lab_columns, pressed
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats, finite, non_negative, to_lab, to_si
 
 router = APIRouter(prefix="/v1", tags=["d33"])
@@ -138,7 +140,7 @@ def _adopted_answer(table: SigmaTable, store: Database, request: D33Columns) -> 
 
 
 def _findings(measured: Mapping[str, Floats], d33: Floats) -> list[dict[str, Any]]:
-    return [asdict(finding) for finding in d33_findings.of_rows(measured["frf_pc_per_n"], d33)]
+    return [asdict(finding) for finding in plausibility.of_rows(measured["frf_pc_per_n"], d33)]
 
 
 def _given(request: D33Columns) -> dict[str, Floats]:
@@ -178,7 +180,7 @@ def _plateau(request: D33Columns, factor: Callable[[Floats], Complexes] | None =
     if factor is not None:
         lines = (real + 1j * (0.0 if imaginary is None else imaginary)) * factor(frequency)
         real, imaginary = lines.real, None if imaginary is None else lines.imag
-    level, error = response.plateau(real, inside)
+    level, error = charge_response.plateau(real, inside)
     measured = {"frf_pc_per_n": level}
     if request.frf_uncertainty_pc_per_n is not None:
         measured |= _uncertainty(request)
@@ -189,7 +191,7 @@ def _plateau(request: D33Columns, factor: Callable[[Floats], Complexes] | None =
     else:
         measured["frf_uncertainty_pc_per_n"] = error
     if imaginary is not None:
-        measured["frf_im_pc_per_n"], _ = response.plateau(imaginary, inside)
+        measured["frf_im_pc_per_n"], _ = charge_response.plateau(imaginary, inside)
     return measured
 
 

@@ -10,8 +10,8 @@ from underskin import InvalidInput
 from underskin.units import to_lab
 
 if TYPE_CHECKING:
-    from underskin.inversion import Inversion
-    from underskin.mixed_model import Estimate
+    from underskin.inversion.invert import Inversion
+    from underskin.inversion.mixed_model import Estimate
     from underskin.recordings.elastomer import RecordingModulus
 
 # Raised whenever the fields below, or the figures that underskin.inversion and underskin.recordings put into them,

@@ -14,7 +14,7 @@ from service.gate import SAFE
 from service.keys import Key
 from service.problems import Refusal
 from service.store import Database
-from underskin.surrogate import SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable
 
 
 def _table(request: Request) -> SigmaTable:

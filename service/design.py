@@ -10,8 +10,8 @@ from service.columns import json_document
 from service.dependencies import Table, in_thread
 from service.problems import from_validation
 from underskin import Indenter, InvalidInput, Skin
-from underskin.design import Design, design
-from underskin.surrogate import SigmaTable
+from underskin.prediction.skin_design import Design, design
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import checked, to_lab
 
 router = APIRouter(prefix="/v1", tags=["design"])

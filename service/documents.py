@@ -9,8 +9,8 @@ import orjson
 from service.store import campaigns, codec
 from service.store.engine import Database
 from service.store.tables import AnyRow
-from underskin.recordings import hdf5_file
 from underskin.recordings.campaign import to_dict
+from underskin.recordings.readers import hdf5_file
 
 
 def json_parts(store: Database, row: AnyRow) -> Iterator[bytes]:

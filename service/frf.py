@@ -19,8 +19,8 @@ from service.skin_columns import (
 )
 from service.store import Database
 from underskin import InvalidInput
-from underskin.answers import lab_columns, pressed
-from underskin.surrogate import SigmaTable
+from underskin.prediction.answers import lab_columns, pressed
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, checked, non_negative, to_lab
 
 router = APIRouter(prefix="/v1", tags=["frf"])

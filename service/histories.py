@@ -11,8 +11,8 @@ from service.store import campaigns, inversions, skins
 from service.store.engine import Database
 from service.store.tables import AnyRow
 from underskin import InvalidInput
-from underskin.surrogate import SigmaTable
-from underskin.trend import FEWEST, SIGNIFICANT, Trend, holm, trend
+from underskin.inversion.trend import FEWEST, SIGNIFICANT, Trend, holm, trend
+from underskin.surrogate.sigma_table import SigmaTable
 
 _YEAR_S = 365.25 * 86400
 _LEAST_SPAN_S = 86400.0

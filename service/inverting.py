@@ -17,10 +17,10 @@ from service.store.errors import Conflict, StoreMoved
 from service.store.tables import AnyRow
 from underskin import InvalidInput
 from underskin.recordings.campaign import Campaign
-from underskin.surrogate import SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable
 
 if TYPE_CHECKING:
-    from underskin.inversion import Inversion
+    from underskin.inversion.invert import Inversion
 
 logger = logging.getLogger("underskin")
 
@@ -156,9 +156,8 @@ def _computed(
 
 def _inverted(campaign: Campaign, table: SigmaTable, band_hz: Band | None) -> "tuple[dict[str, Any], Inversion | None]":
     # Imported here: statistics take half a second to load, which a start need not wait for.
-    from underskin import campaign_findings
-    from underskin.inversion import invert
-    from underskin.recordings import elastomer
+    from underskin.inversion.invert import invert
+    from underskin.recordings import elastomer, plausibility
 
     moduli, silent = of_moduli(elastomer.of_campaign(campaign))
     try:
@@ -166,7 +165,7 @@ def _inverted(campaign: Campaign, table: SigmaTable, band_hz: Band | None) -> "t
     except InvalidInput as error:
         if band_hz is not None and error.field == "band_hz":
             raise
-        findings = list(campaign_findings.in_words(campaign))
+        findings = list(plausibility.in_words(campaign))
         return {**_none(str(error)), "findings": findings, "moduli": moduli, "left_out": silent}, None
     left_out = [{"recording": None, "reason": reason} for reason in found.left_out]
     return {**of_inversion(found), "moduli": moduli, "left_out": left_out + silent}, found

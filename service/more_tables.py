@@ -4,9 +4,9 @@ from functools import cache
 from pathlib import Path
 
 from service.problems import Refusal
-from underskin.contact_table import CONTACT_TABLE, ContactTable, load_contact
 from underskin.errors import TableError
-from underskin.influence import INFLUENCE_TABLE, InfluenceTable, load_influence
+from underskin.surrogate.contact_table import CONTACT_TABLE, ContactTable, load_contact
+from underskin.surrogate.influence_table import INFLUENCE_TABLE, InfluenceTable, load_influence
 
 
 @cache

@@ -12,9 +12,10 @@ from service.unique_keys import repeated
 from service.uploads import Upload
 from underskin import InvalidInput
 from underskin.errors import FileError
-from underskin.recordings import formats, join
+from underskin.recordings import join
 from underskin.recordings.campaign import Campaign, from_dict
 from underskin.recordings.channels import Contents
+from underskin.recordings.readers import formats
 from underskin.recordings.reading import Reading, read_contents, understood
 from underskin.recordings.rig_description import RigDescription
 

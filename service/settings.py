@@ -6,7 +6,7 @@ from pathlib import Path
 from pydantic import Field, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-from underskin.surrogate import tables_folder
+from underskin.surrogate.sigma_table import tables_folder
 
 
 class Settings(BaseSettings):

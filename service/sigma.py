@@ -11,8 +11,8 @@ from service.answers import Accept, AnswerInColumns, Columns, respond
 from service.columns import ColumnsRequest, NonNegative, Status, rows
 from service.dependencies import Table, columns_body, columns_route
 from service.front import HotRoute, are_numbers
-from underskin import half_space
-from underskin.surrogate import SigmaTable
+from underskin.physics import half_space
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import non_negative
 
 router = APIRouter(prefix="/v1", tags=["sigma"])

@@ -11,9 +11,9 @@ from service.columns import json_document
 from service.dependencies import in_thread
 from service.more_tables import influence_table
 from service.stress_models import StressAnswer
-from underskin.influence import InfluenceTable
-from underskin.stress_answer import answer
-from underskin.stress_request import StressRequest, read_request
+from underskin.array_stress.answer import answer
+from underskin.array_stress.request import StressRequest, read_request
+from underskin.surrogate.influence_table import InfluenceTable
 
 router = APIRouter(prefix="/v1", tags=["stress"])
 

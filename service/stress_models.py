@@ -3,7 +3,7 @@
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.answers import AnswerInColumns, FindingModel
-from underskin.stress_request import MOST_CONTACTS
+from underskin.array_stress.request import MOST_CONTACTS
 
 
 class _Part(BaseModel):

@@ -8,10 +8,10 @@ from pydantic import BaseModel, Field
 
 from service.dependencies import Table
 from service.more_tables import contact_table, influence_table
-from underskin.contact_table import ContactTable
-from underskin.influence import InfluenceTable
-from underskin.surrogate import SigmaTable
-from underskin.table_format import SIGMA_SCHEMA
+from underskin.surrogate.contact_table import ContactTable
+from underskin.surrogate.hdf5_format import SIGMA_SCHEMA
+from underskin.surrogate.influence_table import InfluenceTable
+from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/v1", tags=["tables"])
 

@@ -20,8 +20,8 @@ from service.front import HotRoute, are_numbers
 from service.problems import Refusal
 from service.unique_keys import JsonRoute
 from underskin import Indenter, InvalidInput, Skin
-from underskin.prediction import frf_gradient, transmission
-from underskin.surrogate import SigmaTable
+from underskin.prediction.pressed_skin import frf_gradient, transmission
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import LAB, Floats, checked, to_lab
 
 router = APIRouter(prefix="/umbridge", tags=["umbridge"], route_class=JsonRoute)

@@ -8,7 +8,7 @@ from fastapi.routing import APIRoute
 
 from service.problems import invalid_input
 from underskin import InvalidInput
-from underskin.repeated_keys import repeated_key
+from underskin.recordings.readers.repeated_keys import repeated_key
 
 
 def repeated(body: bytes) -> InvalidInput | None:

@@ -19,9 +19,9 @@ from tablegen.contact_mesh import contact_mesh
 from tablegen.discretisation import discretise
 from tablegen.neo_hookean import SHEAR_MODULUS, YOUNGS_MODULUS
 from tablegen.newton import State
-from underskin import hertz, linear_layer
 from underskin.errors import SolverError
-from underskin.hankel import normal_stress, punch_transform
+from underskin.physics import hertz, linear_layer
+from underskin.physics.hankel_transform import normal_stress, punch_transform
 from underskin.units import Floats
 
 _SMALLEST_STEP = 1 / 32  # of the way from one sphere to the next

@@ -30,9 +30,9 @@ from tablegen import (
 from tablegen.contact_column import solve_contact_column
 from tablegen.contact_mesh import RIM
 from tablegen.sweep import Arrays, run_pieces, sources_hash
-from underskin import hankel, hertz, linear_layer
-from underskin.influence import interpolation_weights
-from underskin.table_format import CONTACT_SCHEMA, Dataset, data_hash, write_table
+from underskin.physics import hankel_transform, hertz, linear_layer
+from underskin.surrogate.hdf5_format import CONTACT_SCHEMA, Dataset, data_hash, write_table
+from underskin.surrogate.influence_table import interpolation_weights
 from underskin.units import Floats
 
 ORDER = 5
@@ -45,7 +45,7 @@ SOURCES = (
     faces,
     neo_hookean,
     newton,
-    hankel,
+    hankel_transform,
     hertz,
     linear_layer,
     sys.modules[__name__],

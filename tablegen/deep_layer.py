@@ -9,7 +9,7 @@ conditions at base and top fix the combination for each wavenumber k. For depth 
 
 import numpy as np
 
-from underskin.hankel import disc_average, hertz_transform
+from underskin.physics.hankel_transform import disc_average, hertz_transform
 from underskin.units import Floats
 
 _LAST_WAVENUMBER = 44.0  # the transmission falls like (1 + k) e^(−k)

@@ -19,8 +19,8 @@ from scipy.ndimage import maximum_filter1d
 from tablegen import discretisation, faces, influence, newton
 from tablegen.influence import RIM, influence_mesh, solve_influence
 from tablegen.sweep import Arrays, run_pieces, sources_hash
-from underskin.influence import interpolation_weights
-from underskin.table_format import INFLUENCE_SCHEMA, Dataset, data_hash, write_table
+from underskin.surrogate.hdf5_format import INFLUENCE_SCHEMA, Dataset, data_hash, write_table
+from underskin.surrogate.influence_table import interpolation_weights
 from underskin.units import Floats
 
 ORDER = 6

@@ -17,9 +17,9 @@ from tablegen.faces import hertz_load
 from tablegen.mesh import layer_mesh
 from tablegen.neo_hookean import YOUNGS_MODULUS
 from tablegen.newton import Layer, State
-from underskin import linear_layer
 from underskin.errors import SolverError
-from underskin.hertz import peak_pressure_over_modulus
+from underskin.physics import linear_layer
+from underskin.physics.hertz import peak_pressure_over_modulus
 from underskin.units import Floats
 
 _SMALLEST_STEP = 1 / 32  # of the distance between two nodes of the load

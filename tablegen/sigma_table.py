@@ -24,9 +24,9 @@ from tablegen.base_stress import PROFILE_END
 from tablegen.mesh import RIM, layer_mesh
 from tablegen.sigma import Column, Nodes, solve_column
 from tablegen.sweep import Arrays, run_pieces, sources_hash
-from underskin import hankel, hertz, linear_layer
-from underskin.surrogate import interpolation_coefficients
-from underskin.table_format import SIGMA_SCHEMA, Dataset, data_hash, write_table
+from underskin.physics import hankel_transform, hertz, linear_layer
+from underskin.surrogate.hdf5_format import SIGMA_SCHEMA, Dataset, data_hash, write_table
+from underskin.surrogate.sigma_table import interpolation_coefficients
 from underskin.units import Floats
 
 ORDER = 5
@@ -38,7 +38,7 @@ SOURCES = (
     faces,
     base_stress,
     sigma_solve,
-    hankel,
+    hankel_transform,
     hertz,
     linear_layer,
     sys.modules[__name__],

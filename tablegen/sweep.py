@@ -5,7 +5,6 @@ killed at any moment goes on where it was; results do not depend on who computed
 name holds a hash of the sources and settings: pieces of another version are never mixed in.
 """
 
-import hashlib
 import inspect
 import multiprocessing
 import os
@@ -28,6 +27,7 @@ from rich.progress import (
 )
 
 from underskin.errors import SolverError, UnderskinError
+from underskin.source_digest import source_digest
 from underskin.units import Floats
 
 Arrays = Mapping[str, Floats]
@@ -35,11 +35,8 @@ Piece = Callable[[], Arrays]
 
 
 def sources_hash(modules: Sequence[ModuleType]) -> str:
-    """SHA-256 of the sources of the modules that decide a table's numbers."""
-    digest = hashlib.sha256()
-    for module in modules:
-        digest.update(module.__name__.encode() + b"\0" + inspect.getsource(module).encode() + b"\0")
-    return digest.hexdigest()
+    """SHA-256 of what the modules compute that decide a table's numbers (see underskin.source_digest)."""
+    return source_digest({module.__name__: inspect.getsource(module) for module in modules})
 
 
 def run_pieces(

@@ -7,7 +7,7 @@ import numpy as np
 
 from underskin.mechanisms import compose
 from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription
-from underskin.surrogate import SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats
 
 PITCH_MM = 8.0

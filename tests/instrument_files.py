@@ -14,8 +14,9 @@ import scipy.io
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
 from tests.test_recordings_campaign import FRF, document
-from underskin.recordings import hdf5_file, rig_description
+from underskin.recordings import rig_description
 from underskin.recordings.campaign import parse
+from underskin.recordings.readers import hdf5_file
 from underskin.recordings.rig_description import RigDescription
 
 EXAMPLES = Path(__file__).parent.parent / "examples" / "formats"

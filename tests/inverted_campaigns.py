@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.simulated_campaign import LARGEST_SCATTER_MM, Rig
-from underskin.mixed_model import Estimate
+from underskin.inversion.mixed_model import Estimate
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.units import Floats
 

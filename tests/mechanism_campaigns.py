@@ -15,7 +15,7 @@ from underskin.recordings.campaign import (
     Sensor,
     SkinDescription,
 )
-from underskin.surrogate import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Floats
 
 FREQUENCY = np.array([1.0, 3.0, 10.0, 30.0, 47.0, 49.0, 50.0, 51.0, 60.0, 100.0, 150.0, 400.0, 1000.0])

@@ -7,9 +7,9 @@ import numpy as np
 from rig.experiment import parse as experiment
 from rig.output import campaign_of_series
 from rig.time_domain import record_series
-from underskin import inversion
+from underskin.inversion import invert
 from underskin.recordings import campaign
-from underskin.surrogate import SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable
 
 
 def description(number: int) -> dict[str, Any]:
@@ -46,7 +46,7 @@ def covered(number: int, table: SigmaTable) -> tuple[bool, float]:
     """Whether the interval of the array's d33 holds the rig's, and by how many of its uncertainties it is off."""
     planned = experiment(description(number))
     recorded = campaign.parse(campaign_of_series(*record_series(planned)))
-    found = inversion.invert(recorded, table).campaign_d33
+    found = invert.invert(recorded, table).campaign_d33
     assert found is not None
     true = 1e-12 * planned.skin.d33_pc_per_n
     return bool(found.low <= true <= found.high), float((found.value - true) / found.uncertainty)

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from underskin import response
-from underskin.offset import positioned_sigma
-from underskin.prediction import transmission
+from underskin.physics import charge_response
+from underskin.physics.skin import Indenter, Skin
+from underskin.prediction.pressed_skin import transmission
 from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription
-from underskin.skin import Indenter, Skin
-from underskin.surrogate import SigmaTable
+from underskin.surrogate.off_centre_sigma import positioned_sigma
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
 LARGEST_SCATTER_MM = 0.3
@@ -58,7 +58,7 @@ def simulate(table: SigmaTable, rig: Rig, random: np.random.Generator) -> Campai
     sigma = positioned_sigma(
         table, felt.a_over_h, rho, felt.load_parameter, true / rig.thickness_mm, LARGEST_SCATTER_MM / rig.thickness_mm
     ).sigma
-    level = response.frf(rig.d33[number], sigma, rho) * np.exp(random.normal(0, rig.gain, len(design)))
+    level = charge_response.frf(rig.d33[number], sigma, rho) * np.exp(random.normal(0, rig.gain, len(design)))
     frequency = np.geomspace(1, 130, 40) if rig.frequency_hz is None else rig.frequency_hz
     relative = rig.line * (1 + 1.0 * (frequency < 3))
     noise = np.abs(level)[:, None] * relative * random.normal(size=(2, len(design), len(frequency)))

@@ -8,9 +8,9 @@ import pytest
 
 from tests.mechanism_campaigns import SKIN, frf_campaign, indentation_campaign, table
 from underskin import InvalidInput
-from underskin.adopted import AdoptedModel, adopted
 from underskin.mechanisms import CATALOGUE, compose
-from underskin.mechanisms.frf_design import frf_recordings
+from underskin.mechanisms.models.frf_design import frf_recordings
+from underskin.prediction.adopted_model import AdoptedModel, adopted
 from underskin.recordings.campaign import Campaign, FrfRecording
 
 D33 = 14.0

@@ -5,7 +5,7 @@ import pytest
 
 from tablegen import deep_layer
 from tablegen.block import Block, solve
-from underskin import half_space, linear_layer
+from underskin.physics import half_space, linear_layer
 
 A = 0.289
 RHO = np.array([0.0, 0.2, 0.6])

@@ -13,8 +13,8 @@ import pytest
 from tests.conftest import UNDERSKIN, Server, running
 from tests.pages.test_pages_security import BROWSING, token_of
 from tests.store.server import campaign
-from underskin.campaign_findings import in_words
 from underskin.recordings.campaign import parse
+from underskin.recordings.plausibility import in_words
 
 YEAR = "recording s0-1N: recorded_at is 3017-05-03T09:00:00Z, which is still to come: is the year a slip?"
 PLACE = "sensors s0 and s1 lie at one place, x 0 mm, y 0 mm: is it a slip?"

@@ -14,9 +14,9 @@ from tests.instrument_files import EXAMPLES
 from tests.simulated_campaign import Rig, simulate
 from tests.test_cli import FRF, SKIN, refused, run
 from underskin import load_table
-from underskin.inversion import invert
-from underskin.recordings import json_file
+from underskin.inversion.invert import invert
 from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording
+from underskin.recordings.readers import json_file
 from underskin.units import to_lab
 
 CURVE = "Compression (mm),Load (N)\n" + "".join(f"{0.1 * step:.1f},{0.4 * step:.2f}\n" for step in range(40))

@@ -12,8 +12,8 @@ import pytest
 from tests.simulated_campaign import Rig, simulate
 from tests.test_cli import refused, run
 from underskin import load_table
-from underskin.recordings import json_file
 from underskin.recordings.campaign import Campaign
+from underskin.recordings.readers import json_file
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,9 @@ import pytest
 
 import underskin
 from tests.conftest import UNDERSKIN, running
-from underskin import Client, Indenter, ServiceError, Skin, Unreachable, half_space
-from underskin.influence import load_influence
+from underskin import Client, Indenter, ServiceError, Skin, Unreachable
+from underskin.physics import half_space
+from underskin.surrogate.influence_table import load_influence
 from underskin.units import to_lab, to_si
 
 SKIN: dict[str, Any] = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16.0, "sensor_radius_mm": 1.5}

@@ -10,12 +10,12 @@ from numpy.polynomial import legendre
 from scipy.special import j0
 
 from tests.oracle import NEEDS_ORACLE
-from underskin import hertz, layer
-from underskin.contact import SphereContact, SphereOnLayer
-from underskin.contact_equation import ContactEquation, mode_transforms
 from underskin.errors import InvalidInput
-from underskin.hankel import normal_stress
-from underskin.layer import Layer
+from underskin.physics import elastic_layer, hertz
+from underskin.physics.contact_integral_equation import ContactEquation, mode_transforms
+from underskin.physics.elastic_layer import Layer
+from underskin.physics.hankel_transform import normal_stress
+from underskin.physics.sphere_contact import SphereContact, SphereOnLayer
 from underskin.units import Floats
 
 RADIUS, MODULUS, DEEP, THICKNESS = 4e-3, 1e6, 1e6, 2.5e-3  # m, Pa
@@ -152,7 +152,9 @@ def test_the_base_carries_the_whole_force() -> None:
 def test_a_small_contact_transmits_like_hertz() -> None:
     setup = SphereOnLayer(RADIUS, MODULUS, THICKNESS, Layer(0.4, 0.3))
     contact = setup.at_radius(0.02 * THICKNESS)
-    assert _sigma(contact, setup, 0.6, 0.5) == pytest.approx(float(layer.sigma(setup.layer, 0.02, 0.6, 0.5)), rel=1e-6)
+    assert _sigma(contact, setup, 0.6, 0.5) == pytest.approx(
+        float(elastic_layer.sigma(setup.layer, 0.02, 0.6, 0.5)), rel=1e-6
+    )
 
 
 def test_force_control_ends_at_pull_off() -> None:

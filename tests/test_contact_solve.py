@@ -13,7 +13,8 @@ from tablegen.contact_column import Sphere, press_spheres
 from tablegen.contact_mesh import contact_mesh
 from tablegen.discretisation import discretise
 from tests.oracle import NEEDS_ORACLE
-from underskin import SolverError, linear_layer
+from underskin import SolverError
+from underskin.physics import linear_layer
 
 RHO = np.array([0.0, 0.2, 0.6, 1.0, 3.0])
 

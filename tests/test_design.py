@@ -9,7 +9,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 import underskin
 from underskin import Indenter, Skin, load_table
-from underskin.design import Design, design, resolution
+from underskin.prediction.skin_design import Design, design, resolution
 
 PROTOTYPE = {
     "thickness_mm": 2.5,

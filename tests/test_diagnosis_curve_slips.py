@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from underskin.diagnosis.curve_slips import without_slips
-from underskin.diagnosis.diagnose import diagnosis_report
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.screening.curve_unit_errors import without_slips
 from underskin.recordings.campaign import Campaign, CompressionRecording, SkinDescription
-from underskin.surrogate import load_table
+from underskin.surrogate.sigma_table import load_table
 
 Change = Callable[[CompressionRecording], CompressionRecording]
 MODULUS_MPA = 0.5

@@ -9,9 +9,9 @@ import pytest
 
 from proof.real import recorded
 from tests.rig_pads import pressed
-from underskin.diagnosis.diagnose import diagnosis_report
+from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import parse
-from underskin.surrogate import load_table
+from underskin.surrogate.sigma_table import load_table
 
 
 def creeping_pad(seed: int) -> dict[str, Any]:

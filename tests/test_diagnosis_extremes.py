@@ -6,10 +6,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from underskin.diagnosis.diagnose import diagnosis_report
+from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import from_dict
-from underskin.surrogate import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 EDGE = settings(
     max_examples=150,

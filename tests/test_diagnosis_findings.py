@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tests.diagnosis_campaigns import Made, added, campaign
-from underskin.diagnosis.diagnose import diagnosis_report
-from underskin.diagnosis.findings import inspect
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.screening.inspection import inspect
 from underskin.recordings.campaign import Campaign, FrfRecording, from_dict, to_dict
-from underskin.surrogate import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Complexes, Floats
 
 MADE = Made(sensors=3, repeats=2, lines=20)

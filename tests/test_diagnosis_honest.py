@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.diagnosis_campaigns import Made, campaign
-from underskin.diagnosis.diagnose import diagnosis_report
-from underskin.diagnosis.extremes import without_extremes
-from underskin.diagnosis.findings import inspect
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.screening.inspection import inspect
+from underskin.diagnosis.screening.physical_limits import without_extremes
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.surrogate import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 THREE = Made(sensors=1, spheres_mm=(4.0,), preloads_n=(0.3, 2.0, 3.0), lines=40)
 

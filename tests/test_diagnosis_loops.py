@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.rig_pads import pressed
-from underskin.diagnosis.diagnose import diagnosis_report
-from underskin.diagnosis.jumps import jumps
+from underskin.diagnosis.data.snap_in import jumps
+from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import parse
-from underskin.surrogate import load_table
+from underskin.surrogate.sigma_table import load_table
 
 
 def loops(effects: dict[str, dict[str, float]], seed: int = 5, **curves: Any) -> dict[str, Any]:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.diagnosis_campaigns import Made, added, campaign
-from underskin.diagnosis.diagnose import diagnosis_report
+from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.surrogate import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Floats
 
 MADE = Made(sensors=3, preloads_n=(0.5, 1.2, 2.4), lines=60, line=0.005)

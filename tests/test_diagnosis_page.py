@@ -18,16 +18,16 @@ from typer.testing import CliRunner
 
 from tests.diagnosis_campaigns import Made, campaign
 from tests.mechanism_campaigns import indentation_campaign
-from underskin.cli import app
-from underskin.diagnosis.diagnose import diagnose
-from underskin.diagnosis.figures import figures
-from underskin.diagnosis.page import page
-from underskin.diagnosis.report import Diagnosis, report
-from underskin.diagnosis.wording import readable
+from underskin.cli.app import app
+from underskin.diagnosis.pipeline import diagnose
+from underskin.diagnosis.reporting.figures import figures
+from underskin.diagnosis.reporting.html_report import page
+from underskin.diagnosis.reporting.report import Diagnosis, report
+from underskin.diagnosis.reporting.wording import readable
 from underskin.mechanisms import compose
-from underskin.mechanisms.catalogue import CATALOGUE
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, to_dict
-from underskin.surrogate import load_table
+from underskin.surrogate.sigma_table import load_table
 
 HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(2)>&amp;<a href='https://example.org'>x</a>"
 RESONANT = Made(

@@ -10,16 +10,16 @@ import pytest
 
 from tests.diagnosis_campaigns import Made, campaign
 from tests.mechanism_campaigns import indentation_campaign
-from underskin.diagnosis.diagnose import diagnose
-from underskin.diagnosis.explanation import Explanation, Workbench
-from underskin.diagnosis.lines import lines
-from underskin.diagnosis.plan import DECIDED, plan
-from underskin.diagnosis.rig_limits import Limits
-from underskin.diagnosis.search import Answer, Search, search
-from underskin.digits import in_percent
+from underskin.diagnosis.data.dataset import lines
+from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.pipeline import diagnose
+from underskin.diagnosis.planning.optimal_design import DECIDED, plan
+from underskin.diagnosis.planning.rig_limits import Limits
+from underskin.diagnosis.selection.search import Answer, Search, search
+from underskin.formatting import in_percent
 from underskin.mechanisms import compose
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.surrogate import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 DRAWS = 400 if os.environ.get("UNDERSKIN_SOAK") == "1" else 40
 TWINS = Made(("moving_contact_edge",), (0.9,), sensors=3, repeats=2, thickness_mm=1.2)

@@ -13,11 +13,11 @@ from typer.testing import CliRunner
 
 from tests.diagnosis_campaigns import Made, campaign
 from tests.mechanism_campaigns import indentation_campaign
-from underskin.cli import app
-from underskin.diagnosis.diagnose import diagnosis_report
+from underskin.cli.app import app
+from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.mechanisms import CATALOGUE, compose
 from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, to_dict
-from underskin.surrogate import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 SHARED = os.environ.get("UNDERSKIN_CAMPAIGNS")
 SENSORS = Made(sensors=3, repeats=2)

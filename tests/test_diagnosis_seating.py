@@ -6,9 +6,9 @@ import pytest
 
 from rig.elastomer import campaign_of_curves, record_curves
 from rig.experiment import parse
-from underskin.diagnosis.diagnose import diagnosis_report
+from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import from_dict
-from underskin.surrogate import load_table
+from underskin.surrogate.sigma_table import load_table
 
 
 def pressed(seed: int, **effects: Any) -> Any:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from tests.series_campaigns import codes, forces, recorded
-from underskin.diagnosis.findings import inspect
+from underskin.diagnosis.screening.inspection import inspect
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.surrogate import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 
 @pytest.fixture(scope="module")

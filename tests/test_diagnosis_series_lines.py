@@ -9,13 +9,13 @@ import pytest
 from scipy.signal import lfilter
 
 from tests.series_campaigns import codes, recorded
-from underskin.diagnosis.diagnose import diagnosis_report
-from underskin.diagnosis.findings import inspect
-from underskin.diagnosis.series_lines import telling
-from underskin.mechanisms.frf_design import frf_recordings
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.screening.inspection import inspect
+from underskin.diagnosis.screening.select_lines import telling
+from underskin.mechanisms.models.frf_design import frf_recordings
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.frf_estimation import Frf, lines_of
-from underskin.surrogate import SigmaTable, load_table
+from underskin.recordings.frf.estimation import Frf, lines_of
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 
 @pytest.fixture(scope="module")

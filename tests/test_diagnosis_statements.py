@@ -7,24 +7,24 @@ import numpy as np
 import pytest
 
 from tests.diagnosis_campaigns import Made, campaign
-from underskin.diagnosis.aliases import fit_and_plausibility, without_occam
-from underskin.diagnosis.axes import WORDS
-from underskin.diagnosis.confounding import Confounding, left_open
-from underskin.diagnosis.diagnose import diagnose
-from underskin.diagnosis.doubts import doubts
-from underskin.diagnosis.effect import Effect, effect
-from underskin.diagnosis.evidence import laplace
-from underskin.diagnosis.explanation import Explanation, Workbench
-from underskin.diagnosis.fit import Fitter
-from underskin.diagnosis.lines import Lines, lines
-from underskin.diagnosis.locate import AxisResult
-from underskin.diagnosis.page import page
-from underskin.diagnosis.report import report
-from underskin.diagnosis.search import Answer
-from underskin.diagnosis.statements import answer_statement, location_statement, why_not
-from underskin.digits import in_percent
-from underskin.mechanisms.mechanism import Kind
-from underskin.surrogate import SigmaTable, load_table
+from underskin.diagnosis.data.axes import WORDS
+from underskin.diagnosis.data.dataset import Lines, lines
+from underskin.diagnosis.inference.evidence import laplace
+from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.optimizer import Fitter
+from underskin.diagnosis.localisation.effect_size import Effect, effect
+from underskin.diagnosis.localisation.permutation_test import AxisResult
+from underskin.diagnosis.pipeline import diagnose
+from underskin.diagnosis.reporting.fit_warnings import doubts
+from underskin.diagnosis.reporting.html_report import page
+from underskin.diagnosis.reporting.report import report
+from underskin.diagnosis.reporting.statements import answer_statement, location_statement, why_not
+from underskin.diagnosis.selection.occam_correction import fit_and_plausibility, without_occam
+from underskin.diagnosis.selection.search import Answer
+from underskin.diagnosis.validation.identifiability import Confounding, left_open
+from underskin.formatting import in_percent
+from underskin.mechanisms.base import Kind
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Floats
 
 GAIN = 0.02
@@ -142,7 +142,7 @@ def test_the_model_that_lacks_something_is_called_by_its_name(table: SigmaTable,
 
 
 def test_every_axis_has_words() -> None:
-    from underskin.diagnosis.figures import AXES as LABELS
+    from underskin.diagnosis.reporting.figures import AXES as LABELS
 
     assert set(LABELS) == set(WORDS)
     assert LABELS["preload_n"] == "preload [N]"

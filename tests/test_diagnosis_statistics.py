@@ -11,13 +11,13 @@ from scipy.stats import multivariate_normal, multivariate_t
 
 from tests.diagnosis_campaigns import Made, campaign
 from tests.nested_sampling import Posterior, nested
-from underskin.diagnosis.bell import log_box
-from underskin.diagnosis.evidence import Evidence, laplace
-from underskin.diagnosis.explanation import Explanation, Workbench
-from underskin.diagnosis.fit import Evaluated, Fitter
-from underskin.diagnosis.lines import Lines, lines
-from underskin.diagnosis.scatter import GAIN_PRIOR, POSITION_PRIOR
-from underskin.surrogate import SigmaTable, load_table
+from underskin.diagnosis.data.dataset import Lines, lines
+from underskin.diagnosis.inference.evidence import Evidence, laplace
+from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.laplace import log_box
+from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
+from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Floats
 
 SOAK = os.environ.get("UNDERSKIN_SOAK") == "1"

@@ -1,6 +1,5 @@
 """No false all-clear, no invented cause, nothing to quote where several answers are left; what was left out is said."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,13 +8,14 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.diagnosis_campaigns import Made, campaign
-from underskin.diagnosis.diagnose import diagnosis_report
-from underskin.diagnosis.page import page
-from underskin.diagnosis.search import NOTHING_MISSING
-from underskin.mechanisms.catalogue import CATALOGUE
+from underskin.diagnosis.data.names import NOTHING_MISSING
+from underskin.diagnosis.inference.laplace import levels_covariance
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.reporting.html_report import page
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings import read_file
 from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, SkinDescription
-from underskin.surrogate import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Floats
 
 EXAMPLE = Path(__file__).parent.parent / "service" / "pages" / "example" / "2024-11.json"
@@ -92,13 +92,43 @@ def test_the_example_is_explained_by_its_heavy_tip(table: SigmaTable) -> None:
     assert report["d33"]["quotable"]
 
 
-def test_every_interval_has_a_width(table: SigmaTable) -> None:
-    """Also that of a noise level at its bound, where the Hessian may be negative."""
-    made = Made(mechanisms=("mains_pickup",), parameters=(0.02, 6.0, 1.0), sensors=3, lines=60, highest_hz=200.0)
+def test_a_resonance_and_mains_are_both_named(table: SigmaTable) -> None:
+    """Where mains are there, the noise beside the resonance hides none of them."""
+    made = Made(
+        mechanisms=("contact_resonance", "mains_pickup"),
+        parameters=(6.0, 0.05, 0.02, 6.0, 1.0),
+        sensors=3,
+        lines=60,
+        highest_hz=300.0,
+        seed=5,
+    )
     report = diagnosis_report(campaign(made, table), table)
-    for mechanism in report["mechanisms"]:
-        for entry in mechanism["parameters"]:
-            assert entry["low"] < entry["high"]
+    assert report["verdict"] == "explained"
+    named = {entry["name"]: entry for entry in report["mechanisms"]}
+    assert set(named) == {"contact_resonance", "mains_pickup"}
+    assert named["mains_pickup"]["explains_percent"] > 0
+    assert all(entry["low"] < entry["high"] for one in named.values() for entry in one["parameters"])
+
+
+def test_the_interval_of_a_noise_level_has_a_width_where_its_hessian_is_negative() -> None:
+    """As at a bound: read from its inverse, the variance was negative and the interval without width."""
+    covariance = levels_covariance(np.array([[40.0, 3.0], [3.0, -2.0]]))
+    assert (np.diag(covariance) > 0).all()
+    sound = np.array([[40.0, 3.0], [3.0, 2.0]])
+    assert levels_covariance(sound) == pytest.approx(np.linalg.inv(sound))
+
+
+def test_recordings_of_noise_tell_nothing(table: SigmaTable) -> None:
+    """A noise floor of several hundred per cent is no agreement, and no sign of physics either."""
+    report = diagnosis_report(campaign(Made(line=1.5, lines=40), table), table)
+    assert report["verdict"] == "insufficient_data"
+    assert "stands out of its noise" in report["statement"]
+
+
+def test_scatter_far_beyond_its_noise_model_is_no_agreement(table: SigmaTable) -> None:
+    report = diagnosis_report(campaign(Made(gain=0.12, seed=2), table), table)
+    assert report["verdict"] != "no_mismatch"
+    assert report["d33"] is None
 
 
 def test_no_d33_is_given_where_several_answers_are_left(table: SigmaTable) -> None:
@@ -122,22 +152,47 @@ def test_a_d33_that_pvdf_cannot_have_is_called_so(table: SigmaTable) -> None:
     assert "Quote it as the d33" not in page(report)
 
 
-def test_a_dead_sensor_stands_beside_the_verdict(table: SigmaTable) -> None:
-    made = campaign(Made(sensors=3, lines=40), table)
-    random = np.random.default_rng(3)
+def without_response(made: Campaign, sensors: set[str], seed: int = 3) -> Campaign:
+    """With noise alone in the recordings of these sensors."""
+    random = np.random.default_rng(seed)
     entries = []
     for entry in made.recordings:
         assert isinstance(entry, FrfRecording)
         noise = 1e-3 * random.normal(size=(2, 40))
-        dead = entry.sensor == "s2"
+        dead = entry.sensor in sensors
         entries.append(replace(entry, frf_re_pc_per_n=noise[0], frf_im_pc_per_n=noise[1]) if dead else entry)
-    report = diagnosis_report(replace(made, recordings=tuple(entries)), table)
+    return replace(made, recordings=tuple(entries))
+
+
+def test_a_dead_sensor_stands_beside_the_verdict(table: SigmaTable) -> None:
+    report = diagnosis_report(without_response(campaign(Made(sensors=3, lines=40), table), {"s2"}), table)
     said = "None of the 8 recordings of sensor 's2' shows a response above its noise: left out."
     assert said in report["statement"]
     assert report["statement"].index(said) < 200
+    assert "nothing needs to be added for those that were used" in report["statement"]
     shown = page(report)
     assert shown.index("recordings of sensor &#x27;s2&#x27;") < shown.index("<h2>")
-    assert "response above its noise" not in json.dumps(report["location"])
+
+
+def test_each_dead_sensor_is_named(table: SigmaTable) -> None:
+    dead = {"s1", "s2", "s4", "s5"}
+    report = diagnosis_report(without_response(campaign(Made(sensors=7, lines=40), table), dead), table)
+    assert all(f"of sensor {name!r} shows" in report["statement"] for name in dead)
+
+
+def test_a_dead_sensor_is_one_though_chance_gives_a_recording_a_mean(table: SigmaTable) -> None:
+    """One in some hundred recordings of noise has a mean that stands out of it: its sensor is dead all the same."""
+    made = campaign(Made(sensors=3, lines=40), table)
+    noisy = without_response(made, {"s2"})
+    entries = list(noisy.recordings)
+    last = entries[-1]
+    assert isinstance(last, FrfRecording)
+    assert last.frf_re_pc_per_n is not None
+    entries[-1] = replace(last, frf_re_pc_per_n=last.frf_re_pc_per_n - 1e-3)
+    report = diagnosis_report(replace(noisy, recordings=tuple(entries)), table)
+    assert {entry["code"] for entry in report["findings"]} >= {"no_response"}
+    assert "None of the 8 recordings of sensor 's2' shows" in report["statement"]
+    assert not {"sign_flipped", "units_off_by_1000"} & {entry["code"] for entry in report["findings"]}
 
 
 def test_what_is_left_out_of_an_explained_campaign_stands_at_the_head_of_its_page(table: SigmaTable) -> None:

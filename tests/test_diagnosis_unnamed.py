@@ -10,13 +10,13 @@ from scipy.stats import multivariate_normal
 from rig.draw import drawn, record
 from rig.recorded import campaign as recorded
 from tests.diagnosis_campaigns import Made, campaign
-from underskin.diagnosis.diagnose import diagnosis_report
-from underskin.diagnosis.explanation import Workbench
-from underskin.diagnosis.line_process import frequency_bins
-from underskin.diagnosis.lines import lines
-from underskin.diagnosis.recording_process import GainResidual, Scatter
+from underskin.diagnosis.data.dataset import lines
+from underskin.diagnosis.inference.explanation import Workbench
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.selection.frequency_gp import frequency_bins
+from underskin.diagnosis.selection.recording_gp import GainResidual, Scatter
 from underskin.recordings.campaign import from_dict
-from underskin.surrogate import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from underskin.digits import significant
+from underskin.formatting import significant
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ import pytest
 from tests.conftest import running
 from tests.shown import is_as_shown
 from underskin import Client, load_table
-from underskin.inversion import invert
+from underskin.inversion.invert import invert
 from underskin.recordings import read_file
 from underskin.units import to_lab
 

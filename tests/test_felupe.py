@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests import felupe_layer
-from underskin import linear_layer
-from underskin.surrogate import load_table
+from underskin.physics import linear_layer
+from underskin.surrogate.sigma_table import load_table
 
 POINTS = [
     (0.1, 0.0, 0.01),

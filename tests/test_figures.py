@@ -15,7 +15,7 @@ from underskin.figures import (
     raw_traces,
     response_per_sensor,
 )
-from underskin.frf_summary import FrfLines
+from underskin.recordings.frf.summary import FrfLines
 
 SENSORS = ("s1", "s2", "s3")
 D33 = np.array([14.0, 15.0, 3.0])

@@ -9,8 +9,8 @@ import pytest
 
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording, parse
-from underskin.recordings.flat_zone import Condition, FlatZone, band_average, flat_zone, stacked
-from underskin.recordings.frf_estimation import Frf, lines_of
+from underskin.recordings.frf.estimation import Frf, lines_of
+from underskin.recordings.frf.flat_zone import Condition, FlatZone, band_average, flat_zone, stacked
 from underskin.units import Complexes, Floats
 
 LOG_GRID = np.geomspace(1, 1000, 60)

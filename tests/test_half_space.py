@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from underskin import half_space, hertz
+from underskin.physics import half_space, hertz
 
 RADII = np.array([0.0, 0.1, 0.5, 1.0, 3.0, 10.0])
 
@@ -48,7 +48,7 @@ def test_the_plane_at_depth_carries_the_whole_force() -> None:
 @given(a=st.floats(0, 5), rho=st.floats(0, 5), offset=st.floats(0, 5))
 def test_reciprocity_of_pressure_and_sensor_discs(a: float, rho: float, offset: float) -> None:
     """A uniform pressure disc of radius a over a sensor disc of radius ρ equals the two exchanged."""
-    from underskin.hankel import disc_average, normal_stress
+    from underskin.physics.hankel_transform import disc_average, normal_stress
 
     def transmission(k: np.ndarray) -> np.ndarray:
         return (1 + k) * np.exp(-k)

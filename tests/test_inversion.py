@@ -11,11 +11,11 @@ import pytest
 
 from tests.inverted_campaigns import covered, drawn, moved, scaled
 from tests.simulated_campaign import Rig, simulate
-from underskin import hertz
 from underskin.errors import InvalidInput
-from underskin.inversion import NoD33, invert
+from underskin.inversion.invert import NoD33, invert
+from underskin.physics import hertz
 from underskin.recordings.campaign import Campaign, FrfRecording, parse
-from underskin.surrogate import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 CAMPAIGNS = 3000 if os.environ.get("UNDERSKIN_SOAK") else 400
 

@@ -7,9 +7,9 @@ import pytest
 
 from tests.inverted_campaigns import covered, drawn, moved, scaled
 from tests.simulated_campaign import Rig, simulate
-from underskin.inversion import Inversion, invert
+from underskin.inversion.invert import Inversion, invert
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.surrogate import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 
 @pytest.fixture(scope="module")

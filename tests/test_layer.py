@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tests.oracle import NEEDS_ORACLE
-from underskin import layer, linear_layer
 from underskin.errors import InvalidInput
-from underskin.hankel import normal_stress, punch_transform
-from underskin.layer import Layer, slip
+from underskin.physics import elastic_layer, linear_layer
+from underskin.physics.elastic_layer import Layer, slip
+from underskin.physics.hankel_transform import normal_stress, punch_transform
 from underskin.units import Floats
 
 K = np.array([1e-6, 1e-3, 0.1, 0.2499, 0.2501, 1.0, 3.0, 10.0, 40.0])
@@ -44,13 +44,13 @@ def test_every_row_of_the_oracle(quantity: str, layers: int) -> None:
     assert len(oracle) == layers
     for body, (rho, a, offset, value) in oracle.items():
         if quantity == "sigma_hertz":
-            found = layer.sigma(body, a, rho, offset)
+            found = elastic_layer.sigma(body, a, rho, offset)
         elif quantity == "sigma_edge":
             found = _punch_sigma(body, a, rho)
         elif quantity == "gamma_n":
-            found = layer.gamma_n(body, offset, rho)
+            found = elastic_layer.gamma_n(body, offset, rho)
         else:
-            found = layer.gamma_t(body, offset, rho)
+            found = elastic_layer.gamma_t(body, offset, rho)
         assert found == pytest.approx(value, abs=2e-8), body
 
 
@@ -106,7 +106,7 @@ def test_derivatives(name: str) -> None:
 def test_the_base_carries_the_whole_force() -> None:
     """On a disc of thirty thicknesses; a nearly frictionless base spreads it further, over 1/√κ."""
     for body in (Layer(), Layer(0.3), Layer(0.0, 0.4), Layer(0.45, 1.0)):
-        assert 1.5 * 30.0**2 * layer.sigma(body, 1.0, 30.0) == pytest.approx(1.0, abs=1e-6)
+        assert 1.5 * 30.0**2 * elastic_layer.sigma(body, 1.0, 30.0) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_slip_of_a_glue_line() -> None:

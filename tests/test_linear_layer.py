@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.oracle import NEEDS_ORACLE, linear_layer_values
-from underskin import half_space, linear_layer
-from underskin.hankel import normal_stress, punch_transform
+from underskin.physics import half_space, linear_layer
+from underskin.physics.hankel_transform import normal_stress, punch_transform
 
 
 def test_reference_values() -> None:

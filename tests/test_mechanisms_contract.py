@@ -19,7 +19,7 @@ from tests.mechanism_campaigns import (
     table,
 )
 from underskin.mechanisms import CATALOGUE, Mechanism, Model, Parameter, compose
-from underskin.mechanisms.mechanism import UNITS, Kind
+from underskin.mechanisms.base import UNITS, Kind
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.units import Floats
 

@@ -12,7 +12,7 @@ from docs.mechanisms.signatures import SHOWN, panels
 from docs.mechanisms.silicones import LAWS, RESULTS, Sample, fit, main, yeoh
 from docs.mechanisms.text import document
 from underskin.mechanisms import CATALOGUE
-from underskin.surrogate import load_table
+from underskin.surrogate.sigma_table import load_table
 
 DOCS = Path(__file__).parents[1] / "docs"
 

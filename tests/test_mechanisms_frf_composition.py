@@ -5,7 +5,7 @@ import pytest
 
 from tests.mechanism_campaigns import SKIN, campaign, frf_recording, predicted
 from tests.mechanism_contacts import H, level
-from underskin import response
+from underskin.physics import charge_response
 
 INSIDE: dict[str, dict[str, float]] = {
     "layered_contact": {},
@@ -53,7 +53,7 @@ def test_what_makes_charge_of_stress_acts_sensor_by_sensor_then_on_the_recording
 
     def own_charge(sensor: str) -> float:
         recording = frf_recording(sensor=sensor, position_mm=place, preload_n=preload)
-        stress = 1e-6 * response.mean_stress(preload, level([], recording).real, H)
+        stress = 1e-6 * charge_response.mean_stress(preload, level([], recording).real, H)
         oscillating = level(["moving_contact_edge"], recording, SKIN, mobile_fraction=0.8).real
         return float(oscillating * (1 + 2.0 * stress / (1 + stress / 0.5)))
 

@@ -8,17 +8,17 @@ import pytest
 from tests.mechanism_campaigns import SKIN, campaign, frf_recording, predicted, table
 from tests.mechanism_contacts import RHO, E, H, level, linear_contact, oracle_rows
 from tests.oracle import NEEDS_ORACLE
-from underskin import hertz, response
-from underskin.hankel import hertz_transform, normal_stress
-from underskin.layer import Layer
-from underskin.offset import positioned_sigma
+from underskin.physics import charge_response, hertz
+from underskin.physics.elastic_layer import Layer
+from underskin.physics.hankel_transform import hertz_transform, normal_stress
+from underskin.surrogate.off_centre_sigma import positioned_sigma
 
 
 def test_the_base_model_is_the_table_at_hertz_radius() -> None:
     for preload, radius in ((0.5, 4.0), (2.0, 10.0)):
         a = hertz.contact_radius(preload, radius * 1e-3, E)
         load = hertz.load_parameter(preload, radius * 1e-3, E)
-        expected = response.frf(14e-12, table().sigma(a / H, RHO, load).sigma, RHO)
+        expected = charge_response.frf(14e-12, table().sigma(a / H, RHO, load).sigma, RHO)
         found = predicted([], campaign([frf_recording(preload_n=preload, indenter_radius_mm=radius)]), d33=14.0)
         assert found == pytest.approx(np.full(len(found), complex(expected)), rel=1e-5)
 

@@ -8,14 +8,14 @@ import pytest
 from tests.mechanism_campaigns import campaign, fit_of, frf_recording, predicted, table
 from tests.mechanism_contacts import E, H, level, linear_contact, sphere_on_layer
 from tests.oracle import NEEDS_ORACLE
-from underskin import response
 from underskin.mechanisms import compose
+from underskin.physics import charge_response
 
 
 def test_d33_changes_with_the_stress_on_the_sensor_and_saturates() -> None:
     recording = frf_recording(preload_n=2.0)
     base = level([], recording)
-    stress_mpa = 1e-6 * response.mean_stress(2.0, base.real, H)
+    stress_mpa = 1e-6 * charge_response.mean_stress(2.0, base.real, H)
     linear = level(["preload_dependent_d33"], recording, stress_coefficient=2.0, saturation_stress=1e12)
     assert (linear / base).real == pytest.approx(1 + 2.0 * stress_mpa, rel=1e-9)
     saturated = level(["preload_dependent_d33"], recording, stress_coefficient=2.0, saturation_stress=1e-6)

@@ -12,7 +12,7 @@ from docs.paper.__main__ import main
 from docs.paper.prototype import INDENTERS_MM, PRELOADS_N, press
 from docs.paper.service_run import D33_PC_PER_N, ArrayRun, run_array
 from docs.paper.text import array_section, load_section, numbers_section
-from underskin.surrogate import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 DOCS = Path(__file__).parents[1] / "docs"
 FIGURES = ("4", "6", "8", "10", "11")

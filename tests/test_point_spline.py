@@ -8,8 +8,8 @@ import pytest
 from scipy.interpolate import NdBSpline
 
 from underskin import load_table
-from underskin.point_spline import PointSpline
-from underskin.surrogate import interpolation_coefficients
+from underskin.surrogate.point_spline import PointSpline
+from underskin.surrogate.sigma_table import interpolation_coefficients
 
 TABLE = load_table()
 GENERATOR = np.random.default_rng(3)

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from underskin import Indenter, Skin, linear_layer, load_table, transmission
-from underskin.prediction import frf_gradient
+from underskin import Indenter, Skin, load_table, transmission
+from underskin.physics import linear_layer
+from underskin.prediction.pressed_skin import frf_gradient
 from underskin.units import Floats
 
 TABLE = load_table()

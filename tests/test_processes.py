@@ -14,7 +14,7 @@ import pytest
 
 from tests.diagnosis_campaigns import Made, campaign
 from underskin.recordings.campaign import to_dict
-from underskin.surrogate import load_table
+from underskin.surrogate.sigma_table import load_table
 
 SMALL = Made(("contact_resonance",), (6.0, 0.05), sensors=1, highest_hz=1000.0, lines=10, modulus_mpa=16.0)
 SLEEPING = """

@@ -25,9 +25,9 @@ from proof.text import document
 from rig.draw import CATALOGUED, UNKNOWN, drawn
 from rig.experiment import parse as parse_experiment
 from rig.strengths import of_frf
-from underskin.diagnosis.diagnose import diagnosis_report
+from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import FrfRecording, parse
-from underskin.surrogate import load_table
+from underskin.surrogate.sigma_table import load_table
 
 RECORDINGS = os.environ.get("UNDERSKIN_RECORDINGS")
 

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from underskin.errors import FileError, InvalidInput
-from underskin.recordings import json_file
 from underskin.recordings.campaign import from_dict, parse, to_dict
+from underskin.recordings.readers import json_file
 
 SKIN: dict[str, Any] = {
     "id": "palm-3",

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from tests.instrument_files import COMMON, rig
+from underskin.array_stress.pressure_map import parse as pressure_map
 from underskin.errors import FileError, InvalidInput
-from underskin.pressure_map_file import parse as pressure_map
 from underskin.recordings import Reading, read_contents, read_file
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.channels import Contents

@@ -8,7 +8,7 @@ import pytest
 
 from underskin.recordings import read_file, rig_description
 from underskin.recordings.campaign import CompressionRecording, FrfRecording
-from underskin.recordings.formats import MODULES
+from underskin.recordings.readers.formats import MODULES
 from underskin.recordings.rig_description import ChannelMapping, Property
 
 TEXT = (Path(__file__).parent.parent / "docs" / "formats.md").read_text()

@@ -23,9 +23,10 @@ from tests.instrument_files import (
 )
 from tests.test_recordings_campaign import EVERYTHING, FRF, document
 from underskin.errors import FileError, InvalidInput
-from underskin.recordings import json_file, read_contents, read_file
+from underskin.recordings import read_contents, read_file
 from underskin.recordings.campaign import parse, to_dict
 from underskin.recordings.channels import Contents
+from underskin.recordings.readers import json_file
 from underskin.recordings.rig_description import RigDescription
 
 MAY, JUNE = np.datetime64("2024-05-03T10:00:00"), np.datetime64("2024-06-03T10:00:00.500000")

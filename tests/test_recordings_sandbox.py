@@ -17,7 +17,7 @@ from tests.test_recordings_campaign import EVERYTHING, INDENTATION, document
 from underskin.errors import FileError
 from underskin.recordings import read_contents, read_file
 from underskin.recordings.channels import Contents
-from underskin.recordings.sandbox import Limits, call_apart, parse_apart
+from underskin.recordings.readers.sandbox import Limits, call_apart, parse_apart
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def matlab_73(fill: Callable[[Any], None]) -> bytes:
 
 
 def test_what_the_child_reads_arrives_unchanged(stream: BinaryIO) -> None:
-    from underskin.recordings import tdms_file
+    from underskin.recordings.readers import tdms_file
 
     here, apart = tdms_file.read(stream, "a"), parse_apart("TDMS", stream, "a")
     assert isinstance(apart, Contents)

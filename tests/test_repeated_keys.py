@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from tests.store.server import UNDERSKIN
 from underskin.errors import FileError
 from underskin.recordings import read_file, rig_description
-from underskin.repeated_keys import RepeatedKey, repeated_key
+from underskin.recordings.readers.repeated_keys import RepeatedKey, repeated_key
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "formats"
 CAMPAIGN = (EXAMPLES / "template.json").read_text()

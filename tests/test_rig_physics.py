@@ -20,7 +20,7 @@ from rig.pressed import Pressed
 from rig.recorded import make_bench
 from tests.oracle import NEEDS_ORACLE
 from tests.rig_experiments import PARAMETERS, described
-from underskin.offset import positioned_sigma
+from underskin.surrogate.off_centre_sigma import positioned_sigma
 
 RHO = 0.6
 

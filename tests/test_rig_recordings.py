@@ -21,7 +21,7 @@ from tests.rig_experiments import PARAMETERS, described
 from underskin.recordings import campaign as campaigns
 from underskin.recordings import read_file, rig_description
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.frf_estimation import Frf, broadband, estimate
+from underskin.recordings.frf.estimation import Frf, broadband, estimate
 
 EXAMPLES = Path(__file__).parent.parent / "examples" / "rig"
 SOAK = "UNDERSKIN_SOAK" in os.environ

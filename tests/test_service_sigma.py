@@ -14,7 +14,8 @@ from scipy.integrate import quad
 from scipy.special import j1
 
 from tests.oracle import NEEDS_ORACLE, linear_layer_values
-from underskin import half_space, load_table
+from underskin import load_table
+from underskin.physics import half_space
 from underskin.units import Floats
 
 TABLE = load_table()

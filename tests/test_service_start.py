@@ -16,7 +16,7 @@ from service.settings import Settings
 from tests.conftest import UNDERSKIN, running
 from tests.test_service_errors import SIGMA, problem_of
 from tests.test_service_limits import HEAD, connect, read_answer
-from underskin.surrogate import SIGMA_TABLE, tables_folder
+from underskin.surrogate.sigma_table import SIGMA_TABLE, tables_folder
 
 
 def refusal(folder: Path, *options: str, **environment: str) -> str:

@@ -13,14 +13,15 @@ import numpy as np
 import pytest
 
 from tests.stress_documents import COMMAND, PRESS, SKIN, Document, document, posted
-from underskin import Client, layer
-from underskin.contact import SphereOnLayer
-from underskin.half_space import stress as half_space_stress
-from underskin.hankel import normal_stress
-from underskin.influence import load_influence
-from underskin.layer import Layer
-from underskin.stress_answer import answer
-from underskin.stress_request import read_request
+from underskin import Client
+from underskin.array_stress.answer import answer
+from underskin.array_stress.request import read_request
+from underskin.physics import elastic_layer
+from underskin.physics.elastic_layer import Layer
+from underskin.physics.half_space import stress as half_space_stress
+from underskin.physics.hankel_transform import normal_stress
+from underskin.physics.sphere_contact import SphereOnLayer
+from underskin.surrogate.influence_table import load_influence
 from underskin.units import Floats
 
 TABLE = load_influence()
@@ -74,7 +75,7 @@ def tangential(exact: Layer, a: float, r: float) -> float:
     radius = a * np.sqrt(1 - t**2)
     x, y = r + np.outer(radius, np.cos(angle)), np.outer(radius, np.sin(angle))
     distance = np.hypot(x, y)
-    values = layer.gamma_t(exact, distance, 0.6) * x / distance
+    values = elastic_layer.gamma_t(exact, distance, 0.6) * x / distance
     return float((3 * t**2 * weight) @ values.sum(axis=1) * share)
 
 

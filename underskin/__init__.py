@@ -14,13 +14,14 @@ from underskin.errors import (
 )
 
 if TYPE_CHECKING:
-    from underskin.client import Client
-    from underskin.inversion import Inversion, invert
-    from underskin.prediction import Transmission, transmission
+    from underskin.client.service_client import Client
+    from underskin.inversion.invert import Inversion, invert
+    from underskin.physics.charge_response import Sigma
+    from underskin.physics.skin import Indenter, Skin
+    from underskin.prediction.pressed_skin import Transmission, transmission
     from underskin.recordings.campaign import Campaign
     from underskin.recordings.reading import Reading, read_file
-    from underskin.skin import Indenter, Skin
-    from underskin.surrogate import Sigma, SigmaTable, load_table
+    from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 __version__ = "0.1.0"
 
@@ -51,17 +52,17 @@ __all__ = [
 _MODULES = {
     "Campaign": "recordings.campaign",
     "Client": "client",
-    "Indenter": "skin",
-    "Inversion": "inversion",
+    "Indenter": "physics.skin",
+    "Inversion": "inversion.invert",
     "Reading": "recordings.reading",
-    "Sigma": "surrogate",
-    "SigmaTable": "surrogate",
-    "Skin": "skin",
-    "Transmission": "prediction",
-    "invert": "inversion",
-    "load_table": "surrogate",
+    "Sigma": "physics.charge_response",
+    "SigmaTable": "surrogate.sigma_table",
+    "Skin": "physics.skin",
+    "Transmission": "prediction.pressed_skin",
+    "invert": "inversion.invert",
+    "load_table": "surrogate.sigma_table",
     "read_file": "recordings.reading",
-    "transmission": "prediction",
+    "transmission": "prediction.pressed_skin",
 }
 
 if not TYPE_CHECKING:  # or a type checker would believe in every name

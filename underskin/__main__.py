@@ -1,5 +1,5 @@
 """`python -m underskin`, where the command is not on the path."""
 
-from underskin.cli import main
+from underskin.cli.app import main
 
 main()

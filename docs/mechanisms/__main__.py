@@ -4,7 +4,7 @@ from pathlib import Path
 
 from docs.mechanisms import figures
 from docs.mechanisms.text import document
-from underskin.surrogate import load_table
+from underskin.surrogate.sigma_table import load_table
 
 
 def main(docs: Path = Path(__file__).parents[1]) -> None:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from docs.mechanisms.signatures import panels
 from underskin.mechanisms import CATALOGUE
-from underskin.surrogate import SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable
 
 _STYLE = Path(__file__).parents[1] / "figures.mplstyle"
 _SMALL = {"font.size": 8, "legend.fontsize": "medium", "path.simplify_threshold": 0.5}

@@ -17,7 +17,7 @@ from underskin.recordings.campaign import (
     Sensor,
     SkinDescription,
 )
-from underskin.surrogate import SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
 SHOWN: dict[str, dict[str, float]] = {

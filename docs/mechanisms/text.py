@@ -9,7 +9,7 @@ from docs.mechanisms.signatures import SHOWN
 from docs.mechanisms.silicones import RESULTS
 from docs.paper.markdown import table
 from underskin.mechanisms import CATALOGUE, Mechanism, Normal, Parameter
-from underskin.mechanisms.nuisances import FRF_NUISANCES
+from underskin.mechanisms.models.nuisances import FRF_NUISANCES
 from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription
 
 _INTRODUCTION = """\

@@ -5,7 +5,7 @@ from pathlib import Path
 from docs.paper import block_question, figures
 from docs.paper.service_run import run_array
 from docs.paper.text import document
-from underskin.surrogate import load_table
+from underskin.surrogate.sigma_table import load_table
 
 
 def main(docs: Path = Path(__file__).parents[1]) -> None:

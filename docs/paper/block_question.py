@@ -6,7 +6,7 @@ import numpy as np
 
 from tablegen import deep_layer
 from tablegen.block import Block, solve
-from underskin import half_space
+from underskin.physics import half_space
 from underskin.units import Floats
 
 H_MM = 2.5

@@ -6,7 +6,7 @@ from docs.paper import block_question as block
 from docs.paper.block_question import Depth
 from docs.paper.markdown import ceiling, percent, table
 from docs.paper.prototype import INDENTERS_MM
-from underskin.surrogate import SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable
 
 _PAPER_PERCENT = {2.5: "about 40", 10.0: "10", 30.0: "1"}
 

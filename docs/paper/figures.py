@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from docs.paper.prototype import BEST_FIT_D33_PC_PER_N, INDENTERS_MM, PRELOADS_N, RHO, press
-from underskin import half_space, linear_layer, response
-from underskin.surrogate import SigmaTable
+from underskin.physics import charge_response, half_space, linear_layer
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
 _STYLE = Path(__file__).parents[1] / "figures.mplstyle"
@@ -114,7 +114,7 @@ def _frf_over_preload(figure: Figure, table: SigmaTable) -> None:
 
 
 def _frf_pc_per_n(sigma: Floats, d33_pc_per_n: float = BEST_FIT_D33_PC_PER_N) -> Floats:
-    return d33_pc_per_n * response.gain(sigma, RHO)
+    return d33_pc_per_n * charge_response.gain(sigma, RHO)
 
 
 def _ends() -> tuple[float, float]:

@@ -19,8 +19,8 @@ from docs.paper.prototype import (
     preload_at_peak_pressure,
     press,
 )
-from underskin import half_space, hertz, linear_layer, response
-from underskin.surrogate import SigmaTable
+from underskin.physics import charge_response, half_space, hertz, linear_layer
+from underskin.surrogate.sigma_table import SigmaTable
 
 _LINEAR_UP_TO_MPA = 2.0
 _LAST_FLAT_HZ = 130.0
@@ -106,7 +106,7 @@ def _hertz(small: Press) -> list[Number]:
 
 
 def _best_fit(small: Press, large: Press) -> Number:
-    plateaus = [BEST_FIT_D33_PC_PER_N * response.gain(pressed.table, RHO) for pressed in (small, large)]
+    plateaus = [BEST_FIT_D33_PC_PER_N * charge_response.gain(pressed.table, RHO) for pressed in (small, large)]
     by_half_space = BEST_FIT_D33_PC_PER_N * np.concatenate(
         [pressed.table / pressed.half_space for pressed in (small, large)]
     )
@@ -216,7 +216,7 @@ def _neo_hookean_stretch(stress_over_modulus: float) -> float:
 
 
 def _dynamic_force(small: Press) -> Number:
-    frf = BEST_FIT_D33_PC_PER_N * response.gain(small.table[1], RHO)
+    frf = BEST_FIT_D33_PC_PER_N * charge_response.gain(small.table[1], RHO)
     return Number(
         "dynamic force",
         "0.09 N",

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from underskin import half_space, hertz, linear_layer
-from underskin.prediction import transmission
-from underskin.skin import Indenter, Skin
-from underskin.surrogate import SigmaTable
+from underskin.physics import half_space, hertz, linear_layer
+from underskin.physics.skin import Indenter, Skin
+from underskin.prediction.pressed_skin import transmission
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_lab, to_si
 
 THICKNESS_MM = 2.5

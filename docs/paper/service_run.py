@@ -17,8 +17,8 @@ import numpy as np
 
 from docs.paper.prototype import MODULUS_MPA, RHO, SENSOR_RADIUS_MM, SKIN, THICKNESS_MM
 from tablegen.sigma import Nodes, solve_column
-from underskin import hertz, linear_layer, response
-from underskin.skin import Indenter
+from underskin.physics import charge_response, hertz, linear_layer
+from underskin.physics.skin import Indenter
 from underskin.units import Floats
 
 INDENTER_RADIUS_MM = 4.0
@@ -79,7 +79,7 @@ def fresh_frf_pc_per_n() -> Floats:
         load = float(hertz.load_parameter(preload, radius, SKIN.youngs_modulus))
         nodes = Nodes(np.array([a]), np.array([0.0, RHO]), np.array([0.0, np.cbrt(load)]), np.array([0.0, 1.0]))
         sigma = linear_layer.sigma(a, RHO) + solve_column(a, nodes, _ORDER).sigma_change[1, 1]
-        frf.append(float(d33 * response.gain(sigma, RHO)))
+        frf.append(float(d33 * charge_response.gain(sigma, RHO)))
     return np.array(frf)
 
 

@@ -8,7 +8,7 @@ from docs.paper.markdown import ceiling, percent, table
 from docs.paper.numbers import reported
 from docs.paper.prototype import INDENTERS_MM, PRELOADS_N, Press, press
 from docs.paper.service_run import D33_PC_PER_N, PRELOAD_N, SENSORS, ArrayRun
-from underskin.surrogate import SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable
 
 _INTRODUCTION = """\
 # The paper, recomputed

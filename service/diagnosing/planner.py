@@ -17,10 +17,10 @@ from service.problems import Refusal
 from service.store import diagnoses
 from service.store.engine import Database
 from service.store.tables import AnyRow
-from underskin.recordings import json_file
+from underskin.recordings.readers import json_file
 
 if TYPE_CHECKING:
-    from underskin.diagnosis.rig_limits import Limits
+    from underskin.diagnosis.planning.rig_limits import Limits
 
 _REMEMBERED = 50
 _MOST_WAITING = 8

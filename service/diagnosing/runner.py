@@ -18,7 +18,7 @@ from service.store.engine import Database, StorageFull
 from service.store.errors import StoreMoved
 from service.store.tables import AnyRow
 from underskin import __version__
-from underskin.recordings import json_file
+from underskin.recordings.readers import json_file
 
 logger = logging.getLogger("underskin")
 

@@ -64,13 +64,13 @@ def main() -> None:
 
 def _work(job: Job, campaign: bytes, say: Callable[[dict[str, Any]], None]) -> None:
     """The report, with what was left out of it among the findings; then the figures, without which it is kept too."""
-    from underskin.diagnosis.diagnose import diagnose
-    from underskin.diagnosis.figures import figures
-    from underskin.diagnosis.report import report
-    from underskin.diagnosis.rig_limits import Limits
+    from underskin.diagnosis.pipeline import diagnose
+    from underskin.diagnosis.planning.rig_limits import Limits
+    from underskin.diagnosis.reporting.figures import figures
+    from underskin.diagnosis.reporting.report import report
     from underskin.errors import TableError
     from underskin.recordings.campaign import parse
-    from underskin.surrogate import load_table
+    from underskin.surrogate.sigma_table import load_table
 
     table = load_table(Path(job.table))
     if table.sha256 != job.table_sha256:

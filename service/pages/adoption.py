@@ -14,7 +14,7 @@ from service.store.engine import Database
 from service.store.errors import Conflict
 from service.store.tables import AnyRow
 from underskin import InvalidInput
-from underskin.surrogate import SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ from service.pages.skin_values import start
 from service.store import campaigns, skins
 from service.store.engine import Database
 from underskin import InvalidInput, UnderskinError
-from underskin.recordings import text
-from underskin.stress_answer import StressAnswer, answer
-from underskin.stress_request import read_request
-from underskin.surrogate import SigmaTable
+from underskin.array_stress.answer import StressAnswer, answer
+from underskin.array_stress.request import read_request
+from underskin.recordings.readers import text
+from underskin.surrogate.sigma_table import SigmaTable
 
 _MOST_SENSORS = 10_000
 _BETWEEN = re.compile(r"[;\s]+|,(?:\s+|$)")  # numbers in a line: a comma without a space may be a decimal one

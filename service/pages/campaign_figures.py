@@ -86,8 +86,8 @@ def frf_columns(campaign: Campaign, show: str = "") -> dict[str, list[Any]]:
 def _frf(
     row: AnyRow, loaded: Callable[[], Campaign], answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str
 ) -> list[Drawn]:
-    from underskin import frf_summary
     from underskin.figures import frf_overview, frf_recordings
+    from underskin.recordings.frf import summary
 
     band = answer["band"]
     zone = None if band is None else (band["low_hz"], band["high_hz"])
@@ -97,7 +97,7 @@ def _frf(
         if not chosen:
             return []
         if len(chosen) <= MOST_SINGLE:
-            lines = [frf_summary.lines_of(_title(recording, show), frf) for recording, frf in chosen]
+            lines = [summary.lines_of(_title(recording, show), frf) for recording, frf in chosen]
             about = "Magnitude, phase and coherence of each recording."
             return [drawn("frf", frf_recordings(lines, zone), about, place)]
         found = spreads_of(chosen)

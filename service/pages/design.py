@@ -20,7 +20,7 @@ from service.pages.html import compress, page
 from service.pages.skin_values import PROTOTYPE, start
 from service.problems import from_validation
 from underskin import InvalidInput, UnderskinError
-from underskin.surrogate import SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/design")
 

@@ -68,7 +68,7 @@ def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Resp
         outdated=diagnoses.outdated(row),
         adopted_as=adopted_as,
         in_force=own is not None and own is of_skin[0] and own.model_withdrawn_at is None,
-        may_be_adopted=row.verdict == "explained" and report is not None and report["d33"] is not None,
+        may_be_adopted=report is not None and _not_adopted(report) is None,
         open=report is not None and left_open(report),
         limit_fields=FIELDS,
         not_adopted=None if report is None else _not_adopted(report),
@@ -81,7 +81,7 @@ def one_file(diagnosis_id: DiagnosisId, store: Store) -> Response:
     """The whole as one file that needs nothing else, to be kept or sent."""
     import plotly.io
 
-    from underskin.diagnosis import page as file
+    from underskin.diagnosis.reporting import html_report as file
 
     row, report, texts = _done(store, diagnosis_id)
     try:
@@ -129,10 +129,14 @@ def adopt(request: Request, diagnosis_id: DiagnosisId, sent: Form, store: Store)
 
 def _not_adopted(report: Mapping[str, Any]) -> str | None:
     """Why a report cannot become a model, and what to do; None where it can."""
-    from underskin.adopted import NOT_ADOPTED
+    from underskin.prediction.adopted_model import NOT_ADOPTED
+    from underskin.prediction.plausibility import implausible
 
     if report["verdict"] == "explained":
-        return None if report["d33"] is not None else "it is of curves, which have no d33: a model of a skin is of FRFs"
+        if report["d33"] is None:
+            return "it is of curves, which have no d33: a model of a skin is of FRFs"
+        reason = implausible(report["d33"]["value"])
+        return None if reason is None else f"its d33 is {report['d33']['value']:.4g} pC/N, {reason}"
     return NOT_ADOPTED[report["verdict"]].removeprefix("must be explained: ")
 
 
@@ -148,7 +152,7 @@ def _done(store: Database, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any], d
 
 def _shown(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> tuple[Markup, Markup]:
     """The report, worded as the file has it, with the figures of a page; and with what it was made."""
-    from underskin.diagnosis import page as file
+    from underskin.diagnosis.reporting import html_report as file
 
     try:
         figures = _drawn(row, report, texts)
@@ -160,7 +164,7 @@ def _shown(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> 
 
 
 def _drawn(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> dict[str, Drawn]:
-    from underskin.diagnosis.page import of_report
+    from underskin.diagnosis.reporting.html_report import of_report
 
     def numbers(name: str) -> str:
         return f"/diagnoses/{row.id}/{name}.csv"

@@ -41,10 +41,10 @@ def drawn(name: str, figure: "go.Figure", about: str, numbers: str | None = None
 @cache
 def prepare() -> None:
     """Load what draws and what it needs, before somebody asks for the first figure: it takes half a second."""
-    import underskin.campaign_figures
+    import underskin.figures.campaign_figures
     from underskin.figures import frf_overview
 
-    assert underskin.campaign_figures
+    assert underskin.figures.campaign_figures
     frf_overview([], None).to_json()
     gzipped(LIBRARY)
 

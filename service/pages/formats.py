@@ -8,7 +8,7 @@ from typing import Any
 import orjson
 from markupsafe import Markup, escape
 
-from underskin.digits import in_percent, significant
+from underskin.formatting import in_percent, significant
 
 _UNSAFE = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026", 0x2028: "\\u2028", 0x2029: "\\u2029"}
 

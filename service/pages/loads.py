@@ -11,7 +11,7 @@ from service.pages.array import Described, answered, charge_columns, described, 
 from service.pages.figures import csv_answer, drawn
 from service.pages.html import page
 from underskin import InvalidInput, UnderskinError
-from underskin.stress_answer import StressAnswer
+from underskin.array_stress.answer import StressAnswer
 
 router = APIRouter(prefix="/loads")
 

@@ -21,7 +21,7 @@ from service.pages.skin_values import start
 from service.problems import from_validation
 from service.store.engine import Database
 from underskin import InvalidInput, UnderskinError
-from underskin.surrogate import SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/d33")
 

@@ -13,10 +13,10 @@ from service.problems import Refusal
 from service.store.engine import Database
 from service.store.errors import Conflict
 from underskin import InvalidInput, UnderskinError
-from underskin.surrogate import SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable
 
 if TYPE_CHECKING:
-    from underskin.adopted import AdoptedModel
+    from underskin.prediction.adopted_model import AdoptedModel
 
 # Words and unit of what a model may need beside sphere and preload.
 _NEEDED = {

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from service.answers import Columns
-from underskin.surrogate import SigmaTable
-from underskin.unusable_row import Pressed, beyond
+from underskin.prediction.domain_checks import Pressed, beyond
+from underskin.surrogate.sigma_table import SigmaTable
 
 
 def reasons(document: Mapping[str, Any], found: Columns, table: SigmaTable) -> list[str]:

@@ -22,7 +22,7 @@ from service.store.tables import AnyRow
 from underskin import InvalidInput, UnderskinError
 
 if TYPE_CHECKING:
-    from underskin.diagnosis.rig_limits import Limits
+    from underskin.diagnosis.planning.rig_limits import Limits
 
 router = APIRouter(prefix="/diagnoses/{diagnosis_id}/plan")
 
@@ -130,14 +130,14 @@ def _limits(given: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _checked(told: Mapping[str, Any]) -> "Limits":
-    from underskin.diagnosis.rig_limits import Limits
+    from underskin.diagnosis.planning.rig_limits import Limits
 
     return Limits(**told)
 
 
 def _worded(planned: Mapping[str, Any]) -> Markup:
     """A plan as the report words it."""
-    from underskin.diagnosis.page import plan_of
+    from underskin.diagnosis.reporting.html_report import plan_of
 
     return Markup(plan_of(planned))  # noqa: S704 -- every text in it is escaped where it is made
 

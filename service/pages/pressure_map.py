@@ -20,9 +20,10 @@ from service.pages.forms import TOKEN, require_own
 from service.pages.html import page
 from service.store.engine import Database
 from service.uploads import Upload, received
-from underskin import InvalidInput, UnderskinError, pressure_map_file
-from underskin.recordings import text
-from underskin.stress_answer import StressAnswer
+from underskin import InvalidInput, UnderskinError
+from underskin.array_stress import pressure_map
+from underskin.array_stress.answer import StressAnswer
+from underskin.recordings.readers import text
 
 router = APIRouter(prefix="/loads/map")
 
@@ -64,7 +65,7 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
     try:
         if len(content) > _LARGEST_BYTES:
             raise InvalidInput("pressure_map", name, f"must have at most {_LARGEST_BYTES / 1e6:g} MB: make it coarser")
-        pressure = pressure_map_file.parse(content, name)
+        pressure = pressure_map.parse(content, name)
         document = {**described.document(), "pressure_map": pressure}
         found = array.answered(request, document)
     except UnderskinError as refused:

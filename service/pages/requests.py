@@ -61,8 +61,8 @@ def planned(request: Request, campaign_id: str, options: Sequence[str], limits: 
     fetch = f"{_curl(request, f'/v1/campaigns/{campaign_id}/document')} -o {file}"
     python = (
         "from pathlib import Path\n\n"
-        "from underskin.diagnosis.diagnose import diagnose\n"
-        "from underskin.diagnosis.rig_limits import Limits\n"
+        "from underskin.diagnosis.pipeline import diagnose\n"
+        "from underskin.diagnosis.planning.rig_limits import Limits\n"
         "from underskin.recordings import read_file\n"
         "from underskin.surrogate import load_table\n\n"
         f"campaign = read_file(Path({file!r}), {file!r}).campaign\n"

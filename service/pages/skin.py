@@ -22,7 +22,7 @@ from service.skin_models import History, SensorHistory
 from service.store import campaigns, inversions, models, overview, skins
 from service.store.engine import Database
 from service.store.tables import AnyRow
-from underskin.surrogate import SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/skins/{skin_id}")
 

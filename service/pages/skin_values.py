@@ -7,7 +7,7 @@ import numpy as np
 
 from service.store import campaigns, overview, skins
 from service.store.engine import Database
-from underskin.surrogate import SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable
 
 PROTOTYPE = {
     "thickness_mm": 2.5,

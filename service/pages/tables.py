@@ -13,9 +13,9 @@ from service.pages import requests
 from service.pages.html import page
 from service.pages.skin_values import PROTOTYPE
 from service.tables import TableAxis, TableEntry, Tables, tables
-from underskin.contact_table import CONTACT_TABLE
-from underskin.influence import INFLUENCE_TABLE
-from underskin.surrogate import SIGMA_TABLE
+from underskin.surrogate.contact_table import CONTACT_TABLE
+from underskin.surrogate.influence_table import INFLUENCE_TABLE
+from underskin.surrogate.sigma_table import SIGMA_TABLE
 
 router = APIRouter(prefix="/tables")
 

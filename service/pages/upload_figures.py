@@ -66,14 +66,14 @@ def _traces(look: Look, place: str) -> list[Drawn]:
 
 
 def _frf(campaigns: list[Campaign], place: str) -> list[Drawn]:
-    from underskin import frf_summary
     from underskin.figures import frf_recordings
+    from underskin.recordings.frf import summary
 
     found = [entry for campaign in campaigns for entry in measured(campaign)]
     if not found:
         return []
     lines = [
-        frf_summary.lines_of(f"{one.id}: {one.sensor}, {one.indenter_radius_mm:g} mm, {one.preload_n:g} N", frf)
+        summary.lines_of(f"{one.id}: {one.sensor}, {one.indenter_radius_mm:g} mm, {one.preload_n:g} N", frf)
         for one, frf in found[:_MOST_FRF]
     ]
     some = f" of the first {_MOST_FRF} of {len(found)} recordings" if len(found) > _MOST_FRF else " of each recording"

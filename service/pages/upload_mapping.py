@@ -8,8 +8,8 @@ from typing import Any
 from service.pages.form_words import FOR_REQUESTS
 from service.pages.upload_seen import ChannelSeen
 from underskin import InvalidInput
+from underskin.recordings.readers.unit_labels import lab_field, unit
 from underskin.recordings.rig_description import SCHEMA, channel_fields
-from underskin.recordings.unit_labels import lab_field, unit
 
 KINDS = {
     "frf": "FRF: charge against a shaken force",

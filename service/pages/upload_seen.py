@@ -151,7 +151,7 @@ def _recording(recording: Recording) -> RecordingSeen:
 
 
 def _level(recording: FrfRecording) -> float | None:
-    from underskin.recordings.frf_estimation import lines_of
+    from underskin.recordings.frf.estimation import lines_of
 
     try:
         values = lines_of(recording).values

@@ -8,7 +8,7 @@ from sqlalchemy import Connection
 
 from service.store import diagnoses
 from service.store.tables import AnyRow
-from underskin.digits import in_percent
+from underskin.formatting import in_percent
 
 _SURE = 0.8  # least probability that is stated without its rivals, as a report does
 _WORTH_NAMING = 0.02  # probability of a rival, as in a report

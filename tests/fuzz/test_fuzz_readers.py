@@ -19,9 +19,9 @@ from hypothesis import strategies as st
 
 from tests import instrument_files as examples
 from tests.test_recordings_campaign import EVERYTHING
-from underskin.recordings import json_file
 from underskin.recordings.campaign import parse
-from underskin.recordings.formats import MODULES
+from underskin.recordings.readers import json_file
+from underskin.recordings.readers.formats import MODULES
 
 COUNT = 100_000 if os.environ.get("UNDERSKIN_SOAK") == "1" else 500
 # Read by libraries in C, which damage can make crash, loop or ask for all memory: what the process apart is for.

@@ -16,9 +16,10 @@ from typing import BinaryIO
 
 from tests.instrument_files import rig
 from underskin.errors import FileError, InvalidInput
-from underskin.recordings import formats, rig_mapping
+from underskin.recordings import rig_mapping
 from underskin.recordings.campaign import from_dict
 from underskin.recordings.channels import Contents
+from underskin.recordings.readers import formats
 
 SECONDS = 10
 _MEMORY_BYTES = 1 << 30
@@ -28,7 +29,7 @@ _RIG = rig()
 
 def main() -> None:
     kind = sys.argv[1]
-    importlib.import_module(f"underskin.recordings.{formats.MODULES[kind]}")
+    importlib.import_module(f"underskin.recordings.readers.{formats.MODULES[kind]}")
     own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (own + _MEMORY_BYTES, own + _MEMORY_BYTES))
     while length := sys.stdin.buffer.read(8):

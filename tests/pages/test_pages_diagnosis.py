@@ -16,9 +16,9 @@ from tests.pages.test_pages_security import BROWSING, HOSTILE, token_of
 from tests.store.diagnosed import asked, resonant, sent, table
 from tests.store.server import Server
 from underskin import __version__
-from underskin.diagnosis.diagnose import diagnose
-from underskin.diagnosis.figures import figures
-from underskin.diagnosis.report import report
+from underskin.diagnosis.pipeline import diagnose
+from underskin.diagnosis.reporting.figures import figures
+from underskin.diagnosis.reporting.report import report
 from underskin.recordings.campaign import parse
 
 LINES = 30

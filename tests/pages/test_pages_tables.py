@@ -5,7 +5,7 @@ import numpy as np
 
 from tests.pages.conftest import Visit
 from tests.store.server import Server
-from underskin.surrogate import SIGMA_TABLE, tables_folder
+from underskin.surrogate.sigma_table import SIGMA_TABLE, tables_folder
 
 
 def test_each_table_tells_its_range_its_errors_and_how_it_was_made(visitor: Visit, server: Server) -> None:

@@ -12,10 +12,10 @@ import orjson
 from service.store import database, diagnoses
 from tests.store.server import Server
 from underskin import __version__
-from underskin.diagnosis.diagnose import diagnosis_report
+from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.mechanisms import compose
 from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription, parse, to_dict
-from underskin.surrogate import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 D33 = 14.0
 TIP_MASS_G = 4.0

@@ -12,7 +12,7 @@ import pytest
 from tests.store.diagnosed import D33, SKIN, diagnosed, report, resonant, sent
 from tests.store.server import Server, campaign
 from underskin import Client, ServiceError
-from underskin.client_answers import Adopted
+from underskin.client.answers import Adopted
 from underskin.recordings.campaign import FrfRecording, parse
 
 PRESSED: dict[str, Any] = {

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from tests.store.diagnosed import report, resonant, sent
 from tests.store.server import Place, running
-from underskin.cli import app
+from underskin.cli.app import app
 
 
 def test_reports_of_kept_campaigns_are_those_of_the_service(tmp_path: Path) -> None:

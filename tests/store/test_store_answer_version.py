@@ -15,7 +15,7 @@ from service.store.codec import compressed, decompressed
 from service.store.tables import inversions, sensor_d33
 from tests.store.server import Place, Server, campaign, running
 from underskin import load_table
-from underskin.inversion import invert
+from underskin.inversion.invert import invert
 from underskin.recordings.campaign import parse
 
 # Of each version: the digest of the answer's fields, and the array's d33 with its uncertainty [pC/N].

@@ -14,8 +14,8 @@ from service import documents
 from service.store import Database, campaigns, open_store
 from service.store.tables import AnyRow
 from tests.store.server import Place, Server, campaign
-from underskin.recordings import hdf5_file
 from underskin.recordings.campaign import parse, to_dict
+from underskin.recordings.readers import hdf5_file
 
 RECORDINGS, SAMPLES = 60, 50_000
 ONE = SAMPLES * 8 * 2  # bytes of a recording's two arrays

@@ -11,8 +11,8 @@ import orjson
 import pytest
 
 from tests.store.server import Place, Server, campaign, running
-from underskin.recordings import hdf5_file
 from underskin.recordings.campaign import parse
+from underskin.recordings.readers import hdf5_file
 
 RIG = """\
 schema: rig/1

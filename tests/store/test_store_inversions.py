@@ -12,7 +12,8 @@ from service.store import Database, backup, campaigns, inversions, open_store
 from service.store.restore import restore
 from service.store.tables import AnyRow
 from tests.store.server import Place, Server, campaign
-from underskin import inversion, load_table
+from underskin import load_table
+from underskin.inversion import invert
 from underskin.recordings.campaign import parse
 
 TABLE = "0" * 64
@@ -57,7 +58,7 @@ def test_figures_that_cannot_be_computed_are_an_answer_and_tried_again(
 
     row, table = kept(store, "odd"), load_table()
     with monkeypatch.context() as broken:
-        broken.setattr(inversion, "invert", fail)
+        broken.setattr(invert, "invert", fail)
         for band in (None, (10.0, 100.0)):
             told = D33(**inverting.answer(store, table, row, band))
             assert (told.status, str(error) in str(told.reason), told.sensors) == ("none", True, [])

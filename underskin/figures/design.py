@@ -6,8 +6,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from underskin.design import Design
 from underskin.figures.style import COLOURS, DASHES, styled
+from underskin.prediction.skin_design import Design
 from underskin.units import to_lab
 
 _TITLES = {"a_over_h": "a/h", "rt_over_h": "rT/h", "load_parameter": "L = F/(R²E)"}

@@ -9,7 +9,7 @@ from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
 
 from underskin.figures.style import COLOURS, DASHES, ZONE, label, styled
-from underskin.frf_summary import FrfLines, FrfSpread
+from underskin.recordings.frf.summary import FrfLines, FrfSpread
 from underskin.units import Floats
 
 Trace = dict[str, Any]

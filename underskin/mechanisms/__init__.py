@@ -4,9 +4,9 @@ model = compose(["moving_contact_edge", "contact_resonance"], campaign, table)
 prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
 """
 
-from underskin.mechanisms.catalogue import CATALOGUE
-from underskin.mechanisms.mechanism import Mechanism, Normal, Parameter, Uniform, Unsupported
-from underskin.mechanisms.model import Model, Prediction, compose
+from underskin.mechanisms.base import Mechanism, Normal, Parameter, Uniform, Unsupported
+from underskin.mechanisms.models.composed import Model, Prediction, compose
+from underskin.mechanisms.registry import CATALOGUE
 
 __all__ = [
     "CATALOGUE",

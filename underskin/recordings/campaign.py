@@ -11,8 +11,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from underskin.errors import InvalidInput
-from underskin.recordings import fields as field
-from underskin.recordings.fields import named, shown
+from underskin.recordings import validation as field
+from underskin.recordings.validation import named, shown
 
 SCHEMA = "campaign/1"
 

@@ -9,7 +9,7 @@ from pathlib import PurePath
 from typing import Any
 
 from underskin.errors import InvalidInput
-from underskin.recordings import fields as field
+from underskin.recordings import validation as field
 from underskin.recordings.campaign import Campaign, Recording, SkinDescription
 from underskin.recordings.reading import Reading
 from underskin.recordings.repeats import digest

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from underskin.errors import FileError
-from underskin.recordings import formats, rig_mapping
+from underskin.recordings import rig_mapping
 from underskin.recordings.campaign import Campaign, RecordingProblem, from_dict
 from underskin.recordings.channels import Contents
+from underskin.recordings.readers import formats
+from underskin.recordings.readers.sandbox import parse_apart
 from underskin.recordings.rig_description import RigDescription
-from underskin.recordings.sandbox import parse_apart
 
 _LARGEST_TEXT = 8_000_000  # larger tables are parsed under the limits of binary files
 

@@ -20,10 +20,10 @@ from typing import Annotated, Any
 import yaml
 
 from underskin.errors import FileError, InvalidInput
-from underskin.recordings import fields as field
-from underskin.recordings import json_file, text
+from underskin.recordings import validation as field
 from underskin.recordings.campaign import COLUMNS, KINDS, SkinDescription
-from underskin.recordings.fields import mapping, named, shown
+from underskin.recordings.readers import json_file, text
+from underskin.recordings.validation import mapping, named, shown
 
 SCHEMA = "rig/1"
 LARGEST_BYTES = 1_000_000

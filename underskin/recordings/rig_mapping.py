@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from underskin.errors import FileError
-from underskin.recordings import text
 from underskin.recordings.campaign import SCHEMA
 from underskin.recordings.channels import Block, Channel, Contents, Values
-from underskin.recordings.fields import LONGEST_NAME, shown
+from underskin.recordings.readers import text
+from underskin.recordings.readers.unit_labels import field_unit, labelled_unit, unit
 from underskin.recordings.rig_description import BLOCK_NAME, COMPLEX_FRF, ChannelMapping, Property, RigDescription
-from underskin.recordings.unit_labels import field_unit, labelled_unit, unit
+from underskin.recordings.validation import LONGEST_NAME, shown
 from underskin.units import LAB, Floats
 
 _TEXTS = ("id", "sensor", "recorded_at")

@@ -19,10 +19,10 @@ import numpy as np
 import orjson
 
 from underskin.errors import FileError
-from underskin.recordings.hdf5_damage import damage
-from underskin.recordings.hdf5_file import MAGIC
-from underskin.recordings.hdf5_links import refuse_outside
-from underskin.recordings.sandbox import Limits, call_apart
+from underskin.recordings.readers.hdf5_damage import damage
+from underskin.recordings.readers.hdf5_file import MAGIC
+from underskin.recordings.readers.hdf5_links import refuse_outside
+from underskin.recordings.readers.sandbox import Limits, call_apart
 from underskin.units import Floats
 
 SCHEMA = "skin-export/1"

@@ -1,0 +1,1 @@
+"""Several loads, or a map of pressure, on an array of sensors."""

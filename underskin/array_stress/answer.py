@@ -1,0 +1,142 @@
+"""Charge and mean stress on every sensor of an array: the answer of `POST /v1/stress` and `underskin stress`."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.array_stress.load_integration import (
+    Load,
+    array_stress,
+    charge,
+    contact_load,
+    map_points,
+    pressure_map_loads,
+    together,
+)
+from underskin.array_stress.request import StressRequest
+from underskin.array_stress.validation import findings, refuse_beside_skin, refuse_coarse, refuse_many, refuse_overlap
+from underskin.errors import InvalidInput
+from underskin.physics.contact_pressure import MOST_A_OVER_H, SpherePressure, sphere_pressures
+from underskin.physics.elastic_layer import Layer, slip
+from underskin.surrogate.influence_table import Influence, InfluenceTable
+from underskin.units import Finding, Floats, checked, to_lab, to_si
+
+
+@dataclass(frozen=True)
+class StressAnswer:
+    """One entry a sensor; NaN where no load is within the table's reach, or numbers overflow (not `inside`).
+
+    `contact_radius_mm`: one entry a contact; empty for a map.
+    """
+
+    columns: Mapping[str, Floats]
+    sensors: tuple[str, ...]
+    inside: NDArray[np.bool_]
+    reach_mm: float
+    contact_radius_mm: Floats
+    findings: list[Finding]
+
+
+def answer(table: InfluenceTable, request: StressRequest) -> StressAnswer:
+    """Charge and mean stress on every sensor.
+
+    InvalidInput for a skin outside the table, for loads beside the skin, over one another or too wide, and for too much
+    at once.
+    """
+    thickness, radius, d33 = (
+        float(checked(name, getattr(request, name), units_checked=True))
+        for name in ("thickness_mm", "sensor_radius_mm", "d33_pc_per_n")
+    )
+    influence = _influence(table, request, radius / thickness)
+    sensors = to_si("x_mm", [[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
+    pressures = _pressures(request, thickness)
+    loads = [_contacts_load(request, pressures, thickness)] if request.contacts else _map_loads(request, thickness)
+    found = array_stress(influence, thickness, sensors, loads)
+    inside = found.inside & np.isfinite(found.stress)
+    stress, error = (np.where(inside, values, np.nan) for values in (found.stress, found.error))
+    columns = {
+        "x_mm": to_lab("x_mm", sensors[:, 0]),
+        "y_mm": to_lab("y_mm", sensors[:, 1]),
+        "charge_pc": to_lab("charge_pc", charge(stress, d33, radius)),
+        "charge_error_pc": to_lab("charge_error_pc", np.abs(charge(error, d33, radius))),
+        "mean_stress_mpa": to_lab("mean_stress_mpa", 0.0 - stress),
+    }
+    return StressAnswer(
+        columns=columns,
+        sensors=tuple(sensor.id for sensor in request.sensors),
+        inside=inside,
+        reach_mm=float(to_lab("x_mm", influence.reach * thickness)),
+        contact_radius_mm=to_lab("x_mm", [pressure.radius for pressure in pressures]),
+        findings=findings(request),
+    )
+
+
+def _influence(table: InfluenceTable, request: StressRequest, rt_over_h: float) -> Influence:
+    """The skin's influence; InvalidInput where the table has none."""
+    low, high = table.domain["poisson_ratio"]
+    if not low <= request.poisson_ratio <= high:
+        allowed = f"must be {low:g} to {high:g}: the table of influences holds no other"
+        raise InvalidInput("poisson_ratio", request.poisson_ratio, allowed)
+    low, high = table.domain["rt_over_h"]
+    glue = np.inf if request.glue_stiffness is None else request.glue_stiffness
+    influence = table.at(rt_over_h, request.poisson_ratio, slip(glue))
+    if influence is None:
+        allowed = f"must be {low:g} to {high:g} times thickness_mm ({request.thickness_mm:g}): the table's range"
+        raise InvalidInput("sensor_radius_mm", request.sensor_radius_mm, allowed)
+    return influence
+
+
+def _pressures(request: StressRequest, thickness: float) -> list[SpherePressure]:
+    """Pressures of the contacts; InvalidInput for those too wide for a linear layer."""
+    if not request.contacts:
+        return []
+    glue = np.inf if request.glue_stiffness is None else request.glue_stiffness
+    modulus = float(to_si("youngs_modulus_mpa", request.youngs_modulus_mpa or np.nan))
+    radii = to_si("indenter_radius_mm", [contact.indenter_radius_mm for contact in request.contacts])
+    forces = to_si("normal_force_n", [contact.normal_force_n for contact in request.contacts])
+    layer = Layer(request.poisson_ratio, slip(glue))
+    found = []
+    for index, pressure in enumerate(sphere_pressures(layer, thickness, modulus, radii, forces)):
+        if pressure is None or pressure.radius >= radii[index]:
+            allowed = (
+                f"must press less: the contact must be smaller than its sphere and {MOST_A_OVER_H:g} thicknesses; "
+                "is the modulus in MPa?"
+            )
+            raise InvalidInput(f"contacts[{index}].normal_force_n", request.contacts[index].normal_force_n, allowed)
+        found.append(pressure)
+    return found
+
+
+def _contacts_load(request: StressRequest, pressures: list[SpherePressure], thickness: float) -> Load:
+    places = to_si("x_mm", [[contact.x_mm, contact.y_mm] for contact in request.contacts])
+    radii = np.array([pressure.radius for pressure in pressures])
+    refuse_beside_skin(request, places, radii[:, None], "contacts[{}]".format)
+    refuse_overlap(places, radii)
+    load = together(
+        [
+            contact_load(place, (*contact.tangential_force_n, contact.normal_force_n), pressure, thickness)
+            for place, contact, pressure in zip(places, request.contacts, pressures, strict=True)
+        ]
+    )
+    refuse_many(request, len(load.places))
+    return load
+
+
+def _map_loads(request: StressRequest, thickness: float) -> Iterable[Load]:
+    found = request.pressure_map
+    assert found is not None
+    x, y = to_si("x_mm", found.x_mm), to_si("x_mm", found.y_mm)
+    pressure = to_si("pressure_mpa", found.pressure_mpa)
+    refuse_coarse(x, y, thickness)
+    row, column = np.nonzero(pressure)
+    half = np.array([x[1] - x[0], y[1] - y[0]]) / 2
+    refuse_beside_skin(
+        request,
+        np.stack([x[column], y[row]], axis=-1),
+        half,
+        lambda cell: f"pressure_map.pressure_mpa[{row[cell]}][{column[cell]}]",
+    )
+    refuse_many(request, map_points(x, y, pressure, thickness))
+    return pressure_map_loads(x, y, pressure, thickness)

@@ -1,0 +1,138 @@
+"""What `POST /v1/stress` and `underskin stress` are asked, as the lab writes it.
+
+The skin's fields are named as in a campaign; x runs along its length, y along its width.
+"""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+
+from underskin.array_stress import pressure_map
+from underskin.errors import InvalidInput
+from underskin.recordings import validation as field
+from underskin.recordings.campaign import Sensors
+from underskin.recordings.readers import json_file
+from underskin.recordings.validation import shown
+from underskin.units import Floats
+
+MOST_CONTACTS = 1000
+_EVEN = 1e-6  # of a cell, how evenly the map's places must be spaced
+_MOST_NAMED = 5  # cells of a map that are refused
+
+
+@dataclass(frozen=True)
+class LabContact:
+    """A sphere pressed and dragged: forces on the skin along x and y, and into it."""
+
+    x_mm: field.Number
+    y_mm: field.Number
+    indenter_radius_mm: field.Declared
+    normal_force_n: field.Declared
+    tangential_force_n: field.Position = (0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PressureMap:
+    """Pressure into the skin, a row for each y and a column for each x, constant around each place."""
+
+    x_mm: field.Increasing
+    y_mm: field.Increasing
+    pressure_mpa: field.Rows
+
+
+def _contacts(name: str, value: Any, units_checked: bool) -> tuple[LabContact, ...]:
+    if not isinstance(value, list | tuple) or not 0 < len(value) <= MOST_CONTACTS:
+        raise InvalidInput(name, shown(value), f"must be a list of 1 to {MOST_CONTACTS} contacts")
+    return tuple(field.build(LabContact, f"{name}[{i}]", entry, units_checked) for i, entry in enumerate(value))
+
+
+def _pressure_map(name: str, value: Any, units_checked: bool) -> PressureMap:
+    found = field.build(PressureMap, name, value, units_checked)
+    for axis, places in (("x_mm", found.x_mm), ("y_mm", found.y_mm)):
+        steps = np.diff(places)
+        if places.size < 2 or np.ptp(steps) > _EVEN * steps[0]:
+            raise InvalidInput(f"{name}.{axis}", shown(places.tolist()), "must be two or more evenly spaced places")
+    shape = (found.y_mm.size, found.x_mm.size)
+    if found.pressure_mpa.shape != shape:
+        rows, columns = found.pressure_mpa.shape
+        allowed = f"must have a row for each y_mm ({shape[0]}) and a column for each x_mm ({shape[1]})"
+        raise InvalidInput(f"{name}.pressure_mpa", f"{rows} rows, {columns} columns", allowed)
+    _refuse_pull(f"{name}.pressure_mpa", found.pressure_mpa)
+    return found
+
+
+def _refuse_pull(name: str, pressure: Floats) -> None:
+    """Refuse negative cells, and name the first ones."""
+    cells = np.argwhere(pressure < 0)
+    if cells.size:
+        first, *others = [f"[{row}][{column}]" for row, column in cells[:_MOST_NAMED]]
+        more = f" and {len(cells) - _MOST_NAMED} more" if len(cells) > _MOST_NAMED else ""
+        also = f"; so are {', '.join(others)}{more}" if others else ""
+        allowed = f"must be at least 0: a pressure does not pull{also}"
+        raise InvalidInput(name + first, float(pressure[tuple(cells[0])]), allowed)
+
+
+@dataclass(frozen=True, eq=False)
+class StressRequest:
+    """A skin, its sensors, and either `contacts` or a `pressure_map`.
+
+    `glue_stiffness` κ [-]: shear stress at the base over (G/h) times the slip there; left out: bonded.
+    """
+
+    thickness_mm: field.Declared
+    sensor_radius_mm: field.Declared
+    d33_pc_per_n: field.Declared
+    sensors: Sensors
+    youngs_modulus_mpa: field.Declared | None = None
+    poisson_ratio: field.PoissonRatio = 0.5
+    glue_stiffness: field.NotNegative | None = None
+    width_mm: field.Declared | None = None
+    length_mm: field.Declared | None = None
+    contacts: Annotated[tuple[LabContact, ...], _contacts] = ()
+    pressure_map: Annotated[PressureMap | None, _pressure_map] = None
+
+
+def read_file(path: str, map_path: str | None = None) -> StressRequest:
+    """The request in a JSON file (`-`: standard input), with the pressure map of a CSV file.
+
+    Raises InvalidInput, or FileError that names line and column of what is not JSON.
+    """
+    try:
+        content = sys.stdin.buffer.read() if path == "-" else Path(path).read_bytes()
+    except OSError as error:
+        raise InvalidInput("file", path, f"must be a readable JSON file ({error.strerror})") from error
+    document = json_file.document(content, path)
+    if map_path is not None:
+        if field.mapping("body", document).get("pressure_map") is not None:
+            raise InvalidInput("pressure_map", map_path, f"is in {path} already; give it once")
+        document = {**document, "pressure_map": _map_in_file(map_path)}
+    return read_request(document)
+
+
+def _map_in_file(path: str) -> dict[str, Any]:
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise InvalidInput("pressure_map", path, f"must be a readable CSV file ({error.strerror})") from error
+    return pressure_map.parse(content, path)
+
+
+def read_request(document: Any) -> StressRequest:
+    """The request that a JSON document makes; raises InvalidInput at the first field that cannot be used."""
+    given = dict(field.mapping("body", document))
+    units_checked = field.flag("units_checked", given.pop("units_checked", False), False)
+    values, refused = field.check_fields(StressRequest, given, units_checked=units_checked)
+    if refused:
+        raise refused[0]
+    request = StressRequest(**values)
+    if not request.sensors:
+        raise InvalidInput("sensors", shown(request.sensors), "must hold at least one sensor")
+    if bool(request.contacts) == (request.pressure_map is not None):
+        allowed = "must be given, or pressure_map, but not both"
+        raise InvalidInput("contacts", shown(request.contacts) if request.contacts else None, allowed)
+    if request.contacts and request.youngs_modulus_mpa is None:
+        raise InvalidInput("youngs_modulus_mpa", None, "is required with contacts, whose radii depend on it")
+    return request

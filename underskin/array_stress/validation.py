@@ -1,0 +1,159 @@
+"""What is refused of the loads on an array, and what is answered all the same but looks wrong.
+
+Where the skin's length and width are given, it is taken to be centred on the middle of the sensors' extent.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from underskin.array_stress.request import LabContact, PressureMap, StressRequest
+from underskin.errors import InvalidInput
+from underskin.physics import hertz
+from underskin.units import Finding, Floats, to_lab, to_si
+from underskin.units import findings as unusual
+
+MOST_PAIRS = 50_000_000  # of a sensor and a point force: about ten seconds
+_WIDEST_CELL = 12.0  # thicknesses; no sensor is influenced from further away
+_NARROW = 0.1  # sensor radii; a finger, or a sphere, is wider
+_LINEAR = 0.01  # of L; there finite strain adds up to 1.3 % beneath a sphere
+_ROUNDING = 1e-9
+
+
+def refuse_many(request: StressRequest, points: int) -> None:
+    """Refuse what would take minutes."""
+    if len(request.sensors) * points > MOST_PAIRS:
+        allowed = f"sensors times points of the load must be at most {MOST_PAIRS}: send fewer, or coarser, at a time"
+        raise InvalidInput("sensors", f"{len(request.sensors)} sensors, {points} points", allowed)
+
+
+def refuse_coarse(x: Floats, y: Floats, thickness: float) -> None:
+    """Refuse maps whose cells are wider than the skin's influence reaches: [m]."""
+    widest = _WIDEST_CELL * thickness
+    for name, places in (("x_mm", x), ("y_mm", y)):
+        step = places[1] - places[0]
+        if step > widest:
+            allowed = (
+                f"must be in steps of at most {to_lab('x_mm', widest):g} mm, {_WIDEST_CELL:g} thicknesses: is it in mm?"
+            )
+            raise InvalidInput(f"pressure_map.{name}", f"steps of {to_lab('x_mm', step):g} mm", allowed)
+
+
+def refuse_beside_skin(request: StressRequest, places: Floats, half: Floats, name: Callable[[int], str]) -> None:
+    """Refuse loads at `places` (loads, 2) [m] that reach by `half` (…, 2) [m] over the skin's edge, where it is known.
+
+    The sensors' centres must lie on it too. `name` tells a load's field.
+    """
+    sensors = np.array([[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
+    lowest, highest = sensors.min(axis=0), sensors.max(axis=0)
+    outermost = np.abs(places - to_si("x_mm", (lowest + highest) / 2)) + half
+    for axis, (extent, size) in enumerate((("length_mm", request.length_mm), ("width_mm", request.width_mm))):
+        if size is None:
+            continue
+        span, middle = highest[axis] - lowest[axis], (highest[axis] + lowest[axis]) / 2
+        if span > size:
+            raise InvalidInput(extent, size, f"must be at least {span:g}: so far apart are the sensors")
+        over = to_lab("x_mm", outermost[:, axis]) > size / 2 * (1 + _ROUNDING)
+        if over.any():
+            first = int(np.argmax(over))
+            place, reach = (
+                float(to_lab("x_mm", np.broadcast_to(v, places.shape)[first, axis])) for v in (places, half)
+            )
+            allowed = (
+                f"must lie on the skin, {'xy'[axis]} from {middle - size / 2:g} to {middle + size / 2:g} mm "
+                f"({extent} {size:g}, about the middle of the sensors)"
+            )
+            value = f"{'xy'[axis]} from {place - reach:.4g} to {place + reach:.4g} mm"
+            raise InvalidInput(name(first), value, allowed)
+
+
+def refuse_overlap(places: Floats, radii: Floats) -> None:
+    """Refuse contacts (contacts, 2) [m] of radii (contacts,) [m] over one another."""
+    distance = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
+    apart = radii[:, None] + radii
+    first, second = np.nonzero(np.triu(distance < apart, 1))
+    if first.size:
+        i, j = int(first[0]), int(second[0])
+        gap, least = to_lab("x_mm", distance[i, j]), to_lab("x_mm", apart[i, j])
+        allowed = f"must not overlap contacts[{i}]: the centres are {gap:.4g} mm apart, the radii add to {least:.4g} mm"
+        x, y = to_lab("x_mm", places[j])
+        raise InvalidInput(f"contacts[{j}]", f"at x {x:g}, y {y:g} mm", allowed)
+
+
+def findings(request: StressRequest) -> list[Finding]:
+    """What the answer is right for, but hardly the skin."""
+    if request.pressure_map is not None:
+        return [
+            *_about_sensors(request),
+            *_about_places(request.pressure_map, request.sensor_radius_mm),
+            *_about_map(request.pressure_map, request.youngs_modulus_mpa),
+        ]
+    modulus = request.youngs_modulus_mpa or np.nan
+    strained = [(_load_parameter(contact, modulus), i) for i, contact in enumerate(request.contacts)]
+    slipping = [(_shear(contact) / contact.normal_force_n, i) for i, contact in enumerate(request.contacts)]
+    return [
+        *_about_sensors(request),
+        *_worst(
+            ((load, i) for load, i in strained if load > _LINEAR),
+            "L = F/(R²E) is {:.2g}: the layer is linear here, and finite strain is left out; "
+            "it adds up to 1.3 % at L = 0.01 and 3 % at L = 0.1 to the stress on a sensor beneath a sphere",
+        ),
+        *_worst(
+            ((ratio, i) for ratio, i in slipping if ratio > 1),
+            "the tangential force is {:.3g} times the normal one: it slips unless friction is stronger",
+        ),
+    ]
+
+
+def _about_sensors(request: StressRequest) -> Iterator[Finding]:
+    places = np.array([[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
+    if len(places) < 2:
+        return
+    distances, nearest = (np.asarray(found) for found in cKDTree(places).query(places, k=2))  # each finds itself too
+    distance = distances[:, 1]
+    first = int(np.argmin(distance))
+    other = next(int(i) for i in nearest[first] if i != first)
+    if distance[first] < 2 * request.sensor_radius_mm * (1 - _ROUNDING):
+        pair = f"{request.sensors[first].id} and {request.sensors[other].id}"
+        statement = f"{pair} lie over one another, their centres {distance[first]:g} mm apart: are x and y in mm?"
+        yield Finding(f"sensors[{first}]", None, statement)
+
+
+def _worst(found: Iterable[tuple[float, int]], statement: str) -> Iterator[Finding]:
+    """One finding for all contacts alike, about the worst of them."""
+    several = sorted(found, reverse=True)
+    if several:
+        value, index = several[0]
+        others = f" ({len(several) - 1} more contacts like it)" if len(several) > 1 else ""
+        yield Finding(f"contacts[{index}]", None, statement.format(value) + others)
+
+
+def _about_places(given: PressureMap, sensor_radius_mm: float) -> Iterator[Finding]:
+    for name, places in (("x_mm", given.x_mm), ("y_mm", given.y_mm)):
+        span = float(np.ptp(places))
+        if span < _NARROW * sensor_radius_mm:
+            statement = f"the map spans {span:g} mm, on sensors {2 * sensor_radius_mm:g} mm across: is it in mm?"
+            yield Finding(f"pressure_map.{name}", None, statement)
+
+
+def _about_map(given: PressureMap, modulus: float | None) -> Iterator[Finding]:
+    row, column = np.unravel_index(int(np.argmax(given.pressure_mpa)), given.pressure_mpa.shape)
+    highest = float(given.pressure_mpa[row, column])
+    place = f"pressure_map.pressure_mpa[{row}][{column}]"
+    if highest == 0:
+        return
+    if modulus is not None and highest > modulus:
+        statement = f"{highest:g} MPa is more than the layer's modulus, {modulus:g} MPa: it is far from linear there"
+        yield Finding(place, None, statement)
+    for finding in unusual("pressure_mpa", highest):
+        yield Finding(place, None, finding.statement)
+
+
+def _load_parameter(contact: LabContact, modulus: float) -> float:
+    force, radius = contact.normal_force_n, float(to_si("indenter_radius_mm", contact.indenter_radius_mm))
+    return float(hertz.load_parameter(force, radius, to_si("youngs_modulus_mpa", modulus)))
+
+
+def _shear(contact: LabContact) -> float:
+    return float(np.hypot(*contact.tangential_force_n))

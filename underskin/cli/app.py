@@ -1,0 +1,276 @@
+"""The command `underskin`: sigma, frf, d33 and stress from the shipped tables, and the commands of the other packages.
+
+The other packages (the server, the table generator) hand in theirs through the entry-point group
+`underskin.commands`. Nothing heavy is imported before a command needs it, so that `underskin --help` answers at once.
+"""
+
+import ast
+import importlib.util
+import math
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from enum import StrEnum
+from importlib.metadata import EntryPoint, entry_points
+from io import TextIOWrapper
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from underskin.cli import diagnose, invert_files, store, stress
+from underskin.errors import UnderskinError
+
+if TYPE_CHECKING:
+    from underskin.prediction.answers import Answer
+    from underskin.surrogate.sigma_table import SigmaTable
+    from underskin.units import Floats
+
+COMMAND_GROUP = "underskin.commands"
+_NOT_IN_IMAGE = ("prove",)
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode="markdown",  # or [mm] is taken for a style
+    help="Stress, FRF and d33 of piezoelectric electronic skin.",
+)
+
+
+class Model(StrEnum):
+    """Which body carries the stress to the sensor."""
+
+    LAYER = "layer"
+    HALF_SPACE = "half_space"
+
+
+def _column(meaning: str) -> object:
+    return typer.Option(help=meaning, metavar="NUMBER,...", show_default=False)
+
+
+_Given = list[str] | None
+ThicknessMm = Annotated[_Given, _column("Thickness h of the layer over the sensors [mm].")]
+YoungsModulusMpa = Annotated[_Given, _column("Young's modulus E of the layer [MPa].")]
+SensorRadiusMm = Annotated[_Given, _column("Radius rT of a sensor [mm].")]
+PoissonRatio = Annotated[_Given, _column("Poisson's ratio of the layer, 0.5 if left out; others are out_of_domain.")]
+IndenterRadiusMm = Annotated[_Given, _column("Radius R of the sphere [mm].")]
+PreloadN = Annotated[_Given, _column("Static force F [N].")]
+Input = Annotated[
+    str | None,
+    typer.Option("--input", metavar="FILE", help="CSV file with columns named as the options (_ for -); - is stdin."),
+]
+Csv = Annotated[bool, typer.Option("--csv", help="Write CSV (inputs, results, status) instead of a table.")]
+UnitsChecked = Annotated[
+    bool, typer.Option("--units-checked", help="Accept magnitudes that look like a slip of units.")
+]
+
+
+@app.command(no_args_is_help=True)
+def sigma(
+    a_over_h: Annotated[_Given, _column("Contact radius over thickness.")] = None,
+    rt_over_h: Annotated[_Given, _column("Sensor radius over thickness; 0 is a point sensor.")] = None,
+    load_parameter: Annotated[_Given, _column("L = F/(R² E), 0 if left out: the linear layer.")] = None,
+    model: Annotated[Model, typer.Option(help="The layer on a rigid base, or the half space.")] = Model.LAYER,
+    input_file: Input = None,
+    csv: Csv = False,
+) -> None:
+    """The stress transmission σ, from dimensionless numbers."""
+
+    given = {"a_over_h": a_over_h, "rt_over_h": rt_over_h, "load_parameter": load_parameter}
+    from underskin.prediction import answers
+
+    _answer(
+        given,
+        {"load_parameter": 0.0},
+        input_file,
+        csv,
+        lambda table, columns: answers.sigma(table, columns, model.value),
+    )
+
+
+@app.command(no_args_is_help=True)
+def frf(
+    thickness_mm: ThicknessMm = None,
+    youngs_modulus_mpa: YoungsModulusMpa = None,
+    sensor_radius_mm: SensorRadiusMm = None,
+    indenter_radius_mm: IndenterRadiusMm = None,
+    preload_n: PreloadN = None,
+    d33_pc_per_n: Annotated[_Given, _column("Piezoelectric coefficient d33 of the sensor [pC/N].")] = None,
+    poisson_ratio: PoissonRatio = None,
+    units_checked: UnitsChecked = False,
+    input_file: Input = None,
+    csv: Csv = False,
+) -> None:
+    """The FRF, charge over force, that a skin should show under a sphere."""
+
+    given = {
+        "thickness_mm": thickness_mm,
+        "youngs_modulus_mpa": youngs_modulus_mpa,
+        "sensor_radius_mm": sensor_radius_mm,
+        "poisson_ratio": poisson_ratio,
+        "indenter_radius_mm": indenter_radius_mm,
+        "preload_n": preload_n,
+        "d33_pc_per_n": d33_pc_per_n,
+    }
+    from underskin.prediction import answers
+
+    _answer(
+        given,
+        {"poisson_ratio": 0.5},
+        input_file,
+        csv,
+        lambda table, columns: answers.frf(table, columns, units_checked),
+    )
+
+
+@app.command(no_args_is_help=True)
+def d33(
+    thickness_mm: ThicknessMm = None,
+    youngs_modulus_mpa: YoungsModulusMpa = None,
+    sensor_radius_mm: SensorRadiusMm = None,
+    indenter_radius_mm: IndenterRadiusMm = None,
+    preload_n: PreloadN = None,
+    frf_pc_per_n: Annotated[_Given, _column("Measured FRF on the plateau, real part [pC/N].")] = None,
+    frf_uncertainty_pc_per_n: Annotated[
+        _Given, _column("Standard uncertainty of the measured FRF [pC/N]; without it d33 has none.")
+    ] = None,
+    poisson_ratio: PoissonRatio = None,
+    units_checked: UnitsChecked = False,
+    input_file: Input = None,
+    csv: Csv = False,
+    files: invert_files.Files = None,
+    rig: invert_files.Rig = None,
+    band: invert_files.Band = None,
+    figures: invert_files.Figures = None,
+    together: invert_files.Together = None,
+) -> None:
+    """The d33 of a sensor from its measured FRF, or of an array from files of its recordings.
+
+    Files also tell the elastomer's modulus, where it was recorded on the same bench (compression, indentation).
+    """
+    given = {
+        "thickness_mm": thickness_mm,
+        "youngs_modulus_mpa": youngs_modulus_mpa,
+        "sensor_radius_mm": sensor_radius_mm,
+        "poisson_ratio": poisson_ratio,
+        "indenter_radius_mm": indenter_radius_mm,
+        "preload_n": preload_n,
+        "frf_pc_per_n": frf_pc_per_n,
+        "frf_uncertainty_pc_per_n": frf_uncertainty_pc_per_n,
+    }
+    if files:
+        for_columns = [f"--{name.replace('_', '-')}" for name, values in given.items() if values]
+        for_columns += [name for name, used in (("--input", input_file), ("--units-checked", units_checked)) if used]
+        invert_files.refuse(for_columns, "is for columns; files say it themselves")
+        invert_files.invert_files(files, rig, band, figures, together, csv)
+        return
+    only_files = (("--rig", rig), ("--band", band), ("--figures", figures), ("--together", together))
+    for_files = [name for name, used in only_files if used is not None]
+    invert_files.refuse(for_files, "goes with FILE, and none is given")
+
+    defaults = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": math.nan}
+    from underskin.prediction import answers
+
+    _answer(given, defaults, input_file, csv, lambda table, columns: answers.d33(table, columns, units_checked))
+
+
+def _answer(
+    given: Mapping[str, _Given],
+    defaults: Mapping[str, float],
+    input_file: str | None,
+    as_csv: bool,
+    compute: "Callable[[SigmaTable, Mapping[str, Floats]], Answer]",
+) -> None:
+    """Gather the columns, compute, and write inputs and results."""
+    from underskin.cli import columns
+    from underskin.surrogate.sigma_table import load_table
+
+    gathered = columns.gather(given, defaults, input_file)
+    count = columns.rows(gathered)
+    table = load_table()
+    answer = compute(table, gathered)
+    everything = {**gathered, **answer.columns}
+    columns.say(answer.findings)
+    if as_csv:
+        columns.write_csv(everything, answer.inside, count)
+    else:
+        columns.write_table(everything, answer.inside, count)
+        if not answer.inside.all():
+            typer.echo(f"The domain is {answer.domain}.")
+
+
+app.command("stress", no_args_is_help=True)(stress.stress)
+app.command("import", no_args_is_help=True)(store.import_files)
+app.command("export", no_args_is_help=True)(store.export_skin)
+diagnose.add_commands(app)
+
+
+def _add_commands_of_other_packages() -> None:
+    """Each becomes a command that loads the real one when called and hands over all its arguments."""
+    raw = {
+        "ignore_unknown_options": True,
+        "allow_extra_args": True,
+        "allow_interspersed_args": False,
+        "help_option_names": [],
+    }
+    for entry in sorted(entry_points(group=COMMAND_GROUP), key=lambda entry: entry.name):
+        app.command(entry.name, help=_summary(entry), context_settings=raw)(_forward(entry))
+
+
+def _forward(entry: EntryPoint) -> Callable[[typer.Context], None]:
+    def command(context: typer.Context) -> None:
+        try:
+            loaded = entry.load()
+        except ImportError as error:
+            raise UnderskinError(f"this command {_elsewhere(entry)} ({error})") from error
+        if not isinstance(loaded, typer.Typer):
+            function, loaded = loaded, typer.Typer(add_completion=False)
+            loaded.command(entry.name)(function)
+        raise typer.Exit(_run(loaded, context.args, context.command_path))
+
+    return command
+
+
+def _elsewhere(entry: EntryPoint) -> str:
+    return "runs from a checkout" + ("" if entry.name in _NOT_IN_IMAGE else " or the image")
+
+
+def _summary(entry: EntryPoint) -> str:
+    """First line of a command's help, read from its source, since to import a server takes a second."""
+    try:
+        specification = importlib.util.find_spec(entry.module)
+    except ModuleNotFoundError:
+        specification = None
+    if specification is None or specification.origin is None:
+        return f"({_elsewhere(entry)})"
+    for node in ast.parse(Path(specification.origin).read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef) and node.name == entry.attr:
+            return (ast.get_docstring(node) or "").partition("\n")[0]
+        if (
+            isinstance(node, ast.Assign)
+            and isinstance(node.value, ast.Call)
+            and ast.unparse(node.targets[0]) == entry.attr
+        ):
+            return next((ast.literal_eval(word.value) for word in node.value.keywords if word.arg == "help"), "")
+    return ""
+
+
+def _run(command: typer.Typer, arguments: Sequence[str], name: str) -> int:
+    """Exit status; what goes wrong in the usage is raised."""
+    return typer.main.get_command(command).main(list(arguments), prog_name=name, standalone_mode=False) or 0
+
+
+def main() -> None:
+    """Run the command line; an error is one line on stderr and exit status 2."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal may know no σ
+    _add_commands_of_other_packages()
+    try:
+        sys.exit(_run(app, sys.argv[1:], "underskin"))
+    except (typer.TyperException, UnderskinError) as error:
+        message = error.format_message() if isinstance(error, typer.TyperException) else str(error)
+        if message:  # empty where the help was shown instead
+            typer.echo(f"underskin: {message}", err=True)
+        sys.exit(2)
+    except typer.Abort:
+        sys.exit(130)

@@ -1,0 +1,271 @@
+"""The commands `diagnose` and `plan`: what recordings and model disagree about, and which recordings would settle it.
+
+`diagnose` writes one report (`report/1`) a campaign, named like its input; it uses all cores, or a Dask cluster, one
+campaign a process, so that the reports do not depend on how many there are.
+"""
+
+import json
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from underskin.cli.store import LOCAL, Key, Url, connect
+from underskin.errors import UnderskinError
+from underskin.parallel import one_blas_thread, processes
+
+if TYPE_CHECKING:
+    from underskin.client.service_client import Client
+
+Files = Annotated[list[Path] | None, typer.Argument(help="Campaigns (campaign/1, JSON, or any format that is read).")]
+_REPORTS = Path("diagnosis")
+
+Workers = Annotated[int, typer.Option(min=0, help="Processes; 0 is one for each core.")]
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """What became of one campaign: its verdict, or why there is no report."""
+
+    source: str
+    problem: str = ""
+    verdict: str = ""
+
+
+def add_commands(app: typer.Typer) -> None:
+    """Add both commands."""
+    app.command(no_args_is_help=True)(diagnose)
+    app.command(no_args_is_help=True)(plan)
+
+
+def diagnose(
+    files: Files = None,
+    output_dir: Annotated[Path, typer.Option(help="Folder for the reports; made where it does not exist.")] = _REPORTS,
+    html: Annotated[bool, typer.Option("--html", help="Also write each report as a page with figures.")] = False,
+    workers: Workers = 0,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Address of a Dask cluster, whose workers must find files and folder where they are here."),
+    ] = None,
+    campaign: Annotated[
+        list[str] | None, typer.Option(help="Id of a campaign that the service keeps and diagnoses; repeatable.")
+    ] = None,
+    url: Url = LOCAL,
+    key: Key = None,
+) -> None:
+    """Where recordings and model disagree, and what physics the model left out: one report a campaign."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    one_blas_thread()
+    files, campaign = files or [], campaign or []
+    _refuse_overwriting(files, campaign, output_dir)
+    output_dir.mkdir(parents=True, exist_ok=True)
+    failed = False
+    console = Console(stderr=True)
+    with Progress(console=console) as progress:
+        bar = progress.add_task("diagnosing", total=len(files) + len(campaign))
+        for outcomes in (
+            _of_files(files, output_dir, html, workers or os.cpu_count() or 1, scheduler),
+            _of_store(campaign, output_dir, html, url, key),
+        ):
+            for outcome in outcomes:
+                progress.advance(bar)
+                failed |= bool(outcome.problem)
+                line = f"underskin: {outcome.problem}" if outcome.problem else f"{outcome.source}: {outcome.verdict}"
+                console.print(line, markup=False, highlight=False, soft_wrap=True)
+    if output_dir == _REPORTS and any(output_dir.iterdir()):
+        console.print(f"reports are in {output_dir}", markup=False, highlight=False)
+    if failed:
+        raise typer.Exit(2)
+
+
+def _refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_dir: Path) -> None:
+    """Reports are named like their campaigns: two of one name, or a campaign in the folder, would be lost."""
+    names = [*(file.stem for file in files), *campaigns]
+    if not names:
+        raise typer.BadParameter("give files or --campaign", param_hint="FILES")
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        given = [(file.stem, str(file)) for file in files] + [(name, f"--campaign {name}") for name in campaigns]
+        clashing = " and ".join(source for name, source in given if name == twice[0])
+        problem = (
+            f"reports are named like their campaigns: {clashing} would all become {twice[0]}.json. "
+            "Rename files, or run once for each, with an --output-dir of its own"
+        )
+        raise typer.BadParameter(problem, param_hint="FILES")
+    lost = [file for file in files if (output_dir / f"{file.stem}.json").resolve() == file.resolve()]
+    if lost:
+        raise typer.BadParameter(f"the report would overwrite {lost[0]}", param_hint="--output-dir")
+
+
+def _of_files(
+    files: Sequence[Path], output_dir: Path, html: bool, workers: int, scheduler: str | None
+) -> Iterator[_Outcome]:
+    if scheduler is None and (len(files) <= 1 or workers == 1):
+        for file in files:
+            yield _one(file, output_dir, html)
+        return
+    left = list(files)
+    while left:
+        for file, outcome in _of_pool(left, output_dir, html, min(workers, len(left)), scheduler):
+            left.remove(file)
+            yield outcome
+        # A process that dies takes the others' work with it: what can have been at fault goes on alone, one by one
+        suspects = left[:workers]
+        for file in suspects:
+            alone = dict(_of_pool([file], output_dir, html, 1, scheduler))
+            left.remove(file)
+            yield alone.get(file, _Outcome(str(file), f"{file}: the process that worked it out was killed; memory?"))
+
+
+def _of_pool(
+    files: Sequence[Path], output_dir: Path, html: bool, workers: int, scheduler: str | None
+) -> Iterator[tuple[Path, _Outcome]]:
+    """Of those files that were worked out before any process died."""
+    with _executor(workers, scheduler) as pool:
+        # Absolute, since a cluster's workers have a working folder of their own
+        folder = output_dir.resolve()
+        pending: dict[Future[_Outcome], Path] = {
+            pool.submit(_one, file if scheduler is None else file.resolve(), folder, html): file for file in files
+        }
+        for done in as_completed(pending):
+            file = pending[done]
+            try:
+                yield file, done.result()
+            except BrokenExecutor:
+                continue
+            except Exception as error:  # must not take the other campaigns with it
+                yield file, _Outcome(str(file), f"{file}: {type(error).__name__}: {error}")
+
+
+@contextmanager
+def _executor(workers: int, scheduler: str | None) -> Iterator[Executor]:
+    """Processes on this machine, or a Dask cluster through the same interface."""
+    if scheduler is None:
+        with processes(workers) as pool:
+            yield pool
+        return
+    try:
+        from distributed import Client as Cluster
+    except ImportError as error:
+        raise UnderskinError("--scheduler needs Dask: pip install 'underskin[cluster]'") from error
+
+    try:
+        cluster = Cluster(scheduler, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise UnderskinError(f"no Dask scheduler answers at {scheduler}: {error}") from error
+    with cluster, cluster.get_executor(pure=False) as pool:
+        yield pool
+
+
+def _one(file: Path, output_dir: Path, html: bool) -> _Outcome:
+    """Read, diagnose and write one campaign."""
+    from underskin.diagnosis.pipeline import diagnose as work_out
+    from underskin.diagnosis.pipeline import with_refused
+    from underskin.diagnosis.reporting.report import report
+    from underskin.recordings import read_file
+    from underskin.surrogate.sigma_table import load_table
+
+    try:
+        reading = read_file(file, file.name)
+        found = with_refused(work_out(reading.campaign, load_table()), reading.problems)
+    except UnderskinError as error:
+        return _Outcome(str(file), f"{file}: {' '.join(str(error).split())}")
+    document = report(found)
+    write_report(document, output_dir / f"{file.stem}.json")
+    if html:
+        from underskin.diagnosis.reporting.figures import figures
+        from underskin.diagnosis.reporting.html_report import page
+
+        _write(page(document, figures(found, document)), output_dir / f"{file.stem}.html")
+    return _Outcome(str(file), verdict=str(document["verdict"]))
+
+
+def _of_store(campaigns: Sequence[str], output_dir: Path, html: bool, url: str, key: str | None) -> Iterator[_Outcome]:
+    """Have campaigns diagnosed where they are kept; all are asked for before the first is awaited."""
+    if not campaigns:
+        return
+    with connect(url, key) as client:
+        asked = [(campaign, _asked(client, campaign)) for campaign in campaigns]
+        for campaign, started in asked:
+            yield started if isinstance(started, _Outcome) else _fetched(client, campaign, started, output_dir, html)
+
+
+def _asked(client: "Client", campaign: str) -> str | _Outcome:
+    """The id of the diagnosis."""
+    try:
+        return str(client.diagnoses.start(campaign)["id"])
+    except UnderskinError as error:
+        return _Outcome(campaign, f"{campaign}: {error}")
+
+
+def _fetched(client: "Client", campaign: str, diagnosis: str, output_dir: Path, html: bool) -> _Outcome:
+    """Await one diagnosis and write its report; its page has the one figure that a report alone can give."""
+    try:
+        found = client.diagnoses.wait(diagnosis)
+    except UnderskinError as error:
+        return _Outcome(campaign, f"{campaign}: {error}")
+    document = found["report"]
+    if document is None:
+        return _Outcome(campaign, f"{campaign}: {found['state']}: {found['reason'] or 'no report'}")
+    write_report(document, output_dir / f"{campaign}.json")
+    if html:
+        from underskin.diagnosis.reporting.html_report import page
+
+        _write(page(document), output_dir / f"{campaign}.html")
+    return _Outcome(campaign, verdict=str(document["verdict"]))
+
+
+def write_report(document: dict[str, Any], path: Path) -> None:
+    """Write a report as JSON, the same bytes for the same report."""
+    _write(json.dumps(document, ensure_ascii=False, indent=1, allow_nan=False) + "\n", path)
+
+
+def _write(text: str, path: Path) -> None:
+    partial = path.with_name(f".{path.name}.part")
+    partial.write_text(text, encoding="utf-8")
+    partial.replace(path)
+
+
+def plan(
+    file: Annotated[Path, typer.Argument(help="A campaign.")],
+    preload_n: Annotated[
+        tuple[float, float] | None, typer.Option(help="Lowest and highest preload that the rig can hold [N].")
+    ] = None,
+    indenter_radius_mm: Annotated[list[float] | None, typer.Option(help="A sphere at hand [mm]; repeatable.")] = None,
+    offset_mm: Annotated[
+        list[float] | None, typer.Option(help="How far beside the sensor the sphere can be put [mm]; repeatable.")
+    ] = None,
+    dynamic_force_n: Annotated[
+        list[float] | None, typer.Option(help="A dynamic force that the shaker can give [N]; repeatable.")
+    ] = None,
+    dwell_s: Annotated[list[float] | None, typer.Option(help="A time to hold the preload [s]; repeatable.")] = None,
+    recordings: Annotated[int, typer.Option(min=1, help="Recordings at most.")] = 8,
+) -> None:
+    """The recordings that best separate what a campaign leaves confusable, and the chance that they do; JSON.
+
+    What is left out is as in the campaign; if all is and that separates nothing, what most rigs can do is tried too.
+    """
+    one_blas_thread()
+    from underskin.diagnosis.pipeline import diagnose as work_out
+    from underskin.diagnosis.planning.rig_limits import Limits
+    from underskin.recordings import read_file
+    from underskin.surrogate.sigma_table import load_table
+
+    campaign = read_file(file, file.name).campaign
+    limits = Limits(
+        preload_n=preload_n,
+        indenter_radius_mm=indenter_radius_mm,
+        dynamic_force_n=dynamic_force_n,
+        offset_mm=offset_mm,
+        dwell_s=dwell_s,
+        recordings=recordings,
+    )
+    found = work_out(campaign, load_table(), limits=limits)
+    typer.echo(json.dumps(dict(found.next_experiment), ensure_ascii=False, indent=1))

@@ -1,0 +1,33 @@
+"""The command `underskin stress`."""
+
+from typing import Annotated
+
+import typer
+
+
+def stress(
+    request: Annotated[
+        str, typer.Argument(metavar="FILE", help="JSON as for POST /v1/stress: skin, sensors and loads; - is stdin.")
+    ],
+    pressure_map: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CSV",
+            help="File of the pressure map, where the JSON has none: x_mm in the first line, from its second cell on; "
+            "then a line for each y_mm, which comes first, with its pressure_mpa.",
+        ),
+    ] = None,
+    csv: Annotated[bool, typer.Option("--csv", help="Write CSV instead of a table.")] = False,
+) -> None:
+    """The charge on every sensor of an array under several contacts or a pressure map."""
+    from underskin.array_stress.answer import answer
+    from underskin.array_stress.request import read_file
+    from underskin.cli import columns
+    from underskin.surrogate.influence_table import load_influence
+
+    found = answer(load_influence(), read_file(request, pressure_map))
+    columns.say(found.findings)
+    write = columns.write_csv if csv else columns.write_table
+    write(found.columns, found.inside, len(found.sensors), {"sensor": found.sensors})
+    if not csv and not found.inside.all():
+        typer.echo(f"Out of the domain are sensors with no load within {found.reach_mm:g} mm.")

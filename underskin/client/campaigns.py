@@ -1,0 +1,215 @@
+"""The client's part that sends campaigns and asks for what is kept: `client.campaigns` and `client.skins`.
+
+Answers are the documents of the HTTP interface (docs/store.md, /openapi.json), as dictionaries.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, Literal
+from urllib.parse import quote
+from uuid import uuid4
+
+import orjson
+
+from underskin.client.http_session import Session
+from underskin.errors import InvalidInput, Unreachable
+from underskin.recordings.campaign import Campaign, parse, to_dict
+
+Document = dict[str, Any]
+ModelName = Literal["paper", "adopted"]
+_TRIES = 3
+
+
+class Campaigns:
+    """Campaigns: sent, read, withdrawn, corrected, their recordings excluded, their d33."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def post(
+        self,
+        campaign: Campaign | Mapping[str, Any],
+        *,
+        skin: str | None = None,
+        corrects: str | None = None,
+        reason: str | None = None,
+        all_or_nothing: bool = False,
+        idempotency_key: str | None = None,
+    ) -> Document:
+        """Send a campaign, or its document; says of each recording whether it was kept.
+
+        It is kept once even where the connection breaks and it is sent again; with an `idempotency_key` of your own,
+        even where your program ends and starts anew.
+        """
+        document = to_dict(campaign) if isinstance(campaign, Campaign) else dict(campaign)
+        content = orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
+        query = query_of(skin=skin, corrects=corrects, reason=reason, all_or_nothing=all_or_nothing)
+        headers = {"Content-Type": "application/json", "Idempotency-Key": idempotency_key or uuid4().hex}
+        return self._again(
+            lambda: self._session.json("POST", "/v1/campaigns", **query, headers=headers, content=content)
+        )
+
+    def post_files(
+        self,
+        files: Sequence[str | Path],
+        *,
+        skin: str | None = None,
+        rig: str | Path | None = None,
+        all_or_nothing: bool = False,
+        together: str | None = None,
+        idempotency_key: str | None = None,
+    ) -> list[Document]:
+        """Send files as instruments write them; one entry a campaign. `rig` describes their channels.
+
+        `repeated` of an entry says whether it was kept before, under the same `idempotency_key`.
+
+        `together` is the name of the one campaign that they are joined into, such as a file a press.
+        """
+        if not files:
+            raise InvalidInput("files", [], "must name at least one file")
+        headers = {"Idempotency-Key": idempotency_key or uuid4().hex}
+        query = query_of(skin=skin, all_or_nothing=all_or_nothing, together=together)
+
+        def send() -> Document:
+            with ExitStack() as opened:
+                named = [("file", Path(file)) for file in files] + ([] if rig is None else [("rig", Path(rig))])
+                parts = [(name, (path.name, opened.enter_context(path.open("rb")))) for name, path in named]
+                answer, told = self._session.answered("POST", "/v1/campaigns", **query, headers=headers, files=parts)
+            repeated = "Idempotency-Replayed" in told
+            return {"campaigns": [{**entry, "repeated": repeated} for entry in answer["campaigns"]]}
+
+        return list(self._again(send)["campaigns"])
+
+    def all(
+        self,
+        *,
+        skin: str | None = None,
+        state: str = "current",
+        name_contains: str | None = None,
+        recorded_from: str | None = None,
+        recorded_to: str | None = None,
+    ) -> Iterator[Document]:
+        """Campaigns, the latest arrival first, without their recordings."""
+        filters = {
+            "skin": skin,
+            "name_contains": name_contains,
+            "recorded_from": recorded_from,
+            "recorded_to": recorded_to,
+        }
+        yield from pages(self._session, "/v1/campaigns", "campaigns", state=state, **filters)
+
+    def get(self, campaign_id: str) -> Document:
+        """A campaign and its recordings, without their arrays."""
+        return self._session.json("GET", _path(campaign_id))
+
+    def load(self, campaign_id: str) -> Campaign:
+        """A campaign as it was sent, arrays and all."""
+        return parse(self._session.json("GET", _path(campaign_id, "document")))
+
+    def d33(
+        self, campaign_id: str, band_hz: tuple[float, float] | None = None, *, model: ModelName = "paper"
+    ) -> Document:
+        """d33 by sensor, indenter and preload, over the flat zone or a band of your own, and what it leaves out."""
+        low, high = (None, None) if band_hz is None else band_hz
+        query = query_of(band_low_hz=low, band_high_hz=high, model=model)
+        return self._session.json("GET", _path(campaign_id, "d33"), **query)
+
+    def withdraw(self, campaign_id: str, reason: str) -> Document:
+        """Take it out of all figures; it can still be read."""
+        return self._session.json("POST", _path(campaign_id, "withdraw"), json={"reason": reason})
+
+    def exclude(self, campaign_id: str, recording: str, reason: str) -> Document:
+        """Take a recording out of all figures; it can still be read."""
+        body = {"recording": recording, "reason": reason}
+        return self._session.json("POST", _path(campaign_id, "exclusions"), json=body)
+
+    def _again(self, send: Callable[[], Document]) -> Document:
+        """Send under one Idempotency-Key until an answer comes, a few times at most."""
+        for _ in range(_TRIES - 1):
+            try:
+                return send()
+            except Unreachable:
+                continue
+        return send()
+
+
+class Skins:
+    """Skins: listed, joined, their d33 over time, all of one as a file."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def all(self, *, id_contains: str | None = None) -> Iterator[Document]:
+        """Skins by id."""
+        yield from pages(self._session, "/v1/skins", "skins", id_contains=id_contains)
+
+    def get(self, skin_id: str) -> Document:
+        """A skin, and what was joined to it."""
+        return self._session.json("GET", _skin(skin_id))
+
+    def join(self, skin_id: str, other: str, reason: str) -> Document:
+        """Count the skin `other` as `skin_id` from now on."""
+        return self._session.json("POST", _skin(skin_id, "join"), json={"skin_id": other, "reason": reason})
+
+    def history(self, skin_id: str, *, model: ModelName = "paper") -> Document:
+        """d33 of each sensor over time, its trend, and what that leaves out."""
+        return self._session.json("GET", _skin(skin_id, "history"), **query_of(model=model))
+
+    def adopt(self, skin_id: str, diagnosis_id: str) -> Document:
+        """Make an explained diagnosis the skin's model, which `adopted` stands for from now on."""
+        return self._session.json("POST", _skin(skin_id, "model"), json={"diagnosis_id": diagnosis_id})
+
+    def withdraw_model(self, skin_id: str, reason: str) -> Document:
+        """Have no model in force, as before the first was adopted; the version that was stays, with when and why."""
+        return self._session.json("DELETE", _skin(skin_id, "model"), **query_of(reason=reason))
+
+    def model(self, skin_id: str) -> Document:
+        """The model in force, with the campaign and the evidence that it comes from."""
+        return self._session.json("GET", _skin(skin_id, "model"))
+
+    def models(self, skin_id: str) -> list[Document]:
+        """All models that the skin ever had, the latest adoption first."""
+        return list(self._session.json("GET", _skin(skin_id, "model", "versions"))["models"])
+
+    def export(self, skin_id: str, file: str | Path, progress: Callable[[int], object] = lambda _: None) -> None:
+        """Write all that is kept of a skin into one HDF5 file; `progress` hears how many bytes came."""
+        part = Path(file).with_name(Path(file).name + ".part")
+        try:
+            with self._session.stream("GET", _skin(skin_id, "export")) as response, part.open("wb") as target:
+                for chunk in response.iter_bytes():
+                    target.write(chunk)
+                    progress(len(chunk))
+            part.replace(file)
+        finally:
+            part.unlink(missing_ok=True)
+
+    def load(self, file: str | Path) -> Document:
+        """Bring in what `export` wrote elsewhere."""
+        headers = {"Content-Type": "application/octet-stream"}
+        with Path(file).open("rb") as source:
+            return self._session.json("POST", "/v1/skins/import", headers=headers, content=source)
+
+
+def _path(campaign_id: str, *more: str) -> str:
+    return "/".join(("/v1/campaigns", quote(campaign_id, safe=""), *more))
+
+
+def _skin(skin_id: str, *more: str) -> str:
+    return "/".join(("/v1/skins", quote(skin_id, safe=""), *more))
+
+
+def query_of(**given: Any) -> dict[str, dict[str, Any]]:
+    """What was given, as httpx takes a query."""
+    return {"params": {name: value for name, value in given.items() if value is not None}}
+
+
+def pages(session: Session, path: str, noun: str, **filters: str | None) -> Iterator[Document]:
+    """The entries of a list, page after page."""
+    cursor: str | None = None
+    while True:
+        page = session.json("GET", path, **query_of(limit=200, cursor=cursor, **filters))
+        yield from page[noun]
+        cursor = page["next"]
+        if cursor is None:
+            return

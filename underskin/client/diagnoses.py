@@ -1,0 +1,73 @@
+"""The client's part that has campaigns diagnosed: `client.diagnoses`.
+
+    started = client.diagnoses.start(campaign_id)
+    report = client.diagnoses.wait(started["id"], progress=print)["report"]
+
+Answers are the documents of the HTTP interface (docs/store.md, /openapi.json), as dictionaries.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from urllib.parse import quote
+
+from underskin.client.campaigns import Document, pages
+from underskin.client.http_session import Session
+from underskin.errors import Unreachable
+
+_POLL_S = 0.5
+_SILENT_S = 60.0
+
+
+class Diagnoses:
+    """Diagnoses of kept campaigns: started, awaited, read, cancelled."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def start(self, campaign_id: str) -> Document:
+        """Have a campaign diagnosed; its `id` and `state`. One that was diagnosed as it is now is `done` at once."""
+        return self._session.json("POST", f"/v1/campaigns/{quote(campaign_id, safe='')}/diagnosis")
+
+    def get(self, diagnosis_id: str) -> Document:
+        """How far it is and, once it is done, its `report`."""
+        return self._session.json("GET", _path(diagnosis_id))
+
+    def all(
+        self, *, campaign: str | None = None, skin: str | None = None, state: str | None = None
+    ) -> Iterator[Document]:
+        """Diagnoses, the latest first, without their reports."""
+        yield from pages(self._session, "/v1/diagnoses", "diagnoses", campaign=campaign, skin=skin, state=state)
+
+    def wait(
+        self,
+        diagnosis_id: str,
+        *,
+        progress: Callable[[float], object] = lambda _: None,
+        timeout: float | None = None,
+    ) -> Document:
+        """The diagnosis once it is done, has failed or was cancelled; `progress` hears how far it is, 0 to 1.
+
+        A server that is being restarted is waited for, a minute at most. Raises TimeoutError after `timeout` seconds.
+        """
+        start = heard = time.monotonic()
+        while True:
+            try:
+                found = self.get(diagnosis_id)
+                heard = time.monotonic()
+                progress(found["progress"])
+                if found["state"] not in ("queued", "running"):
+                    return found
+            except Unreachable:
+                if time.monotonic() - heard > _SILENT_S:
+                    raise
+            if timeout is not None and time.monotonic() - start > timeout:
+                raise TimeoutError(f"diagnosis {diagnosis_id} is not done after {timeout:g} s; it goes on")
+            time.sleep(_POLL_S)
+
+    def cancel(self, diagnosis_id: str) -> Document:
+        """End it; one that is done or has failed raises ServiceError (409)."""
+        return self._session.json("DELETE", _path(diagnosis_id))
+
+
+def _path(diagnosis_id: str) -> str:
+    return f"/v1/diagnoses/{quote(diagnosis_id, safe='')}"

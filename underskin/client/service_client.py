@@ -1,0 +1,226 @@
+"""A client of the service: columns of numbers in, columns of numbers out.
+
+    with underskin.Client() as client:
+        answer = client.sigma(a_over_h=[0.1, 0.3], rt_over_h=0.6)
+        answer.sigma, answer.status
+
+Fields are named and meant as in the HTTP interface, in lab units. A single number holds for all rows; arrays must be
+equally long. Answers have one entry a row, or shape () where only single numbers were given; a row outside the model's
+domain has the status `out_of_domain` and NaN in all that depends on σ. Campaigns and skins: `client.campaigns` and
+`client.skins` (underskin.campaign_client); diagnoses: `client.diagnoses` (underskin.diagnosis_client).
+"""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from types import TracebackType
+from typing import Any, Literal, Self, TypeVar
+
+import numpy as np
+import orjson
+from numpy.typing import ArrayLike
+
+from underskin.client.answers import (
+    Adopted,
+    Answer,
+    D33Answer,
+    FrfAnswer,
+    SigmaAnswer,
+    StressAnswer,
+    TableAxis,
+    TableEntry,
+)
+from underskin.client.campaigns import Campaigns, Skins
+from underskin.client.diagnoses import Diagnoses
+from underskin.client.http_session import Session
+from underskin.units import Finding, Floats
+
+_Answer = TypeVar("_Answer", bound=Answer)
+
+
+class Client:
+    """The service at `base_url`. All methods raise ServiceError (it refused or failed) and Unreachable (no answer)."""
+
+    def __init__(
+        self, base_url: str = "http://127.0.0.1:8000", api_key: str | None = None, timeout: float = 60.0
+    ) -> None:
+        """`api_key` where the service asks for one; `timeout` in seconds, for connecting and between bytes."""
+        self._session = Session(base_url, api_key, timeout)
+        self.campaigns = Campaigns(self._session)
+        self.skins = Skins(self._session)
+        self.diagnoses = Diagnoses(self._session)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._session.http.close()
+
+    def sigma(
+        self,
+        a_over_h: ArrayLike,
+        rt_over_h: ArrayLike,
+        load_parameter: ArrayLike = 0.0,
+        model: Literal["layer", "half_space"] = "layer",
+    ) -> SigmaAnswer:
+        """σ(a/h, rT/h, L) of the layer on a rigid base, or of the half space."""
+        columns = {"a_over_h": a_over_h, "rt_over_h": rt_over_h, "load_parameter": load_parameter}
+        return self._columns("sigma", SigmaAnswer, columns, {"model": model})
+
+    def frf(
+        self,
+        *,
+        thickness_mm: ArrayLike,
+        youngs_modulus_mpa: ArrayLike,
+        sensor_radius_mm: ArrayLike,
+        indenter_radius_mm: ArrayLike,
+        preload_n: ArrayLike,
+        d33_pc_per_n: ArrayLike,
+        poisson_ratio: ArrayLike = 0.5,
+        frequency_hz: ArrayLike | None = None,
+        units_checked: bool = False,
+        adopted: Adopted | None = None,
+    ) -> FrfAnswer:
+        """The FRF of a skin under a sphere; `frequency_hz` (a list for all rows) adds spectra.
+
+        `units_checked` accepts magnitudes that look like a slip of units; `adopted` asks the skin's own model.
+        """
+        columns = {
+            "thickness_mm": thickness_mm,
+            "youngs_modulus_mpa": youngs_modulus_mpa,
+            "sensor_radius_mm": sensor_radius_mm,
+            "poisson_ratio": poisson_ratio,
+            "indenter_radius_mm": indenter_radius_mm,
+            "preload_n": preload_n,
+            "d33_pc_per_n": d33_pc_per_n,
+        }
+        shared = {"frequency_hz": frequency_hz, "units_checked": units_checked}
+        return self._columns("frf", FrfAnswer, columns, shared, adopted)
+
+    def d33(
+        self,
+        *,
+        thickness_mm: ArrayLike,
+        youngs_modulus_mpa: ArrayLike,
+        sensor_radius_mm: ArrayLike,
+        indenter_radius_mm: ArrayLike,
+        preload_n: ArrayLike,
+        frf_pc_per_n: ArrayLike | None = None,
+        frf_uncertainty_pc_per_n: ArrayLike | None = None,
+        poisson_ratio: ArrayLike = 0.5,
+        frequency_hz: ArrayLike | None = None,
+        frf_re_pc_per_n: ArrayLike | None = None,
+        frf_im_pc_per_n: ArrayLike | None = None,
+        band_hz: tuple[float, float] | None = None,
+        units_checked: bool = False,
+        adopted: Adopted | None = None,
+    ) -> D33Answer:
+        """d33 from plateau values `frf_pc_per_n`, or from lines averaged over a band.
+
+        For lines give `frequency_hz` (for all rows), `frf_re_pc_per_n` and, if measured, `frf_im_pc_per_n` (rows ×
+        lines), and `band_hz`. `units_checked` accepts magnitudes that look like a slip of units; `adopted` asks the
+        skin's own model.
+        """
+        columns = {
+            "thickness_mm": thickness_mm,
+            "youngs_modulus_mpa": youngs_modulus_mpa,
+            "sensor_radius_mm": sensor_radius_mm,
+            "poisson_ratio": poisson_ratio,
+            "indenter_radius_mm": indenter_radius_mm,
+            "preload_n": preload_n,
+            "frf_pc_per_n": frf_pc_per_n,
+            "frf_uncertainty_pc_per_n": frf_uncertainty_pc_per_n,
+        }
+        lines = {
+            "frequency_hz": frequency_hz,
+            "frf_re_pc_per_n": frf_re_pc_per_n,
+            "frf_im_pc_per_n": frf_im_pc_per_n,
+            "band_hz": band_hz,
+            "units_checked": units_checked,
+        }
+        return self._columns("d33", D33Answer, columns, lines, adopted)
+
+    def stress(self, request: Mapping[str, Any]) -> StressAnswer:
+        """Charge on every sensor of an array; `request` is the document that `POST /v1/stress` takes."""
+        document = self._request("POST", "/v1/stress", request)
+        values = {field.name: _field(field.name, document, single=False) for field in fields(StressAnswer)}
+        return StressAnswer(**values | {"sensor": tuple(document["sensor"])})
+
+    def design(self, **fields: float) -> dict[str, Any]:
+        """How much of a load a skin's sensors feel, how finely its array tells where it is, and how far apart two loads
+        must be; `fields` as `POST /v1/design` takes them."""
+        return self._request("POST", "/v1/design", fields)
+
+    def tables(self) -> tuple[TableEntry, ...]:
+        """The tables that answers come from."""
+        document = self._request("GET", "/v1/tables")
+        return tuple(
+            TableEntry(**{**entry, "axes": tuple(TableAxis(**axis) for axis in entry["axes"])})
+            for entry in document["tables"]
+        )
+
+    def health(self) -> str:
+        """`ok` while the process answers; needs no key."""
+        return str(self._request("GET", "/health")["status"])
+
+    def ready(self) -> str:
+        """The hash of the table in use, once the service can do its work; needs no key."""
+        return str(self._request("GET", "/ready")["table_sha256"])
+
+    def _columns(
+        self,
+        noun: str,
+        kind: type[_Answer],
+        columns: Mapping[str, ArrayLike | None],
+        shared: Mapping[str, Any],
+        adopted: Adopted | None = None,
+    ) -> _Answer:
+        if adopted is not None:
+            columns, shared = {**columns, **adopted.columns()}, {**shared, **adopted.shared()}
+        arrays = {name: _array(value) for name, value in columns.items() if value is not None}
+        others = {name: _shared(name, value) for name, value in shared.items() if value is not None}
+        document = self._request("POST", f"/v1/{noun}", {**arrays, **others})
+        single = all(array.ndim == 0 for array in arrays.values()) and not any(
+            np.ndim(value) > 1 for value in shared.values() if value is not None
+        )
+        return kind(**{field.name: _field(field.name, document, single) for field in fields(kind)})
+
+    def _request(self, method: str, path: str, body: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        content = None if body is None else orjson.dumps(body, _number, orjson.OPT_SERIALIZE_NUMPY)
+        return self._session.json(method, path, content=content, headers={"Content-Type": "application/json"})
+
+
+# Rows × lines; a single list is one row.
+_LINES = ("frf_re_pc_per_n", "frf_im_pc_per_n")
+
+
+def _array(value: Any) -> Floats:
+    return np.asarray(value, dtype=float, order="C")
+
+
+def _number(array: Floats) -> float:
+    """A single number, which orjson does not take as an array."""
+    return float(array)
+
+
+def _shared(name: str, value: Any) -> Any:
+    """A value that is not a column, as the interface has it."""
+    if isinstance(value, bool | str):
+        return value
+    return np.atleast_2d(_array(value)) if name in _LINES else _array(value)
+
+
+def _field(name: str, document: Mapping[str, Any], single: bool) -> Any:
+    """A field of the answer: an array, without its rows' axis where single numbers were given."""
+    value = document.get(name)
+    if name == "findings":
+        return tuple(Finding(**finding) for finding in value or ())
+    if not isinstance(value, list):
+        return value
+    array = np.array(value) if name in ("status", "sensor") else np.array(value, dtype=float)  # None becomes NaN
+    return array[0, ...] if single and name != "frequency_hz" else array

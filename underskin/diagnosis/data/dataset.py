@@ -1,0 +1,191 @@
+"""The lines of a campaign's FRF recordings as the diagnosis uses them: what was measured, and how surely.
+
+A model without frequency in it has one value a recording, and then the recording's lines can be replaced by their
+weighted mean: with weights 1/d², Σ|y − m|²/d² = Σ|y − ȳ|²/d² + |ȳ − m|²/d̄². `collapsed` does that, exactly; the
+first sum, which no such model changes, is carried along in `scatter`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.diagnosis.noise.correlated_error import SmoothError, Whitening
+from underskin.diagnosis.noise.line_noise import LineNoise, line_noise
+from underskin.mechanisms.base import Kind
+from underskin.mechanisms.models.composition import kind_of
+from underskin.mechanisms.models.frf_design import frf_recordings
+from underskin.recordings.campaign import Campaign, FrfRecording, Recording
+from underskin.recordings.frf.estimation import lines_of
+from underskin.units import Complexes, Floats
+
+COLLAPSED_HZ = 30.0  # stands for the frequency of a collapsed line; no model that is given one asks for it
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Rows run over all recordings one after another; SI.
+
+    `campaign` holds exactly these rows, so that a model composed for it predicts them. `deviation` is the standard
+    deviation of real and of imaginary part each, up to the common factor that every hypothesis fits. `scatter` is what
+    collapsing left out: Σ|y − ȳ|²/d² and its degrees of freedom. `smooth` is the error that a curve's
+    samples share.
+    """
+
+    campaign: Campaign
+    value: Complexes  # (rows,)
+    deviation: Floats  # (rows,)
+    frequency: Floats  # (rows,)
+    recording: NDArray[np.intp]  # (rows,)
+    sensor: NDArray[np.intp]  # (recordings,)
+    noise: LineNoise
+    scatter: tuple[float, int] = (0.0, 0)
+    smooth: SmoothError | None = None  # of curves
+
+    @property
+    def recordings(self) -> int:
+        """How many there are."""
+        return len(self.sensor)
+
+    @cached_property
+    def kind(self) -> Kind:
+        """Of the recordings; all are of one kind."""
+        return kind_of(self.campaign)
+
+    @property
+    def curves(self) -> bool:
+        """Whether the rows are samples of force, not lines of an FRF."""
+        return self.kind != "frf"
+
+    @property
+    def row_axes(self) -> tuple[str, ...]:
+        """The axes along which the rows of a recording run."""
+        return ("displacement_mm",) if self.curves else ("frequency_hz", "phase")
+
+    @cached_property
+    def first(self) -> NDArray[np.intp]:
+        """The first row of each recording."""
+        return np.searchsorted(self.recording, np.arange(self.recordings))
+
+    @cached_property
+    def whitening(self) -> Whitening | None:
+        """What makes the samples of curves independent."""
+        return None if self.smooth is None else Whitening(self.smooth, self.deviation, self.recording)
+
+    def collapsed(self) -> "Lines":
+        """One line a recording: the weighted mean; see the module."""
+        weight = self.deviation**-2
+        total = np.add.reduceat(weight, self.first)
+        mean = np.add.reduceat(weight * self.value, self.first).astype(np.complex128) / total
+        left = float(np.sum(weight * np.abs(self.value - mean[self.recording]) ** 2))
+        campaign = replace(
+            self.campaign,
+            recordings=tuple(
+                _with_lines(entry, np.array([COLLAPSED_HZ]), mean[[number]])
+                for number, entry in enumerate(frf_recordings(self.campaign))
+            ),
+        )
+        return replace(
+            self,
+            campaign=campaign,
+            value=mean,
+            deviation=total**-0.5,
+            frequency=np.full(len(mean), COLLAPSED_HZ),
+            recording=np.arange(len(mean)),
+            scatter=(self.scatter[0] + left, self.scatter[1] + 2 * (len(self.value) - len(mean))),
+        )
+
+    def part(self, kept: NDArray[np.bool_]) -> "Lines":
+        """Only some of the rows, each with the noise it had; recordings without a row are left out."""
+        recordings = np.unique(self.recording[kept])
+        entries = [self.campaign.recordings[number] for number in recordings]
+        rows = [np.flatnonzero(kept & (self.recording == number)) for number in recordings]
+        campaign = replace(
+            self.campaign,
+            recordings=tuple(_with_rows(entry, self, own) for entry, own in zip(entries, rows, strict=True)),
+        )
+        order = np.concatenate(rows)
+        return replace(
+            self,
+            campaign=campaign,
+            value=self.value[order],
+            deviation=self.deviation[order],
+            frequency=self.frequency[order],
+            recording=np.repeat(np.arange(len(rows)), [len(own) for own in rows]),
+            sensor=self.sensor[recordings],
+            scatter=(0.0, self.scatter[1] and -len(order)),
+            smooth=None if self.smooth is None else self.smooth.part(order),
+        )
+
+
+def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None, expected: Complexes | None = None) -> Lines:
+    """The FRF lines of a campaign, sorted by frequency, those that are not finite left out. `uneven` is, of recordings
+    by their id, the noise of each line over its course along frequency (1 where not given); `expected` a prediction of
+    the rows (rows,), whose course is not counted as noise.
+
+    Recordings of another kind and recordings without a finite line are left out of the `campaign` that comes with them.
+    """
+    numbers = {sensor.id: index for index, sensor in enumerate(campaign.skin.sensors)}
+    entries: list[FrfRecording] = []
+    values, frequencies, coherences, unevens, sensors = [], [], [], [], []
+    for entry in campaign.recordings:
+        if not isinstance(entry, FrfRecording):
+            continue
+        measured = lines_of(entry)
+        order = np.argsort(measured.frequency, kind="stable")
+        order = order[np.isfinite(measured.values[order]) & np.isfinite(measured.frequency[order])]
+        if len(order) == 0:
+            continue
+        value, frequency = measured.values[order], measured.frequency[order]
+        entries.append(_with_lines(entry, frequency, value))
+        values.append(value)
+        frequencies.append(frequency)
+        coherence = measured.coherence
+        coherences.append(np.full(len(order), np.nan) if coherence is None else coherence[order])
+        unevens.append((uneven or {}).get(entry.id, np.ones(len(measured.values)))[order])
+        sensors.append(numbers[entry.sensor])
+    recording = np.repeat(np.arange(len(values)), [len(value) for value in values]).astype(np.intp)
+    value = np.concatenate([*values, np.zeros(0, dtype=complex)])
+    frequency = np.concatenate([*frequencies, np.zeros(0)])
+    noise = line_noise(
+        value,
+        frequency,
+        recording,
+        np.concatenate([*coherences, np.zeros(0)]),
+        np.concatenate([*unevens, np.zeros(0)]),
+        expected,
+    )
+    return Lines(
+        campaign=replace(campaign, recordings=tuple(entries)),
+        value=value,
+        deviation=noise.deviation,
+        frequency=frequency,
+        recording=recording,
+        sensor=np.array(sensors, dtype=np.intp),
+        noise=noise,
+    )
+
+
+def _with_rows(entry: Recording, lines: Lines, own: NDArray[np.intp]) -> Recording:
+    """A recording with only some of its rows, given by their places among all rows."""
+    if isinstance(entry, FrfRecording):
+        return _with_lines(entry, lines.frequency[own], lines.value[own])
+    rows = own - int(np.searchsorted(lines.recording, lines.recording[own[0]]))
+    time = None if entry.time_s is None else entry.time_s[rows]
+    return replace(entry, displacement_mm=entry.displacement_mm[rows], force_n=entry.force_n[rows], time_s=time)
+
+
+def _with_lines(entry: FrfRecording, frequency: Floats, value: Complexes) -> FrfRecording:
+    """The recording with other lines, written as the campaign writes them."""
+    return replace(
+        entry,
+        frequency_hz=frequency,
+        frf_re_pc_per_n=value.real * 1e12,
+        frf_im_pc_per_n=value.imag * 1e12,
+        coherence=None,
+        sample_rate_hz=None,
+        force_n=None,
+        charge_pc=None,
+    )

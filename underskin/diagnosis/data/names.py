@@ -1,0 +1,18 @@
+"""What answers and models are called, in reports and in sentences."""
+
+from collections.abc import Mapping, Sequence
+
+from underskin.mechanisms.base import Kind
+
+NOTHING_MISSING, NONE_OF_THESE = "nothing_missing", "none_of_these"
+SIMPLEST: Mapping[Kind, str] = {  # what the model to which nothing is added is called, of each kind of recording
+    "frf": "the paper's model",
+    "indentation": "Hertz's law",
+    "compression": "Hooke's law",
+}
+
+
+def in_words(names: Sequence[str]) -> str:
+    """An answer's names as a sentence has them."""
+    special = {NOTHING_MISSING: "nothing missing", NONE_OF_THESE: "something without a name"}
+    return " and ".join(special.get(name, name.replace("_", " ")) for name in names)

@@ -1,0 +1,1 @@
+"""One set of mechanisms: likelihood, most probable parameters, evidence."""

@@ -1,0 +1,1 @@
+"""Where recordings and model disagree, how much, and in which shape."""

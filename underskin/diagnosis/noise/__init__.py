@@ -1,0 +1,1 @@
+"""The noise of lines, curves, gains and positions, and its priors."""

@@ -1,0 +1,80 @@
+"""What a curve deviates by, smoothly, under every hypothesis: no law of a soft contact holds to better than a percent.
+
+Zero and gain of a load cell, where a surface begins, friction in a stage and every law's own idealisation bend a curve
+a little. Its samples share that, so that sixty of them are not sixty independent witnesses against a law. Within each
+curve, with F_max its largest force, x the place along the curve from 0 to 1 and η the size,
+
+    ε ~ N(0, η² B),  B = F_max² k(x − x'),
+
+k the mean of Matérn-3/2 of length 0.1 (where a contact begins, a grip that seats) and 0.4 (a law's idealisation).
+η is a parameter of every hypothesis: equal density of its logarithm from 0.1 to 1 %, falling off outside, more slowly
+downwards. Something without a name is the same process with η from 2 to 50 %.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.diagnosis.noise.noise_priors import Plateau
+from underskin.mechanisms.autodiff import Array
+from underskin.units import Floats
+
+USUAL = Plateau.of((1e-3, 1e-2), (1.0, 0.25))
+UNNAMED = Plateau.of((2e-2, 0.5), (0.05, 0.05))
+TYPICAL = 3e-3
+_LENGTHS = (0.1, 0.4)
+
+
+@dataclass(frozen=True)
+class SmoothError:
+    """Of all rows of a campaign's curves, one curve after another."""
+
+    scale: Floats  # (rows,) [N]: the deviation is η times this
+    place: Floats  # (rows,) along the curve, 0 to 1
+
+    def part(self, order: NDArray[np.intp]) -> "SmoothError":
+        """Of some of the rows."""
+        return SmoothError(self.scale[order], self.place[order])
+
+
+class Whitening:
+    """κ² D + η² B as κ² times a unit matrix: each curve's rows over d, turned to where B is diagonal, and weighed."""
+
+    def __init__(self, error: SmoothError, deviation: Floats, recording: NDArray[np.intp]) -> None:
+        """Find the directions of each curve; `deviation` is D's square root (rows,)."""
+        self._deviation = deviation
+        edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
+        self._spans = [slice(low, high) for low, high in pairwise(edges)]
+        self._turns, sizes = [], []
+        for span in self._spans:
+            relative = error.scale[span] / deviation[span]
+            size, turn = np.linalg.eigh(relative[:, None] * _likeness(error.place[span]) * relative)
+            self._turns.append(turn.T)
+            sizes.append(np.maximum(size, 0.0))
+        self._size = np.concatenate(sizes)
+
+    def log_determinant(self, ratio: float) -> float:
+        """log|I + (η/κ)² D^(−½) B D^(−½)|."""
+        return float(np.log1p(ratio**2 * self._size).sum())
+
+    def weight(self, ratio: float) -> Floats:
+        """What weighs the turned rows at η/κ (rows,)."""
+        return np.asarray(1 / np.sqrt(1 + ratio**2 * self._size))
+
+    def __call__(self, rows: Array, ratio: float) -> Floats:
+        """The rows (…, rows), forces, such that their covariance is κ² times the unit matrix, at η/κ."""
+        scaled = rows.real / self._deviation
+        turned = [scaled[..., span] @ turn.T for span, turn in zip(self._spans, self._turns, strict=True)]
+        weighed: Floats = np.concatenate(turned, axis=-1) * self.weight(ratio)
+        return weighed
+
+
+def _likeness(place: Floats) -> Floats:
+    """k between all places of a curve."""
+    total = np.zeros((len(place), len(place)))
+    for length in _LENGTHS:
+        distance = np.sqrt(3.0) * np.abs(place[:, None] - place) / length
+        total += (1 + distance) * np.exp(-distance) / len(_LENGTHS)
+    return total

@@ -1,0 +1,235 @@
+"""The next experiment: which recordings best separate the explanations that survive.
+
+Candidates lie within the rig's limits, given or inferred from the campaign; where those separate nothing and the user
+gave none, within what most rigs can do besides. Each surviving explanation predicts the logarithm of every candidate's
+response, with the covariance S + J Σ Jᵀ: S the scatter of gains, of positioning and of lines, Σ what is still unknown
+of its own parameters (d33 among them, so that a common factor tells nothing). Recordings are added one by one, repeats
+allowed, the one first that raises the expected probability of deciding most; of equal ones that whose sphere is mounted
+already. That probability is simulated: truth drawn from the posterior, recordings from its prediction, and the
+posterior updated: the chance that the true explanation then holds at least 0.8.
+"""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from underskin.diagnosis.data.axes import WORDS
+from underskin.diagnosis.data.names import in_words
+from underskin.diagnosis.inference.explanation import Workbench
+from underskin.diagnosis.planning.rig_limits import Limits, candidates, inferred, wider
+from underskin.diagnosis.selection.search import Answer, Search
+from underskin.formatting import in_percent
+from underskin.mechanisms.base import Unsupported
+from underskin.mechanisms.models.composed import compose
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.recordings.campaign import FrfRecording
+from underskin.units import Floats
+
+DECIDED = 0.8
+SEED = 20180206
+_SIMULATIONS = 2000
+_ENOUGH = 0.95
+_LEAST_GAIN = 0.01  # in the probability of deciding that a further recording must bring
+_SURVIVES = 0.02
+_RIVALS = 4
+
+
+def plan(bench: Workbench, search: Search, limits: Limits) -> dict[str, Any]:
+    """The recordings to make, in lab units, what they cost, and the chance that they decide; empty if all is decided.
+
+    Where several answers remain and no recording can be planned, the document says why, with no recordings in it.
+    """
+    surviving = [answer for answer in search.answers if answer.probability > _SURVIVES][:_RIVALS]
+    if len(surviving) < 2:
+        return {}
+    if not bench.lines.curves:
+        within = inferred(bench.lines.campaign, limits)
+        for beyond, rig in enumerate([within] if limits.given else [within, wider(bench.lines.campaign, within)]):
+            found = _planned(bench, surviving, rig, bool(beyond))
+            if found:
+                return found
+    return {} if surviving[0].probability >= DECIDED else _nothing_to_plan(surviving)
+
+
+def _planned(bench: Workbench, surviving: Sequence[Answer], limits: Limits, beyond: bool) -> dict[str, Any]:
+    """The best recordings within these limits; empty where none brings anything."""
+    allowed = candidates(bench.lines.campaign, limits)
+    rivals, outlook, allowed = _outlook(bench, surviving, allowed)
+    if len(rivals) < 2 or not allowed:
+        return {}
+    chosen, chance = _choose(outlook, allowed, limits)
+    if not chosen:
+        return {}
+    spheres = {allowed[index].indenter_radius_mm for index in chosen}
+    names = [list(answer.names) for answer in rivals]
+    return {
+        "recordings": _described(allowed, chosen),
+        "separates": names,
+        "probability_of_deciding": round(chance, 3),
+        "without_it": round(outlook.deciding([]), 3),
+        "minutes": round(len(chosen) * limits.minutes_per_recording + len(spheres) * limits.minutes_per_indenter, 1),
+        "statement": _statement(allowed, chosen, chance, names, beyond),
+    }
+
+
+def _nothing_to_plan(surviving: Sequence[Answer]) -> dict[str, Any]:
+    """Why no recording is planned, and on which axes the rivals would differ."""
+    names = [list(answer.names) for answer in surviving]
+    told = f"No recording within these limits tells {_together([in_words(entry) for entry in names])} apart."
+    axes = [
+        {axis for name in entry for axis in CATALOGUE[name].axes} for entry in names if set(entry) <= set(CATALOGUE)
+    ]
+    apart = {axis for own in axes for axis in own if any(axis not in other for other in axes)}
+    if apart:
+        words = sorted(WORDS[axis][0] if axis in WORDS else axis for axis in apart)
+        told += f" They differ in what they depend on: vary the {_together(words)} more widely than here."
+    return {
+        "recordings": [],
+        "separates": names,
+        "probability_of_deciding": 0.0,
+        "without_it": 0.0,
+        "minutes": 0.0,
+        "statement": told,
+    }
+
+
+def _together(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def _outlook(
+    bench: Workbench, surviving: Sequence[Answer], allowed: Sequence[FrfRecording]
+) -> tuple[list[Answer], "_Outlook", list[FrfRecording]]:
+    """The rivals whose laws can be predicted there, what they predict, and the candidates that all tables hold."""
+    # The campaign's own recordings go along, so that each model has the parameters that it was fitted with.
+    campaign = bench.collapsed.campaign
+    together = replace(campaign, recordings=(*campaign.recordings, *allowed))
+    own = len(campaign.recordings)
+    inside = np.ones(len(allowed), dtype=bool)
+    rivals, predictions = [], []
+    for answer in surviving:
+        if answer.explanation is None:
+            continue
+        try:
+            model = compose(answer.explanation.names, together, bench.table, "frf")
+        except Unsupported:
+            continue
+        if len(model.parameters) != len(answer.explanation.point.fit):
+            continue
+        prediction = model.predict(answer.explanation.point.fit)
+        inside &= prediction.inside[own:] & (np.abs(prediction.value[own:]) > 0)
+        rivals.append(answer)
+        predictions.append(prediction)
+    kept = own + np.flatnonzero(inside)
+    line = float(np.median(np.add.reduceat(bench.lines.deviation**-2.0, bench.lines.first)) ** -0.5)
+    responses, unknown, scatter = [], [], []
+    for answer, prediction in zip(rivals, predictions, strict=True):
+        explanation = answer.explanation
+        assert explanation is not None
+        levels, value = explanation.best.at.marginal.levels, prediction.value[kept]
+        slopes = (prediction.slopes[explanation.best.fitter.places][:, kept] / value).real
+        responses.append(np.log(np.abs(value)))
+        unknown.append(slopes.T @ np.linalg.cholesky(explanation.best.covariance))
+        variance = levels.gain**2 + (levels.level * line / np.abs(value)) ** 2
+        if prediction.position_slopes is not None:
+            variance += levels.position**2 * (np.abs(prediction.position_slopes[:, kept] / value) ** 2).sum(axis=0)
+        scatter.append(variance)
+    prior = np.array([answer.probability for answer in rivals])
+    outlook = _Outlook(np.array(responses), unknown, np.array(scatter), prior / prior.sum())
+    return rivals, outlook, [entry for entry, good in zip(allowed, inside, strict=True) if good]
+
+
+@dataclass(frozen=True)
+class _Outlook:
+    """What the rivals predict, and how sure each is."""
+
+    responses: Floats  # log |response| (rivals, candidates)
+    unknown: list[Floats]  # of each W (candidates, parameters), W Wᵀ the covariance from its own parameters
+    scatter: Floats  # variance of the logarithm of a new recording (rivals, candidates)
+    prior: Floats  # (rivals,)
+
+    def deciding(self, chosen: Sequence[int]) -> float:
+        """The simulated chance that the true explanation holds `DECIDED` after these recordings."""
+        random = np.random.default_rng(SEED)
+        truth = random.choice(len(self.prior), size=_SIMULATIONS, p=self.prior)
+        noise = random.normal(size=(_SIMULATIONS, len(chosen)))
+        means = self.responses[:, chosen]
+        roots = []
+        for unknown, scatter in zip(self.unknown, self.scatter, strict=True):
+            rows = unknown[chosen]
+            roots.append(np.linalg.cholesky(rows @ rows.T + np.diag(scatter[chosen])))
+        measured = means[truth] + np.einsum("nab,nb->na", np.array(roots)[truth], noise)
+        log_posterior = np.empty((_SIMULATIONS, len(self.prior)))
+        for rival, root in enumerate(roots):
+            white = np.linalg.solve(root, (measured - means[rival]).T)
+            log_posterior[:, rival] = -0.5 * (white**2).sum(axis=0) - np.log(np.diag(root)).sum()
+        log_posterior += np.log(self.prior)
+        log_posterior -= np.logaddexp.reduce(log_posterior, axis=1)[:, None]
+        return float((np.exp(log_posterior[np.arange(_SIMULATIONS), truth]) >= DECIDED).mean())
+
+    @property
+    def promising(self) -> list[int]:
+        """Candidates at the ends of what separates each pair of rivals: only these are worth a simulation."""
+        found: list[int] = []
+        for first, second in itertools.combinations(range(len(self.prior)), 2):
+            order = np.argsort(self.responses[first] - self.responses[second], kind="stable").tolist()
+            found += [*order[:2], *order[-2:]]
+        return list(dict.fromkeys(found))
+
+
+def _choose(outlook: _Outlook, candidates: Sequence[FrfRecording], limits: Limits) -> tuple[list[int], float]:
+    """Recordings, two and then one at a time, until they decide or a further one brings too little."""
+    promising = outlook.promising
+    chosen: list[int] = []
+    best = outlook.deciding([])
+    steps: list[tuple[int, ...]] = list(itertools.combinations_with_replacement(promising, 2))
+    while len(chosen) < limits.recordings and best < _ENOUGH:
+        mounted = {candidates[index].indenter_radius_mm for index in chosen}
+        rated = []
+        for step in steps:
+            new = {candidates[index].indenter_radius_mm for index in step} - mounted
+            rated.append((round(outlook.deciding([*chosen, *step]), 3), -len(new), tuple(-index for index in step)))
+        chance, _, picked = max(rated)
+        if chance < best + _LEAST_GAIN:
+            break
+        chosen += [-index for index in picked]
+        best = chance
+        steps = [(index,) for index in promising]
+    return chosen, best
+
+
+def _described(candidates: Sequence[FrfRecording], chosen: Sequence[int]) -> list[dict[str, Any]]:
+    found = []
+    for index in sorted(set(chosen)):
+        entry = candidates[index]
+        described: Mapping[str, Any] = {
+            "sensor": entry.sensor,
+            "indenter_radius_mm": entry.indenter_radius_mm,
+            "preload_n": entry.preload_n,
+            "dynamic_force_n": entry.dynamic_force_n,
+            "position_mm": list(entry.position_mm or ()),
+            "dwell_s": entry.dwell_s,
+            "repeats": list(chosen).count(index),
+        }
+        found.append({name: value for name, value in described.items() if value is not None})
+    return found
+
+
+def _statement(
+    candidates: Sequence[FrfRecording],
+    chosen: Sequence[int],
+    chance: float,
+    names: Sequence[Sequence[str]],
+    beyond: bool,
+) -> str:
+    entry = candidates[chosen[0]]
+    count = f"{len(chosen)} recordings, first" if len(chosen) > 1 else "One recording"
+    wider_than = " It goes beyond what this campaign did: check that the rig can." if beyond else ""
+    rivals = _together([in_words(rival) for rival in names])
+    return (
+        f"{count} with the {entry.indenter_radius_mm:g} mm sphere at {entry.preload_n:g} N, should tell which of "
+        f"{rivals} it is, with a probability of {in_percent(chance)}.{wider_than}"
+    )

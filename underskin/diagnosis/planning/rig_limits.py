@@ -1,0 +1,140 @@
+"""What the rig can do, as the user says or as the campaign did, and the recordings that this allows."""
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from underskin.errors import InvalidInput
+from underskin.mechanisms.models.frf_design import frf_recordings, offsets
+from underskin.recordings.campaign import Campaign, FrfRecording
+
+MOST_RECORDINGS = 8
+_FURTHER = 1.25  # beyond the highest preload used
+_PRELOADS = 8
+_LOUDER, _LONGER = (
+    (3.0, 10.0),
+    10.0,
+)  # than the campaign's largest dynamic force and longest dwell, where no more is known
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the rig can do, in lab units; what is left None is inferred from the campaign.
+
+    Raises InvalidInput where no rig could: a force, a radius or a count not above zero, a distance or a time below it.
+    """
+
+    preload_n: tuple[float, float] | None = None
+    indenter_radius_mm: Sequence[float] | None = None
+    dynamic_force_n: Sequence[float] | None = None
+    dwell_s: Sequence[float] | None = None
+    offset_mm: Sequence[float] | None = None
+    recordings: int = MOST_RECORDINGS
+    minutes_per_recording: float = 5.0
+    minutes_per_indenter: float = 10.0
+
+    def __post_init__(self) -> None:
+        if self.preload_n is not None and not 0 < self.preload_n[0] <= self.preload_n[1] < math.inf:
+            raise InvalidInput("preload_n", list(self.preload_n), "must be above 0, the lowest first")
+        for name in ("indenter_radius_mm", "dynamic_force_n"):
+            if any(not 0 < value < math.inf for value in getattr(self, name) or ()):
+                raise InvalidInput(name, list(getattr(self, name)), "must be above 0, each")
+        for name in ("dwell_s", "offset_mm"):
+            if any(not 0 <= value < math.inf for value in getattr(self, name) or ()):
+                raise InvalidInput(name, list(getattr(self, name)), "must be 0 or more, each")
+        if self.recordings < 1:
+            raise InvalidInput("recordings", self.recordings, "must be 1 or more")
+
+    @property
+    def given(self) -> bool:
+        """Whether the user said anything of what the rig can do."""
+        return any(
+            value is not None
+            for value in (self.preload_n, self.indenter_radius_mm, self.dynamic_force_n, self.dwell_s, self.offset_mm)
+        )
+
+
+def inferred(campaign: Campaign, limits: Limits) -> Limits:
+    """The limits, those left open as the campaign did it: its spheres, amplitudes, dwells and distances from the
+    sensor, its preloads and a quarter beyond the highest."""
+    entries = frf_recordings(campaign)
+    preloads = [entry.preload_n for entry in entries]
+    distances = np.round(1e3 * np.hypot(*offsets(campaign).T), 1)
+    dwells = [entry.dwell_s for entry in entries if entry.dwell_s is not None]
+    return replace(
+        limits,
+        preload_n=limits.preload_n or (min(preloads), _FURTHER * max(preloads)),
+        indenter_radius_mm=limits.indenter_radius_mm or sorted({entry.indenter_radius_mm for entry in entries}),
+        dynamic_force_n=limits.dynamic_force_n or _ends([entry.dynamic_force_n for entry in entries]),
+        dwell_s=limits.dwell_s or (_ends(dwells) if len(dwells) == len(entries) else ()),
+        offset_mm=_ends(distances.tolist()) if limits.offset_mm is None else limits.offset_mm,
+    )
+
+
+def wider(campaign: Campaign, limits: Limits) -> Limits:
+    """Inferred limits with what most rigs can do besides: a larger dynamic force, a longer dwell, half and all of the
+    thickness beside the sensor."""
+    thickness = campaign.skin.thickness_mm
+    assert thickness is not None
+    assert limits.dynamic_force_n is not None
+    assert limits.dwell_s is not None
+    assert limits.offset_mm is not None
+    return replace(
+        limits,
+        dynamic_force_n=[*limits.dynamic_force_n, *(times * max(limits.dynamic_force_n) for times in _LOUDER)],
+        dwell_s=[*limits.dwell_s, _LONGER * max(limits.dwell_s)] if limits.dwell_s else (),
+        offset_mm=sorted({*limits.offset_mm, 0.5 * thickness, thickness}),
+    )
+
+
+def _ends(values: Sequence[float]) -> list[float]:
+    return sorted({min(values), max(values)}) if values else []
+
+
+def candidates(campaign: Campaign, limits: Limits) -> list[FrfRecording]:
+    """One recording at every combination of what the rig can do, at the sensor that was recorded most, after all."""
+    entries = frf_recordings(campaign)
+    sensors = [entry.sensor for entry in entries]
+    sensor = max(dict.fromkeys(sensors), key=sensors.count)
+    place = next((known.x_mm, known.y_mm) for known in campaign.skin.sensors if known.id == sensor)
+    cycles = [entry.load_cycles for entry in entries if entry.load_cycles is not None]
+    return [
+        replace(
+            entries[0],
+            id=f"candidate {number}",
+            sensor=sensor,
+            indenter_radius_mm=sphere,
+            preload_n=force,
+            dynamic_force_n=amplitude,
+            dwell_s=dwell,
+            load_cycles=max(cycles) if len(cycles) == len(entries) else None,
+            position_mm=(place[0] + round(offset, 3), place[1]),
+            frequency_hz=np.array([30.0]),
+            frf_re_pc_per_n=np.array([1.0]),
+            frf_im_pc_per_n=np.array([0.0]),
+            coherence=None,
+            sample_rate_hz=None,
+            force_n=None,
+            charge_pc=None,
+        )
+        for number, (force, sphere, amplitude, dwell, offset) in enumerate(_settings(limits))
+    ]
+
+
+def _settings(limits: Limits) -> Iterator[tuple[float, float, float, float | None, float]]:
+    assert limits.preload_n is not None
+    forces = sorted({float(f"{force:.2g}") for force in np.geomspace(*limits.preload_n, _PRELOADS)})
+    inside = [force for force in forces if limits.preload_n[0] <= force <= limits.preload_n[1]]
+    forces = sorted({*inside, *limits.preload_n})
+    for force, sphere, amplitude, dwell, offset in itertools.product(
+        forces,
+        limits.indenter_radius_mm or (),
+        limits.dynamic_force_n or (),
+        limits.dwell_s or (None,),
+        limits.offset_mm or (0.0,),
+    ):
+        if amplitude < force:
+            yield force, sphere, amplitude, dwell, offset

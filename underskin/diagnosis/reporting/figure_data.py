@@ -1,0 +1,134 @@
+"""What the figures of a diagnosis show: measured and predicted responses, thinned to a number that an eye can read.
+
+A point is one recording, or one recording at some neighbouring lines where the misfit or its explanation runs along the
+lines. Its values are means weighted with 1/variance.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.diagnosis.data.axes import recording_axes
+from underskin.diagnosis.inference.explanation import Explanation, Workbench, needs_lines
+from underskin.diagnosis.inference.residuals import whole_prediction
+from underskin.diagnosis.localisation.permutation_test import axis_values
+from underskin.diagnosis.reporting.report import Diagnosis
+from underskin.mechanisms.autodiff import Array
+from underskin.units import Complexes, Floats
+
+_MOST_POINTS = 600
+_LEAST_BINS = 8  # of the lines, so that a shape over them can be seen in campaigns of any size
+_MOST_LEVELS = 24  # of an axis
+_SMALLEST = 0.05  # of the largest response: smaller ones are no scale for a residual
+
+
+@dataclass(frozen=True)
+class Points:
+    """Responses in pC/N, forces of curves in N; `deviation` without gain scatter, which is relative."""
+
+    recording: NDArray[np.intp]  # (points,)
+    measured: Complexes  # (points,)
+    predicted: Complexes  # (points,)
+    deviation: Floats  # (points,) of real and of imaginary part
+    gain: float  # sd of a recording's and of its sensor's gain
+
+    @property
+    def residual_percent(self) -> Complexes:
+        """Measured less predicted over |predicted|, or over 5 % of the largest where that is less."""
+        size = np.abs(self.predicted)
+        residual: Complexes = 100 * (self.measured - self.predicted) / np.maximum(size, _SMALLEST * size.max())
+        return residual
+
+
+@dataclass(frozen=True)
+class Levels:
+    """An axis in steps: of each point the step, of each step its name and the values that it holds."""
+
+    step: NDArray[np.intp]  # (points,)
+    names: list[str]
+    low: Array  # (steps,)
+    high: Array  # (steps,)
+
+
+class Thinned:
+    """Which rows each point is the mean of."""
+
+    def __init__(self, diagnosis: Diagnosis, bench: Workbench, shown: Explanation) -> None:
+        """One point a recording unless region or explanation run along the lines."""
+        self.lines = lines = bench.lines
+        self.bench = bench
+        along = any(axis in diagnosis.region for axis in lines.row_axes)
+        by_line = lines.curves or along or any(needs_lines(name) for name in shown.names)
+        distinct, line = np.unique(np.round(lines.frequency, 6), return_inverse=True)
+        bins = min(len(distinct), max(_MOST_POINTS // lines.recordings, _LEAST_BINS)) if by_line else 1
+        key = lines.recording * bins + line.reshape(-1) * bins // len(distinct)
+        self.by_line = by_line
+        self._used, self._point = np.unique(key, return_inverse=True)
+        self.recording = self._used // bins
+        self._weight = lines.deviation**-2.0
+        self._total = np.bincount(self._point, self._weight)
+
+    def points(self, explanation: Explanation) -> Points:
+        """Measured, and predicted by an explanation with the sensors' gains that it found."""
+        lines, best = self.lines, explanation.best.at
+        levels = best.marginal.levels
+        gains = np.exp(best.marginal.sensor_gains)[lines.sensor][lines.recording]
+        predicted = whole_prediction(self.bench, explanation) * gains
+        variance = (levels.level**2 / self._total) + self._mean(self._placed(explanation))
+        unit = 1.0 if lines.curves else 1e12
+        return Points(
+            recording=self.recording,
+            measured=unit * self._complex_mean(lines.value),
+            predicted=unit * self._complex_mean(predicted),
+            deviation=unit * np.sqrt(variance),
+            gain=float(np.hypot(levels.gain, levels.spread)),
+        )
+
+    def levels(self, axis: str) -> Levels | None:
+        """The axis in steps; None where all points lie at one."""
+        column = axis_values(self.lines, axis, True)
+        assert column is not None
+        if column.dtype.kind != "U":
+            column = self._mean(column)
+            return _stepped(column) if np.ptp(column) > 0 else None
+        first = np.unique(self._point, return_index=True)[1]
+        names, step = np.unique(column[first], return_inverse=True)
+        return Levels(step.reshape(-1), names.tolist(), names, names) if len(names) > 1 else None
+
+    def axes(self) -> list[str]:
+        """The axes that the points can be laid out along, those of the rows first."""
+        return [*self.lines.row_axes[: int(self.by_line)], *recording_axes(self.lines.campaign)]
+
+    def _placed(self, explanation: Explanation) -> Floats:
+        """The variance from positioning and mains pick-up, of each row."""
+        prediction, levels = explanation.best.at.prediction, explanation.best.at.marginal.levels
+        variance = np.zeros(len(prediction.value))
+        if self.lines.smooth is not None:
+            variance += (levels.smooth * self.lines.smooth.scale) ** 2
+        if prediction.position_slopes is not None:
+            variance += levels.position**2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
+        variance += explanation.best.at.pickup_variance
+        return variance if len(variance) == len(self.lines.value) else variance[self.lines.recording]
+
+    def _mean(self, column: Floats) -> Floats:
+        return np.bincount(self._point, self._weight * column) / self._total
+
+    def _complex_mean(self, column: Complexes) -> Complexes:
+        return self._mean(column.real) + 1j * self._mean(column.imag)
+
+
+def _stepped(column: Floats) -> Levels:
+    """Its distinct values, or as many steps of like counts."""
+    distinct, number = np.unique(np.round(column, 6), return_inverse=True)
+    steps = min(len(distinct), _MOST_LEVELS)
+    of_value = np.arange(len(distinct)) * steps // len(distinct)
+    starts = np.searchsorted(of_value, np.arange(steps))
+    low, high = distinct[starts], distinct[np.append(starts[1:], len(distinct)) - 1]
+    names = [_short((a + b) / 2) for a, b in zip(low, high, strict=True)]
+    return Levels(of_value[number.reshape(-1)], names, low, high)
+
+
+def _short(value: float) -> str:
+    """Three digits, never as a power of ten."""
+    return np.format_float_positional(value, precision=3, fractional=False, trim="-")

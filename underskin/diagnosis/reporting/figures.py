@@ -1,0 +1,250 @@
+"""Figures of a diagnosis: where recordings and model differ, measured against predicted before and after, how probable
+each explanation is, and what is known of its parameters. Colours of Okabe and Ito, and a scale from purple to orange,
+that colour-blind people tell apart; lab units.
+"""
+
+from collections.abc import Mapping
+from html import escape
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from underskin.diagnosis.data.axes import WORDS
+from underskin.diagnosis.data.names import SIMPLEST
+from underskin.diagnosis.inference.explanation import Explanation, Workbench, own_places
+from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT
+from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned
+from underskin.diagnosis.reporting.report import Diagnosis
+from underskin.formatting import in_percent
+from underskin.units import Floats
+
+AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in WORDS.items()}
+_BLUE, _ORANGE, _GREY = "#0072B2", "#D55E00", "#BBBBBB"
+_SIGMAS = 1.96  # of a 95 % interval
+_MOST_LABELLED = 80  # cells of a map that show their number
+_BAND = 60  # points along a band
+_ROW, _BETWEEN = 110, 0.65  # height of a parameter's row [pixels], and the share of it that labels need
+
+
+def figures(diagnosis: Diagnosis, document: Mapping[str, Any]) -> dict[str, go.Figure]:
+    """By name: where, before_after, explanations, parameters; those that the diagnosis has. `document`: its report."""
+    if diagnosis.search is None or diagnosis.bench is None:
+        return {}
+    nothing = next(entry for entry in diagnosis.search.explanations if not entry.names)
+    shown = diagnosis.search.shown_or_nothing(diagnosis.search.answers[0])
+    thinned = Thinned(diagnosis, diagnosis.bench, shown)
+    before, after = thinned.points(nothing), thinned.points(shown)
+    found = {
+        "where": residual_map(diagnosis, thinned, before),
+        "before_after": before_and_after(diagnosis, thinned, before, after, shown),
+        "explanations": explanations(document),
+    }
+    if any(entry["parameters"] for entry in document["mechanisms"]):
+        found["parameters"] = parameter_intervals(diagnosis.bench, shown, document)
+    return found
+
+
+def explanations(document: Mapping[str, Any]) -> go.Figure:
+    """The probability of each explanation in a report, the stated answer on top."""
+    stated = {"no_mismatch": ["nothing_missing"], "unexplained": ["none_of_these"]}
+    leader = stated.get(document["verdict"]) or [entry["name"] for entry in document["mechanisms"]]
+    rows = [(leader, document["probability"])]
+    rows += [(entry["mechanisms"], entry["probability"]) for entry in document["alternatives"]]
+    names = [escape(" + ".join(name.replace("_", " ") for name in entry)) for entry, _ in rows]
+    values = [value for _, value in rows]
+    figure = go.Figure()
+    figure.add_bar(
+        x=values,
+        y=names,
+        orientation="h",
+        marker={"color": [_BLUE, *[_GREY] * (len(rows) - 1)]},
+        text=[in_percent(value) for value in values],
+        textposition="outside",
+        cliponaxis=False,
+        hovertemplate="%{y}: %{text}<extra></extra>",
+    )
+    figure.update_layout(
+        title="How probable each explanation is", height=130 + 34 * len(rows), margin={"r": 110, "t": 60}
+    )
+    figure.update_xaxes(title="probability", range=[0, 1.0], tickformat=".0%")
+    figure.update_yaxes(autorange="reversed")
+    return _styled(figure)
+
+
+def residual_map(diagnosis: Diagnosis, thinned: Thinned, before: Points) -> go.Figure:
+    """Measured less the model to which nothing is added, over the located axes; the region outlined.
+
+    A cell is the mean over the points in it; out of phase where the misfit lies in the phase.
+    """
+    part, name = _part(diagnosis, before.residual_percent)
+    x_axis, y_axis = _map_axes(diagnosis, thinned)
+    x, y = (None if axis is None else thinned.levels(axis) for axis in (x_axis, y_axis))
+    x, y = (_one_level(before) if entry is None else entry for entry in (x, y))
+    cell = y.step * len(x.names) + x.step
+    size = len(x.names) * len(y.names)
+    count = np.bincount(cell, minlength=size)
+    mean = np.where(count > 0, np.bincount(cell, part, size) / np.maximum(count, 1), np.nan)
+    shape = (len(y.names), len(x.names))
+    limit = float(np.nanmax(np.abs(mean))) or 1.0
+    figure = go.Figure()
+    figure.add_heatmap(
+        z=mean.reshape(shape),
+        zmid=0,
+        zmin=-limit,
+        zmax=limit,
+        colorscale="PuOr_r",
+        customdata=count.reshape(shape),
+        texttemplate="%{z:+.0f}" if size <= _MOST_LABELLED else None,
+        xgap=1,
+        ygap=1,
+        colorbar={"title": {"text": f"{name} [%]", "side": "right"}},
+        hovertemplate="%{z:+.3g} % (mean of %{customdata})<extra></extra>",
+    )
+    for entry, axis, update in ((x, x_axis, figure.update_xaxes), (y, y_axis, figure.update_yaxes)):
+        labels = [escape(label) for label in entry.names]
+        update(title=AXES.get(axis or "", ""), tickmode="array", tickvals=list(range(len(labels))), ticktext=labels)
+    if diagnosis.region:
+        (x0, x1), (y0, y1) = _outline(diagnosis, x_axis, x), _outline(diagnosis, y_axis, y)
+        figure.add_shape(type="rect", x0=x0, x1=x1, y0=y0, y1=y1, line={"color": "#000000", "width": 3})
+    figure.update_layout(
+        title=f"Where: measured above {SIMPLEST[thinned.lines.kind]} [%]",
+        height=170 + 40 * max(4, min(len(y.names), 12)),
+    )
+    return _styled(figure)
+
+
+def before_and_after(
+    diagnosis: Diagnosis, thinned: Thinned, before: Points, after: Points, shown: Explanation
+) -> go.Figure:
+    """Measured against predicted, by the model alone and by what is stated, each with the band that noise allows."""
+    named = " + ".join(shown.names).replace("_", " ") or "nothing added"
+    figure = make_subplots(
+        1, 2, subplot_titles=(f"before: {SIMPLEST[thinned.lines.kind]}", f"after: {named}"), shared_yaxes=True
+    )
+    _, name = _part(diagnosis, before.measured)
+    ids = [escape(entry.id) for entry in thinned.lines.campaign.recordings]
+    for place, (points, colour, marker) in enumerate(((before, _ORANGE, "square"), (after, _BLUE, "circle")), start=1):
+        predicted, measured = (_part(diagnosis, column)[0] for column in (points.predicted, points.measured))
+        reach = np.linspace(predicted.min(), predicted.max(), _BAND)
+        # Where all predictions are alike the band would have no width along the abscissa.
+        reach = reach if np.ptp(reach) > 0 else reach + np.linspace(-1, 1, _BAND) * (np.abs(reach).max() or 1.0) * 0.05
+        half = _SIGMAS * np.hypot(points.gain * reach, float(np.median(points.deviation)))
+        figure.add_scatter(
+            x=[*reach, *reach[::-1]],
+            y=[*(reach + half), *(reach - half)[::-1]],
+            fill="toself",
+            fillcolor="rgba(0,0,0,0.15)",
+            line={"width": 0},
+            hoverinfo="skip",
+            name="95 % of the noise",
+            showlegend=place == 1,
+            row=1,
+            col=place,
+        )
+        figure.add_scatter(
+            x=reach, y=reach, mode="lines", line={"color": "#000000", "width": 1}, name="measured = predicted",
+            hoverinfo="skip", showlegend=place == 1, row=1, col=place,
+        )  # fmt: skip
+        figure.add_scatter(
+            x=predicted,
+            y=measured,
+            mode="markers",
+            marker={"color": colour, "symbol": marker, "size": 6, "opacity": 0.7},
+            name=("before", "after")[place - 1],
+            text=[ids[number] for number in points.recording],
+            hovertemplate="%{text}<br>predicted %{x:.4g}<br>measured %{y:.4g}<extra></extra>",
+            row=1,
+            col=place,
+        )
+    unit = "force [N]" if thinned.lines.curves else f"FRF, {name} [pC/N]"
+    figure.update_xaxes(title=f"predicted {unit}")
+    figure.update_yaxes(title=f"measured {unit}", col=1)
+    figure.update_layout(
+        title="Measured against predicted",
+        height=470,
+        margin={"t": 90, "b": 100},
+        legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
+    )
+    return _styled(figure)
+
+
+def parameter_intervals(bench: Workbench, shown: Explanation, document: Mapping[str, Any]) -> go.Figure:
+    """Each parameter's 95 % interval (blue) on that of its prior (grey), in its own unit."""
+    places = own_places(shown.names, bench.lines)
+    rows = [
+        (entry["name"], parameter, prior)
+        for entry in document["mechanisms"]
+        for parameter, prior in zip(entry["parameters"], shown.model.parameters[places[entry["name"]]], strict=True)
+    ]
+    titles = [f"{name.replace('_', ' ')}: {_labelled(entry)}" for name, entry, _ in rows]
+    figure = make_subplots(len(rows), 1, subplot_titles=titles, vertical_spacing=_BETWEEN / len(rows))
+    for place, (_, entry, prior) in enumerate(rows, start=1):
+        widest = [prior.from_fit(prior.quantile(q)) for q in (0.025, 0.975)]
+        for ends, colour, width, label in (
+            (widest, _GREY, 14, "before the recordings (prior), 95 %"),
+            ([entry["low"], entry["high"]], _BLUE, 8, "after them, 95 %"),
+        ):
+            figure.add_scatter(
+                x=ends, y=[0, 0], mode="lines", line={"color": colour, "width": width}, name=label,
+                showlegend=place == 1, row=place, col=1,
+            )  # fmt: skip
+        figure.add_scatter(
+            x=[entry["value"]], y=[0], mode="markers", name="most probable", showlegend=place == 1,
+            marker={"color": "#000000", "symbol": "line-ns-open", "size": 16, "line": {"width": 2}}, row=place, col=1,
+        )  # fmt: skip
+        figure.update_xaxes(type="log" if prior.scale == "log" else "linear", row=place, col=1)
+    figure.update_yaxes(visible=False, range=[-1, 1])
+    figure.update_layout(
+        title="What the recordings say of the parameters",
+        height=190 + _ROW * len(rows),
+        legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
+        margin={"t": 100, "b": 90},
+    )
+    return _styled(figure)
+
+
+def _labelled(entry: Mapping[str, Any]) -> str:
+    unit = "" if entry["unit"] == "-" else f" {entry['unit']}"
+    interval = f"{entry['value']:.3g} ({entry['low']:.3g} to {entry['high']:.3g}){unit}"
+    return f"{entry['name'].replace('_', ' ')} {interval}"
+
+
+def _part(diagnosis: Diagnosis, column: np.ndarray[Any, Any]) -> tuple[Floats, str]:
+    """The real part, or the imaginary where the misfit lies in the phase alone, and what it is called."""
+    telling = [entry for entry in diagnosis.axes if entry.p_value is not None and entry.p_value < SIGNIFICANT]
+    largest = max(telling, key=lambda entry: entry.share, default=None)
+    if largest is not None and largest.axis == "phase":
+        return column.imag, "out of phase"
+    return column.real, "in phase"
+
+
+def _map_axes(diagnosis: Diagnosis, thinned: Thinned) -> tuple[str | None, str | None]:
+    """Those of the region, then the campaign's, as far as points differ along them; frequency lies on x."""
+    every = thinned.axes()
+    wanted = [name for name in dict.fromkeys([*diagnosis.region, *every]) if name in every]
+    varying: list[str | None] = [name for name in wanted if thinned.levels(name) is not None]
+    first, second = (*varying, None, None)[:2]
+    return (second, first) if second in thinned.lines.row_axes else (first, second)
+
+
+def _one_level(points: Points) -> Levels:
+    """All points at one place."""
+    return Levels(np.zeros(len(points.recording), dtype=np.intp), [""], np.zeros(1), np.zeros(1))
+
+
+def _outline(diagnosis: Diagnosis, axis: str | None, levels: Levels) -> tuple[float, float]:
+    """From where to where the region reaches on an axis of the map, whose steps are 0, 1, …"""
+    ends = diagnosis.region.get(axis or "")
+    if ends is None:
+        return -0.5, len(levels.names) - 0.5
+    slack = 0.0 if isinstance(ends[0], str) else 1e-6 * abs(float(ends[-1]))
+    low, high = (ends[0], ends[-1]) if isinstance(ends[0], str) else (float(ends[0]) - slack, float(ends[-1]) + slack)
+    inside = np.flatnonzero((levels.high >= low) & (levels.low <= high))
+    return (float(inside.min()) - 0.5, float(inside.max()) + 0.5) if len(inside) else (-0.5, len(levels.names) - 0.5)
+
+
+def _styled(figure: go.Figure) -> go.Figure:
+    figure.update_layout(template="plotly_white", font={"size": 14, "color": "#222222"})
+    return figure

@@ -1,0 +1,98 @@
+"""How much better the recordings are described: errors before and after, in sample and on groups held out."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from underskin.diagnosis.data.names import NOTHING_MISSING
+from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
+from underskin.diagnosis.selection.search import Search
+from underskin.diagnosis.validation import cross_validation
+from underskin.mechanisms.models.pickup import PICKUP_NAMES
+from underskin.mechanisms.registry import CATALOGUE
+
+
+def explains_percent(
+    search: Search, bench: Workbench, explanation: Explanation, name: str, whole: cross_validation.Prediction
+) -> float | None:
+    """How much of the misfit beyond noise, without the mechanism, it takes away [%].
+
+    None where the set without it was not fitted, or where the misfit without it is no larger than noise makes it: an
+    effect that only many recordings together tell. A mechanism that adds variance takes nothing away (see
+    `_share_of_variance`).
+    """
+    if any(entry.name in PICKUP_NAMES for entry in CATALOGUE[name].parameters(bench.lines.campaign, bench.kind)):
+        return round(100 * _share_of_variance(explanation), 1)
+    rest = tuple(entry for entry in explanation.names if entry != name)
+    without = next((entry for entry in search.explanations if entry.names == rest), None)
+    if without is None:
+        return None
+    misfit = cross_validation.in_sample(bench, without)
+    beyond = misfit.square / misfit.size - whole.noise / whole.size
+    left = whole.square / whole.size - whole.noise / whole.size
+    return round(100 * float(np.clip(1 - max(left, 0.0) / beyond, 0.0, 1.0)), 1) if beyond > 0 else None
+
+
+def _share_of_variance(explanation: Explanation) -> float:
+    """What mains pick-up is of the lines' variance where it acts: Σ q² · q²/(q² + n²) / Σ q², n a line's own noise."""
+    at = explanation.best.at
+    pickup = at.pickup_variance
+    noise = (at.marginal.levels.level * explanation.best.fitter.hypothesis.lines.deviation) ** 2
+    return float((pickup**2 / (pickup + noise)).sum() / pickup.sum())
+
+
+def fit_summary(
+    search: Search, bench: Workbench, groups: Sequence[cross_validation.HeldOut], explanation: Explanation
+) -> dict[str, Any]:
+    """Errors before and after, held-out groups, the noise that was found, and of curves the modulus."""
+    nothing = next(entry for entry in search.explanations if not entry.names)
+    inside = [cross_validation.in_sample(bench, entry) for entry in (nothing, explanation)]
+    outside = cross_validation.total(groups)
+    parts = {
+        name: {
+            "rmse_percent": rounded(fitted.rmse_percent),
+            "heldout_rmse_percent": rounded(left.rmse_percent),
+            "log_score": rounded(left.log_score / left.recordings) if left.recordings else None,
+            **({"youngs_modulus": modulus(bench, entry)} if bench.lines.curves else {}),
+        }
+        for name, entry, fitted, left in zip(("before", "after"), (nothing, explanation), inside, outside, strict=True)
+    }
+    floor = outside[1].floor_percent if outside[1].recordings else inside[1].floor_percent
+    return {
+        **parts,
+        "mechanisms": list(explanation.names),  # of `after`, also where something beyond them is unexplained
+        "noise_floor_percent": rounded(floor),
+        "groups": [
+            {
+                "group": entry.group,
+                "chosen": list(entry.chosen) or [NOTHING_MISSING],
+                "before_rmse_percent": rounded(entry.before.rmse_percent),
+                "after_rmse_percent": rounded(entry.after.rmse_percent),
+                "noise_floor_percent": rounded(entry.after.floor_percent),
+            }
+            for entry in groups
+        ],
+        "noise": _noise(explanation),
+    }
+
+
+def modulus(bench: Workbench, explanation: Explanation) -> dict[str, Any]:
+    """Young's modulus under an explanation, with its 95 % interval; from a factor on what was declared, or free."""
+    found = parameter(explanation, place_of(explanation, "youngs_modulus"))
+    declared = bench.lines.campaign.skin.youngs_modulus_mpa
+    if declared is None:
+        return found
+    scaled = {name: rounded(declared * found[name]) for name in ("value", "low", "high")}
+    return {**found, "unit": "MPa", **scaled}
+
+
+def _noise(explanation: Explanation) -> dict[str, Any]:
+    levels = explanation.best.at.marginal.levels
+    return {
+        "gain_percent": rounded(100 * levels.gain),
+        "position_mm": rounded(1e3 * levels.position),
+        "line_level": rounded(levels.level),
+        "smooth_percent": rounded(100 * levels.smooth),
+    }

@@ -1,0 +1,51 @@
+"""Numbers as a report states them: rounded to stated digits, parameters with their 95 % intervals."""
+
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtri
+
+from underskin.diagnosis.inference.explanation import Explanation
+from underskin.diagnosis.inference.hypothesis import COVARIANCE_NAMES
+from underskin.diagnosis.inference.laplace import levels_covariance
+
+_QUANTILE = float(ndtri(0.975))
+
+
+def rounded(value: float, digits: int = 4) -> float | None:
+    """To significant digits; None for what is not finite."""
+    return float(f"{value:.{digits}g}") if np.isfinite(value) else None
+
+
+def probability(value: float) -> float:
+    """To three decimals."""
+    return round(value, 3)
+
+
+def place_of(explanation: Explanation, name: str) -> int:
+    """Where in its model's parameters one is."""
+    return [entry.name for entry in explanation.model.parameters].index(name)
+
+
+def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
+    """A parameter's most probable value and 95 % interval, within its bounds."""
+    fitter, point = explanation.best.fitter, explanation.point
+    entry = fitter.parameters[place]
+    if entry.name in COVARIANCE_NAMES:
+        names = [parameter.name for parameter in fitter.covariance]
+        own = names.index(entry.name)
+        variance = float(levels_covariance(fitter.covariance_equations(explanation.best.at)[1])[own, own])
+    else:
+        index = fitter.places.index(place)
+        variance = float(explanation.best.covariance[index, index])
+    reach = _QUANTILE * np.sqrt(max(variance, 0.0))
+    low, high = entry.bounds
+    middle = float(point.fit[place])
+    ends = (max(middle - reach, low), min(middle + reach, high))
+    return {
+        "name": entry.name,
+        "unit": entry.unit,
+        "value": rounded(float(entry.from_fit(middle))),
+        "low": rounded(float(entry.from_fit(ends[0]))),
+        "high": rounded(float(entry.from_fit(ends[1]))),
+    }

@@ -1,0 +1,185 @@
+"""The report (`report/1`): what the steps found, in one document with numbers rounded to stated digits.
+
+Four significant digits for values, three decimals for probabilities and p-values: enough for any use. The same input
+gives the same report on one machine; on a processor that rounds differently a last digit may differ.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from underskin.diagnosis.data.names import NOTHING_MISSING
+from underskin.diagnosis.inference.explanation import Explanation, Workbench, own_places
+from underskin.diagnosis.localisation.effect_size import Effect
+from underskin.diagnosis.localisation.permutation_test import AxisResult, reaches_all_along
+from underskin.diagnosis.localisation.residual_shape import REACHES_NOISE
+from underskin.diagnosis.reporting.caveats import caveats
+from underskin.diagnosis.reporting.fit_warnings import doubts
+from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
+from underskin.diagnosis.reporting.numbers import parameter, place_of, probability, rounded
+from underskin.diagnosis.reporting.statements import EXPLAINED, answer_statement, location_statement, why_not
+from underskin.diagnosis.selection.search import Answer, Search
+from underskin.diagnosis.validation import cross_validation
+from underskin.diagnosis.validation.identifiability import Confounding
+from underskin.prediction import plausibility
+from underskin.recordings.finding import Finding
+
+SCHEMA = "report/1"
+_ALTERNATIVES = 6
+_LEAST_PROBABILITY = 0.005
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything that the steps worked out about one campaign; `search` is None where the data were too few."""
+
+    name: str
+    findings: Sequence[Finding]
+    provenance: Mapping[str, Any]
+    lacking: str = ""  # what a campaign that is too small lacks
+    search: Search | None = None
+    bench: Workbench | None = None
+    axes: Sequence[AxisResult] = ()
+    region: Mapping[str, list[float | str]] = field(default_factory=dict)
+    effect: Effect | None = None
+    groups: Sequence[cross_validation.HeldOut] = ()
+    confounded: Sequence[Confounding] = ()
+    shape: str = ""  # of what remains, where nothing here describes it
+    next_experiment: Mapping[str, Any] = field(default_factory=dict)
+
+
+def verdict(diagnosis: Diagnosis) -> str:
+    """The verdict that the probabilities give, as DESIGN.md defines it."""
+    if diagnosis.search is None:
+        return "insufficient_data"
+    leader = diagnosis.search.answers[0]
+    if leader.names == (NOTHING_MISSING,):
+        return "no_mismatch"
+    if leader.explanation is None:
+        return "unexplained"
+    return "explained" if leader.probability >= EXPLAINED else "ambiguous"
+
+
+def report(diagnosis: Diagnosis) -> dict[str, Any]:
+    """The document; plain JSON values."""
+    stated = verdict(diagnosis)
+    document: dict[str, Any] = {"schema": SCHEMA, "campaign": diagnosis.name, "verdict": stated}
+    if diagnosis.search is None or diagnosis.bench is None:
+        return {
+            **document,
+            "probability": 1.0,
+            "statement": f"The recordings cannot tell anything: {diagnosis.lacking}.",
+            "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "Nothing was located."},
+            "mechanisms": [],
+            "alternatives": [],
+            "not_identifiable": [],
+            "findings": _findings(diagnosis.findings),
+            "fit": None,
+            "d33": None,
+            "next_experiment": None,
+            "provenance": dict(diagnosis.provenance),
+        }
+    search, bench = diagnosis.search, diagnosis.bench
+    leader = search.answers[0]
+    shown = search.shown_or_nothing(leader)
+    fit = fit_summary(search, bench, diagnosis.groups, shown)
+    named = leader.explanation if stated in ("explained", "ambiguous") else None
+    d33, implausible = _d33(bench, shown, leader, fit)
+    findings = _findings([*diagnosis.findings, *doubts(bench, shown), *implausible])
+    modulus = fit["after"].get("youngs_modulus")
+    statement = answer_statement(
+        search.answers, stated, diagnosis.shape, bench.kind, modulus, caveats=caveats(findings)
+    )
+    return {
+        **document,
+        "probability": probability(leader.probability),
+        "statement": statement,
+        "location": _location(diagnosis, bench, stated == "no_mismatch"),
+        "mechanisms": [] if named is None else _mechanisms(search, bench, named),
+        "alternatives": _alternatives(search.answers),
+        "not_identifiable": [
+            {"mechanism": entry.mechanism, "confounded_with": entry.confounded_with, "reason": entry.reason}
+            for entry in diagnosis.confounded
+        ],
+        "findings": findings,
+        "fit": fit,
+        "d33": d33,
+        "next_experiment": dict(diagnosis.next_experiment) or None,
+        "provenance": dict(diagnosis.provenance),
+    }
+
+
+def _d33(
+    bench: Workbench, shown: Explanation, leader: Answer, fit: Mapping[str, Any]
+) -> tuple[dict[str, Any] | None, list[Finding]]:
+    """The d33 under the one answer that stands, and a finding where no PVDF has it; None where several answers are
+    left, or none: each would mean another d33.
+
+    `quotable`: it is plausible, and the answer fits the recordings to their noise.
+    """
+    if bench.lines.curves or leader.explanation is None or leader.probability < EXPLAINED:
+        return None, []
+    d33 = parameter(shown, place_of(shown, "d33"))
+    slip = plausibility.implausible(d33["value"])
+    reached = fit["after"]["rmse_percent"] <= REACHES_NOISE * fit["noise_floor_percent"]
+    findings = [Finding("implausible_d33", "", "d33_pc_per_n", f"d33 comes out as {d33['value']:.4g} pC/N, {slip}")]
+    return {**d33, "quotable": reached and slip is None}, findings if slip else []
+
+
+def _findings(found: Sequence[Finding]) -> list[dict[str, str]]:
+    return [
+        {"code": entry.code, "recording": entry.recording, "field": entry.field, "statement": entry.statement}
+        for entry in found
+    ]
+
+
+def _mechanisms(search: Search, bench: Workbench, explanation: Explanation) -> list[dict[str, Any]]:
+    places = own_places(explanation.names, explanation.best.fitter.hypothesis.lines)
+    whole = cross_validation.in_sample(bench, explanation)
+    sets = [answer for answer in search.answers if answer.explanation is not None]
+    return [
+        {
+            "name": name,
+            "probability": probability(sum(answer.probability for answer in sets if name in answer.names)),
+            "parameters": [parameter(explanation, place) for place in range(places[name].start, places[name].stop)],
+            "explains_percent": explains_percent(search, bench, explanation, name, whole),
+        }
+        for name in explanation.names
+    ]
+
+
+def _alternatives(answers: Sequence[Answer]) -> list[dict[str, Any]]:
+    leader = answers[0]
+    found: list[dict[str, Any]] = []
+    for answer in answers[1:]:
+        if len(found) >= _ALTERNATIVES or (answer.probability < _LEAST_PROBABILITY and len(found) > 1):
+            break
+        found.append(
+            {
+                "mechanisms": list(answer.names),
+                "probability": probability(answer.probability),
+                "why_not": why_not(answer, leader),
+            }
+        )
+    return found
+
+
+def _location(diagnosis: Diagnosis, bench: Workbench, agrees: bool) -> dict[str, Any]:
+    assert diagnosis.effect is not None
+    effect, region = diagnosis.effect, diagnosis.region
+    whole = {name: reaches_all_along(bench.lines, name, ends) for name, ends in region.items()}
+    return {
+        "axes": [
+            {
+                "axis": entry.axis,
+                "p_value": None if entry.p_value is None else round(entry.p_value, 3),
+                "share_percent": round(100 * float(entry.share), 1),
+                **({"undecidable": entry.reason} if entry.reason else {}),
+            }
+            for entry in diagnosis.axes
+        ],
+        "region": {name: [rounded(x) if isinstance(x, float) else x for x in ends] for name, ends in region.items()},
+        "effect_percent": rounded(effect.percent, 3),
+        "effect_interval_percent": [rounded(effect.low, 3), rounded(effect.high, 3)],
+        "statement": location_statement(diagnosis.axes, region, whole, effect, agrees=agrees),
+    }

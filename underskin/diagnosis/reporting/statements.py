@@ -1,0 +1,147 @@
+"""What a report says in words, for people who press skins: no statistics but percentages, values with their units."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from underskin.diagnosis.data.axes import WORDS
+from underskin.diagnosis.data.names import SIMPLEST, in_words
+from underskin.diagnosis.localisation.effect_size import Effect
+from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT, AxisResult
+from underskin.diagnosis.selection.search import Answer
+from underskin.formatting import in_digits, in_percent
+from underskin.mechanisms.base import Kind
+from underskin.mechanisms.registry import CATALOGUE
+
+EXPLAINED = 0.8  # least probability of an answer that is stated without its rivals
+_WORTH_NAMING = 0.02
+_UNTHOUGHT_AT_MOST = 0.016  # of none_of_these, where no process shows
+_IN_PERCENT = 90.0  # beyond it an effect is said as a factor
+
+
+def answer_statement(
+    answers: Sequence[Answer],
+    verdict: str,
+    shape: str,
+    kind: Kind = "frf",
+    modulus: Mapping[str, Any] | None = None,
+    caveats: str = "",
+) -> str:
+    """Some plain sentences: what is missing, what decides how far that can be trusted (`caveats`), the laws; of curves
+    also the modulus under the stated answer."""
+    first, rest = _answer(answers, verdict, shape, SIMPLEST[kind], all_used=not caveats)
+    parts = [first, caveats, rest]
+    if modulus is not None and verdict != "unexplained":
+        interval = f"95 %: {modulus['low']:.3g} to {modulus['high']:.3g}"
+        parts.append(f"Young's modulus under this answer: {modulus['value']:.3g} {modulus['unit']} ({interval}).")
+    return " ".join(part for part in parts if part)
+
+
+def _answer(answers: Sequence[Answer], verdict: str, shape: str, model: str, *, all_used: bool) -> tuple[str, str]:
+    """The verdict in one sentence, and what else there is to say of it."""
+    leader = answers[0]
+    percent = in_percent(leader.probability)
+    rivals = [answer for answer in answers[1:4] if answer.probability > _WORTH_NAMING]
+    listed = "; ".join(f"{in_words(answer.names)} ({in_percent(answer.probability)})" for answer in rivals)
+    mentioned = dict.fromkeys(name for answer in (leader, *rivals) for name in answer.names if name in CATALOGUE)
+    if verdict == "no_mismatch":
+        agree = f"Recordings and {model} agree within the noise (probability {percent})"
+        if leader.probability >= EXPLAINED or not rivals:
+            return f"{agree}; nothing needs to be added{'' if all_used else ' for those that were used'}.", ""
+        return f"{agree}, but they do not rule out: {listed}.", _laws(tuple(mentioned))
+    if verdict == "unexplained":
+        return f"Something is missing that none of the known mechanisms describes (probability {percent}).", shape
+    names = in_words(leader.names)
+    if verdict == "explained":
+        return f"{model[0].upper()}{model[1:]} lacks {names} (probability {percent}).", _laws(leader.names)
+    return f"Best explained by {names} ({percent}), but these rivals remain: {listed}.", _laws(tuple(mentioned))
+
+
+def _laws(names: Sequence[str]) -> str:
+    """What each mechanism is, a sentence each."""
+    return " ".join(f"{in_words([name]).capitalize()}: {CATALOGUE[name].plain.rstrip('.')}." for name in names)
+
+
+def why_not(answer: Answer, leader: Answer) -> str:
+    """Why an answer is less probable than the leading one."""
+    if answer.probability > 0.25 * leader.probability:
+        return "the recordings hardly tell it from the leading explanation"
+    if answer.explanation is None and answer.probability < _UNTHOUGHT_AT_MOST:
+        return "nothing in the recordings asks for it; a small share always stays for what nobody thought of"
+    if answer.explanation is None:
+        return "a smooth discrepancy without a name explains the recordings less well, or no better at a higher price"
+    if leader.explanation is None:
+        return "what it leaves of the misfit is not noise"
+    less = leader.explanation.log_evidence - answer.explanation.log_evidence
+    if less > 1:
+        factor = f"about {_round(np.exp(less))}" if less < np.log(1e6) else "more than a million"
+        return f"the recordings are {factor} times less probable under it"
+    return "it explains no more and is less probable beforehand" if less > -1 else "it is less probable beforehand"
+
+
+def _round(value: float) -> str:
+    return f"{float(f'{value:.1g}'):.0f}" if value >= 10 else f"{value:.1g}"
+
+
+def location_statement(
+    axes: Sequence[AxisResult],
+    region: Mapping[str, Sequence[float | str]],
+    whole: Mapping[str, bool],
+    effect: Effect,
+    *,
+    agrees: bool = False,
+) -> str:
+    """One plain sentence; `whole` says of each axis of the region whether the region reaches all along it, `agrees`
+    that recordings and model agree within the noise."""
+    telling = [entry for entry in axes if entry.p_value is not None and entry.p_value < SIGNIFICANT]
+    undecidable = [WORDS[entry.axis][0] for entry in axes if entry.p_value is None]
+    tail = f"; whether it depends on {_listed(undecidable)}, this design cannot tell" if undecidable else ""
+    if not telling:
+        return f"The misfit depends on none of the axes beyond chance{tail}."
+    names = _listed([WORDS[entry.axis][0] for entry in sorted(telling, key=lambda entry: entry.p_value or 0.0)])
+    if agrees:
+        return (
+            f"What is left is within the noise, though more of it goes along with {names} than chance would give{tail}."
+        )
+    parts = [_range(name, ends) for name, ends in region.items() if not whole[name]]
+    where = f"most of it lies at {_listed(parts)}, where" if parts else "it is spread over all of the recordings, where"
+    return f"The misfit depends on {names}; {where} {_size(effect)}{tail}."
+
+
+def _size(effect: Effect) -> str:
+    low, high = sorted((abs(effect.low), abs(effect.high)))
+    if not effect.signed:
+        return (
+            f"the response is off by {in_digits(effect.percent, 3)} % (root mean square: above the model in parts, "
+            f"below it in others; 95 %: {in_digits(low, 3)} to {in_digits(high, 3)} %)"
+        )
+    if abs(effect.percent) > _IN_PERCENT:
+        return _times(effect)
+    side = "above" if effect.percent > 0 else "below"
+    span = (
+        f"{effect.low:+.2g} to {effect.high:+.2g}"
+        if effect.low * effect.high < 0
+        else f"{in_digits(low, 3)} to {in_digits(high, 3)}"
+    )
+    return f"the response is {in_digits(abs(effect.percent), 3)} % {side} the model (95 %: {span} %)"
+
+
+def _times(effect: Effect) -> str:
+    """A large effect as a factor: nothing is more than 100 % below, unless its sign has turned."""
+    factor, low, high = (1 + percent / 100 for percent in (effect.percent, effect.low, effect.high))
+    span = f"{in_digits(low, 2)} to {in_digits(high, 2)}"
+    if factor >= 0:
+        return f"the response is {in_digits(factor, 2)} times the model's (95 %: {span})"
+    return f"the response has the other sign than the model's, {in_digits(factor, 2)} times it (95 %: {span})"
+
+
+def _range(axis: str, ends: Sequence[float | str]) -> str:
+    words, unit = WORDS[axis]
+    values = [value if isinstance(value, str) else in_digits(value) for value in ends]
+    text = " to ".join(dict.fromkeys(values))
+    return f"{words} {text} {unit}".rstrip()
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

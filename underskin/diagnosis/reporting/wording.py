@@ -1,0 +1,61 @@
+"""Names and numbers of a report as a page has them."""
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from underskin.diagnosis.data.axes import WORDS
+from underskin.diagnosis.reporting.figures import AXES
+from underskin.mechanisms.registry import CATALOGUE
+
+_NAMES = {name: name.replace("_", " ") for name in CATALOGUE} | {name: words for name, (words, _) in WORDS.items()}
+_NAMED = re.compile(rf"\b({'|'.join(sorted(_NAMES, key=len, reverse=True))})\b")
+
+
+def readable(text: str) -> str:
+    """A statement with the names of mechanisms and axes as words: contact resonance for contact_resonance."""
+    return _NAMED.sub(lambda found: _NAMES[found[0]], text)
+
+
+def words(name: str) -> str:
+    """A name of the code as words."""
+    return name.replace("_", " ")
+
+
+def axis(name: str) -> str:
+    """An axis with its unit."""
+    return AXES.get(name, words(name))
+
+
+def group(name: str) -> str:
+    """A group of recordings, "preload_n 3.0", by its axis and value."""
+    field, _, value = name.partition(" ")
+    return f"{axis(field)}: {value}"
+
+
+def number(value: float | None) -> str:
+    """Four digits."""
+    return "–" if value is None else f"{value:.4g}"
+
+
+def error(value: float | None) -> str:
+    """An error [%]."""
+    return "–" if value is None else f"{value:.3g} %"
+
+
+def interval(entry: Mapping[str, Any]) -> str:
+    """From low to high."""
+    return f"{number(entry['low'])} to {number(entry['high'])}"
+
+
+def unit(label: str) -> str:
+    """Empty for a pure number."""
+    return "" if label == "-" else label
+
+
+def plain(value: Any) -> str:
+    """A value of a planned recording."""
+    if isinstance(value, list):
+        return ", ".join(map(plain, value))
+    return f"{value:.4g}" if isinstance(value, float) and math.isfinite(value) else "" if value is None else str(value)

@@ -1,0 +1,62 @@
+"""Recordings without a response above their own noise: a sensor that is dead, or not connected.
+
+The noise of a line is read from how much neighbouring lines differ, σ² = median |z_j+1 − z_j|²/(2 ln 2) of the complex
+values, which a resonance between a few of them does not reach.
+A recording is silent where its mean over n lines is no larger than noise makes it, n |mean|²/σ² < 9 (which noise alone
+exceeds once in 8000 recordings), and its lines are no larger than noise, mean |z|² < 3 σ².
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.finding import Finding
+from underskin.recordings.frf.estimation import lines_of
+from underskin.units import Floats
+
+_LEAST_LINES = 4
+_MEAN, _LINES = 9.0, 3.0  # over their variance
+_FAINT = 0.1  # of the level to be expected: what else a sensor shows that is silent in most of its recordings
+_AUDIBLE = 16.0  # of the response that the others let expect: only then is a silent recording no recording
+
+Mask = NDArray[np.bool_]
+
+
+def silence(entries: Sequence[FrfRecording]) -> tuple[Mask, Floats]:
+    """Which recordings are silent, and the variance of each one's mean [(C/N)²]; 0 where its lines are too few."""
+    silent, variance = np.zeros(len(entries), dtype=bool), np.zeros(len(entries))
+    for number, entry in enumerate(entries):
+        measured = lines_of(entry)
+        order = np.argsort(measured.frequency, kind="stable")
+        lines = measured.values[order]
+        lines = lines[np.isfinite(lines)]
+        if len(lines) < _LEAST_LINES:
+            continue
+        noise = float(np.median(np.abs(np.diff(lines)) ** 2)) / (2 * np.log(2.0))
+        variance[number] = noise / len(lines)
+        quiet = float(np.abs(lines.mean()) ** 2) < _MEAN * variance[number]
+        silent[number] = quiet and float(np.mean(np.abs(lines) ** 2)) < _LINES * noise
+    return silent, variance
+
+
+def dead(
+    entries: Sequence[FrfRecording], silent: Mask, variance: Floats, expected: Floats, found: list[Finding]
+) -> Mask:
+    """Which recordings are silent though the others let expect a response well above their noise; each is named, or
+    its sensor where that is silent in most of its recordings and faint in the others, which noise alone does."""
+    lost: Mask = silent & (expected**2 > _AUDIBLE * variance)
+    sensors = np.array([entry.sensor for entry in entries])
+    level = np.array([float(np.abs(np.nanmean(lines_of(entry).values))) for entry in entries])
+    for name in dict.fromkeys(sensors[lost].tolist()):
+        own = sensors == name
+        if own.sum() > 1 and 2 * lost[own].sum() > own.sum() and (lost | (level < _FAINT * expected))[own].all():
+            text = f"none of the {own.sum()} recordings of sensor {name!r} shows a response above its noise: left out"
+            lost = lost | own
+            found.append(Finding("no_response", entries[int(np.flatnonzero(own)[0])].id, "frf_re_pc_per_n", text))
+            continue
+        for number in np.flatnonzero(lost & own).tolist():
+            text = "no response above its noise, where the other recordings let expect one: left out"
+            found.append(Finding("no_response", entries[number].id, "frf_re_pc_per_n", text))
+    return lost

@@ -1,0 +1,75 @@
+"""Numbers that no instrument writes and no skin has, whatever their unit: products and powers of them overflow.
+
+The bounds lie far beyond any slip of units: from a picometre to a kilometre, from a millionth of a pascal to that of
+neutron stars. `units_checked` says nothing against them. A recording with such a number is left out; where the skin has
+one, nothing can be told.
+"""
+
+from collections.abc import Iterator
+from dataclasses import fields, replace
+
+import numpy as np
+
+from underskin.diagnosis.data.inspected import Inspected
+from underskin.recordings.campaign import Campaign, Recording, SkinDescription
+from underskin.recordings.finding import Finding
+
+_LENGTH, _FORCE, _TIME = (1e-9, 1e6), (1e-8, 1e8), (1e-12, 1e12)
+_PLACE = (0.0, 1e6)  # of what differences and rotations leave where 0 is meant, too
+_CHARGE = (1e-9, 1e9)
+_BOUNDS = {
+    "thickness_mm": _LENGTH,
+    "sensor_radius_mm": _LENGTH,
+    "youngs_modulus_mpa": (1e-12, 1e12),
+    "sensors": _PLACE,
+    "indenter_radius_mm": _LENGTH,
+    "sample_height_mm": _LENGTH,
+    "sample_diameter_mm": _LENGTH,
+    "position_mm": _PLACE,
+    "displacement_mm": _LENGTH,
+    "preload_n": _FORCE,
+    "dynamic_force_n": _FORCE,
+    "force_n": _FORCE,
+    "frf_re_pc_per_n": _CHARGE,
+    "frf_im_pc_per_n": _CHARGE,
+    "charge_pc": _CHARGE,
+    "dwell_s": _TIME,
+    "time_s": _TIME,
+    "sample_rate_hz": (1e-6, 1e9),
+}
+_WIDEST_SENSOR = 100.0  # radii over the thickness; tables end far below
+
+
+def without_extremes(campaign: Campaign) -> Inspected:
+    """The campaign without recordings that hold such numbers, each named; `lacking` where its skin does."""
+    skin = [Finding("impossible_number", "", f"skin.{name}", text) for name, text in _of_skin(campaign.skin)]
+    if skin:
+        what = " and ".join(entry.field for entry in skin)
+        return Inspected(replace(campaign, recordings=()), skin, f"{what} cannot be right as declared (see findings)")
+    found, kept = [], []
+    for entry in campaign.recordings:
+        wrong = list(_of(entry))
+        found += [Finding("impossible_number", entry.id, name, f"{text}: left out") for name, text in wrong]
+        kept += [] if wrong else [entry]
+    return Inspected(replace(campaign, recordings=tuple(kept)), found, "" if kept else "no recording can be used")
+
+
+def _of_skin(skin: SkinDescription) -> Iterator[tuple[str, str]]:
+    yield from _of(skin)
+    if skin.thickness_mm and skin.sensor_radius_mm and skin.sensor_radius_mm > _WIDEST_SENSOR * skin.thickness_mm:
+        yield "sensor_radius_mm", f"{skin.sensor_radius_mm:g} mm is beyond {_WIDEST_SENSOR:g} thicknesses"
+
+
+def _of(model: SkinDescription | Recording) -> Iterator[tuple[str, str]]:
+    """Each field whose largest magnitude is neither 0 nor within its bounds, and how that is said."""
+    for name in (entry.name for entry in fields(model) if entry.name in _BOUNDS):
+        value = getattr(model, name)
+        if name == "sensors":
+            value = [(sensor.x_mm, sensor.y_mm) for sensor in value]
+        if value is None or np.size(value) == 0:
+            continue
+        low, high = _BOUNDS[name]
+        size = np.abs(np.asarray(value, dtype=float))
+        largest = float(np.nanmax(size)) if np.isfinite(size).any() else 0.0
+        if largest and not low <= largest <= high:
+            yield name, f"{largest:.3g} is no number that can be meant ({low:g} to {high:g} in magnitude)"

@@ -1,0 +1,1 @@
+"""Which sets are compared, and how probable each is."""

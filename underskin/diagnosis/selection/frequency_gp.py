@@ -1,0 +1,105 @@
+"""Something that no mechanism here describes, along frequency: a complex process that changes the shape of lines.
+
+A Matérn-3/2 process over log frequency, that all recordings share or that changes along an axis of the campaign, on top
+of each recording's own best real multiple of the model.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+from scipy.special import logsumexp
+
+from underskin.diagnosis.data.axes import recording_axes
+from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.residuals import line_residuals
+from underskin.diagnosis.noise.noise_priors import Bell, level_prior
+from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, matern, normalised
+from underskin.mechanisms.autodiff import Array
+from underskin.units import Floats
+
+_LINE_LENGTHS = (0.08, 0.25, 0.8)  # of the logarithm of frequency
+_INTERPLAY_LENGTH, _INTERPLAY_LANDMARKS = 0.4, 8  # where both frequency and a recording's axis count
+_LEAST_RECORDINGS = 4
+_MOST_LINES = 160  # distinct frequencies, beyond which they are binned
+_LEAST_LINES = 8  # in a recording
+
+
+def over_lines(bench: Workbench, explanation: Explanation) -> dict[str, float]:
+    """The log evidence that a process over frequency gains, the level of the lines' noise free in both: one that all
+    recordings share ("frequency_hz"), and for each axis one that changes along it."""
+    lines = bench.lines
+    if np.bincount(lines.recording).max() < _LEAST_LINES:
+        return {}
+    relative, weight = line_residuals(bench, explanation)
+    noise = _LineNoise(
+        float((weight * np.abs(relative) ** 2).sum()),
+        2 * len(relative) + lines.scatter[1] - lines.recordings,
+        level_prior(lines.noise.log_level_sd),
+    )
+    plain = noise.best(np.zeros(0), np.zeros(0))
+    line, centres = frequency_bins(lines.frequency)
+    total = np.bincount(line, weight, len(centres))
+    sums = np.bincount(line, weight * relative.real, len(centres))
+    sums = sums + 1j * np.bincount(line, weight * relative.imag, len(centres))
+    distance = np.abs(np.log(centres[:, None] / centres[None]))
+    each = []
+    for length in _LINE_LENGTHS:
+        root = np.linalg.cholesky(matern(distance / length) + 1e-9 * np.eye(len(centres)))
+        each += noise.gains(root.T @ (total[:, None] * root), root.T @ sums)
+    found = {"frequency_hz": float(logsumexp(each) - np.log(len(each)) - plain)}
+    if lines.recordings < _LEAST_RECORDINGS:
+        return found
+    shapes = features(normalised(np.log(lines.frequency)[:, None]), _INTERPLAY_LENGTH, _INTERPLAY_LANDMARKS)
+    moments = np.add.reduceat(shapes * (weight * relative)[:, None], lines.first)
+    products = (shapes[:, :, None] * shapes[:, None, :] * weight[:, None, None]).reshape(len(shapes), -1)
+    grams = np.add.reduceat(products, lines.first).reshape(lines.recordings, *2 * (shapes.shape[1],))
+    for name, column in recording_axes(lines.campaign).items():
+        along = features(normalised(column), _INTERPLAY_LENGTH, _INTERPLAY_LANDMARKS)
+        size = along.shape[1] * shapes.shape[1]
+        gram = np.einsum("ra,rb,rfg->afbg", along, along, grams, optimize=True).reshape(size, size)
+        moment = (along.T @ moments).reshape(size)
+        found[f"frequency_hz and {name}"] = float(
+            logsumexp(noise.gains(gram, moment)) - np.log(len(AMPLITUDES)) - plain
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class _LineNoise:
+    """The lines' residuals without a process: Σ|·|²/d², its degrees of freedom, and the prior of the noise's level."""
+
+    chi2: float
+    freedom: int
+    prior: Bell
+
+    def gains(self, gram: Array, moment: Array) -> list[float]:
+        """log p of the lines with a process of each amplitude, at the level that suits it best."""
+        eigenvalues, vectors = np.linalg.eigh(gram)
+        eigenvalues = np.maximum(eigenvalues, 0.0)
+        square = np.abs(vectors.T @ moment) ** 2
+        return [self.best(eigenvalues * amplitude**2, square * amplitude**2) for amplitude in AMPLITUDES]
+
+    def best(self, eigenvalues: Array, square: Array) -> float:
+        """With AᵀW A's eigenvalues and |AᵀW r|² along them, at κ: χ²/κ² less Σ square/(κ⁴ (1 + λ/κ²))."""
+
+        def cost(log_level: float) -> float:
+            k2 = np.exp(2 * log_level)
+            inner = 1 + eigenvalues / k2
+            value = 0.5 * self.chi2 / k2 + self.freedom * log_level - self.prior.log_density(log_level)
+            return float(value - 0.5 * (square / inner).sum() / k2**2 + np.log(inner).sum())
+
+        found = minimize_scalar(cost, bounds=(-1.0, 5.0), method="bounded", options={"xatol": 1e-3})
+        return -float(found.fun)
+
+
+def frequency_bins(frequency: Floats) -> tuple[NDArray[np.intp], Floats]:
+    """Of each row its distinct frequency, or its bin where there are too many, and the frequencies."""
+    distinct, line = np.unique(np.round(frequency, 6), return_inverse=True)
+    if len(distinct) <= _MOST_LINES:
+        return line, distinct
+    edges = np.geomspace(distinct[0], distinct[-1] * (1 + 1e-9), _MOST_LINES + 1)
+    line = np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, _MOST_LINES - 1)
+    used, line = np.unique(line, return_inverse=True)
+    return line, np.sqrt(edges[used] * edges[used + 1])

@@ -1,0 +1,192 @@
+"""Something that no mechanism here describes, from recording to recording: a process in gain, or in place.
+
+FRF = model · (1 + δ), linear in the model's parameters at their best fit, in sensors' gains and in δ's features. δ is
+- a Matérn-3/2 process over one axis of the campaign, over all of them, or over how the preload had been before;
+- a sine over the order of the recordings, of one unknown period;
+- what follows where the contact's place itself wanders in order: δ = ∇m·o/m, with o smooth or running round.
+Scatter of gain, and beside a wandering place scatter of position too, are marginalised over their priors.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.special import logsumexp
+
+from underskin.diagnosis.data.axes import order, preload_before, recording_axes
+from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.optimizer import Evaluated
+from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, NO_POSITION, POSITION_PRIOR
+from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, normalised
+from underskin.mechanisms.base import Normal, Parameter
+from underskin.units import Floats
+
+_LENGTHS = (0.15, 0.4, 1.2)  # of a recording's axis, over its range
+_LEAST_RECORDINGS, _LEAST_IN_ORDER = 4, 8
+_WANDERING = np.array([0.1e-3, 0.3e-3, 1.0e-3])  # [m] amplitudes of a place that wanders
+_WANDERING_LANDMARKS = 12
+_SHORTEST_PERIOD, _MOST_PERIODS = 3.0, 100  # recordings
+_GAINS = np.geomspace(0.005, 0.5, 9)
+_USUAL_POSITION = np.geomspace(0.05e-3, 0.3e-3, 4)  # [m], beside a process; without one the scatter may be larger
+_ANY_POSITION = np.geomspace(0.03e-3, 0.6e-3, 12)
+_FAINT = 1e-12  # of the largest response, below which a recording has no direction
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """One scatter of gain and one of place: log weight, and under it each recording's residual and variance."""
+
+    log_weight: float
+    residual: Floats
+    variance: Floats
+
+
+def over_recordings(bench: Workbench, explanation: Explanation) -> dict[str, float]:
+    """The log evidence that a process of each kind gains over none."""
+    campaign = bench.collapsed.campaign
+    axes = {name: normalised(column) for name, column in recording_axes(campaign).items()}
+    if bench.collapsed.recordings < _LEAST_RECORDINGS or not axes:
+        return {}
+    if len(axes) > 1:
+        axes["all"] = np.concatenate(list(axes.values()), axis=1) / np.sqrt(len(axes))
+    before = preload_before(campaign)
+    if before is not None:
+        axes["preload_before"] = normalised(before)
+    residual = GainResidual(bench, explanation)
+    found = {name: _smooth(residual, column) for name, column in axes.items()}
+    rank = order(campaign)
+    if len(rank) >= _LEAST_IN_ORDER:
+        found["order"] = mean_of_logs(residual.gains(_sines(rank), AMPLITUDES))
+        found["place"] = mean_of_logs([_smooth_place(residual, rank), _round(residual, rank)])
+    return found
+
+
+def mean_of_logs(log_values: list[float] | Floats) -> float:
+    """log of the mean of what these are the logarithms of."""
+    return float(logsumexp(log_values) - np.log(len(log_values)))
+
+
+def _smooth(residual: "GainResidual", column: Floats) -> float:
+    sets = np.stack([features(column, length) for length in _LENGTHS])
+    return mean_of_logs(residual.gains(sets, AMPLITUDES))
+
+
+def _sines(rank: Floats) -> Floats:
+    """Sine and cosine over the order, of periods from two times all recordings downwards (periods, recordings, 2)."""
+    count = len(rank)
+    halves = np.arange(1, min(_MOST_PERIODS, int(2 * count / _SHORTEST_PERIOD)) + 1)
+    angle = np.pi * halves[:, None] * rank / count
+    return np.stack([np.sin(angle), np.cos(angle)], axis=2)
+
+
+def _smooth_place(residual: "GainResidual", rank: Floats) -> float:
+    along = (rank / len(rank))[:, None]
+    sets = np.stack([features(along, length, _WANDERING_LANDMARKS) for length in _LENGTHS])
+    return mean_of_logs(residual.gains(residual.moved(sets), _WANDERING))
+
+
+def _round(residual: "GainResidual", rank: Floats) -> float:
+    return mean_of_logs(residual.gains(residual.moved(_sines(rank)), _WANDERING))
+
+
+class GainResidual:
+    """Each recording's gain residual, linear in the model's parameters, sensors' gains and a process' features."""
+
+    def __init__(self, bench: Workbench, explanation: Explanation) -> None:
+        at, parameters = explanation.best.at, explanation.best.fitter.parameters
+        self._moments = moments = at.marginal.moments
+        _, uj, _ = moments.slopes
+        size = moments.along * moments.uu
+        self._least = _FAINT * np.abs(size).max()
+        slopes = uj / self._not_faint(size)[:, None]
+        centre = np.array([entry.start for entry in parameters]) - at.point.fit
+        scale = np.array([_prior_sd(entry) for entry in parameters])
+        self._known = slopes @ centre
+        sensors = np.eye(int(bench.lines.sensor.max()) + 1)[bench.lines.sensor]
+        sensors = sensors[:, sensors.any(axis=0)]
+        self.fixed = np.concatenate([slopes * scale, at.marginal.levels.spread * sensors], axis=1)
+        self._moving = relative_place_slopes(at)
+        self.usual = self._scatters(_USUAL_POSITION)
+
+    def _not_faint(self, size: Floats) -> Floats:
+        return np.where(np.abs(size) > self._least, size, self._least)
+
+    def _scatters(self, positions: Floats) -> list[Scatter]:
+        """No scatter of position and each of these [m], with each of gain; relative to the model's mean under it."""
+        moments, found = self._moments, []
+        for position, share in _shares(positions).items():
+            along, ur, _ = moments.at_position(position, moments.uu, moments.ur, moments.rr)
+            size = self._not_faint(along * moments.uu)
+            placed = position**2 * (self._moving**2).sum(axis=0) + 0.5 * position**4 * moments.second_order
+            for gain in _GAINS:
+                log_weight = GAIN_PRIOR.log_density(float(np.log(gain))) + np.log(share) - np.log(np.abs(size)).sum()
+                variance = gain**2 + placed + moments.uu / size**2
+                found.append(Scatter(float(log_weight), ur / size - self._known, variance))
+        return found
+
+    def moved(self, sets: Floats) -> Floats:
+        """Features of a place's two coordinates, as what the response makes of them (sets, recordings, 2 features)."""
+        return np.concatenate([sets * slope[None, :, None] for slope in self._moving], axis=2)
+
+    @cached_property
+    def _plain(self) -> float:
+        """log p(residual) without a process."""
+        nothing = np.zeros((1, len(self._known), 1))
+        return float(logsumexp([self._with(nothing, np.ones(1), entry) for entry in self._scatters(_ANY_POSITION)]))
+
+    def gains(self, sets: Floats, amplitudes: Floats) -> Floats:
+        """What each set of features (sets, recordings, features) gains over none at all, in log evidence (sets,).
+
+        Over the priors of the scatters, and of the amplitudes, each as probable as the others.
+        """
+        each = np.array([self._with(sets, amplitudes, entry) for entry in self.usual])
+        return np.asarray(logsumexp(each, axis=0) - self._plain)
+
+    def _with(self, sets: Floats, amplitudes: Floats, scatter: Scatter) -> Floats:
+        """log p(residual, features) at one scatter (sets,)."""
+        root = 1 / np.sqrt(scatter.variance)
+        fixed, z = self.fixed * root[:, None], scatter.residual * root
+        lower = np.linalg.cholesky(fixed.T @ fixed + np.eye(fixed.shape[1]))
+        count, rows, size = sets.shape
+        shapes = (sets * root[:, None]).transpose(1, 0, 2).reshape(rows, count * size)
+        taken = np.linalg.solve(lower, fixed.T @ np.column_stack([z, shapes]))
+        chi2 = z @ z - taken[:, 0] @ taken[:, 0]
+        log_determinant = np.log(scatter.variance).sum() + 2 * np.log(np.diagonal(lower)).sum()
+        moment = (shapes.T @ z - taken[:, 1:].T @ taken[:, 0]).reshape(count, size)
+        gram = _grams(shapes, count) - _grams(taken[:, 1:], count)
+        values, vectors = np.linalg.eigh(gram)
+        values = np.maximum(values, 0.0)[:, None] * amplitudes[:, None] ** 2
+        along = (vectors.transpose(0, 2, 1) @ moment[..., None])[..., 0]
+        gained = (amplitudes[:, None] ** 2 * along[:, None] ** 2 / (1 + values)).sum(axis=2)
+        gained = np.logaddexp.reduce(0.5 * (gained - np.log1p(values).sum(axis=2)), axis=1) - np.log(len(amplitudes))
+        return np.asarray(scatter.log_weight - 0.5 * (chi2 + log_determinant) + gained)
+
+
+def _grams(columns: Floats, count: int) -> Floats:
+    """The products of each of `count` blocks of columns with itself (count, size, size)."""
+    blocks = columns.reshape(len(columns), count, -1).transpose(1, 2, 0)
+    return np.asarray(blocks @ blocks.transpose(0, 2, 1))
+
+
+def relative_place_slopes(at: Evaluated) -> Floats:
+    """∇m/m of each recording over its contact's place [1/m] (2, recordings)."""
+    first, slopes = at.moments.lines_first, at.prediction.position_slopes
+    value = at.prediction.value[first]
+    if slopes is None:
+        return np.zeros((2, len(first)))
+    answers = np.abs(value) > _FAINT * np.abs(value).max()
+    return np.asarray((slopes[:, first] / np.where(answers, value, np.inf)).real)
+
+
+def _shares(positions: Floats) -> dict[float, float]:
+    """The shares of no scatter of position, and of each of these."""
+    shares = np.exp([POSITION_PRIOR.log_density(float(np.log(position))) for position in positions])
+    shares *= (1 - NO_POSITION) / shares.sum()
+    return {0.0: NO_POSITION, **dict(zip(positions.tolist(), shares.tolist(), strict=True))}
+
+
+def _prior_sd(entry: Parameter) -> float:
+    if isinstance(entry.prior, Normal):
+        return entry.prior.sd
+    low, high = entry.bounds
+    return (high - low) / np.sqrt(12.0)

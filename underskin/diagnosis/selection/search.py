@@ -1,0 +1,181 @@
+"""Which sets of mechanisms are fitted, and how probable each is.
+
+Priors over sets are fixed: see PRIORS. Within a size, every set of mechanisms that the campaign supports is equally
+probable. Singles are all fitted; pairs and triples grow greedily from the best.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
+from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.selection.occam_correction import without_occam
+from underskin.diagnosis.selection.unnamed_rivals import Discrepancy, discrepancy
+from underskin.mechanisms.base import Unsupported
+from underskin.mechanisms.registry import CATALOGUE
+
+# "Nothing" stands for all that does not show as well, which is every other campaign.
+PRIORS = {"nothing_missing": 0.45, "one": 0.34, "two": 0.14, "three": 0.02, "none_of_these": 0.05}
+_PARENTS = 3
+_BEST = 3  # nothing and two more: processes are tried on top of the best two
+SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
+_UNTHOUGHT = 0.015  # probability that none of what was compared is right
+_WITHIN = 20.0  # nats behind the best within which evidence is worth integrating over loose parameters
+_BEHIND = 12.0  # nats behind the best beyond which a single is no parent
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One of the rivals and its posterior probability: a set of mechanisms (maybe none), or `none_of_these`."""
+
+    explanation: Explanation | None  # None for none_of_these
+    probability: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """As a report names it."""
+        if self.explanation is None:
+            return (NONE_OF_THESE,)
+        return self.explanation.names or (NOTHING_MISSING,)
+
+
+@dataclass(frozen=True)
+class Search:
+    """What was tried: explanations, processes on top of some of them, and what the campaign does not support.
+
+    `null_contradicted`: under the null hypothesis the residual keeps structure, or its noise is no noise (see
+    residual_shape.py); its probability is then that of `none_of_these`.
+    """
+
+    explanations: tuple[Explanation, ...]
+    discrepancies: tuple[tuple[Explanation, Discrepancy], ...]
+    unsupported: dict[str, str]
+    null_contradicted: bool = False
+
+    @property
+    def supported(self) -> int:
+        """How many mechanisms the campaign supports."""
+        return len(CATALOGUE) - len(self.unsupported)
+
+    def log_weight(self, explanation: Explanation) -> float:
+        """Prior times evidence."""
+        return explanation.log_evidence + log_prior(len(explanation.names), self.supported)
+
+    def shows(self, explanation: Explanation) -> bool:
+        """Whether each mechanism of a set shows: without it, evidence is lost. A set that holds one that does not says
+        no more than the smaller one, which stands for both."""
+        evidence = {frozenset(entry.names): entry.log_evidence for entry in self.explanations}
+        whole = frozenset(explanation.names)
+        smaller = [evidence.get(whole - {name}, -math.inf) for name in whole]
+        return all(explanation.log_evidence > without + SHOWS for without in smaller)
+
+    def shown_or_nothing(self, answer: Answer) -> Explanation:
+        """The explanation that an answer stands on: for `none_of_these`, the one beneath its best process."""
+        if answer.explanation is not None:
+            return answer.explanation
+        beneath = [pair for pair in self.discrepancies if self.shows(pair[0])]
+        return max(beneath, key=lambda pair: self._log_weight_beneath(*pair))[0]
+
+    def _log_weight_beneath(self, explanation: Explanation, process: Discrepancy) -> float:
+        return process.log_evidence + log_prior_beneath(len(explanation.names), self.supported)
+
+    @cached_property
+    def answers(self) -> list[Answer]:
+        """The rivals, the most probable first; their probabilities sum to 1.
+
+        `none_of_these` is always one of them, with its evidence where a process shows, and at least with the share that
+        stays for what neither laws nor processes here can be.
+        """
+        kept = [entry for entry in self.explanations if self.shows(entry)]
+        weights = without_occam(kept, [self.log_weight(entry) for entry in kept]).tolist()
+        showing = [
+            self._log_weight_beneath(entry, process)
+            for entry, process in self.discrepancies
+            if process.log_evidence > entry.log_evidence + SHOWS
+        ]
+        weights.append(float(np.logaddexp.reduce(showing)) if showing else -math.inf)
+        probabilities = (1 - _UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
+        probabilities[-1] += _UNTHOUGHT
+        rivals: list[Explanation | None] = [*kept, None]
+        if self.null_contradicted:
+            null = next(number for number, entry in enumerate(kept) if not entry.names)
+            probabilities[-1] += probabilities[null]
+            probabilities[null] = 0.0
+        answers = [
+            Answer(entry, value)
+            for entry, value in zip(rivals, probabilities.tolist(), strict=True)
+            if entry is None or entry.names or not self.null_contradicted
+        ]
+        return sorted(answers, key=lambda answer: -answer.probability)
+
+
+def log_prior(size: int, supported: int) -> float:
+    """The logarithm of the prior of one set of that many mechanisms."""
+    share = PRIORS[("nothing_missing", "one", "two", "three")[size]]
+    return math.log(share) - math.log(math.comb(supported, size))
+
+
+def log_prior_beneath(size: int, supported: int) -> float:
+    """The logarithm of the prior of something undescribed on top of one set: a mechanism like any other."""
+    if size == 0:
+        return math.log(PRIORS[NONE_OF_THESE])
+    return log_prior(size, supported) + math.log(PRIORS[NONE_OF_THESE] * PRIORS["two"] / PRIORS["one"])
+
+
+def search(bench: Workbench) -> Search:
+    """Fit nothing, every single, then what grows from the best."""
+    nothing = bench.explain(())
+    assert nothing is not None
+    found: dict[frozenset[str], Explanation] = {frozenset(): nothing}
+    unsupported: dict[str, str] = {}
+    for name in CATALOGUE:
+        try:
+            single = bench.explain((name,))
+        except Unsupported as refusal:
+            unsupported[name] = refusal.reason
+            continue
+        assert single is not None
+        found[frozenset((name,))] = single
+    names = [name for name in CATALOGUE if name not in unsupported]
+    done: set[frozenset[str]] = set()
+    for size in (2, 3):
+        _integrate(found, done, unsupported, 1)
+        for parent in _parents(Search(tuple(found.values()), (), unsupported), size):
+            for name in names:
+                chosen = frozenset((*parent.names, name))
+                if len(chosen) != size or chosen in found:
+                    continue
+                grown = bench.explain(tuple(chosen), parent)
+                if grown is not None:
+                    found[chosen] = grown
+    _integrate(found, done, unsupported, _BEST)
+    result = Search(tuple(found.values()), (), unsupported)
+    best = sorted((entry for entry in result.explanations if entry.names), key=result.log_weight, reverse=True)[:2]
+    processes = tuple((entry, discrepancy(bench, entry)) for entry in (nothing, *best))
+    return replace(result, discrepancies=processes)
+
+
+def _integrate(
+    found: dict[frozenset[str], Explanation], done: set[frozenset[str]], unsupported: dict[str, str], best: int
+) -> None:
+    """Integrate the evidences that may count, and the `best` anyhow, over loose parameters, once each."""
+    weight = Search(tuple(found.values()), (), unsupported).log_weight
+    ranked = sorted(found, key=lambda names: weight(found[names]), reverse=True)
+    least = weight(found[ranked[0]]) - _WITHIN
+    for place, names in enumerate(ranked):
+        if names not in done and (place < best or weight(found[names]) > least):
+            found[names] = found[names].integrated()
+            done.add(names)
+
+
+def _parents(result: Search, size: int) -> list[Explanation]:
+    """The explanations, one mechanism smaller, from which sets of this size grow."""
+    ranked = sorted(result.explanations, key=result.log_weight, reverse=True)
+    best = result.log_weight(ranked[0])
+    if size == 3:
+        return ranked[:1] if len(ranked[0].names) == 2 else []
+    smaller = [entry for entry in ranked if len(entry.names) == size - 1][:_PARENTS]
+    return [entry for entry in smaller if result.log_weight(entry) > best - _BEHIND]

@@ -1,0 +1,80 @@
+"""Something that no mechanism here describes, as a full rival, with the noise and the parameters of every hypothesis.
+
+- δ of a recording, FRF = model · (1 + δ): see `recording_gp`; of a line: see `frequency_gp`; or both;
+- scatter from recording to recording far beyond what rigs have: what scatters by 20 % has a cause that nobody named;
+- of curves, a smooth error far beyond what laws of contact have.
+An amplitude of δ below 1.5 % is not looked for: a law that is right to that is not missing physics.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from underskin.diagnosis.inference.evidence import laplace
+from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.hypothesis import Hypothesis
+from underskin.diagnosis.inference.optimizer import Fitter
+from underskin.diagnosis.noise.correlated_error import UNNAMED
+from underskin.diagnosis.noise.noise_priors import GAIN, POSITION, UNUSUAL_GAIN, UNUSUAL_POSITION
+from underskin.diagnosis.selection.frequency_gp import over_lines
+from underskin.diagnosis.selection.recording_gp import over_recordings
+
+_KINDS = {"recordings": 0.45, "lines": 0.4, "both": 0.05, "scatter": 0.1}
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """The evidence for δ on top of one explanation: log Z of the whole, and of δ over each axis against none."""
+
+    log_evidence: float
+    axes: dict[str, float]  # log evidence gained; "frequency_hz" for lines
+
+
+def discrepancy(bench: Workbench, explanation: Explanation) -> Discrepancy:
+    """What a process gains on top of an explanation."""
+    if bench.lines.curves:
+        return _along_curves(bench, explanation)
+    over = {
+        "recordings": over_recordings(bench, explanation),
+        "lines": over_lines(bench, explanation),
+        "scatter": _unusual_scatter(explanation),
+    }
+    gained = {
+        kind: float(logsumexp(list(gains.values())) - np.log(len(gains))) for kind, gains in over.items() if gains
+    }
+    if "recordings" in gained and "lines" in gained:
+        gained["both"] = gained["recordings"] + gained["lines"]
+    each = [np.log(_KINDS[kind]) + gain for kind, gain in gained.items()]
+    total = float(logsumexp(each)) if each else -np.inf
+    return Discrepancy(explanation.log_evidence + total, {**over["recordings"], **over["lines"], **over["scatter"]})
+
+
+def _unusual_scatter(explanation: Explanation) -> dict[str, float]:
+    """What scatter beyond the usual gains; looked for where the fit went beyond the usual itself."""
+    levels = explanation.best.at.marginal.levels
+    usual = explanation.best.fitter.hypothesis
+    found = {}
+    if levels.gain > GAIN[1]:
+        wider = replace(usual, gain=UNUSUAL_GAIN)
+        found["scatter of gain"] = _refitted(wider, explanation, 0, UNUSUAL_GAIN.low)
+    if levels.position > POSITION[1]:
+        wider = replace(usual, position=UNUSUAL_POSITION)
+        found["scatter of position"] = _refitted(wider, explanation, 2, UNUSUAL_POSITION.low)
+    return {name: log_evidence - explanation.log_evidence for name, log_evidence in found.items()}
+
+
+def _refitted(hypothesis: Hypothesis, explanation: Explanation, place: int, least: float) -> float:
+    """The evidence of a hypothesis whose `place`-th parameter of the covariance is large, from at least `least`."""
+    fitter = Fitter(hypothesis)
+    covariance = explanation.point.covariance.copy()
+    covariance[place] = max(covariance[place], least)
+    return laplace(fitter, fitter.improve(replace(explanation.point, covariance=covariance))).log_evidence
+
+
+def _along_curves(bench: Workbench, explanation: Explanation) -> Discrepancy:
+    """The smooth error that every hypothesis has of curves, large: everything is fitted again beneath it."""
+    found = _refitted(
+        replace(bench.hypothesis(explanation.names, placed=False), smooth=UNNAMED), explanation, 2, UNNAMED.low
+    )
+    return Discrepancy(found, {"displacement_mm": found - explanation.log_evidence})

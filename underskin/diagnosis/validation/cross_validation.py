@@ -1,0 +1,191 @@
+"""How well the recordings are predicted before and after, on groups that were left out whole: extrapolation.
+
+Groups: the highest preload, one sphere (the largest), one sensor (the last), the highest band, the latest day. Without
+the group everything is fitted again: nothing missing, and the choice among the best sets is made again from evidence.
+rmse = 100 √(Σ|y − m|²/Σ|m|²) over all groups together; the noise floor is its expectation from the noise alone, for
+a new recording: gain, positioning and line scatter, and the sensors' gains where the sensor was not seen.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.diagnosis.data.dataset import Lines
+from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.selection.search import log_prior
+from underskin.errors import InvalidInput
+from underskin.mechanisms.base import Unsupported
+from underskin.mechanisms.models.composed import Prediction as Predicted
+from underskin.mechanisms.models.composed import compose
+from underskin.mechanisms.models.frf_design import frf_recordings
+
+_FURTHEST = 0.6  # of a curve's highest force
+_LEAST_AFTER = 6  # samples beyond the highest force that make a hold or a way back
+_LEAST_KEPT = 3  # recordings that must remain
+_BEST = 10  # sets among which the choice is repeated
+_BEHIND = 15.0  # nats
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Sums over held-out rows under one way of predicting them."""
+
+    square: float = 0.0  # Σ|y − m|²
+    size: float = 0.0  # Σ|m|²
+    noise: float = 0.0  # Σ E|y − m|² from noise alone
+    log_score: float = 0.0  # Σ log predictive density of the recordings' levels, relative
+    recordings: int = 0
+    pickup: float = 0.0  # that part of `noise` which is mains pick-up
+
+    def __add__(self, other: "Prediction") -> "Prediction":
+        return Prediction(
+            self.square + other.square,
+            self.size + other.size,
+            self.noise + other.noise,
+            self.log_score + other.log_score,
+            self.recordings + other.recordings,
+            self.pickup + other.pickup,
+        )
+
+    @property
+    def rmse_percent(self) -> float:
+        """100 √(Σ|y − m|²/Σ|m|²)."""
+        return 100 * float(np.sqrt(self.square / self.size)) if self.size > 0 else float("nan")
+
+    @property
+    def floor_percent(self) -> float:
+        """What noise alone would give."""
+        return 100 * float(np.sqrt(self.noise / self.size)) if self.size > 0 else float("nan")
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """One group: its name, what was chosen without it, and how it was predicted."""
+
+    group: str
+    chosen: tuple[str, ...]
+    before: Prediction
+    after: Prediction
+
+
+def groups(lines: Lines) -> dict[str, NDArray[np.bool_]]:
+    """The rows of each group that can be left out, with enough recordings remaining."""
+    found: dict[str, NDArray[np.bool_]] = {}
+    if lines.curves:
+        return _parts_of_curves(lines)
+    entries = frf_recordings(lines.campaign)
+
+    def add(name: str, column: Sequence[float | str | None], last: Callable[[list[float | str]], float | str]) -> None:
+        if None in column or len(set(column)) < 2:
+            return
+        chosen = last(sorted(set(column)))  # type: ignore[arg-type]
+        rows = np.array([value == chosen for value in column])[lines.recording]
+        found[f"{name} {chosen}"] = rows
+
+    add("preload_n", [entry.preload_n for entry in entries], max)
+    add("indenter_radius_mm", [entry.indenter_radius_mm for entry in entries], max)
+    add("sensor", [entry.sensor for entry in entries], lambda values: values[-1])
+    days = [None if entry.recorded_at is None else str(entry.recorded_at)[:10] for entry in entries]
+    add("recorded_at", days, max)
+    edge = float(np.quantile(np.unique(lines.frequency), 0.75))
+    if len(np.unique(lines.frequency)) >= 8:
+        found[f"frequency_hz above {edge:.4g}"] = lines.frequency > edge
+    return {
+        name: rows
+        for name, rows in found.items()
+        if len(np.unique(lines.recording[~rows])) >= _LEAST_KEPT and rows.any()
+    }
+
+
+def _parts_of_curves(lines: Lines) -> dict[str, NDArray[np.bool_]]:
+    """A curve's contact point is its own, so parts of each are left out: the highest force of curves that only load,
+    and the later half of what follows the highest force where curves hold or return."""
+    force = np.abs(lines.value.real)  # tension is negative
+    later = np.zeros(len(force), dtype=bool)
+    for low, high in pairwise((*lines.first, len(force))):
+        rest = high - 1 - (low + int(np.argmax(force[low:high])))
+        later[high - rest // 2 : high] = rest >= _LEAST_AFTER
+    if later.any():
+        return {"the later half after the highest force_n": later}
+    highest = np.maximum.reduceat(force, lines.first)[lines.recording]
+    return {f"force_n above {_FURTHEST:.0%}": force > _FURTHEST * highest}
+
+
+def hold_out(bench: Workbench, ranked: Sequence[Explanation], nothing: Explanation, supported: int) -> list[HeldOut]:
+    """Predict each group from the rest; `ranked` are the sets found on everything, the best first."""
+    weights = [entry.log_evidence + log_prior(len(entry.names), supported) for entry in ranked]
+    rivals = [entry for entry, w in zip(ranked, weights, strict=True) if w > weights[0] - _BEHIND][:_BEST]
+    found = []
+    for name, rows in groups(bench.lines).items():
+        smaller = Workbench(bench.lines.part(~rows), bench.table)
+        fits: dict[tuple[str, ...], Explanation] = {}
+        for entry in (nothing, *rivals):
+            if entry.names in fits:
+                continue
+            try:
+                fit = smaller.refit(entry)
+            except (Unsupported, InvalidInput):
+                continue  # what was left out is what the mechanism, or any model of a curve, needs
+            if fit is not None:
+                fits[entry.names] = fit
+        if nothing.names not in fits:
+            continue
+        chosen = max(fits.values(), key=lambda entry: entry.log_evidence + log_prior(len(entry.names), supported))
+        before, after = (_predict(smaller, fits[names], bench, rows) for names in (nothing.names, chosen.names))
+        found.append(HeldOut(name, chosen.names, before, after))
+    return found
+
+
+def _predict(smaller: Workbench, explanation: Explanation, bench: Workbench, rows: NDArray[np.bool_]) -> Prediction:
+    """Some of the rows from a fit to others; sensors that were seen keep the gain that was found for them."""
+    left = bench.lines.part(rows)
+    model = compose(explanation.names, bench.lines.campaign, bench.table, bench.kind)
+    point, levels = explanation.point, explanation.best.at.marginal.levels
+    whole = model.predict(point.fit)
+    prediction, pickup_variance = _some(whole, rows), whole.pickup_variance
+    seen = np.isin(left.sensor, smaller.lines.sensor)
+    gains = np.zeros(max(int(left.sensor.max()), int(smaller.lines.sensor.max())) + 1)
+    found = explanation.best.at.marginal.sensor_gains
+    gains[: len(found)] = found
+    value = prediction.value * np.exp(gains[left.sensor])[left.recording]
+    scatter = levels.gain**2 + np.where(seen, 0.0, levels.spread**2)
+    noise = (
+        scatter[left.recording] * np.abs(value) ** 2 + (1 if left.curves else 2) * (levels.level * left.deviation) ** 2
+    )
+    if left.smooth is not None:
+        noise = noise + (levels.smooth * left.smooth.scale) ** 2
+    if prediction.position_slopes is not None:
+        noise = noise + levels.position**2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
+    picked_up = 2 * pickup_variance[rows]
+    noise = noise + picked_up
+    square = np.abs(left.value - value) ** 2
+    first = left.first
+    each, expected = np.add.reduceat(square, first), np.add.reduceat(noise, first)
+    size = np.add.reduceat(np.abs(value) ** 2, first)
+    score = -0.5 * (each / expected + np.log(2 * np.pi * expected / size))
+    square_sum, size_sum, noise_sum, score_sum = (float(column.sum()) for column in (square, size, noise, score))
+    return Prediction(square_sum, size_sum, noise_sum, score_sum, len(first), float(picked_up.sum()))
+
+
+def total(found: Sequence[HeldOut]) -> tuple[Prediction, Prediction]:
+    """Before and after, over all groups."""
+    before, after = Prediction(), Prediction()
+    for entry in found:
+        before, after = before + entry.before, after + entry.after
+    return before, after
+
+
+def in_sample(bench: Workbench, explanation: Explanation) -> Prediction:
+    """The recordings that the explanation was fitted to."""
+    return _predict(bench, explanation, bench, np.ones(len(bench.lines.value), dtype=bool))
+
+
+def _some(whole: Predicted, rows: NDArray[np.bool_]) -> Predicted:
+    return replace(
+        whole,
+        value=whole.value[rows],
+        position_slopes=None if whole.position_slopes is None else whole.position_slopes[:, rows],
+    )

@@ -1,0 +1,154 @@
+"""Which mechanisms a campaign's design cannot tell from d33, E and h, or from each other; worked out before any fit.
+
+Each mechanism's signature is what a typical strength of it (the quartile of its prior away from the limit) would change
+in the base model's response. Under the noise that is usual, the information of all signatures and the nuisances is one
+matrix JᵀC⁻¹J. What is left of a signature after the nuisances (with their priors) are taken out is the χ² by which the
+mechanism would show; the cosine between two such remainders says whether they are alike. A law has a shape too (when an
+ageing sets in, at which stress a d33 saturates): what one mechanism typically does is held against all shapes of
+another, each further parameter at its middle and at either end of its usual range.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from underskin.diagnosis.inference.explanation import Workbench
+from underskin.diagnosis.inference.hypothesis import COVARIANCE_NAMES
+from underskin.diagnosis.inference.likelihood import Marginal, Moments
+from underskin.diagnosis.inference.optimizer import Fitter
+from underskin.diagnosis.noise.correlated_error import TYPICAL
+from underskin.diagnosis.noise.noise_levels import NoiseLevels
+from underskin.diagnosis.selection.search import Answer
+from underskin.mechanisms.base import Normal, Parameter, Unsupported
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.units import Floats
+
+_LEAST_CHI2 = 9.0
+_TWINS = 0.98
+_ENDS = (0.1, 0.9)  # of a shape's usual range
+_OPEN = 0.1  # of the leader's probability: a rival beyond that is not told from it
+_GAIN = 0.022
+
+
+@dataclass(frozen=True)
+class Confounding:
+    """`confounded_with` is another mechanism, "d33", or "noise" where too little of it shows."""
+
+    mechanism: str
+    confounded_with: str
+    reason: str
+
+
+def confounding(bench: Workbench) -> list[Confounding]:
+    """What cannot be told apart here; mechanisms that the campaign does not support at all are not listed."""
+    fitter = Fitter(bench.hypothesis((), placed=False, whole=True))
+    base = fitter.evaluate(fitter.start(np.zeros(0)))
+    owners, signatures = [], []
+    for name, mechanism in CATALOGUE.items():
+        if bench.kind not in mechanism.kinds:
+            continue
+        parameters = mechanism.parameters(bench.lines.campaign, bench.kind)
+        if any(entry.name in COVARIANCE_NAMES for entry in parameters):
+            continue
+        try:
+            hypothesis = bench.hypothesis((name,), placed=False, whole=True)
+        except Unsupported:
+            continue
+        for own in _shapes(parameters):
+            owners.append(name)
+            signatures.append(hypothesis.model.predict(np.concatenate([own, base.point.fit])).value)
+    if not owners:
+        return []
+    slopes = np.concatenate([base.prediction.slopes, np.array(signatures) - base.prediction.value])
+    prediction = replace(base.prediction, slopes=slopes)
+    lines = bench.lines
+    ratio = TYPICAL if lines.curves else 0.0
+    moments = Moments(lines, prediction, np.zeros(lines.recordings), bench.curvature, 0.0, ratio)
+    information, _ = Marginal(lines, moments, NoiseLevels(_GAIN, 1.0, 0.0, 0.01)).normal_equations()
+    return _told(owners, information, fitter.parameters)
+
+
+def typical(entry: Parameter) -> float:
+    """The fit coordinate of a typical strength."""
+    if entry.limit is None or not isinstance(entry.prior, Normal):
+        return entry.quantile(0.5)
+    with np.errstate(divide="ignore"):
+        limit = entry.limit if entry.scale == "linear" else float(np.log(entry.limit))
+    if not np.isfinite(limit):
+        return entry.quantile(0.5)
+    return max(entry.quantile(0.25), entry.quantile(0.75), key=lambda end: abs(end - limit))
+
+
+def _shapes(parameters: Sequence[Parameter]) -> list[Floats]:
+    """The fit coordinates of a typical strength, then of the same with one other parameter at the ends of its range."""
+    middle = np.array([typical(entry) for entry in parameters])
+    shapes = [middle]
+    for place, entry in enumerate(parameters):
+        if entry.limit is not None and np.isfinite(entry.to_fit(entry.limit) if entry.limit > 0 else entry.limit):
+            continue  # its strength
+        for quantile in _ENDS:
+            moved = middle.copy()
+            moved[place] = entry.quantile(quantile)
+            shapes.append(moved)
+    return shapes
+
+
+def _told(owners: Sequence[str], information: Floats, nuisances: Sequence[Parameter]) -> list[Confounding]:
+    """From the information on the nuisances and then on every signature, whose mechanisms are `owners`."""
+    count = len(nuisances)
+    prior = np.diag([entry.prior.sd**-2 if isinstance(entry.prior, Normal) else 0.0 for entry in nuisances])
+    own, shared, beside = information[count:, count:], information[count:, :count], information[:count, :count] + prior
+    left = own - shared @ np.linalg.solve(beside, shared.T)
+    chi2 = np.maximum(np.diag(left), 0.0)
+    first = {name: owners.index(name) for name in owners}  # a mechanism's first signature is the typical one
+    found = []
+    for name, index in first.items():
+        if own[index, index] < _LEAST_CHI2:
+            found.append(Confounding(name, "noise", "at a typical strength it stays within the noise here"))
+        elif chi2[index] < _LEAST_CHI2:
+            reason = "at a typical strength, d33, E and h within their tolerances take up what it does here"
+            found.append(Confounding(name, "d33", reason))
+    visible = [name for name in first if chi2[first[name]] >= _LEAST_CHI2]
+    for one, other in itertools.combinations(visible, 2):
+        for typical_one, shaped in ((one, other), (other, one)):
+            place = first[typical_one]
+            rivals = [index for index, name in enumerate(owners) if name == shaped and chi2[index] >= _LEAST_CHI2]
+            cosine = left[place, rivals] / np.sqrt(chi2[place] * chi2[rivals])
+            apart = (1 - cosine**2) * np.minimum(chi2[place], chi2[rivals])
+            if (np.abs(cosine) > _TWINS).any() or (apart < _LEAST_CHI2).any():
+                reason = f"what {typical_one} typically does to these recordings, {shaped} can do as well"
+                found.append(Confounding(one, other, reason))
+                break
+    return found
+
+
+def left_open(confounded: Sequence[Confounding], answers: Sequence[Answer]) -> list[Confounding]:
+    """What cannot be told in the end: of the design's confounding all but what the recordings told all the same, and
+    the rivals that explain them as well as the leading answer does.
+
+    A mechanism of the leading set shows, whatever it would do typically; and it is told from another where the set with
+    that in its place is not probable.
+    """
+    leader = answers[0]
+    named = set(_sets([leader])[0]) if _sets([leader]) else set()
+    swapped = {}
+    for rival in _sets([answer for answer in answers[1:] if answer.probability >= _OPEN * leader.probability]):
+        gone, come = named - set(rival), set(rival) - named
+        if len(gone) == len(come) == 1:
+            swapped[frozenset(gone | come)] = (*gone, *come)
+    found = []
+    for entry in confounded:
+        both = {entry.mechanism, entry.confounded_with}
+        if not both & named or frozenset(both) in swapped:
+            found.append(entry)
+            swapped.pop(frozenset(both), None)
+    for one, other in sorted(swapped.values()):
+        found.append(Confounding(one, other, f"{other} explains these recordings about as well as {one}"))
+    return found
+
+
+def _sets(answers: Sequence[Answer]) -> list[tuple[str, ...]]:
+    """The answers that are sets of mechanisms."""
+    return [answer.names for answer in answers if answer.explanation is not None and answer.explanation.names]

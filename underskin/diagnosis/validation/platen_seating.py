@@ -1,0 +1,66 @@
+"""Stiffening that only the beginning of compression curves tells: a platen that seats, tilted or on an uneven end.
+
+While a wedge closes the force rises too slowly, and from full contact on linearly, shifted by half the wedge: as a
+whole the curve looks stiffer at its end than at its beginning. Stiffening goes on, seating does not: what only the
+first tenth of the displacement tells is seating. Samples that are pulled are gripped, and seat on nothing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from underskin.diagnosis.data.curve_samples import curve_lines
+from underskin.diagnosis.inference.explanation import Workbench
+from underskin.diagnosis.selection.search import SHOWS
+from underskin.recordings.campaign import Campaign, CompressionRecording, Recording
+from underskin.recordings.finding import Finding
+from underskin.surrogate.sigma_table import SigmaTable
+
+_BEGINNING = 0.1  # of each curve's displacement
+_STIFFENING = "strain_stiffening"
+
+
+def without_seating(campaign: Campaign, names: Sequence[str], table: SigmaTable) -> tuple[Workbench, Finding] | None:
+    """The rest of the curves and the finding, where the rest speaks no more for the stiffening among `names`.
+
+    Relaxation needs a curve's whole history: with contact_creep nothing is tried.
+    """
+    if _STIFFENING not in names or "contact_creep" in names:
+        return None
+    if not all(_is_pressed(entry) for entry in campaign.recordings):
+        return None
+    rows = curve_lines(_without_beginning(campaign), "compression")
+    if rows.recordings < len(campaign.recordings):
+        return None
+    bench = Workbench(rows, table)
+    stiffer, plain = bench.explain(tuple(names)), bench.explain(tuple(name for name in names if name != _STIFFENING))
+    assert stiffer is not None
+    assert plain is not None
+    if stiffer.log_evidence - plain.log_evidence > SHOWS:
+        return None
+    text = (
+        f"only the first {100 * _BEGINNING:.0f} % of the displacement speaks for strain_stiffening: a platen that is "
+        "tilted, or an uneven end, seats like that. It was left out; a small preload before zeroing avoids it"
+    )
+    return bench, Finding("seating", "", "displacement_mm", text)
+
+
+def _is_pressed(entry: Recording) -> bool:
+    """Whether it is pressed, and no farther pulled."""
+    assert isinstance(entry, CompressionRecording)
+    moved = entry.displacement_mm - entry.displacement_mm[0]
+    return float(moved.max()) > -float(moved.min())
+
+
+def _without_beginning(campaign: Campaign) -> Campaign:
+    kept = []
+    for entry in campaign.recordings:
+        assert isinstance(entry, CompressionRecording)
+        moved = np.abs(entry.displacement_mm - entry.displacement_mm[0])
+        rest = moved > _BEGINNING * np.nanmax(moved)
+        time = None if entry.time_s is None else entry.time_s[rest]
+        kept.append(
+            replace(entry, displacement_mm=entry.displacement_mm[rest], force_n=entry.force_n[rest], time_s=time)
+        )
+    return replace(campaign, recordings=tuple(kept))

@@ -1,0 +1,1 @@
+"""From a campaign's FRFs to the d33 of each sensor."""

@@ -1,0 +1,287 @@
+"""d33 of an array from a campaign's FRF recordings: per recording, per sensor × indenter × preload, per sensor, and
+for the campaign (Seminara 2018, section 3.2 and equation 15).
+
+Each recording's Re FRF is averaged over the flat zone and divided by (3/2) ρ² σ, σ at the commanded offset; the mixed
+model then says how far the recordings scatter, and so how well each d33 is known. Intervals hold for the skin as
+declared and the base model as it stands: `declared_percent` says by how much d33 would move with E 2 % and h 1 % off.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.errors import InvalidInput
+from underskin.inversion import findings, mixed_model
+from underskin.inversion.mixed_model import Estimate, MixedModel, Rows
+from underskin.inversion.outliers import strays
+from underskin.inversion.sensor_flags import Flag, standing_out, unfit
+from underskin.physics.charge_response import gain
+from underskin.physics.skin import Indenter, Skin
+from underskin.prediction import domain_checks
+from underskin.prediction.domain_checks import usable
+from underskin.prediction.pressed_skin import Transmission, frf_gradient, transmission
+from underskin.recordings import plausibility
+from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.frf.estimation import Frf, lines_of
+from underskin.recordings.frf.flat_zone import FlatZone, band_average, flat_zone, stacked
+from underskin.surrogate.off_centre_sigma import PositionedSigma, positioned_sigma
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats, to_lab, to_si
+
+_LEAST_CHARGE = 1e-24  # FRF [C/N] that can be a measured one
+_MOST_REASONS = 3  # told where no recording can be used
+_MODULUS_UNSURE, _THICKNESS_UNSURE = 0.02, 0.01  # what a declared value may be off by
+
+
+class NoD33(InvalidInput):
+    """A campaign of which no d33 can be told; as text it is the reason."""
+
+    def __str__(self) -> str:
+        return self.allowed
+
+
+@dataclass(frozen=True)
+class RecordingD33:
+    """One entry a recording, SI: measured level, σ, d33 and its uncertainty by line noise; NaN where not `inside`."""
+
+    ids: tuple[str, ...]
+    sensor: NDArray[np.intp]  # number of the sensor in Inversion.sensor_ids
+    indenter_radius: Floats
+    preload: Floats
+    frf: Floats
+    frf_uncertainty: Floats
+    line_scatter: Floats  # relative
+    sigma: Floats
+    rel_error: Floats  # of σ, the table's bound
+    d33: Floats
+    d33_uncertainty: Floats
+    inside: NDArray[np.bool_]  # contact within the table's domain, and a line in the band with a charge that can be
+
+
+@dataclass(frozen=True)
+class Cells:
+    """d33 per sensor × indenter × preload that was recorded; arrays over the cells, SI."""
+
+    sensor: NDArray[np.intp]
+    indenter_radius: Floats
+    preload: Floats
+    recordings: NDArray[np.intp]
+    d33: Estimate
+
+
+@dataclass(frozen=True)
+class Inversion:
+    """The array's d33. `campaign_d33`, `spread` (relative, over sensors), `gain` and `position` [m] come from the
+    sensors that are neither dead, inverted nor weak; None where there is no such sensor."""
+
+    sensor_ids: tuple[str, ...]
+    recordings: RecordingD33
+    cells: Cells
+    sensors: Estimate  # one entry a sensor id, NaN without a usable recording
+    flags: tuple[Flag, ...]
+    zone: FlatZone
+    campaign_d33: Estimate | None
+    spread: Estimate | None
+    gain: Estimate | None
+    position: Estimate | None
+    left_out: tuple[str, ...]  # in words, each sensor or recording that the campaign's d33 does without
+    findings: tuple[str, ...]  # in words, what looked wrong and was used all the same
+    declared_percent: float  # change of d33 for E 2 % and h 1 % off, in quadrature
+
+
+def invert(
+    campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] | None = None, zone: FlatZone | None = None
+) -> Inversion:
+    """The d33 of a campaign's `frf` recordings, over its flat zone or the band given; `zone`: as it was found before.
+
+    Raises InvalidInput where no line lies in that band; NoD33 where the campaign has no frf recording, none within the
+    table's domain, none with a line in the flat zone, or none with any charge.
+    """
+    recorded = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
+    if not recorded:
+        raise NoD33("recordings", campaign.name, "there is no recording of kind frf in it")
+    measured, recorded, refused = _measured(recorded)
+    if not recorded:
+        raise _none_usable(campaign, refused)
+    frfs = stacked(measured)
+    zone = zone or flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
+    level, noise, scatter = band_average(frfs, zone)
+    contact = _Contact.of(campaign, recorded, table)
+    inside = usable(level, noise, contact.positioned.sigma, contact.felt)
+    reasons = domain_checks.reasons(recorded, campaign.skin, contact.felt, level, table)
+    refused += [
+        f"recording {item.id}: {reason}"
+        for item, reason, good in zip(recorded, reasons, inside, strict=True)
+        if not good
+    ]
+    if not inside.any():
+        raise _none_usable(campaign, refused)
+    if np.abs(level[inside]).max() < _LEAST_CHARGE:
+        raise NoD33("recordings", campaign.name, "there is no charge in any recording")
+    seen = gain(contact.positioned.sigma, contact.felt.rt_over_h)
+    d33, uncertainty = level / seen, noise / np.abs(seen)
+    ids = tuple(dict.fromkeys(item.sensor for item in recorded))
+    sensor = np.array([ids.index(item.sensor) for item in recorded])
+    rows = RecordingD33(
+        ids=tuple(item.id for item in recorded),
+        sensor=sensor,
+        indenter_radius=to_si("indenter_radius_mm", [item.indenter_radius_mm for item in recorded]),
+        preload=to_si("preload_n", [item.preload_n for item in recorded]),
+        frf=level,
+        frf_uncertainty=noise,
+        line_scatter=scatter,
+        sigma=np.where(inside, contact.positioned.sigma, np.nan),
+        rel_error=contact.felt.rel_error,
+        d33=np.where(inside, d33, np.nan),
+        d33_uncertainty=np.where(inside, uncertainty, np.nan),
+        inside=inside,
+    )
+    found = _estimated(ids, rows, contact, zone)
+    looked_at = [
+        *plausibility.in_words(campaign),
+        *findings.in_words(recorded, measured, level, found.campaign_d33),
+    ]
+    return replace(found, left_out=(*refused, *found.left_out), findings=tuple(looked_at))
+
+
+def _none_usable(campaign: Campaign, refused: Sequence[str]) -> NoD33:
+    """Of a campaign whose recordings are all refused, each with the reason: the first reasons that differ."""
+    different = list({line.partition(": ")[2]: line for line in reversed(refused)}.values())[::-1]
+    more = (
+        f"; and {len(refused) - len(different[:_MOST_REASONS])} more"
+        if len(refused) > len(different[:_MOST_REASONS])
+        else ""
+    )
+    said = "; ".join(different[:_MOST_REASONS])
+    return NoD33("recordings", campaign.name, f"none of the {len(refused)} recordings can be used: {said}{more}")
+
+
+def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfRecording], list[str]]:
+    """The FRF of each recording that has one, those recordings, and in words why the others have none."""
+    frfs, kept, refused = [], [], []
+    for recording in recorded:
+        try:
+            frfs.append(lines_of(recording))
+            kept.append(recording)
+        except InvalidInput as error:
+            refused.append(f"recording {recording.id}: {error}")
+    return frfs, kept, refused
+
+
+@dataclass(frozen=True)
+class _Contact:
+    """What the base model says of each recording's contact."""
+
+    felt: Transmission
+    positioned: PositionedSigma
+    thickness: float
+    declared: Floats  # relative change of FRF for E and h off
+
+    @classmethod
+    def of(cls, campaign: Campaign, recorded: Sequence[FrfRecording], table: SigmaTable) -> "_Contact":
+        described = campaign.skin
+        assert described.thickness_mm is not None
+        assert described.youngs_modulus_mpa is not None
+        assert described.sensor_radius_mm is not None
+        skin = Skin.from_lab(
+            thickness_mm=described.thickness_mm,
+            youngs_modulus_mpa=described.youngs_modulus_mpa,
+            sensor_radius_mm=described.sensor_radius_mm,
+            poisson_ratio=described.poisson_ratio,
+            units_checked=True,  # the campaign's reader has checked them
+        )
+        indenter = Indenter(to_si("indenter_radius_mm", [item.indenter_radius_mm for item in recorded]))
+        preload = to_si("preload_n", [item.preload_n for item in recorded])
+        felt = transmission(table, skin, indenter, preload)
+        centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in described.sensors}
+        offset = [
+            np.hypot(*np.subtract(item.position_mm or centres[item.sensor], centres[item.sensor])) for item in recorded
+        ]
+        thickness = float(skin.thickness)
+        positioned = positioned_sigma(
+            table,
+            felt.a_over_h,
+            float(skin.rt_over_h),
+            felt.load_parameter,
+            to_si("thickness_mm", offset) / thickness,
+            float(mixed_model.POSITIONS[-1]) / thickness,
+        )
+        slopes = frf_gradient(table, skin, indenter, preload, 1.0)
+        size = felt.frf(1.0)
+        declared = np.hypot(
+            slopes["youngs_modulus"] * skin.youngs_modulus * _MODULUS_UNSURE / size,
+            slopes["thickness"] * thickness * _THICKNESS_UNSURE / size,
+        )
+        return cls(felt, positioned, thickness, declared)
+
+
+def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone: FlatZone) -> Inversion:
+    moments = [contact.positioned.scattered(p / contact.thickness) for p in mixed_model.POSITIONS]
+    mean, variance = (np.array(part) for part in zip(*moments, strict=True))
+    stray = _strays(rows, np.sqrt((mean[-1] - 1) ** 2 + np.maximum(variance[-1], 0)))
+    good = np.setdiff1d(np.flatnonzero(rows.inside), stray)
+    sensor, d33, noise = rows.sensor[good], rows.d33[good], rows.d33_uncertainty[good]
+    misfits, pilot = unfit(sensor, d33, noise, len(ids))
+    mean, variance = mean[:, good], variance[:, good]
+    measured = Rows(d33, noise, pilot[sensor], mean, variance)
+    plain = np.array([number not in misfits for number in sensor])
+    model = None
+    if plain.any():
+        numbered = np.unique(sensor[plain], return_inverse=True)[1]
+        model = mixed_model.fit(measured.part(plain), numbered)
+    scatter = model.scatter if model else mixed_model.prior_scatter()
+    cell, where, count = _cells(rows, good)
+    flags = [Flag(ids[number], *misfit) for number, misfit in misfits.items()]
+    if model:
+        expected = _expected_scatter(model, measured)[plain]
+        flags += standing_out(ids, sensor[plain], rows, good[plain], pilot, expected)
+    return Inversion(
+        sensor_ids=ids,
+        recordings=rows,
+        cells=Cells(
+            rows.sensor[where], rows.indenter_radius[where], rows.preload[where], count,
+            scatter.d33(measured, cell, len(where)),
+        ),
+        sensors=scatter.d33(measured, sensor, len(ids)),
+        flags=tuple(flags),
+        zone=zone,
+        campaign_d33=model.mean if model else None,
+        spread=model.spread if model and len(set(sensor[plain])) > 1 else None,
+        gain=model.gain if model else None,
+        position=model.position if model else None,
+        left_out=_left_out(ids, rows, stray, misfits),
+        findings=(),
+        declared_percent=100 * float(np.nanmedian(contact.declared[good])),
+    )  # fmt: skip
+
+
+def _strays(rows: RecordingD33, position: Floats) -> NDArray[np.intp]:
+    """The rows inside that are grossly off; `position` as `strays` takes it."""
+    good = np.flatnonzero(rows.inside)
+    condition = np.unique(np.column_stack([rows.indenter_radius, rows.preload])[good], axis=0, return_inverse=True)[1]
+    far = strays(rows.sensor[good], condition.reshape(-1), rows.d33[good], rows.d33_uncertainty[good], position[good])
+    return good[far]
+
+
+def _expected_scatter(model: MixedModel, rows: Rows) -> Floats:
+    """The relative scatter of each recording, line noise included."""
+    nearest = int(np.argmin(np.abs(mixed_model.POSITIONS - float(model.position.value))))
+    position = np.maximum(rows.position_variance[nearest], 0)
+    return np.sqrt(float(model.gain.value) ** 2 + position + (rows.line / rows.pilot) ** 2)
+
+
+def _cells(rows: RecordingD33, good: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Of each good row its cell; of each cell a row that shows what it is, and its number of recordings."""
+    keys = np.column_stack([rows.sensor, rows.indenter_radius, rows.preload])[good]
+    _, where, cell, count = np.unique(keys, axis=0, return_index=True, return_inverse=True, return_counts=True)
+    return cell.reshape(-1), good[where], count
+
+
+def _left_out(
+    ids: tuple[str, ...], rows: RecordingD33, stray: NDArray[np.intp], misfits: dict[int, tuple[str, str]]
+) -> tuple[str, ...]:
+    d33 = to_lab("d33_pc_per_n", rows.d33)
+    off = [f"recording {rows.ids[row]}: its d33 of {d33[row]:.3g} pC/N is grossly off all others" for row in stray]
+    return (*off, *(f"sensor {ids[number]}: {reason}" for number, (_, reason) in misfits.items()))

@@ -1,0 +1,49 @@
+"""The skin sticks to the sphere, so the contact is wider than the force alone would make it, most of all at low force,
+under large spheres and on soft skins.
+
+Law: Johnson, Kendall and Roberts: on the half space a³ = (3R/4E') [F + 3πwR + √(6πwRF + (3πwR)²)], pressure = Hertz'
+less a flat punch's; on the layer φ(a) = −√(2awE'/π) in the integral equation of layered_contact.
+
+Assumptions: short-ranged adhesion (soft, large contacts: Tabor's number far above 1), equilibrium on the loading branch
+under a given force. FRF = Q(F)/F with the static pressure. An indentation sticks from the
+first touch to the pull-off, which comes where the travel δ + F/k has its least value: at JKR's depth under a stiff
+stage, at the force −3πwR/2 under a soft one; from there on it must touch again.
+
+Source: Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301.
+"""
+
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.curve_state import Curve
+from underskin.recordings.campaign import Campaign
+
+
+class Adhesion(Mechanism):
+    """See the module."""
+
+    name = "adhesion"
+    kinds = ("frf", "indentation")
+    axes = ("preload_n", "indenter_radius_mm", "position_mm", "force_n")
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The work of adhesion."""
+        return (
+            Parameter(
+                name="work_of_adhesion",
+                unit="J/m²",
+                low=1e-3,
+                high=20.0,
+                prior=Normal(-1.6, 1.3),
+                scale="log",
+                limit=0.0,
+                reason="0.04 J/m² is thermodynamic for silicone; rate effects and soft gels raise it to some J/m²",
+            ),
+        )
+
+    def on_material(self, contacts: Contacts, values: Values) -> None:
+        """Make it stick."""
+        contacts.work_of_adhesion = values["work_of_adhesion"]
+
+    def on_curve(self, curve: Curve, values: Values) -> None:
+        """Make it stick."""
+        curve.work_of_adhesion = values["work_of_adhesion"]

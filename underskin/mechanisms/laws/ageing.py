@@ -1,0 +1,98 @@
+"""The sensors lose strength as the skin is pressed again and again, so recordings after many load cycles are lower than
+those after few.
+
+Law: FRF · f(1 − loss · g), g = [1 − (1 + N/(n (1 + p)))^(−p)]/(1 − 10^(−p)), p = s/(1 − s), n the onset, s the
+saturation. At s = 0 it is 1 − loss · log10(1 + N/n), a loss by the decade; for s → 1 it is 1 − loss · (1 − e^(−N/n)), a
+loss that ends. f(x) = x down to 0.05, below it 0.05 e^(20x − 1): a response dies out, it does not change its sign.
+
+Assumptions: all sensors age alike, by the campaign's own count of cycles.
+
+Source: Jaffe, Cook & Jaffe, Piezoelectric Ceramics (1971), for a loss by the decade; one family holds it and the
+saturating law, so that a fit is well posed.
+"""
+
+import numpy as np
+
+from underskin.mechanisms.autodiff import Differentiated, chain, log
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Uniform, Values
+from underskin.mechanisms.models.frf_design import FrfDesign, frf_recordings
+from underskin.recordings.campaign import Campaign
+
+_SMALL = 1e-3  # below it (1 − e^(−x))/x is taken from its series
+_LEAST = 0.05  # what is left of a response before its fall slows down
+
+
+class Ageing(Mechanism):
+    """See the module."""
+
+    name = "ageing"
+    axes = ("load_cycles",)
+    needs = "load_cycles of every recording, not all the same"
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The loss, by the decade or in the end, the cycles at which it sets in, and the shape."""
+        return (
+            Parameter(
+                name="loss",
+                unit="-",
+                low=0.0,
+                high=0.95,
+                prior=Normal(0.0, 0.3),
+                scale="linear",
+                limit=0.0,
+                reason="poled polymers lose some to tens of percent, a decade or in the end",
+            ),
+            Parameter(
+                name="onset",
+                unit="cycles",
+                low=1.0,
+                high=1e6,
+                prior=Normal(6.9, 2.0),
+                scale="log",
+                limit=None,
+                reason="run-in takes tens to ten thousands of cycles; 1000 within a factor of 7",
+            ),
+            Parameter(
+                name="saturation",
+                unit="-",
+                low=0.0,
+                high=0.95,
+                prior=Uniform(),
+                scale="linear",
+                limit=None,
+                reason="from a loss that goes on by the decade to one that ends: nothing is known beforehand",
+            ),
+        )
+
+    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+        """Counts that differ are needed."""
+        cycles = {entry.id: entry.load_cycles for entry in frf_recordings(campaign)}
+        lacking = [name for name, value in cycles.items() if value is None]
+        if lacking:
+            return f"recording {lacking[0]!r} has no load_cycles"
+        return "load_cycles is the same in all recordings" if len(set(cycles.values())) == 1 else None
+
+    def on_recordings(self, design: FrfDesign, values: Values) -> Differentiated:
+        """The factor on each recording."""
+        left = 1.0 - values["saturation"]
+        power = values["saturation"] / left
+        age = log(1.0 + left * (design.load_cycles / values["onset"]))
+        # (1 − e^(−p x))/p = x · fall(p x)
+        lost = age * _fall(power * age) / (np.log(10.0) * _fall(np.log(10.0) * power))
+        return _alive(1.0 - values["loss"] * lost)
+
+
+def _fall(x: Differentiated) -> Differentiated:
+    """(1 − e^(−x))/x."""
+    safe = np.where(x.value < _SMALL, 1.0, x.value)
+    value = -np.expm1(-safe) / safe
+    slope = (np.exp(-safe) - value) / safe
+    near = 1 - x.value / 2 + x.value**2 / 6, -0.5 + x.value / 3 - x.value**2 / 8
+    return chain(np.where(x.value < _SMALL, near[0], value), (np.where(x.value < _SMALL, near[1], slope), x))
+
+
+def _alive(factor: Differentiated) -> Differentiated:
+    """The factor, or below _LEAST what falls on to 0 from there, as steeply at first."""
+    dying = _LEAST * np.exp(np.minimum(factor.value / _LEAST - 1, 0.0))
+    alive = factor.value > _LEAST
+    return chain(np.where(alive, factor.value, dying), (np.where(alive, 1.0, dying / _LEAST), factor))

@@ -1,0 +1,42 @@
+"""The charge amplifier cannot hold a charge for long, so at the lowest frequencies the response drops and runs ahead of
+the force, alike in all recordings.
+
+Law: FRF · iωτ/(1 + iωτ), τ = 1/(2π corner).
+
+Assumptions: one pole, the same for all recordings and sensors.
+
+Source: a charge amplifier's feedback capacitor with its resistor in parallel (Gautschi, Piezoelectric Sensorics, 2002,
+chapter 11).
+"""
+
+from underskin.mechanisms.autodiff import Differentiated
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.recordings.campaign import Campaign
+
+
+class AmplifierHighPass(Mechanism):
+    """See the module."""
+
+    name = "amplifier_high_pass"
+    axes = ("frequency_hz", "phase")
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The corner frequency."""
+        return (
+            Parameter(
+                name="corner",
+                unit="Hz",
+                low=1e-3,
+                high=100.0,
+                prior=Normal(-0.7, 1.5),
+                scale="log",
+                limit=0.0,
+                reason="charge amplifiers have corners of 0.01 to some Hz; 0.5 Hz within a factor of 4.5",
+            ),
+        )
+
+    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
+        """1/(1 − i corner/f)."""
+        return 1.0 / (1.0 - values["corner"] * (1j / design.line_frequency))

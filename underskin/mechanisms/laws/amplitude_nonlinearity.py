@@ -1,0 +1,64 @@
+"""The dynamic force is not small beside the preload, so the contact grows and shrinks markedly within a cycle and
+charge over force depends on how hard the shaker drives.
+
+Law: σ → (1 − m) σ + m · (first harmonic of (F + Fd sin ωt) σ(F + Fd sin ωt))/Fd, with the edge moving and every other
+mechanism of contact and stress inside; tends to moving_contact_edge as Fd/F → 0. d33 is that at the preload: where it
+changes with stress (preload_dependent_d33) it multiplies the harmonic and does not vary within the cycle.
+
+Assumptions: quasi-static over the cycle; the sphere never leaves the skin (Fd < F); m, the edge's mobility, is the same
+for all recordings.
+
+Source: Gelb & Vander Velde, Multiple-Input Describing Functions (1968), for the first harmonic of a nonlinear answer.
+It is (2/π) ∫₋₁¹ Q(F + Fd s) s/√(1 − s²) ds, by Gauss–Chebyshev quadrature.
+"""
+
+import numpy as np
+
+from underskin.mechanisms.autodiff import Array, Differentiated
+from underskin.mechanisms.base import Kind, Mechanism, Parameter, Uniform, Values
+from underskin.mechanisms.models.frf_design import frf_recordings
+from underskin.recordings.campaign import Campaign
+from underskin.units import Floats
+
+_NODES = 6
+
+
+class AmplitudeNonlinearity(Mechanism):
+    """See the module."""
+
+    name = "amplitude_nonlinearity"
+    axes = ("dynamic_force_n", "preload_n", "indenter_radius_mm")
+    needs = "dynamic_force_n below preload_n in every recording"
+    contact_axes = ("dynamic_force_n",)
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The edge's mobility."""
+        return (
+            Parameter(
+                name="edge_mobility",
+                unit="-",
+                low=0.0,
+                high=1.0,
+                prior=Uniform(),
+                scale="linear",
+                limit=0.0,
+                reason="from an edge pinned by adhesion to one that moves freely: nothing is known beforehand",
+            ),
+        )
+
+    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+        """The contact must not open."""
+        for entry in frf_recordings(campaign):
+            if entry.dynamic_force_n >= entry.preload_n:
+                return f"recording {entry.id!r}: dynamic_force_n reaches preload_n, the contact would open"
+        return None
+
+    def force_nodes(self, force: Floats, dynamic_force: Floats) -> tuple[Array, Array]:
+        """The first harmonic's quadrature; a weight is of σ, so it holds the force at its node."""
+        s = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)[:, None]
+        forces = force + dynamic_force * s
+        return forces, 2 / _NODES * s * forces / dynamic_force
+
+    def mobility(self, values: Values) -> Differentiated:
+        """The edge's mobility."""
+        return values["edge_mobility"]

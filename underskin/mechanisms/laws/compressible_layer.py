@@ -1,0 +1,55 @@
+"""The skin's material can be squeezed together a little in volume, so it passes the pressure on in another shape, which
+shows beside the sensors and with centred presses looks like another d33.
+
+Law: ν < 0.5 in Hertz' E' = E/(1 − ν²), in the layer's transmission M and in its compliance K.
+
+Assumptions: isotropic linear elasticity; what finite strain adds is the incompressible table's, entered with
+L (0.75/(1 − ν²))², which keeps q0/E. For a centred contact nearly a pure gain, not to be told from d33.
+
+Source: Sneddon, Fourier Transforms (1951), chapter 10; the closed forms of M and K stand in
+underskin/physics/elastic_layer.py.
+"""
+
+from underskin.mechanisms.base import Kind, Mechanism, Parameter, Uniform, Values
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.curve_state import Curve
+from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.recordings.campaign import Campaign
+
+
+class CompressibleLayer(Mechanism):
+    """See the module."""
+
+    name = "compressible_layer"
+    kinds = ("frf", "indentation")
+    axes = ("position_mm", "preload_n", "indenter_radius_mm")
+    needs = "a skin declared with poisson_ratio 0.5"
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The Poisson ratio."""
+        return (
+            Parameter(
+                name="poisson_ratio",
+                unit="-",
+                low=0.30,
+                high=0.5,
+                prior=Uniform(),
+                scale="linear",
+                limit=0.5,
+                reason="solid elastomers 0.48 to 0.5, filled and slightly porous ones 0.4, foams 0.3",
+            ),
+        )
+
+    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+        """A skin that is declared compressible has its ν in the base model."""
+        if campaign.skin.poisson_ratio != INCOMPRESSIBLE:
+            return f"the skin is declared compressible already (poisson_ratio {campaign.skin.poisson_ratio:g})"
+        return None
+
+    def on_material(self, contacts: Contacts, values: Values) -> None:
+        """Set ν."""
+        contacts.poisson_ratio = values["poisson_ratio"]
+
+    def on_curve(self, curve: Curve, values: Values) -> None:
+        """Set ν."""
+        curve.poisson_ratio = values["poisson_ratio"]

@@ -1,0 +1,114 @@
+"""The skin slowly gives way under the preload, so the contact grows and the response changes with the time for which
+the preload has been held.
+
+Law: E(t) = E (1 − g (1 − e^(−t/τ))), with t the time held; a³ ∝ 1/E(t), L ∝ 1/E(t).
+
+Assumptions: quasi-elastic: each instant as an elastic layer of modulus E(t), one Prony pair, the declared E is the
+instantaneous one. (Exact creep under a constant force uses J(t), whose time is τ/(1 − g): fitted to FRFs of a solid
+that creeps so, τ comes out 7 % too long at g 0.2, 15 % at 0.4, 24 % at 0.6.) A held oscillation is felt through the
+contact radius alone, since transmission through a linear layer under force control has no modulus in it, and a
+contact's stiffness against an oscillation much faster than τ is the instantaneous modulus' at that radius.
+Curves: an indentation F(t) = ∫₀^{t1} e(t−s) du(s), with u the elastic force, e = E(t)/E, and t1 = t while the contact
+grows; while it shrinks t1 is when it last was as large, ∫_{t1}^{t} e(t−s) dδ(s) = 0 (Ting's theory, exact for one
+growing and one shrinking of the contact, with holds between). With adhesion the edge lets go where it carries the
+stretch ℓ of JKR's contact at the instantaneous modulus. A stage gives by the relaxed force. A sphere that presses again
+after it was drawn back meets a surface that has not recovered: refused. A cylinder: F(t) = ∫₀^t e(t−s) du(s).
+
+Source: Lee & Radok, J. Appl. Mech. 27 (1960) 438; Ting, J. Appl. Mech. 33 (1966) 845; Greenwood & Johnson, Phil. Mag. A
+43 (1981) 697 (the modulus that a moving edge sees).
+"""
+
+import numpy as np
+
+from underskin.mechanisms.autodiff import exp
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Uniform, Values
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.curve_state import Curve
+from underskin.mechanisms.models.curve_timing import time_runs_with_displacement
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.units import Floats
+
+_RETURN = 0.05  # of the range of displacement: smaller returns are noise
+
+
+class ContactCreep(Mechanism):
+    """See the module."""
+
+    name = "contact_creep"
+    kinds = ("frf", "indentation", "compression")
+    axes = ("dwell_s", "preload_n", "indenter_radius_mm", "time_s")
+    needs = (
+        "frf: dwell_s of every recording, not all the same; curves: time_s, and two speeds, a hold or a way back; "
+        "indentations: one way in and one back"
+    )
+    contact_axes = ("dwell_s",)
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """One Prony pair."""
+        return (
+            Parameter(
+                name="relaxed_fraction",
+                unit="-",
+                low=0.0,
+                high=0.9,
+                prior=Uniform(),
+                scale="linear",
+                limit=0.0,
+                reason="from a few percent in a well cured silicone to most of the modulus in a gel",
+            ),
+            Parameter(
+                name="relaxation_time",
+                unit="s",
+                low=0.05,
+                high=5e4,
+                prior=Normal(3.7, 1.5),
+                scale="log",
+                limit=None,
+                reason="what a bench can see lies between seconds and an hour; 40 s within a factor of 4.5",
+            ),
+        )
+
+    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+        """Times are needed that say more than the loads: dwell_s that differ, or time_s apart from displacement."""
+        if kind != "frf":
+            curves = [
+                entry
+                for entry in campaign.recordings
+                if isinstance(entry, IndentationRecording | CompressionRecording) and entry.kind == kind
+            ]
+            lacking = [entry.id for entry in curves if entry.time_s is None]
+            if lacking:
+                return f"recording {lacking[0]!r} has no time_s"
+            if time_runs_with_displacement(curves):
+                return "all curves go one way at one speed: time cannot be told from displacement"
+            return _again(campaign)
+        dwell = {entry.id: entry.dwell_s for entry in campaign.recordings if entry.kind == kind}
+        lacking = [name for name, value in dwell.items() if value is None]
+        if lacking:
+            return f"recording {lacking[0]!r} has no dwell_s"
+        return "dwell_s is the same in all recordings" if len(set(dwell.values())) == 1 else None
+
+    def on_material(self, contacts: Contacts, values: Values) -> None:
+        """Relax the modulus."""
+        times = -contacts.dwell * (1.0 / values["relaxation_time"])
+        contacts.relaxed = 1.0 - values["relaxed_fraction"] * (1.0 - exp(times))
+        contacts.modulus = contacts.modulus * contacts.relaxed
+
+    def on_curve(self, curve: Curve, values: Values) -> None:
+        """Relax the force."""
+        curve.relaxation = values["relaxed_fraction"], values["relaxation_time"]
+
+
+def _again(campaign: Campaign) -> str | None:
+    """The first indentation that goes in again after it had come back."""
+    for entry in campaign.recordings:
+        if isinstance(entry, IndentationRecording) and _presses_again(entry.displacement_mm):
+            return f"recording {entry.id!r} presses again after it was drawn back: give each way in and back by itself"
+    return None
+
+
+def _presses_again(displacement: Floats) -> bool:
+    least = _RETURN * np.ptp(displacement)
+    back = np.flatnonzero(np.maximum.accumulate(displacement) - displacement > least)
+    after = displacement[back[0] :] if len(back) else displacement[:1]
+    return bool((after - np.minimum.accumulate(after)).max() > least)

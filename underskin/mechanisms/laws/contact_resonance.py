@@ -1,0 +1,61 @@
+"""The tip between force cell and skin bounces on the contact as a mass on a spring, so the response swells towards a
+resonance and falls beyond it, at a frequency that moves with preload and sphere.
+
+Law: FRF/(1 − (ω/ω0)² + 2iζω/ω0), ω0² = k/m, k = dF/dδ = 2E'a S(a/h) of the layer at the contact radius in force: the
+resonance moves with preload and indenter as the contact does; where the contact creeps it rises, for the contact grows.
+
+Assumptions: one mass, one damping ratio; damping acts on the tip and is not sensed (a dashpot inside the contact would
+add a numerator 1 + 2iζω/ω0); the edge is held over a cycle, which is short beside the times of creep, so that E' is the
+unrelaxed one; the layer itself has no inertia.
+
+Source: Rabe, Janser & Arnold, Rev. Sci. Instrum. 67 (1996) 3281 (contact resonances); Lebedev & Ufliand, J. Appl. Math.
+Mech. 22 (1958) 442, for the layer's S.
+"""
+
+import numpy as np
+
+from underskin.mechanisms.autodiff import Differentiated
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.recordings.campaign import Campaign
+
+
+class ContactResonance(Mechanism):
+    """See the module."""
+
+    name = "contact_resonance"
+    axes = ("frequency_hz", "phase", "preload_n", "indenter_radius_mm")
+    needs_stiffness = True
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """Tip mass and damping ratio."""
+        return (
+            Parameter(
+                name="tip_mass",
+                unit="g",
+                low=0.01,
+                high=2000.0,
+                prior=Normal(0.7, 1.8),
+                scale="log",
+                limit=0.0,
+                reason="what sits in front of a force cell, from a bead to a shaker's table: 2 g within a factor of 6",
+            ),
+            Parameter(
+                name="damping_ratio",
+                unit="-",
+                low=1e-3,
+                high=1.0,
+                prior=Normal(-3.0, 1.0),
+                scale="log",
+                limit=None,
+                reason="silicones lose little, tan δ 0.02 to 0.3, ζ half of it: 0.05 within a factor of 2.7",
+            ),
+        )
+
+    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
+        """The tip's transfer function."""
+        assert contacts.stiffness is not None
+        natural = (contacts.stiffness * (1e3 / values["tip_mass"])) ** 0.5
+        ratio = 2 * np.pi * design.line_frequency / natural[design.line_contact]
+        return 1.0 / (1.0 - ratio * ratio + 2j * values["damping_ratio"] * ratio)

@@ -1,0 +1,59 @@
+"""Part of the charge of the neighbouring sensors gets into a sensor's own channel, so a press that they feel as well
+reads too high.
+
+Law: charge of a sensor = its own + fraction · Σ own charge of each sensor within 1.2 pitch, pitch being the smallest
+distance between two sensors.
+
+Assumptions: the same fraction for all pairs; a neighbour's own charge follows from the same contact at its own offset,
+with the same d33 law (its own gain is taken as 1).
+
+Source: Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling between leads).
+"""
+
+import numpy as np
+
+from underskin.mechanisms.autodiff import Differentiated
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.recordings.campaign import Campaign
+from underskin.units import to_si
+
+_FELT_WITHIN = 3.0  # thicknesses; further off a bonded layer passes on less than a thousandth
+
+
+class Crosstalk(Mechanism):
+    """See the module."""
+
+    name = "crosstalk"
+    axes = ("position_mm", "sensor")
+    needs = "at least two sensors, and presses within three thicknesses of a neighbour"
+    needs_neighbours = True
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The fraction."""
+        return (
+            Parameter(
+                name="fraction",
+                unit="-",
+                low=0.0,
+                high=0.6,
+                prior=Normal(0.0, 0.15),
+                scale="linear",
+                limit=0.0,
+                reason="coupling of unshielded leads is some to 20 percent",
+            ),
+        )
+
+    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+        """A neighbour that feels something is needed."""
+        if len(campaign.skin.sensors) < 2:
+            return "the skin has one sensor, and so no neighbours"
+        design = FrfDesign.of(campaign, (), neighbours=True)
+        nearest = np.hypot(design.point_x, design.point_y)[design.neighbour_point].min(initial=np.inf)
+        if nearest > _FELT_WITHIN * to_si("thickness_mm", campaign.skin.thickness_mm or 0.0):
+            return "no recording presses within three thicknesses of a sensor's neighbour (position_mm)"
+        return None
+
+    def neighbour_fraction(self, values: Values) -> Differentiated:
+        """The fraction."""
+        return values["fraction"]

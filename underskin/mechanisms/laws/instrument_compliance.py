@@ -1,0 +1,40 @@
+"""The stage gives way under the force, so the displacement read off it is larger than the indentation and the sample
+looks too soft, most of all at high force.
+
+Law: measured displacement = indentation + F/k, with the F that is measured: relaxed, and adhesive.
+
+Assumptions: a linear stage, the same in all recordings; without friction or backlash.
+
+Source: Oliver & Pharr, J. Mater. Res. 7 (1992) 1564 (frame compliance).
+"""
+
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.models.curve_state import Curve
+from underskin.recordings.campaign import Campaign
+
+
+class InstrumentCompliance(Mechanism):
+    """See the module."""
+
+    name = "instrument_compliance"
+    kinds = ("indentation",)
+    axes = ("force_n",)
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The stage's stiffness."""
+        return (
+            Parameter(
+                name="stage_stiffness",
+                unit="N/mm",
+                low=0.01,
+                high=1e5,
+                prior=Normal(5.0, 2.0),
+                scale="log",
+                limit=float("inf"),
+                reason="robot stages 10 to 100 N/mm, testing machines 1000 to 50000; 150 within a factor of 7",
+            ),
+        )
+
+    def on_curve(self, curve: Curve, values: Values) -> None:
+        """Let the stage give."""
+        curve.stage_stiffness = 1e3 * values["stage_stiffness"]

@@ -1,0 +1,41 @@
+"""The glue under the skin gives way sideways, so the pressure reaches the sensors in another shape, which shows beside
+them and with centred presses looks much like another d33.
+
+Law: τ = κ (G/h) u_r at the base, in place of u_r = 0; it changes the layer's transmission M and its compliance K.
+
+Assumptions: a linear glue line of one stiffness everywhere; κ = ∞ is bonded, κ = 0 frictionless. The layer is the
+linear one; what finite strain adds is taken from the bonded table.
+
+Source: Goodman, Taylor & Brekke, J. Soil Mech. Found. Div. 94 (1968) 637 (joint stiffness); Sneddon, Fourier Transforms
+(1951), chapter 10, for the layer: the closed forms of M and K stand in underskin/physics/elastic_layer.py.
+"""
+
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.recordings.campaign import Campaign
+
+
+class InterfaceSlip(Mechanism):
+    """See the module."""
+
+    name = "interface_slip"
+    axes = ("position_mm", "preload_n", "indenter_radius_mm")
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The glue line's stiffness in units of the layer's own."""
+        return (
+            Parameter(
+                name="glue_stiffness",
+                unit="-",
+                low=0.01,
+                high=50.0,
+                prior=Normal(-0.3, 1.5),
+                scale="log",
+                limit=float("inf"),
+                reason="(G_glue/G) (h/t): a tape 0.1 mm thick, 1000 times softer, has 0.02; above 50 no effect",
+            ),
+        )
+
+    def on_material(self, contacts: Contacts, values: Values) -> None:
+        """Set the slip, 1/(1 + κ)."""
+        contacts.slip = 1.0 / (1.0 + values["glue_stiffness"])

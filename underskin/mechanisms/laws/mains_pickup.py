@@ -1,0 +1,144 @@
+"""The mains put charge on the sensors' leads, so lines at the mains' frequency and its multiples are off, the more the
+weaker the dynamic force.
+
+Law: a charge q at the mains' frequency and a share of q/n at its n-th harmonic, each a line of some width, whatever the
+dynamic force: an FRF error of q/Fd, complex, its phase independent in each recording and on each line. It adds its
+square to the lines' variance.
+
+Assumptions: q is the standard deviation of each component over recordings; 50 or 60 Hz, whichever stands out in the
+campaign's lines; harmonics up to the fifth, all with the same share; lines are bells exp(−½ (f/width)²), f from the
+multiple. How phases of neighbouring lines hang together, and the lines' shape in detail, depend on the analyser's
+window and on how the mains drift: neither is relied on.
+
+Source: Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling to leads).
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter
+from underskin.mechanisms.models.frf_design import FrfDesign, frf_recordings
+from underskin.mechanisms.models.pickup import Pickup
+from underskin.recordings.campaign import Campaign
+from underskin.recordings.frf.estimation import Frf, lines_of
+from underskin.units import Floats
+
+_MAINS_HZ = (50.0, 60.0)
+_HARMONICS = np.arange(1, 6)
+_WIDTH_HZ = 1.5  # where it is asked which mains stand out
+_FURTHEST_HZ = 20.0  # beyond which no line reaches, and short of half way from one harmonic to the next
+_REACH_HZ = 3.0
+_REACHED = 0.05  # of the shape
+_LEAST_LINES = 3
+_BESIDE = 9  # lines, the next in frequency, that say what is usual
+_LEAST_STRAY = 1e-6  # relative; of recordings without noise
+
+
+class MainsPickup(Mechanism):
+    """See the module."""
+
+    name = "mains_pickup"
+    axes = ("frequency_hz", "dynamic_force_n")
+    needs = "a line within 3 Hz of 50 or 60 Hz"
+    _last: tuple[Campaign, float] | None = None
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The charge, and what its lines look like."""
+        return (
+            Parameter(
+                name="pickup_charge",
+                unit="pC",
+                low=1e-4,
+                high=1e3,
+                prior=Normal(-3.0, 1.5),
+                scale="log",
+                limit=0.0,
+                reason="unshielded leads of some pF to mains at 230 V collect hundredths to tenths of a pC",
+            ),
+            Parameter(
+                name="pickup_width",
+                unit="Hz",
+                low=0.2,
+                high=6.0,
+                prior=Normal(0.4, 0.6),
+                scale="log",
+                limit=None,
+                reason="the analyser's window and the mains' drift make lines a few Hz wide",
+            ),
+            Parameter(
+                name="pickup_harmonics",
+                unit="-",
+                low=1e-3,
+                high=10.0,
+                prior=Normal(0.0, 1.5),
+                scale="log",
+                limit=None,
+                reason="the n-th harmonic has about 1/n of the charge; a sine has none, rectifiers have more",
+            ),
+        )
+
+    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+        """Lines near the mains are needed."""
+        for entry in frf_recordings(campaign):
+            frequency = lines_of(entry).frequency
+            if any(np.abs(frequency - mains).min() < _REACH_HZ for mains in _MAINS_HZ):
+                return None
+        return "no line lies within 3 Hz of 50 or 60 Hz (frequency_hz)"
+
+    def pickup(self, campaign: Campaign, design: FrfDesign) -> Pickup:
+        """Of the lines within the reach of the mains that stand out, each by the nearest multiple."""
+        away = np.abs(design.row_frequency[:, None] - self._outstanding(campaign) * _HARMONICS)
+        rows = np.flatnonzero(away.min(axis=1) < _FURTHEST_HZ)
+        harmonic = _HARMONICS[away[rows].argmin(axis=1)]
+        half_square, force = 0.5 * away[rows].min(axis=1) ** 2, design.row_dynamic_force[rows]
+
+        def deviation(values: Mapping[str, Floats]) -> Floats:
+            line = np.exp(-half_square / values["pickup_width"] ** 2)
+            share = np.where(harmonic == 1, 1.0, values["pickup_harmonics"] / harmonic)
+            return np.asarray(1e-12 * values["pickup_charge"] * share * line / force)
+
+        return Pickup(rows, deviation)
+
+    def _outstanding(self, campaign: Campaign) -> float:
+        """The mains' frequency, where none stands out the one that has a line nearest; that of the last campaign is
+        kept."""
+        last = self._last
+        if last is None or last[0] is not campaign:
+            lines = [lines_of(entry) for entry in frf_recordings(campaign)]
+            nearest = {mains: min(float(np.abs(one.frequency - mains).min()) for one in lines) for mains in _MAINS_HZ}
+            last = campaign, max(_MAINS_HZ, key=lambda mains: (_excess(lines, mains), -nearest[mains]))
+            self._last = last
+        return last[1]
+
+
+def _excess(recordings: Sequence[Frf], mains: float) -> float:
+    """How much further the lines that these mains reach stray from a straight line between those that none reach than
+    the next ones do from each other: Σ shape² (|stray|² over theirs − 1)/√Σ shape⁴, the score of a variance of that
+    shape in units of its own scatter."""
+    score = weight = 0.0
+    for lines in recordings:
+        shape = _shape(lines.frequency, mains)
+        near, far = shape > _REACHED, np.flatnonzero(shape <= _REACHED)
+        if not near.any() or len(far) < _LEAST_LINES:
+            continue
+        size = np.maximum(np.abs(lines.values), max(float(np.median(np.abs(lines.values))), 1e-300))
+        odd, even = far[1::2], far[::2]
+        stray = _stray(lines, size, np.flatnonzero(near), far)
+        beside = np.abs(lines.frequency[near, None] - lines.frequency[odd]).argsort(axis=1)[:, :_BESIDE]
+        usual = np.median(_stray(lines, size, odd, even)[beside] ** 2, axis=1) / np.log(2.0)  # median = mean · ln 2
+        score += float((shape[near] ** 2 * (stray**2 - usual) / np.maximum(usual, _LEAST_STRAY**2)).sum())
+        weight += float((shape[near] ** 4).sum())
+    return score / np.sqrt(weight) if weight else 0.0
+
+
+def _stray(lines: Frf, size: Floats, rows: NDArray[np.intp], beside: NDArray[np.intp]) -> Floats:
+    """How far rows are from a straight line between others, relative to `size`."""
+    between = np.interp(lines.frequency[rows], lines.frequency[beside], lines.values[beside])
+    return np.asarray(np.abs(lines.values[rows] - between) / size[rows])
+
+
+def _shape(frequency: Floats, mains: float) -> Floats:
+    distance = (frequency[:, None] - mains * _HARMONICS) / _WIDTH_HZ
+    return np.asarray((np.exp(-0.5 * distance**2) / _HARMONICS).sum(axis=1))

@@ -1,0 +1,53 @@
+"""The Young's modulus that was declared is not the skin's, a wrong number rather than missing physics, so every contact
+is wider or narrower than computed, which shows the more the wider it is.
+
+Law: E = declared E · factor; it acts through a³ ∝ 1/E and L ∝ 1/E, and on an indentation's or compression's force.
+
+Assumptions: one factor for the whole skin, in all recordings.
+
+Source: Seminara 2018, equations 7 to 10 and 16: E enters through a and L; under force control a linear layer transmits
+a given pressure alike whatever its modulus.
+"""
+
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.curve_state import Curve
+from underskin.recordings.campaign import Campaign
+
+
+class ModulusError(Mechanism):
+    """See the module."""
+
+    name = "modulus_error"
+    kinds = ("frf", "indentation", "compression")
+    axes = ("preload_n", "indenter_radius_mm", "position_mm")
+    needs = "a declared youngs_modulus_mpa"
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """True over declared modulus."""
+        return (
+            Parameter(
+                name="modulus_factor",
+                unit="-",
+                low=0.25,
+                high=4.0,
+                prior=Normal(0.0, 0.35),
+                scale="log",
+                limit=1.0,
+                reason="E from a durometer, a data sheet or another cure is off by tens of percent",
+            ),
+        )
+
+    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+        """A declared modulus is needed."""
+        if campaign.skin.youngs_modulus_mpa is None:
+            return "skin.youngs_modulus_mpa is not declared, and so free already"
+        return None
+
+    def on_declared(self, contacts: Contacts, values: Values) -> None:
+        """Scale the modulus."""
+        contacts.modulus = contacts.modulus * values["modulus_factor"]
+
+    def on_curve(self, curve: Curve, values: Values) -> None:
+        """Scale the modulus."""
+        curve.modulus = curve.modulus * values["modulus_factor"]

@@ -1,0 +1,53 @@
+"""The edge of the contact moves with the dynamic force, so the oscillating part of the pressure sits towards the rim,
+and a wide contact gives less charge than the steady pressure's shape says.
+
+Law: σ → (1 − m) σ + m d(Fσ)/dF at fixed R, with every other mechanism of contact and stress inside the derivative (d33
+multiplies it: preload_dependent_d33's is the tangent coefficient already); for the linear Hertz case
+d(Fσ)/dF = σ + (a/3) ∂σ/∂a, the flat punch's σ. FRF = charge over oscillating force.
+
+Assumptions: m, the mobile fraction, is the same for all recordings; oscillations small against the preload.
+
+Source: Johnson, Contact Mechanics (1985), section 3.4 (an increment of Hertz' pressure is the flat punch's); Seminara
+2018, equations 12 to 16, holds the edge still.
+"""
+
+import numpy as np
+
+from underskin.mechanisms.autodiff import Array, Differentiated
+from underskin.mechanisms.base import Kind, Mechanism, Parameter, Uniform, Values
+from underskin.recordings.campaign import Campaign
+from underskin.units import Floats
+
+_STEP = 1e-3  # of the central difference over F, relative; its error is of the order of the step's square
+
+
+class MovingContactEdge(Mechanism):
+    """See the module."""
+
+    name = "moving_contact_edge"
+    axes = ("preload_n", "indenter_radius_mm", "position_mm")
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The mobile fraction."""
+        return (
+            Parameter(
+                name="mobile_fraction",
+                unit="-",
+                low=0.0,
+                high=1.0,
+                prior=Uniform(),
+                scale="linear",
+                limit=0.0,
+                reason="from an edge pinned by adhesion to one that moves freely: nothing is known beforehand",
+            ),
+        )
+
+    def force_nodes(self, force: Floats, dynamic_force: Floats) -> tuple[Array, Array]:
+        """d(Fσ)/dF by a central difference."""
+        up, down = 1 + _STEP, 1 - _STEP
+        weight = np.array([up, -down]) / (2 * _STEP)
+        return np.multiply.outer(np.array([up, down]), force), np.multiply.outer(weight, np.ones_like(force))
+
+    def mobility(self, values: Values) -> Differentiated:
+        """The mobile fraction."""
+        return values["mobile_fraction"]

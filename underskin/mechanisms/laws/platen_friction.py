@@ -1,0 +1,41 @@
+"""The plates hold the ends of the compressed cylinder, so that it cannot widen freely and looks too stiff, the more so
+the flatter it is.
+
+Law: nominal stress · (1 + 2 f S²), S = D/4H of the unloaded sample, f from 0 (slips) to 1 (sticks fully).
+
+Assumptions: incompressible; Gent and Lindley's factor for bonded cylinders, which they use with the unloaded shape at
+large compressions as well; f constant. Samples of one shape cannot tell it from the modulus.
+
+Source: Gent & Lindley, Proc. Inst. Mech. Eng. 173 (1959) 111.
+"""
+
+from underskin.mechanisms.base import Kind, Mechanism, Parameter, Uniform, Values
+from underskin.mechanisms.models.curve_state import Curve
+from underskin.recordings.campaign import Campaign
+
+
+class PlatenFriction(Mechanism):
+    """See the module."""
+
+    name = "platen_friction"
+    kinds = ("compression",)
+    axes = ("sample_height_mm", "sample_diameter_mm")
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """How far the platens hold the sample."""
+        return (
+            Parameter(
+                name="friction",
+                unit="-",
+                low=0.0,
+                high=1.0,
+                prior=Uniform(),
+                scale="linear",
+                limit=0.0,
+                reason="from well oiled to bonded: nothing is known beforehand",
+            ),
+        )
+
+    def on_curve(self, curve: Curve, values: Values) -> None:
+        """Let the platens hold."""
+        curve.platen_friction = values["friction"]

@@ -1,0 +1,67 @@
+"""The sensor's material follows a change only with delay, so the response falls with rising frequency and the charge
+lags behind the force.
+
+Law: (iω/ω_ref)^(−n) · (1 + s/(1 + iω/ω_s)), n ≥ 0, s ≥ 0, ω_ref = 2π · 30 Hz: a power law, a step, or both.
+
+Assumptions: linear, the same for all sensors and preloads; causal, so that real and imaginary part belong together.
+
+Source: Jonscher, Dielectric Relaxation in Solids (1983), chapters 3 and 5 (Debye's step, universal power law).
+"""
+
+import numpy as np
+
+from underskin.mechanisms.autodiff import Differentiated, exp
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.recordings.campaign import Campaign
+
+_REFERENCE = 30.0  # Hz
+
+
+class SensorRelaxation(Mechanism):
+    """See the module."""
+
+    name = "sensor_relaxation"
+    axes = ("frequency_hz", "phase")
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The power law's exponent, the step and its frequency."""
+        return (
+            Parameter(
+                name="exponent",
+                unit="-",
+                low=0.0,
+                high=0.4,
+                prior=Normal(0.0, 0.08),
+                scale="linear",
+                limit=0.0,
+                reason="tan δ of PVDF and its copolymers is 0.02 to 0.2, and n is 2/π of it",
+            ),
+            Parameter(
+                name="step",
+                unit="-",
+                low=0.0,
+                high=3.0,
+                prior=Normal(0.0, 0.4),
+                scale="linear",
+                limit=0.0,
+                reason="a relaxation inside the band changes d33 by some tens of percent",
+            ),
+            Parameter(
+                name="step_frequency",
+                unit="Hz",
+                low=0.05,
+                high=3000.0,
+                prior=Normal(3.0, 1.5),
+                scale="log",
+                limit=None,
+                reason="it must lie in or near the band of measurement to be seen; 20 Hz within a factor of 4.5",
+            ),
+        )
+
+    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
+        """(iω/ω_ref)^(−n) (1 + s/(1 + iω/ω_s))."""
+        power = exp(-np.log(1j * design.line_frequency / _REFERENCE) * values["exponent"])
+        step = values["step"] / (1.0 + 1j * design.line_frequency / values["step_frequency"])
+        return power * (1.0 + step)

@@ -1,0 +1,49 @@
+"""The sensors are not alike, so the same press gives each of them a charge that is off by a factor of its own, in all
+of its recordings.
+
+Law: d33 of sensor j = d33 · e^(g_j), g_j normal with the standard deviation `spread`.
+
+Assumptions: the gains are the sensors' own, constant over the campaign; they are marginalised by whoever fits, as a
+random effect along the model's response that a sensor's recordings share. Without this mechanism the spread is 1 %.
+
+Source: Seminara 2018, section 3.2 (d33 over the sensors of an array); a gain is positive, so its logarithm is normal.
+"""
+
+from underskin.mechanisms.autodiff import Differentiated
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.models.composition import SENSOR_SPREAD
+from underskin.mechanisms.models.frf_design import frf_recordings
+from underskin.recordings.campaign import Campaign
+
+
+class SensorSpread(Mechanism):
+    """See the module."""
+
+    name = "sensor_spread"
+    axes = ("sensor",)
+    needs = "recordings of at least two sensors"
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The spread."""
+        return (
+            Parameter(
+                name="spread",
+                unit="-",
+                low=0.02,
+                high=0.8,
+                prior=Normal(-2.5, 0.9),
+                scale="log",
+                limit=SENSOR_SPREAD,
+                reason="poled films and printed electrodes vary by some to 30 percent; 8 % within a factor of 2.5",
+            ),
+        )
+
+    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+        """Two sensors are needed."""
+        if len({entry.sensor for entry in frf_recordings(campaign)}) < 2:
+            return "all recordings are of one sensor"
+        return None
+
+    def spread(self, values: Values) -> Differentiated:
+        """The spread."""
+        return values["spread"]

@@ -1,0 +1,89 @@
+"""The elastomer gets stiffer the more it is deformed, so at high preloads and under small spheres the contact grows
+less, and the force rises more, than a constant modulus would have it.
+
+Law: FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved together.
+Curves: Yeoh's law, nominal stress (E/3)(λ⁻² − λ)(1 + 2 c2 I + 3 c3 I²), I = λ² + 2/λ − 3, λ = 1 − strain; under a
+sphere its secant ratio at ε multiplies the force.
+
+Assumptions: incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative strain; for
+FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0 a curve is neo-Hookean, not
+a straight line: the base model is recovered at small strain.
+
+Source: Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of Metals (1951), for 0.2 a/R; Lin, Dimitriadis
+& Horkay, J. Biomech. Eng. 129 (2007) 904.
+"""
+
+import numpy as np
+
+from underskin.mechanisms.autodiff import Array, chain
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.curve_state import Curve
+from underskin.recordings.campaign import Campaign
+
+_STRAIN = 0.2  # of the contact, times R/a
+_NEWTON_STEPS = 8
+
+_COEFFICIENT = Parameter(
+    name="stiffening",
+    unit="-",
+    low=0.0,
+    high=40.0,
+    prior=Normal(1.0, 4.0),
+    scale="linear",
+    limit=0.0,
+    reason="1 for a neo-Hookean solid, 1.1 to 1.2 for the silicones of docs/mechanisms.md; filled elastomers more",
+)
+_YEOH = (
+    Parameter(
+        name="second_over_first",
+        unit="-",
+        low=-1.0,
+        high=2.0,
+        prior=Normal(0.0, 0.3),
+        scale="linear",
+        limit=None,
+        reason="c2 of the silicones of docs/mechanisms.md: -0.03 to 0.09 over their range, -0.2 to 0.6 below 40 %",
+    ),
+    Parameter(
+        name="third_over_first",
+        unit="-",
+        low=-1.0,
+        high=1.0,
+        prior=Normal(0.0, 0.1),
+        scale="linear",
+        limit=None,
+        reason="c3 of the silicones of docs/mechanisms.md: 0 to 0.03 over their range, -0.4 to 0.1 below 40 %",
+    ),
+)
+
+
+class StrainStiffening(Mechanism):
+    """See the module."""
+
+    name = "strain_stiffening"
+    kinds = ("frf", "indentation", "compression")
+    axes = ("preload_n", "indenter_radius_mm", "displacement_mm")
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The stiffening coefficient, or for curves the law's constants C20/C10 and C30/C10."""
+        return (_COEFFICIENT,) if kind == "frf" else _YEOH
+
+    def on_material(self, contacts: Contacts, values: Values) -> None:
+        """Stiffen each contact by its own strain."""
+        strain = _STRAIN * contacts.hertz_radius / contacts.indenter_radius
+        excess = values["stiffening"] * strain
+        ratio, slope = _radius_ratio(excess.value)
+        contacts.modulus = contacts.modulus * (1.0 + excess * chain(ratio, (slope, excess)))
+
+    def on_curve(self, curve: Curve, values: Values) -> None:
+        """Take Yeoh's law."""
+        curve.yeoh = values["second_over_first"], values["third_over_first"]
+
+
+def _radius_ratio(excess: Array) -> tuple[Array, Array]:
+    """y = a/a0 with y³ (1 + x y) = 1, and dy/dx: the stiffened contact's radius for x = s ε0."""
+    y = 1 / np.cbrt(1 + excess)
+    for _ in range(_NEWTON_STEPS):
+        y = y - (y**3 + excess * y**4 - 1) / (3 * y**2 + 4 * excess * y**3)
+    return y, -(y**4) / (3 * y**2 + 4 * excess * y**3)

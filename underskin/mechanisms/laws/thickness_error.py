@@ -1,0 +1,40 @@
+"""The thickness that was declared is not the skin's, a wrong number rather than missing physics, so the pressure
+spreads out more or less on its way to the sensors than computed, in every recording.
+
+Law: h = declared h · factor; it acts through a/h, rT/h and e/h: everything.
+
+Assumptions: one factor for the whole skin, in all recordings.
+
+Source: Seminara 2018, equations 15 and 16: h is the unit of every length.
+"""
+
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.recordings.campaign import Campaign
+
+
+class ThicknessError(Mechanism):
+    """See the module."""
+
+    name = "thickness_error"
+    axes = ("preload_n", "indenter_radius_mm", "position_mm")
+    largest_stretch = 1.55
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """True over declared thickness."""
+        return (
+            Parameter(
+                name="thickness_factor",
+                unit="-",
+                low=0.65,
+                high=1.55,
+                prior=Normal(0.0, 0.12),
+                scale="log",
+                limit=1.0,
+                reason="a cast layer differs from its mould by shrinkage, meniscus and tilt: some to 20 percent",
+            ),
+        )
+
+    def on_declared(self, contacts: Contacts, values: Values) -> None:
+        """Scale the thickness."""
+        contacts.thickness = contacts.thickness * values["thickness_factor"]

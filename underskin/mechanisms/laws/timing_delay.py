@@ -1,0 +1,43 @@
+"""Charge and force are not sampled at the same instant, so the phase goes off in proportion to frequency while the size
+of the response stays.
+
+Law: FRF · exp(−iωt0), t0 the delay.
+
+Assumptions: one constant delay for all recordings; positive where the charge comes later than the force.
+
+Source: a shift in time is a phase linear in frequency (Bendat & Piersol, Random Data, 4th ed., 2010, section 5.1).
+"""
+
+import numpy as np
+
+from underskin.mechanisms.autodiff import Differentiated, exp
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.recordings.campaign import Campaign
+
+
+class TimingDelay(Mechanism):
+    """See the module."""
+
+    name = "timing_delay"
+    axes = ("phase", "frequency_hz")
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The delay."""
+        return (
+            Parameter(
+                name="delay",
+                unit="µs",
+                low=-5000.0,
+                high=5000.0,
+                prior=Normal(0.0, 300.0),
+                scale="linear",
+                limit=0.0,
+                reason="multiplexed converters and their filters delay by a few samples at 1 to 50 kS/s",
+            ),
+        )
+
+    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
+        """exp(−iωt0)."""
+        return exp(-2e-6j * np.pi * design.line_frequency * values["delay"])

@@ -1,0 +1,122 @@
+"""How mechanisms make up one model: their parameters in one vector, and what a model answers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.errors import InvalidInput
+from underskin.mechanisms.autodiff import Array, Differentiated, variables
+from underskin.mechanisms.base import Kind, Mechanism, Parameter, Unsupported, Values
+from underskin.recordings.campaign import Campaign
+from underskin.units import Floats
+
+SENSOR_SPREAD = 0.01  # sd of the logarithms of the sensors' gains, without `sensor_spread`
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a model says of every row, with its derivatives with respect to the fit coordinates."""
+
+    value: Array  # (rows,) complex FRF [C/N], or force [N]
+    slopes: Array  # (parameters, rows)
+    position_slopes: Array | None  # (2, rows) ∂value/∂x, ∂value/∂y of the contact's place [1/m] (frf)
+    pickup: Floats | None  # sd of mains pick-up [C/N], of real and of imaginary part, on the rows that it reaches
+    picked: NDArray[np.intp] | None  # those rows
+    # (rows,) False where the contact lies beyond the tables, which are continued there, or the sensor's disc beyond the
+    # stress profile, behind whose end the value is 0
+    inside: NDArray[np.bool_]
+
+    @property
+    def pickup_variance(self) -> Floats:
+        """Of real and of imaginary part (rows,) [(C/N)²]."""
+        found = np.zeros(len(self.value))
+        if self.pickup is not None and self.picked is not None:
+            found[self.picked] = self.pickup**2
+        return found
+
+
+class Composition:
+    """The mechanisms of a model, in order, and how one vector of fit coordinates is theirs and the nuisances'."""
+
+    def __init__(
+        self, mechanisms: Sequence[Mechanism], campaign: Campaign, kind: Kind, nuisances: Sequence[Parameter]
+    ) -> None:
+        """Take the parameters of each mechanism, then the nuisances."""
+        self.mechanisms = tuple(mechanisms)
+        own = parameters_together(mechanisms, campaign, kind)
+        self.parameters = (*(parameter for group in own.values() for parameter in group), *nuisances)
+        starts = np.cumsum([0, *(len(group) for group in own.values())])
+        self._places = {
+            name: {parameter.name: start + index for index, parameter in enumerate(group)}
+            for (name, group), start in zip(own.items(), starts[:-1], strict=True)
+        }
+        self._nuisances = {parameter.name: int(starts[-1]) + index for index, parameter in enumerate(nuisances)}
+        self._log = np.array([parameter.scale == "log" for parameter in self.parameters])
+
+    def values(self, fit: Floats, further: int = 0) -> tuple[dict[str, Values], Values, list[Differentiated]]:
+        """Each mechanism's parameters by name, and the nuisances, as values in their units with derivatives.
+
+        `further` variables of value 0 follow, with respect to which the model is differentiated as well.
+
+        Raises InvalidInput where `fit` has another length than the parameters.
+        """
+        if np.shape(fit) != (len(self.parameters),):
+            raise InvalidInput("fit", np.shape(fit), f"must hold {len(self.parameters)} coordinates")
+        value = np.where(self._log, np.exp(np.where(self._log, fit, 0.0)), fit)
+        slope = np.where(self._log, value, 1.0)
+        seeds = variables([*value, *np.zeros(further)], [*slope, *np.ones(further)])
+        return (
+            {name: {key: seeds[place] for key, place in places.items()} for name, places in self._places.items()},
+            {name: seeds[place] for name, place in self._nuisances.items()},
+            seeds[len(self.parameters) :],
+        )
+
+    def sensor_spread(self, fit: Floats) -> tuple[float, Floats]:
+        """The spread that a mechanism frees, or the usual one."""
+        own, _, _ = self.values(fit)
+        for mechanism in self.mechanisms:
+            spread = mechanism.spread(own[mechanism.name])
+            if spread is not None:
+                return float(spread.value[0]), spread.slopes[:, 0]
+        return SENSOR_SPREAD, np.zeros(len(self.parameters))
+
+
+def parameters_together(
+    mechanisms: Sequence[Mechanism], campaign: Campaign, kind: Kind
+) -> dict[str, tuple[Parameter, ...]]:
+    """The parameters of each mechanism by its name, as they are where all of these act together."""
+    names = [mechanism.name for mechanism in mechanisms]
+    return {mechanism.name: mechanism.parameters_beside(names, campaign, kind) for mechanism in mechanisms}
+
+
+def kind_of(campaign: Campaign) -> Kind:
+    """The kind of the campaign's recordings; raises InvalidInput where there are several, or none."""
+    kinds = {recording.kind for recording in campaign.recordings}
+    if len(kinds) != 1:
+        raise InvalidInput("kind", sorted(kinds), "name one: the campaign's recordings are of several kinds, or none")
+    kind: Kind = kinds.pop()  # type: ignore[assignment]
+    return kind
+
+
+def check_supported(mechanisms: Sequence[Mechanism], campaign: Campaign, kind: Kind) -> None:
+    """Raises Unsupported at the first mechanism that the campaign, or this kind of recording, cannot support."""
+    for mechanism in mechanisms:
+        if kind not in mechanism.kinds:
+            raise Unsupported(mechanism.name, f"does not act on recordings of kind {kind}")
+        reason = mechanism.unsupported(campaign, kind)
+        if reason is not None:
+            raise Unsupported(mechanism.name, reason)
+
+
+def chosen(names: Sequence[str], catalogue: Mapping[str, Mechanism]) -> list[Mechanism]:
+    """The mechanisms of these names in order of composition; raises InvalidInput for one unknown or twice."""
+    for name in names:
+        if name not in catalogue:
+            raise InvalidInput("mechanism", name, f"must be one of {', '.join(catalogue)}")
+        if list(names).count(name) > 1:
+            raise InvalidInput("mechanism", name, "must be named once")
+    return [mechanism for name, mechanism in catalogue.items() if name in names]

@@ -1,0 +1,101 @@
+"""The force of a campaign's compression (or tension) curves, sample by sample, under a set of mechanisms.
+
+Base model: one modulus, F = E A (d − d0)/H, compression positive. Stages: declared value → nominal stress of the
+material → friction at the platens → relaxation.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.errors import InvalidInput
+from underskin.mechanisms.autodiff import Differentiated, constant
+from underskin.mechanisms.base import Mechanism, Parameter, Values
+from underskin.mechanisms.models.composition import Composition, Prediction
+from underskin.mechanisms.models.curve_state import Curve, stiffened
+from underskin.mechanisms.models.indentation import declared_modulus, times_of
+from underskin.mechanisms.models.nuisances import contact_point, modulus_parameter
+from underskin.mechanisms.models.pickup import Pickup
+from underskin.mechanisms.models.relaxation import relaxed
+from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.recordings import elastomer
+from underskin.recordings.campaign import Campaign, CompressionRecording
+from underskin.units import Floats, to_si
+
+_CONTACT_SD = 0.01  # of the sample's height
+
+
+class CompressionModel:
+    """See the module; `predict` gives all samples of all recordings, one recording after another."""
+
+    sensor: NDArray[np.intp] | None = None
+
+    def __init__(self, mechanisms: Sequence[Mechanism], campaign: Campaign) -> None:
+        """Work out everything that no parameter changes; InvalidInput names a recording that does not load."""
+        recordings = [entry for entry in campaign.recordings if isinstance(entry, CompressionRecording)]
+        self._skin = campaign.skin
+        self._composition = Composition(mechanisms, campaign, "compression", _nuisances(recordings, campaign))
+        self.names = tuple(mechanism.name for mechanism in mechanisms)
+        self.parameters = self._composition.parameters
+        self._mechanisms = self._composition.mechanisms
+        self._ids = [entry.id for entry in recordings]
+        self.recording = np.repeat(np.arange(len(recordings)), [len(entry.force_n) for entry in recordings])
+        self.valid = np.ones(len(self.recording), dtype=bool)
+        self.pickup: Pickup | None = None
+        self._first = np.diff(self.recording, prepend=-1) > 0
+        heights = to_si("sample_height_mm", [entry.sample_height_mm for entry in recordings])
+        diameters = to_si("sample_diameter_mm", [entry.sample_diameter_mm for entry in recordings])
+        self._height = heights[self.recording]
+        self._area = (np.pi / 4 * diameters**2)[self.recording]
+        self._shape_factor = (diameters / (4 * heights))[self.recording]
+        self._displacement = to_si("displacement_mm", np.concatenate([entry.displacement_mm for entry in recordings]))
+        self._time = times_of(recordings)
+
+    def predict(self, fit: Floats) -> Prediction:
+        """All samples at one point of the fit coordinates (parameters,)."""
+        own, nuisances, _ = self._composition.values(np.asarray(fit, dtype=float))
+        curve = Curve(
+            modulus=declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"],
+            poisson_ratio=constant(INCOMPRESSIBLE, len(self.parameters)),
+        )
+        for mechanism in self._mechanisms:
+            mechanism.on_curve(curve, own[mechanism.name])
+        answer = curve.modulus * self._area * self._relative_stress(curve, self._strain(nuisances))
+        if curve.relaxation is not None:
+            answer = relaxed(answer, self._time, self._first, *curve.relaxation)
+        return Prediction(answer.value, answer.slopes, None, None, None, self.valid)
+
+    def sensor_spread_of(self, fit: Floats) -> tuple[float, Floats]:
+        """No sensor takes part: the usual spread."""
+        return self._composition.sensor_spread(np.asarray(fit, dtype=float))
+
+    def _strain(self, nuisances: Values) -> Differentiated:
+        """Nominal strain (rows,), compression positive."""
+        points = [nuisances[f"contact_point {name}"] for name in self._ids]
+        begins = Differentiated(
+            1e-3 * np.concatenate([point.value for point in points])[self.recording],
+            1e-3 * np.concatenate([point.slopes for point in points], axis=1)[:, self.recording],
+        )
+        return (self._displacement - begins) / self._height
+
+    def _relative_stress(self, curve: Curve, strain: Differentiated) -> Differentiated:
+        """Nominal stress over E."""
+        stress = strain if curve.yeoh is None else stiffened(1.0 - strain, curve.yeoh) / 3.0
+        if curve.platen_friction is None:
+            return stress
+        return stress * (1.0 + 2.0 * self._shape_factor**2 * curve.platen_friction)
+
+
+def _nuisances(recordings: Sequence[CompressionRecording], campaign: Campaign) -> list[Parameter]:
+    estimates, points = [], []
+    for entry in recordings:
+        try:
+            estimates.append(elastomer.of_compression(entry).modulus)
+        except InvalidInput as refusal:
+            raise InvalidInput(f"recordings[{entry.id}].{refusal.field}", refusal.value, refusal.allowed) from refusal
+        height = float(to_si("sample_height_mm", entry.sample_height_mm))
+        unloaded = int(np.abs(entry.force_n).argmin())
+        begins = float(to_si("displacement_mm", entry.displacement_mm[unloaded]))
+        points.append(contact_point(entry.id, begins, _CONTACT_SD * height, 0.1 * height))
+    return [modulus_parameter(campaign.skin, estimates), *points]

@@ -1,0 +1,69 @@
+"""The stage that turns loads into contacts: radius, and the pressure's shape as a mixture of a sphere's and a punch's.
+
+Four cases (Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301; Lebedev & Ufliand, J. Appl. Math. Mech. 22
+(1958) 442): half space or layer, with or without adhesion. On the half space with adhesion a³ = 3 R F1/(4E'),
+F1 = F + 3πwR + √(6πwRF + (3πwR)²), and the pressure is Hertz' under F1 less a flat punch's under F1 − F; on the
+layer both parts are those of contact_curves.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from underskin.mechanisms.autodiff import Differentiated, cbrt, chain
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.physics.contact_curves import REACH, ContactCurves, Rows
+from underskin.units import Floats
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """Contacts (rows,) under their loads."""
+
+    a_over_h: Differentiated
+    cbrt_load: Differentiated  # L^(1/3) to enter the table with
+    sphere_share: Differentiated | None  # of the load, in the sphere's part of the pressure; None: all of it
+
+
+def press(contacts: Contacts, curves: ContactCurves | None) -> Pressed:
+    """The contacts under their forces; `curves`, of the layer at hand, where the contact is the layer's."""
+    if curves is not None:
+        return _on_layer(contacts, curves)
+    if contacts.work_of_adhesion is None:
+        return Pressed(contacts.hertz_radius / contacts.thickness, contacts.cbrt_load, None)
+    pull = (1.5 * np.pi) * contacts.indenter_radius * contacts.work_of_adhesion
+    root = 2.0 * (pull * (contacts.force + pull)) ** 0.5
+    equivalent = contacts.force + 2.0 * pull + root
+    radius = cbrt(0.75 * contacts.indenter_radius * equivalent / contacts.reduced_modulus)
+    return Pressed(radius / contacts.thickness, contacts.cbrt_load, equivalent / contacts.force)
+
+
+def _on_layer(contacts: Contacts, curves: ContactCurves) -> Pressed:
+    scale = contacts.reduced_modulus * contacts.thickness**3.0
+    load = contacts.force * contacts.indenter_radius / scale
+    adhesion = contacts.work_of_adhesion
+    root = None if adhesion is None else contacts.indenter_radius * (adhesion / scale) ** 0.5
+    solved = curves.at_load(load.value, np.zeros_like(load.value) if root is None else root.value)
+    slip = contacts.slip
+
+    beyond = np.isnan(solved.alpha.value)  # of the curves' reach, which is beyond the table's
+
+    def differentiated(rows: Rows, otherwise: Floats | float) -> Differentiated:
+        by_load, by_root, by_poisson_ratio, by_slip = np.where(beyond, 0.0, rows.slopes)
+        terms = [(by_load, load), (by_poisson_ratio, contacts.poisson_ratio)]
+        terms += [] if root is None else [(by_root, root)]
+        terms += [] if slip is None else [(by_slip, slip)]
+        return chain(np.where(beyond, otherwise, rows.value), *terms)
+
+    share = None if root is None else differentiated(solved.sphere_load, load.value) / load
+    return Pressed(differentiated(solved.alpha, REACH), contacts.cbrt_load, share)
+
+
+def stiffness(contacts: Contacts, pressed: Pressed, curves: ContactCurves) -> Differentiated:
+    """dF/dδ = 2 E' a S(a/h) [N/m] of the layer at the contact radius in force, the edge held, E' unrelaxed."""
+    alpha = pressed.a_over_h
+    value, by_alpha, by_poisson_ratio, by_slip = curves.stiffness_at(np.minimum(alpha.value, REACH))
+    terms = [(by_alpha, alpha), (by_poisson_ratio, contacts.poisson_ratio)]
+    terms += [] if contacts.slip is None else [(by_slip, contacts.slip)]
+    held = 2.0 * contacts.reduced_modulus * alpha * contacts.thickness * chain(value, *terms)
+    return held if contacts.relaxed is None else held / contacts.relaxed

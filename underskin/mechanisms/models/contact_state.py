@@ -1,0 +1,40 @@
+"""The contacts of a campaign on their way through a model: what is pressed, by what, and how. SI throughout."""
+
+from dataclasses import dataclass
+
+from underskin.mechanisms.autodiff import Differentiated, cbrt
+from underskin.units import Floats
+
+
+@dataclass
+class Contacts:
+    """One row a contact; a Differentiated of a single row stands for all of them."""
+
+    force: Floats  # F [N]
+    indenter_radius: Floats  # R [m]
+    dwell: Floats  # time since the preload was put on [s]; 0 where no mechanism asks
+    modulus: Differentiated  # E [Pa] in force in each contact: that of the static contact
+    thickness: Differentiated  # h [m], of one row
+    poisson_ratio: Differentiated  # ν, of one row
+    slip: Differentiated | None = None  # of the glue line, 1/(1 + κ), of one row; None where it is rigid
+    work_of_adhesion: Differentiated | None = None  # w [J/m²], of one row; None without adhesion
+    relaxed: Differentiated | None = None  # that E over the one that a fast oscillation meets; None where they are one
+    layered: bool = False  # contact by the layer of finite thickness, not by the half space
+    stiffness: Differentiated | None = None  # dF/dδ [N/m] at the radius in force, where a mechanism asks
+
+    @property
+    def reduced_modulus(self) -> Differentiated:
+        """E' = E/(1 − ν²) [Pa]."""
+        return self.modulus / (1 - self.poisson_ratio**2.0)
+
+    @property
+    def hertz_radius(self) -> Differentiated:
+        """a [m] of a sphere on a half space without adhesion, a³ = 3 F R/(4 E')."""
+        return cbrt(0.75 * self.force * self.indenter_radius / self.reduced_modulus)
+
+    @property
+    def cbrt_load(self) -> Differentiated:
+        """L^(1/3) with which to enter the tables, which are for ν = 0.5: L = F/(R² E) · (0.75/(1 − ν²))²."""
+        cbrt_load = cbrt(self.force / self.indenter_radius**2 / self.modulus)
+        stiffer = 0.75 / (1 - self.poisson_ratio**2.0)
+        return cbrt_load * cbrt(stiffer) * cbrt(stiffer)

@@ -1,0 +1,246 @@
+"""The FRF of a campaign's recordings under a set of mechanisms.
+
+Base model: Hertz' radius on a half space, the contact edge still, σ of the bonded finite-strain layer averaged over the
+sensor's disc at its offset; FRF = d33 · (3/2) ρ² σ (Seminara 2018, equations 7 to 16). The stages, in this order:
+
+declared values → material → contact radius and pressure → position → σ → increment with the load → d33 of each
+sensor under its own stress → neighbours' charge → ageing → dynamics of tip, sensor and electronics, line by line.
+Pick-up stands beside, as a covariance.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.errors import InvalidInput
+from underskin.mechanisms.autodiff import Array, Differentiated, chain, constant, sum_rows
+from underskin.mechanisms.base import Mechanism, Values
+from underskin.mechanisms.models.composition import Composition, Prediction
+from underskin.mechanisms.models.contact_stage import press, stiffness
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.frf_design import FrfDesign, Indices, largest_offset
+from underskin.mechanisms.models.nuisances import FRF_NUISANCES
+from underskin.mechanisms.models.off_centre_response import PROFILE_END, offset_sigma
+from underskin.mechanisms.models.pickup import Pickup
+from underskin.mechanisms.models.sigma_curves import layer_of, sigma_curves
+from underskin.physics.contact_curves import ContactCurves
+from underskin.physics.elastic_layer import Layer
+from underskin.recordings.campaign import Campaign
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats, to_si
+
+_NUISANCE_STRETCH = 1.06  # the thickness' bounds
+_POSITION = 2  # two more variables: the contact's x and y
+
+
+class FrfModel:
+    """See the module; `predict` gives all lines of all recordings, one recording after another."""
+
+    def __init__(self, mechanisms: Sequence[Mechanism], campaign: Campaign, table: SigmaTable) -> None:
+        """Work out everything that no parameter changes."""
+        self._composition = Composition(mechanisms, campaign, "frf", FRF_NUISANCES)
+        self.names = tuple(mechanism.name for mechanism in mechanisms)
+        self.parameters = self._composition.parameters
+        self._mechanisms = self._composition.mechanisms
+        axes = {axis for mechanism in mechanisms for axis in mechanism.contact_axes}
+        neighbours = any(mechanism.needs_neighbours for mechanism in mechanisms)
+        self.design = design = FrfDesign.of(campaign, axes, neighbours=neighbours)
+        self.recording = design.recording
+        self.sensor: Indices | None = design.sensor
+        skin = campaign.skin
+        self._modulus = _required("youngs_modulus_mpa", skin.youngs_modulus_mpa)
+        self._thickness = _required("thickness_mm", skin.thickness_mm)
+        self._sensor_radius = _required("sensor_radius_mm", skin.sensor_radius_mm)
+        self._poisson_ratio = skin.poisson_ratio
+        further = max((mechanism.largest_offset for mechanism in mechanisms), default=0.0)
+        stretch = _NUISANCE_STRETCH * max((mechanism.largest_stretch for mechanism in mechanisms), default=1.0)
+        reached = min(PROFILE_END, stretch * largest_offset(design, further) / self._thickness)
+        self._sigma = offset_sigma(table, self._sensor_radius / self._thickness, stretch, reached)
+        self._needs_stiffness = any(mechanism.needs_stiffness for mechanism in mechanisms)
+        self._last_layer: tuple[Layer, ContactCurves] | None = None
+        pickups = [mechanism.pickup(campaign, design) for mechanism in self._mechanisms]
+        self.pickup: Pickup | None = next((pickup for pickup in pickups if pickup is not None), None)
+        self._force, self._increments = _force_nodes(self._mechanisms, design)
+        self.valid = self._declared_inside(table)[design.point][design.recording]
+
+    def predict(self, fit: Floats) -> Prediction:
+        """All rows at one point of the fit coordinates (parameters,); NaN nowhere."""
+        own, nuisances, position = self._composition.values(np.asarray(fit, dtype=float), _POSITION)
+        contacts = self._contacts(own, nuisances)
+        sigma, inside = self._sigma_at_points(contacts, own, position)
+        level = self._level(contacts, sigma, own, nuisances)
+        lines = self._line_factor(contacts, own)
+        value, slopes = _on_rows(
+            level.spread(len(self.design.point)),
+            None if lines is None else lines.spread(len(self.design.line_frequency)),
+            self.design,
+        )
+        count = len(self.parameters)
+        return Prediction(
+            value=value,
+            slopes=slopes[:count],
+            position_slopes=slopes[count:],
+            pickup=None if self.pickup is None else self.pickup.deviation(_by_name(own)),
+            picked=None if self.pickup is None else self.pickup.rows,
+            inside=inside[self.design.point][self.recording],
+        )
+
+    def sensor_spread_of(self, fit: Floats) -> tuple[float, Floats]:
+        """The sd of the sensors' log gains, and its derivative (parameters,)."""
+        return self._composition.sensor_spread(np.asarray(fit, dtype=float))
+
+    def _contacts(self, own: dict[str, Values], nuisances: Values) -> Contacts:
+        """The contacts at all force nodes, one node after another, as declared and as the mechanisms change them."""
+        nodes = len(self._force)
+        count = len(self.parameters) + _POSITION
+        contacts = Contacts(
+            force=self._force.ravel(),
+            indenter_radius=np.tile(self.design.indenter_radius, nodes),
+            dwell=np.tile(self.design.dwell, nodes),
+            modulus=self._modulus * nuisances["youngs_modulus"],
+            thickness=self._thickness * nuisances["thickness"],
+            poisson_ratio=constant(self._poisson_ratio, count),
+        )
+        for mechanism in self._mechanisms:
+            mechanism.on_declared(contacts, own[mechanism.name])
+        for mechanism in self._mechanisms:
+            mechanism.on_material(contacts, own[mechanism.name])
+        return contacts
+
+    def _sigma_at_points(
+        self, contacts: Contacts, own: dict[str, Values], position: Sequence[Differentiated]
+    ) -> tuple[list[Differentiated], NDArray[np.bool_]]:
+        """σ of each point at each force node, and which points are inside the table at all of them.
+
+        Inside means also that the sensor's disc lies within the stress profile, beyond whose end σ is 0.
+        """
+        design = self.design
+        rho = self._sensor_radius / contacts.thickness
+        layer = self._layer_curves(contacts) if contacts.layered or self._needs_stiffness else None
+        pressed = press(contacts, layer if contacts.layered else None)
+        if layer is not None and self._needs_stiffness:
+            contacts.stiffness = stiffness(contacts, pressed, layer)
+        curves = sigma_curves(self._sigma, contacts, pressed, rho, layer if contacts.layered else None)
+        offset = self._offset(own, position) / contacts.thickness
+        place = self._sigma.place(offset.value)
+        sigma = []
+        inside = place.inside & (offset.value + rho.value <= PROFILE_END)
+        for node in range(len(self._force)):
+            contact = design.point_contact + node * len(design.force)
+            (value, *partial), by_offset = self._sigma.at(curves.coefficients, contact, place)
+            at_points = (variable[contact] for variable in curves.variables)
+            sigma.append(chain(value, (by_offset, offset), *zip(partial, at_points, strict=True)))
+            inside &= curves.inside[contact]
+        return sigma, inside
+
+    def _layer_curves(self, contacts: Contacts) -> ContactCurves:
+        """The contact curves of the layer at hand; those of the last layer are kept."""
+        layer = layer_of(contacts)
+        if self._last_layer is None or self._last_layer[0] != layer:
+            self._last_layer = layer, self._sigma.contact_grid.curves(layer)
+        return self._last_layer[1]
+
+    def _offset(self, own: dict[str, Values], position: Sequence[Differentiated]) -> Differentiated:
+        """The distance of each point's contact from its sensor's centre [m]."""
+        x, y = (
+            place + shift for place, shift in zip((self.design.point_x, self.design.point_y), position, strict=True)
+        )
+        for mechanism in self._mechanisms:
+            moved = mechanism.offset(own[mechanism.name])
+            if moved is not None:
+                x, y = x + moved[0], y + moved[1]
+        distance = np.hypot(x.value, y.value)
+        away = np.where(distance > 0, distance, 1.0)
+        return chain(distance, (x.value / away, x), (y.value / away, y))
+
+    def _level(
+        self, contacts: Contacts, sigma: list[Differentiated], own: dict[str, Values], nuisances: Values
+    ) -> Differentiated:
+        """The FRF of each recording before the dynamics [C/N]."""
+        design = self.design
+        oscillating = sigma[0]
+        for mechanism, nodes, weights in self._increments:
+            rate = sigma[nodes[0]] * weights[0][design.point_contact]
+            for node, weight in zip(nodes[1:], weights[1:], strict=True):
+                rate = rate + sigma[node] * weight[design.point_contact]
+            oscillating = oscillating + mechanism.mobility(own[mechanism.name]) * (rate - oscillating)
+        rho = self._sensor_radius / contacts.thickness
+        charge = oscillating * (1.5e-12 * nuisances["d33"] * rho * rho)
+        mean_stress = sigma[0] * (1.5 / np.pi * design.force[design.point_contact]) / (contacts.thickness**2.0)
+        for mechanism in self._mechanisms:
+            factor = mechanism.on_d33(mean_stress, own[mechanism.name])
+            charge = charge if factor is None else charge * factor
+        level = charge[design.point]
+        for mechanism in self._mechanisms:
+            fraction = mechanism.neighbour_fraction(own[mechanism.name])
+            if fraction is not None:
+                theirs = sum_rows(charge[design.neighbour_point], design.neighbour_recording, len(design.point))
+                level = level + fraction * theirs
+            factor = mechanism.on_recordings(design, own[mechanism.name])
+            level = level if factor is None else level * factor
+        return level
+
+    def _line_factor(self, contacts: Contacts, own: dict[str, Values]) -> Differentiated | None:
+        """The complex factor of each distinct line; None where no mechanism has one."""
+        product: Differentiated | None = None
+        for mechanism in self._mechanisms:
+            factor = mechanism.on_lines(self.design, contacts, own[mechanism.name])
+            if factor is not None:
+                product = factor if product is None else product * factor
+        return product
+
+    def _declared_inside(self, table: SigmaTable) -> NDArray[np.bool_]:
+        """Which points lie inside the table as declared."""
+        none = np.zeros((0, 1))
+        modulus, thickness, poisson_ratio = (
+            Differentiated(np.array([v]), none) for v in (self._modulus, self._thickness, self._poisson_ratio)
+        )
+        design = self.design
+        contacts = Contacts(design.force, design.indenter_radius, design.dwell, modulus, thickness, poisson_ratio)
+        a_over_h = contacts.hertz_radius.value / self._thickness
+        a, x = table.axes[0], table.axes[2]
+        inside = (a_over_h <= a[-1]) & (contacts.cbrt_load.value <= x[-1])
+        distance = np.hypot(design.point_x, design.point_y) + self._sensor_radius
+        near: NDArray[np.bool_] = inside[design.point_contact] & (distance <= PROFILE_END * self._thickness)
+        return near
+
+
+def _force_nodes(
+    mechanisms: Sequence[Mechanism], design: FrfDesign
+) -> tuple[Floats, list[tuple[Mechanism, list[int], Array]]]:
+    """Forces (nodes, contacts), the preload first, and for each mechanism that asks its nodes and their weights."""
+    forces = [design.force]
+    increments = []
+    for mechanism in mechanisms:
+        nodes = mechanism.force_nodes(design.force, design.dynamic_force)
+        if nodes is not None:
+            increments.append((mechanism, list(range(len(forces), len(forces) + len(nodes[0]))), nodes[1]))
+            forces += list(nodes[0])
+    return np.stack(forces), increments
+
+
+def _on_rows(level: Differentiated, lines: Differentiated | None, design: FrfDesign) -> tuple[Array, Array]:
+    """Level times line factor on every row, and the slopes (variables, rows)."""
+    recording: Indices = design.recording
+    if lines is None:
+        return level.value[recording].astype(complex), level.slopes[:, recording].astype(complex)
+    factor = lines.value[design.line]
+    on_rows = level.value[recording]
+    slopes = np.empty((len(level.slopes), len(recording)), dtype=complex)
+    for row, of_level, of_lines in zip(slopes, level.slopes, lines.slopes, strict=True):
+        np.multiply(of_level[recording], factor, out=row)
+        if of_lines.any():
+            row += on_rows * of_lines[design.line]
+    return on_rows * factor, slopes
+
+
+def _by_name(own: dict[str, Values]) -> dict[str, Floats]:
+    """The mechanisms' parameters (1,), whosever they are."""
+    return {name: value.value for values in own.values() for name, value in values.items()}
+
+
+def _required(name: str, value: float | None) -> float:
+    if value is None:
+        raise InvalidInput(f"skin.{name}", None, "required by a recording of kind frf")
+    return float(to_si(name, value))

@@ -1,0 +1,170 @@
+"""σ of many contacts on one skin at any offset, with derivatives, fast enough for a fit.
+
+The table's bottom profile, averaged over the sensor's disc at its offset, is tabulated once as a
+cubic spline in a/h, L^(1/3), log(rT/h) and e/h; a contact then is a curve over e/h. To it may be added what a linear
+layer of another transmission or a pressure of another shape puts there, by its Hankel integral
+(underskin/physics/hankel_transform.py):
+
+    σ = linear(p̂, M; a, e) + [table(a, L, e) − table(a, 0, e)].
+
+A contact beyond the table's a/h or L is continued along the tangent and reported in `inside`; beyond the profile's end,
+r/h = 8, the stress is 0 (below 1e-6 of its peak).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.special import j0
+
+from underskin.mechanisms.models.cubic_basis import CubicBasis
+from underskin.physics.contact_curves import CurveGrid
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats
+
+PROFILE_END = 8.0
+_SPACING = 0.0625  # of the profile and of the offsets; the profile turns over lengths of 0.3 h and more
+_MIRRORED = 4  # offsets below 0, so that the curve is even
+_RADIAL, _ANGULAR = 10, 20  # quadrature over the disc
+_RHO_RATIO = 1.1  # of neighbouring rT/h in the table
+_WAVENUMBER_END, _NODES_PER_TURN = 24.0, 4  # M decays as e^(−k)
+
+
+@dataclass(frozen=True)
+class Curves:
+    """σ over the offset: spline coefficients (quantities, contacts, offsets), and which contacts are in the table.
+
+    The first quantity is σ, the others its partial derivatives; which, the maker says.
+    """
+
+    coefficients: Floats
+    inside: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Place:
+    """The four functions of each offset that differ from 0, their values and their slopes (points, 4)."""
+
+    functions: NDArray[np.intp]
+    values: Floats
+    slopes: Floats
+    inside: NDArray[np.bool_]  # (points,) False beyond the profile's end, where all four are 0
+
+
+class OffsetSigma:
+    """σ(a/h, L^(1/3), rT/h, e/h) around one rT/h, for offsets up to `reach` (in h).
+
+    Attributes: `wavenumber` (k,) in units of 1/h, at which transforms for `linear_curves` are wanted.
+    """
+
+    def __init__(self, table: SigmaTable, rt_over_h: float, stretch: float, reach: float) -> None:
+        """Tabulate for rT/h up to `stretch` times larger or smaller; takes hundredths to tenths of a second."""
+        offsets = _SPACING * np.arange(-_MIRRORED, int(np.ceil(reach / _SPACING)) + _MIRRORED + 1)
+        rho_nodes = max(5, 1 + int(np.ceil(2 * np.log(stretch) / np.log(_RHO_RATIO))))
+        rho = rt_over_h * np.geomspace(1 / stretch, stretch, rho_nodes)
+        radii = np.arange(0.0, min(PROFILE_END, offsets[-1] + rho[-1]) + _SPACING / 2, _SPACING)
+        radii = np.append(radii, radii[-1] + _SPACING * np.arange(1, 4)) if len(radii) < 4 else radii
+        a, x = table.axes[0], table.axes[2]
+        profile = table.profile(radii[:, None, None], a[:, None], x**3)
+        average = np.stack([_disc_averages(radii, np.abs(offsets), ratio) for ratio in rho])
+        values: Floats = np.einsum("mer,rax->axme", average, profile, optimize=True)
+        self.bases = [CubicBasis(np.asarray(nodes)) for nodes in (a, x, np.log(rho), offsets)]
+        for axis, basis in enumerate(self.bases):
+            values = basis.coefficients(values, axis)
+        self._count = values.shape
+        self._table = np.ascontiguousarray(values).reshape(-1, values.shape[-1])
+        # The first coefficient over L^(1/3) is the value at L = 0, and splines sum to 1.
+        self._strained = (values - values[:, :1]).reshape(-1, values.shape[-1])
+        self.wavenumber, self._weight = _wavenumbers(float(offsets[-1] + rho[-1] + a[-1]))
+        bessel = j0(np.multiply.outer(self.wavenumber, offsets)) * (self._weight * self.wavenumber / 3)[:, None]
+        self._bessel = self.bases[3].coefficients(bessel, 1)
+
+    @cached_property
+    def contact_grid(self) -> CurveGrid:
+        """The grid of contacts with a layer whose pressures' transforms are at this object's wavenumbers."""
+        return CurveGrid(self.wavenumber)
+
+    def table_curves(self, a_over_h: Floats, cbrt_load: Floats, rt_over_h: float) -> Curves:
+        """σ and ∂/∂(a/h), ∂/∂L^(1/3), ∂/∂(rT/h) of the table, one row a contact."""
+        return self._curves(self._table, a_over_h, cbrt_load, rt_over_h)
+
+    def finite_strain_curves(self, a_over_h: Floats, cbrt_load: Floats, rt_over_h: float) -> Curves:
+        """What finite strain adds to the linear layer: the table less its own value at L = 0, same quantities."""
+        return self._curves(self._strained, a_over_h, cbrt_load, rt_over_h)
+
+    def linear_curves(self, transforms: Floats) -> Floats:
+        """The Hankel integral of the transforms p̂ · M · 2 J1(kρ)/(kρ): (quantities, contacts, k) to (…, offsets)."""
+        return np.asarray(transforms @ self._bessel)
+
+    def _curves(self, table: Floats, a: Floats, x: Floats, rt_over_h: float) -> Curves:
+        rows = len(a)
+        first_a, value_a, slope_a = self.bases[0].weights(a)
+        first_x, value_x, slope_x = self.bases[1].weights(x)
+        first_r, value_r, slope_r = self.bases[2].weights(np.array([np.log(rt_over_h)]))
+        four = np.arange(4)
+        row_a = (first_a[:, None] + four) * self._count[1]
+        row_x = (row_a[:, :, None] + (first_x[:, None] + four)[:, None, :]) * self._count[2]
+        index = (row_x[..., None] + first_r[0] + four).reshape(rows, 64)
+        weights = np.empty((rows, 4, 4, 4, 4))
+        for number, (of_a, of_x, of_r) in enumerate(
+            (
+                (value_a, value_x, value_r),
+                (slope_a, value_x, value_r),
+                (value_a, slope_x, value_r),
+                (value_a, value_x, slope_r / rt_over_h),
+            )
+        ):
+            weights[:, number] = of_a[:, :, None, None] * of_x[:, None, :, None] * of_r[0]
+        contracted = np.matmul(weights.reshape(rows, 4, 64), table[index])
+        inside = (a <= self.bases[0].nodes[-1]) & (x <= self.bases[1].nodes[-1])
+        return Curves(np.ascontiguousarray(contracted.transpose(1, 0, 2)), inside)
+
+    def place(self, offset: Floats) -> Place:
+        """Where offsets e/h (points,) lie among the curves' coefficients."""
+        end = min(float(self.bases[3].nodes[-1]), PROFILE_END)
+        inside = offset <= end
+        first, value, slope = self.bases[3].weights(np.minimum(offset, end))
+        return Place(first[:, None] + np.arange(4), value * inside[:, None], slope * inside[:, None], inside)
+
+    def at(self, coefficients: Floats, contact: NDArray[np.intp], place: Place) -> tuple[Floats, Floats]:
+        """The quantities (quantities, points) of each point's contact at its place, and ∂σ/∂(e/h) (points,)."""
+        near = coefficients[:, contact[:, None], place.functions]
+        return np.einsum("qpf,pf->qp", near, place.values), np.einsum("pf,pf->p", near[0], place.slopes)
+
+
+@lru_cache(maxsize=8)
+def offset_sigma(table: SigmaTable, rt_over_h: float, stretch: float, reach: float) -> OffsetSigma:
+    """The same, kept for the next model of the same skin."""
+    return OffsetSigma(table, rt_over_h, stretch, reach)
+
+
+def _disc_averages(radii: Floats, offsets: Floats, rt_over_h: float) -> Floats:
+    """The matrix (offsets, radii) that averages a profile given at the radii over the offset disc; 0 beyond them."""
+    x, weight = np.polynomial.legendre.leggauss(_RADIAL)
+    s = rt_over_h * (x + 1) / 2
+    weight = np.repeat(weight * (x + 1) / 2 / _ANGULAR, _ANGULAR)
+    angle = np.pi * (np.arange(_ANGULAR) + 0.5) / _ANGULAR
+    across = offsets[:, None, None]
+    distance = np.sqrt(across**2 + s[:, None] ** 2 + 2 * across * s[:, None] * np.cos(angle)).reshape(-1)
+    knots = make_interp_spline(radii, radii, k=3).t
+    reached = distance <= radii[-1]
+    design = BSpline.design_matrix(np.where(reached, distance, 0.0), knots, 3)
+    weights = np.where(reached, np.tile(weight, len(offsets)), 0.0)
+    # Sums over each disc of the four functions at each of its points.
+    disc = np.repeat(np.arange(len(offsets)) * len(radii), len(weight))
+    place = np.repeat(disc, 4) + design.indices
+    total = np.asarray(np.bincount(place, np.repeat(weights, 4) * design.data, len(offsets) * len(radii)), dtype=float)
+    to_coefficients = np.asarray(make_interp_spline(radii, np.eye(len(radii)), k=3).c)
+    return total.reshape(len(offsets), -1) @ to_coefficients
+
+
+def _wavenumbers(highest: float) -> tuple[Floats, Floats]:
+    """Gauss–Legendre nodes and weights on panels of [0, end], short enough for the fastest oscillation."""
+    turns = _WAVENUMBER_END * highest / (2 * np.pi)
+    panels = int(np.ceil((turns * _NODES_PER_TURN + 48) / 16))
+    x, w = np.polynomial.legendre.leggauss(16)
+    half = _WAVENUMBER_END / panels / 2
+    k = 2 * half * np.arange(panels)[:, None] + half * (1 + x)
+    return k.ravel(), np.tile(half * w, panels)

@@ -1,0 +1,1 @@
+"""The mechanics, in SI: contacts, layers, and what reaches a sensor."""

@@ -1,0 +1,177 @@
+"""Contacts of spheres with the layer, many at once and with derivatives: what the mechanisms compute with.
+
+All is dimensionless. With E' = E/(1 − ν²), α = a/h and the work of adhesion w (JKR), linearity leaves two loads and
+the sum of two solutions, a sphere without adhesion and a flat punch whose φ at the edge is that of adhesion:
+
+    P = F R/(E' h³),   Δ = δ R/h²,   U = √(w/(E' h³)) R
+    P = (4/3) α³ A(α) − U √(8π α³) G(α),   Δ = α² B(α) − U √(2πα) V(α),   dF/dδ = 2 E' a S(α)  (edge held)
+
+A, B, G, V, S are 1 at α = 0 and depend on α, the Poisson ratio and the glue line alone: they are solved at Chebyshev's
+points in α (contact_equation) once for each layer, which takes about a millisecond.
+
+The stress follows in the same way: at the same points in α, the transforms of both pressures at given wave numbers are
+contracted with the layer's transmission, a few numbers for each place of the sensor, smooth in α; a row then costs one
+product of `basis` with those. Both transforms are 1 at k = 0: a contact's is [Ps p̂_sphere + (P − Ps) p̂_punch]/P.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from underskin.physics.chebyshev import ChebyshevInterval
+from underskin.physics.contact_integral_equation import ContactEquation, mode_transforms
+from underskin.physics.elastic_layer import Layer
+from underskin.units import Floats
+
+REACH = 4.0  # largest a/h
+_NODES = 28
+_TABLE: Floats = REACH / 128 * np.arange(1.0, 129.0)  # of a/h, for first guesses
+_SMALLEST = 1e-12
+_TOLERANCE = 1e-7  # of the last step; the error that is left is about its square
+_ITERATIONS = 60
+
+# Sums of terms: factor, exponent of α, the curve among A, G, B, V, S, and whether U multiplies it.
+_Law = tuple[tuple[float, float, int, bool], ...]
+_SPHERE_LOAD: _Law = ((4 / 3, 3.0, 0, False),)
+_LOAD: _Law = (*_SPHERE_LOAD, (-np.sqrt(8 * np.pi), 1.5, 1, True))
+_DEPTH: _Law = ((1.0, 2.0, 2, False), (-np.sqrt(2 * np.pi), 0.5, 3, True))
+_STIFFNESS: _Law = ((1.0, 0.0, 4, False),)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """`value` (rows,) and `slopes` (4, rows): derivatives with respect to what was given (P or α), U, ν and slip."""
+
+    value: Floats
+    slopes: Floats
+
+
+@dataclass(frozen=True)
+class ContactRows:
+    """Contacts (rows,); NaN where there is none: below pull-off, or beyond a/h = REACH.
+
+    `alpha`: a/h. `load`: P. `depth`: Δ. `sphere_load`: Ps, the sphere's part of P; the punch's is P − Ps ≤ 0.
+    `stiffness`: S = (dF/dδ at a fixed edge)/(2 E' a); without adhesion that is dF/dδ altogether.
+    """
+
+    alpha: Rows
+    load: Rows
+    depth: Rows
+    sphere_load: Rows
+    stiffness: Rows
+
+
+class CurveGrid:
+    """What depends on no layer: the points in α and the modes' transforms at `wave_numbers` (k,), in units of 1/h."""
+
+    def __init__(self, wave_numbers: Floats) -> None:
+        self.interval = ChebyshevInterval(REACH, _NODES)
+        self.equation = ContactEquation(self.interval.nodes)
+        s = np.multiply.outer(self.interval.nodes, wave_numbers)
+        self.transforms = mode_transforms(s, self.equation.modes).transpose(0, 2, 1)
+        self.table_basis = self.interval.basis(_TABLE)
+
+    def curves(self, layer: Layer) -> "ContactCurves":
+        """The curves of one layer."""
+        return ContactCurves(self, layer)
+
+
+class ContactCurves:
+    """The functions A, B, G, V, S of one layer and the pressures' transforms.
+
+    `sphere_transform`, `punch_transform` (3, points, k): at the points `interval.nodes` in α, the value, its derivative
+    with respect to ν, and that with respect to slip.
+    """
+
+    def __init__(self, grid: CurveGrid, layer: Layer) -> None:
+        self.interval = grid.interval
+        solved = grid.equation.solve(layer)
+        names = (solved.sphere_force, solved.edge_force, solved.sphere_depth, solved.edge_depth, solved.stiffness)
+        coefficients = self.interval.coefficients(np.stack(names, axis=-1).transpose(1, 0, 2))  # (count, 3, 5)
+        slopes = self.interval.derivative(coefficients[:, :1])
+        self._coefficients = np.concatenate([coefficients[:, :1], slopes, coefficients[:, 1:]], axis=1)
+        at = self._evaluated(grid.table_basis)
+        self._start = _Start(at)
+        shapes = np.concatenate([solved.sphere_shape, solved.punch_shape]).transpose(1, 0, 2)
+        transforms = (shapes @ grid.transforms).transpose(1, 0, 2)
+        self.sphere_transform, self.punch_transform = transforms[:3], transforms[3:]
+
+    def at_load(self, load: Floats, root_adhesion: Floats) -> ContactRows:
+        """Contacts at P (rows,), U (rows,) on the branch that is stable under a given force."""
+        jkr = 3 * np.pi * root_adhesion**2
+        equivalent = load + jkr + np.sqrt(np.maximum(jkr * (2 * load + jkr), 0.0))
+        alpha = self._newton(load, root_adhesion, self._start(np.cbrt(equivalent), root_adhesion))
+        at = self._evaluated(self.interval.basis(alpha))
+        _, by_alpha, *partial = _law(_LOAD, alpha, root_adhesion, at)
+        slopes = np.stack([1 / by_alpha, *(-x / by_alpha for x in partial)])
+
+        def rows(law: _Law) -> Rows:
+            value, by_alpha, *partial = _law(law, alpha, root_adhesion, at)
+            total = by_alpha * slopes
+            total[1:] += partial
+            return Rows(value, total)
+
+        return ContactRows(Rows(alpha, slopes), *(rows(law) for law in (_LOAD, _DEPTH, _SPHERE_LOAD, _STIFFNESS)))
+
+    def at_radius(self, alpha: Floats, root_adhesion: Floats) -> ContactRows:
+        """Contacts at a/h (rows,), above 0 and up to REACH, and U (rows,), stable or not."""
+        at = self._evaluated(self.interval.basis(alpha))
+        one = np.outer([1.0, 0.0, 0.0, 0.0], np.ones_like(alpha))
+
+        def rows(law: _Law) -> Rows:
+            value, *slopes = _law(law, alpha, root_adhesion, at)
+            return Rows(value, np.stack(slopes))
+
+        return ContactRows(Rows(alpha, one), *(rows(law) for law in (_LOAD, _DEPTH, _SPHERE_LOAD, _STIFFNESS)))
+
+    def stiffness_at(self, alpha: Floats) -> Floats:
+        """S at given a/h (rows,), 0 to REACH: its value and derivatives by α, ν and slip (4, rows)."""
+        return self._evaluated(self.interval.basis(alpha))[:, _STIFFNESS[0][2]]
+
+    def _newton(self, target: Floats, root_adhesion: Floats, start: Floats) -> Floats:
+        """α; the law of load is convex: from the stable side the steps end at its root, or cross its minimum."""
+        alpha = np.clip(start, _SMALLEST, REACH)
+        for _ in range(_ITERATIONS):
+            value, by_alpha, *_rest = _law(_LOAD, alpha, root_adhesion, self._evaluated(self.interval.basis(alpha)))
+            lost = (by_alpha <= 0) | ((alpha == REACH) & (value < target))
+            step = np.where(lost, np.nan, (value - target) / by_alpha)
+            alpha = np.clip(alpha - step, alpha / 4, REACH)
+            if not (np.abs(step) > _TOLERANCE * alpha).any():
+                break
+        return np.where(alpha > 2 * _SMALLEST, alpha, np.nan)
+
+    def _evaluated(self, basis: Floats) -> Floats:
+        """The curves' values and derivatives with respect to α, ν and slip: (4, curves, rows)."""
+        flat = self._coefficients.reshape(len(self._coefficients), -1)
+        values: Floats = (basis @ flat).T.reshape(4, -1, len(basis))
+        return values
+
+
+class _Start:
+    """A first guess of α, on the stable side of P's minimum, where U = (sphere's slope)/(adhesion's slope)."""
+
+    def __init__(self, at: Floats) -> None:
+        value, slope, *_ = _law(_LOAD, _TABLE, np.zeros_like(_TABLE), at)
+        adhesion = slope - _law(_LOAD, _TABLE, np.ones_like(_TABLE), at)[1]
+        self._root = np.append(0.0, np.cbrt(value))
+        self._critical = np.append(0.0, (slope / np.maximum(adhesion, _SMALLEST * slope)) ** (2 / 3))
+        self._alpha = np.append(0.0, _TABLE)
+
+    def __call__(self, root: Floats, root_adhesion: Floats) -> Floats:
+        """From the cube root of the load that a sphere without adhesion would have, and U."""
+        unstable = np.interp(root_adhesion ** (2 / 3), self._critical, self._alpha)
+        start: Floats = np.maximum(np.interp(root, self._root, self._alpha), 1.02 * unstable)
+        return start
+
+
+def _law(law: _Law, alpha: Floats, root_adhesion: Floats, at: Floats) -> Floats:
+    """Σ of factor · U^m · α^n · curve over the law's terms, with its derivatives by α, U, ν and slip: (5, rows)."""
+    total = np.zeros((5, len(alpha)))
+    for factor, exponent, column, adhesive in law:
+        power: Floats = factor * alpha**exponent
+        term = power * at[:, column]
+        term[1] += exponent / alpha * term[0]
+        total[[0, 1, 3, 4]] += root_adhesion * term if adhesive else term
+        if adhesive:
+            total[2] += term[0]
+    return total

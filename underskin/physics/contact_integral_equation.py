@@ -1,0 +1,123 @@
+"""The frictionless contact of a rigid axisymmetric indenter with the layer: the integral equation, by Legendre modes.
+
+Lengths in units of the thickness, α = a/h (Lebedev and Ufliand 1958):
+
+    (π/2) φ(x) − ∫₀^α φ(t) N(x, t) dt = f(x),   N(x, t) = ∫₀^∞ (1 − K(k)) cos kx cos kt dk,
+    p̂(k) = ∫₀^α φ(t) cos kt dt
+
+φ is analytic and even, so that a few modes eₙ(t/α) = (−1)ⁿ √(4n + 1) P₂ₙ(t/α) hold it; their cosine transforms are
+α √(4n + 1) j₂ₙ(kα), and Galerkin's matrix is (π/2) I − α ∫ (1 − K) j jᵀ dk, symmetric. f = 1 is the flat punch φ₀ and
+f = (t/α)² gives φ₂; a sphere without adhesion is φ_s = φ₂(α)/φ₀(α) φ₀ − φ₂, which vanishes at the edge.
+
+Whatever depends on the layer is an array whose first axis holds its value, its derivative with respect to the Poisson
+ratio, and that with respect to the slip of the glue line.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import spherical_jn
+
+from underskin.physics.elastic_layer import Layer
+from underskin.units import Floats
+
+_END = 18.0  # where 1 − K has fallen below 1e-13
+_FIRST_PANELS = (0.0, 0.02, 0.15, 0.7)  # a nearly frictionless base bends K close to k = 0
+
+
+@dataclass(frozen=True)
+class EdgeSolutions:
+    """Contacts of radii α (m,), each ratio (3, m) to the half space's value of the same radius, each shape (3, m, n).
+
+    `sphere_force`: F R/(E' h³) over 4α³/3; `sphere_depth`: δ R/h² over α²; `stiffness`: dF/dδ at a fixed edge over
+    2E'a; `edge_force`, `edge_depth`: force and depth of a flat punch per value φ(a) at its edge. The shapes are
+    Legendre coefficients of φ over ∫φ dt, of the sphere and of the flat punch.
+    """
+
+    sphere_force: Floats
+    sphere_depth: Floats
+    stiffness: Floats
+    edge_force: Floats
+    edge_depth: Floats
+    sphere_shape: Floats
+    punch_shape: Floats
+
+
+class ContactEquation:
+    """The equation at radii `alpha` (m,) in units of h, all > 0: what does not depend on the layer is computed here."""
+
+    def __init__(self, alpha: Floats) -> None:
+        largest = float(np.max(alpha))
+        self.alpha = alpha
+        self.modes = 8 + int(np.ceil(2.5 * largest))
+        self._k, self._weight = _nodes(largest)
+        self._transforms = mode_transforms(np.multiply.outer(alpha, self._k), self.modes)
+        order = np.arange(self.modes)
+        self._edge = np.sqrt(4 * order + 1) * (-1.0) ** order  # eₙ(1)
+
+    def solve(self, layer: Layer) -> EdgeSolutions:
+        """All contacts on one layer."""
+        punch, square = self._flat_and_square(layer)
+        punch_edge, square_edge = punch @ self._edge, square @ self._edge
+        depth = _over(square_edge, punch_edge)
+        sphere = _times(depth[..., None], punch) - square
+        return EdgeSolutions(
+            sphere_force=3 * np.pi / 4 * sphere[..., 0],
+            sphere_depth=depth,
+            stiffness=np.pi / 2 * punch[..., 0],
+            edge_force=_over(punch[..., 0], punch_edge),
+            edge_depth=_over(_constant(2 / np.pi, punch_edge), punch_edge),
+            sphere_shape=_over(sphere, sphere[..., :1]),
+            punch_shape=_over(punch, punch[..., :1]),
+        )
+
+    def _flat_and_square(self, layer: Layer) -> tuple[Floats, Floats]:
+        """φ₀ and φ₂, (3, m, n)."""
+        stiffening = layer.stiffening(self._k)
+        kernels = (stiffening.value, stiffening.by_poisson_ratio, stiffening.by_slip)
+        matrix, *slopes = (self._galerkin(kernel) for kernel in kernels)
+        right = np.zeros((self.modes, 2))
+        right[0] = 1, 1 / 3
+        right[1, 1] = -2 / (3 * np.sqrt(5))
+        inverse = np.linalg.inv(np.pi / 2 * np.eye(self.modes) - matrix)
+        solution = inverse @ right
+        changes = [inverse @ (slope @ solution) for slope in slopes]
+        stacked = np.stack([solution, *changes])
+        return stacked[..., 0], stacked[..., 1]
+
+    def _galerkin(self, kernel: Floats) -> Floats:
+        """α ∫ kernel j jᵀ dk, (m, n, n)."""
+        weighted = self._transforms * (self._weight * kernel)[:, None]
+        return self.alpha[:, None, None] * (weighted.transpose(0, 2, 1) @ self._transforms)
+
+
+def mode_transforms(s: Floats, modes: int) -> Floats:
+    """√(4n + 1) j₂ₙ(s), the modes' cosine transforms over α at s = kα, of any shape: (*s.shape, modes)."""
+    order = np.arange(modes)
+    return np.sqrt(4 * order + 1) * np.asarray(spherical_jn(2 * order, s[..., None]))
+
+
+def _nodes(largest: float) -> tuple[Floats, Floats]:
+    """Gauss–Legendre nodes and weights on [0, 20], fine enough for products of modes up to the largest radius."""
+    x, w = np.polynomial.legendre.leggauss(16)
+    panels = max(6, int(np.ceil(_END * 2 * largest / 16.0)))
+    edges = np.concatenate([_FIRST_PANELS[:-1], np.linspace(_FIRST_PANELS[-1], _END, panels + 1)])
+    half = np.diff(edges)[:, None] / 2
+    k = edges[:-1, None] + half * (1 + x)
+    return k.ravel(), (half * w).ravel()
+
+
+def _times(x: Floats, y: Floats) -> Floats:
+    """The product with its derivatives."""
+    return np.concatenate([x[:1] * y[:1], x[1:] * y[:1] + x[:1] * y[1:]])
+
+
+def _over(x: Floats, y: Floats) -> Floats:
+    """The quotient with its derivatives."""
+    quotient = x[:1] / y[:1]
+    return np.concatenate([quotient, (x[1:] - quotient * y[1:]) / y[:1]])
+
+
+def _constant(value: float, like: Floats) -> Floats:
+    """A number whose derivatives are 0."""
+    return np.concatenate([np.full_like(like[:1], value), np.zeros_like(like[1:])])

@@ -1,0 +1,72 @@
+"""The skin as Boussinesq's half space: stress at depth h under forces on the surface.
+
+Lengths in units of the depth h. Source: Seminara 2018, equations 4–6, 12 and 14; Johnson, Contact Mechanics (1985),
+sections 3.2 and 3.6.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from underskin.physics.charge_response import Sigma
+from underskin.physics.hankel_transform import hertz_transform, normal_stress, tangential_stress
+from underskin.units import Floats
+
+# The integral is done anew for each row, at a cost that grows with a/h and rT/h.
+DOMAIN_END = 10.0
+# Of the quadrature against one on twice as many panels, over that domain (tests/test_service_sigma.py).
+REL_ERROR = 1e-10
+
+
+def stress(
+    r: ArrayLike,
+    depth: ArrayLike,
+    normal_force: ArrayLike,
+    force_x: ArrayLike = 0.0,
+    force_y: ArrayLike = 0.0,
+    azimuth: ArrayLike = 0.0,
+) -> Floats:
+    """T3 [Pa] at depth h under a point force, tension positive (equation 4).
+
+    T3 = (3/2π) h² / (r² + h²)^(5/2) · [(F1 cos β + F2 sin β) r − F3 h], with r [m] the lateral distance, F3 [N]
+    pressing into the skin, β [rad] the azimuth of the load seen from the sensor.
+    """
+    r_, h = np.asarray(r, dtype=float), np.asarray(depth, dtype=float)
+    outward = np.asarray(force_x) * np.cos(azimuth) + np.asarray(force_y) * np.sin(azimuth)
+    return 1.5 / np.pi * h**2 / (r_**2 + h**2) ** 2.5 * (outward * r_ - np.asarray(normal_force) * h)
+
+
+def gamma_n(offset: ArrayLike, rho: ArrayLike) -> Floats:
+    """γ(r̂/h, ρ): a normal point force averaged over the sensor's disc (equation 6); (1 + λ²)^(−5/2) at ρ = 0."""
+    return normal_stress(_normal, np.ones_like, 0.0, rho, offset)
+
+
+def gamma_t(offset: ArrayLike, rho: ArrayLike) -> Floats:
+    """The same for a tangential force: λ (1 + λ²)^(−5/2) at ρ = 0; T3 = +(3/2πh²)(F1 cos β + F2 sin β) γ_t."""
+    return tangential_stress(_tangential, rho, offset)
+
+
+def delta(a: ArrayLike) -> Floats:
+    """δ(a/h) = 1 / (1 + (a/h)²): Hertz pressure on a point sensor (equation 12, in closed form)."""
+    return 1 / (1 + np.square(np.asarray(a, dtype=float)))
+
+
+def sigma(a: ArrayLike, rho: ArrayLike, offset: ArrayLike = 0.0) -> Floats:
+    """σ(a/h, ρ): Hertz pressure on an extended sensor, `offset` r̂/h beside it (equation 14)."""
+    return normal_stress(_normal, hertz_transform, a, rho, offset)
+
+
+def sigma_in_domain(a: ArrayLike, rho: ArrayLike) -> Sigma:
+    """σ with its error, NaN where a/h or ρ exceeds `DOMAIN_END`; arrays broadcast."""
+    a_all, rho_all = np.broadcast_arrays(np.asarray(a, dtype=float), np.asarray(rho, dtype=float))
+    inside = (a_all <= DOMAIN_END) & (rho_all <= DOMAIN_END)
+    value = np.full(a_all.shape, np.nan)
+    value[inside] = sigma(a_all[inside], rho_all[inside])
+    return Sigma(value, np.where(inside, REL_ERROR, np.nan), inside)
+
+
+def _normal(k: Floats) -> Floats:
+    return (1 + k) * np.exp(-k)
+
+
+def _tangential(k: Floats) -> Floats:
+    return k * np.exp(-k)

@@ -1,0 +1,1 @@
+"""The forward model for given conditions, and what is said of its answers."""

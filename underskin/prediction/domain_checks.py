@@ -1,0 +1,72 @@
+"""Why the base model says nothing of a recording, in words that name what exceeds which limit."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.prediction.pressed_skin import Transmission
+from underskin.recordings.campaign import FrfRecording, SkinDescription
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats
+
+_MOST_CHARGE = 1.0  # C/N
+_LIKE_MILLI = 100.0  # N: from here on a preload that fits as 1/1000 may be in mN
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """A row's force, sphere and elastomer, as a lab writes them."""
+
+    preload_n: float
+    indenter_radius_mm: float
+    youngs_modulus_mpa: float
+    poisson_ratio: float
+
+
+def usable(level: Floats, noise: Floats, sigma: Floats, felt: Transmission) -> NDArray[np.bool_]:
+    """The rows inside the table's domain, at an offset that it reaches, with a line in the band and below 1 C/N."""
+    return felt.inside & np.isfinite(sigma) & (np.hypot(level, noise) < _MOST_CHARGE)
+
+
+def reasons(
+    recorded: Sequence[FrfRecording], skin: SkinDescription, felt: Transmission, level: Floats, table: SigmaTable
+) -> Iterator[str]:
+    """Of each recording that is not `usable` why; `level` is its averaged FRF [C/N], NaN without a line in the band."""
+    for row, recording in enumerate(recorded):
+        if skin.poisson_ratio != INCOMPRESSIBLE or not felt.inside[row]:
+            assert skin.youngs_modulus_mpa is not None
+            pressed = Pressed(
+                recording.preload_n, recording.indenter_radius_mm, skin.youngs_modulus_mpa, skin.poisson_ratio
+            )
+            yield beyond(pressed, [float(part[row]) for part in _numbers(felt)], table)
+        elif not np.isfinite(level[row]):
+            yield "it has no line in the band"
+        elif not abs(level[row]) < _MOST_CHARGE:
+            yield f"its FRF of {1e12 * level[row]:.3g} pC/N, not below 1 C/N, can be none"
+        else:
+            yield "its position is farther from the sensor than the table reaches, or its lines scatter beyond measure"
+
+
+def _numbers(felt: Transmission) -> tuple[Floats, Floats, Floats]:
+    return felt.a_over_h, np.broadcast_to(felt.rt_over_h, felt.a_over_h.shape), felt.load_parameter
+
+
+def beyond(pressed: Pressed, numbers: Sequence[float], table: SigmaTable) -> str:
+    """What of ν, or of `numbers`, a/h, rT/h and L, is outside the table's domain, with F, R and E."""
+    if pressed.poisson_ratio != INCOMPRESSIBLE:
+        return f"Poisson's ratio = {pressed.poisson_ratio:g}: the table is of incompressible elastomer, 0.5"
+    over_h, rt_over_h, load = numbers
+    force, radius, modulus = pressed.preload_n, pressed.indenter_radius_mm, pressed.youngs_modulus_mpa
+    most_a, most_rt, most_load = (table.domain[name][1] for name in ("a_over_h", "rt_over_h", "load_parameter"))
+    row = f"F = {force:g} N, R = {radius:g} mm, E = {modulus:g} MPa, L = {load:.3g}, a/h = {over_h:.3g}"
+    if load > most_load:
+        most = most_load * radius**2 * modulus
+        slip = "; is the preload in mN?" if force >= _LIKE_MILLI and force / 1000 <= most else ""
+        return f"{row}: L = {load:.3g} exceeds {most_load:g}: at most {most:.3g} N with this sphere{slip}"
+    if over_h > most_a:
+        most = force * (most_a / over_h) ** 3  # a grows with the cube root of F, by Hertz
+        return f"{row}: a/h = {over_h:.3g} exceeds {most_a:g}: at most {most:.3g} N with this sphere"
+    return f"{row}: rT/h = {rt_over_h:.3g} exceeds {most_rt:g}: the sensor is too large for this thickness"

@@ -1,0 +1,135 @@
+"""A skin before it is built: how much of a load reaches a sensor, how finely the array tells where it is, and how far
+apart two loads must be to be told from one (Seminara 2018, section 4, as a tool).
+
+A sensor's *response* to a contact at the distance e from its centre is σ(e): it bears the share (3/2) ρ² σ(e) of the
+force. Two loads are equal, and their responses add, as on a linear layer.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.physics.skin import Indenter, Skin
+from underskin.prediction.pressed_skin import Transmission, transmission
+from underskin.surrogate.off_centre_sigma import sigma_beside
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats
+
+_SWEEP = 61  # points of a sweep
+_PLACEMENTS = 24  # of the array against the contacts, over one pitch
+_DISTANCES = 160
+_FINEST = 25.0  # sensors across the resolution, beyond which more make no difference
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """σ, and γ of a point load, both above the sensor's centre, along one axis; the other two are the design's own."""
+
+    axis: str
+    values: Floats
+    sigma: Floats
+    gamma: Floats
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """How finely an array tells where a load is; lengths in m, NaN where nothing can be told.
+
+    `width`: full width at half maximum of a sensor's response against the contact's place.
+    `between`, `amid`: response to a contact midway between two sensors, and amid four, over that above a sensor.
+    `separation`: the smallest distance from which on two equal contacts in line with a row of sensors show as two,
+    wherever the row lies; `best_separation`: the smallest at which they do where it lies best. They show as two where
+    a sensor between two others reads less than both, by `dip` times the reading above a sensor.
+    """
+
+    width: float
+    between: float
+    amid: float
+    separation: float
+    best_separation: float
+
+
+@dataclass(frozen=True)
+class Design:
+    """What is found: the contact, γ above the sensor, response and γ against the offset [m], sweeps, resolution."""
+
+    contact: Transmission
+    gamma: float
+    offset: Floats
+    response: Floats
+    point_response: Floats
+    sweeps: tuple[Sweep, ...]
+    resolution: Resolution
+
+
+def design(table: SigmaTable, skin: Skin, indenter: Indenter, preload: float, pitch: float, dip: float) -> Design:
+    """One skin under one contact, in SI; `pitch` of the array [m], `dip` over the reading above a sensor [-].
+
+    What lies outside the table's domain is NaN.
+    """
+    contact = transmission(table, skin, indenter, preload)
+    point = tuple(float(part) for part in (contact.a_over_h, contact.rt_over_h, contact.load_parameter))
+    h = float(skin.thickness)
+    inside = bool(contact.inside)
+    offset, response = sigma_beside(table, *point) if inside else (np.zeros(1), np.full(1, np.nan))
+    _, point_response = sigma_beside(table, 0.0, point[1], 0.0) if inside else (offset, response)
+    return Design(
+        contact=contact,
+        gamma=float(table.sigma(0.0, point[1], 0.0).sigma),
+        offset=offset * h,
+        response=response,
+        point_response=point_response,
+        sweeps=_sweeps(table, point),
+        resolution=resolution(offset * h, response, pitch, 2 * float(contact.contact_radius), dip),
+    )
+
+
+def _sweeps(table: SigmaTable, point: tuple[float, ...]) -> tuple[Sweep, ...]:
+    found = []
+    for place, (axis, (low, high)) in enumerate(table.domain.items()):
+        # σ turns fastest near L = 0, where it grows like its cube root.
+        values = low + (high - low) * np.linspace(0, 1, _SWEEP) ** (3 if axis == "load_parameter" else 1)
+        columns = [values if number == place else np.full(_SWEEP, own) for number, own in enumerate(point)]
+        gamma = table.sigma(0.0, columns[1], 0.0).sigma
+        found.append(Sweep(axis, values, table.sigma(*columns).sigma, gamma))
+    return tuple(found)
+
+
+def resolution(offset: Floats, response: Floats, pitch: float, nearest: float, dip: float) -> Resolution:
+    """From a response at offsets [m] from 0 on, taken as 0 beyond; contacts nearer than `nearest` would overlap."""
+    if not bool(np.isfinite(response).all()):
+        return Resolution(*[float("nan")] * 5)
+    last = int(np.flatnonzero(response < float(response[0]) / 2)[0])  # the reach is many times the width
+    pair = [last, last - 1]
+    width = 2 * float(np.interp(float(response[0]) / 2, response[pair], offset[pair]))
+    spacing = max(pitch, width / _FINEST)
+    distances = np.linspace(nearest, nearest + 4 * spacing + 3 * width, _DISTANCES)
+    seen = np.array([_told_apart(offset, response, spacing, distance, dip) for distance in distances])
+    always, sometimes = (np.asarray(part) for part in (seen.all(axis=1), seen.any(axis=1)))
+    settled = len(distances) - int(np.argmin(always[::-1])) if not always.all() else 0
+    between, amid = (
+        float(np.interp(place, offset, response, right=0.0)) / float(response[0])
+        for place in (pitch / 2, pitch / np.sqrt(2))
+    )
+    return Resolution(
+        width=width,
+        between=between,
+        amid=amid,
+        separation=float(distances[settled]) if settled < len(distances) else float("nan"),
+        best_separation=float(distances[np.argmax(sometimes)]) if sometimes.any() else float("nan"),
+    )
+
+
+def _told_apart(offset: Floats, response: Floats, spacing: float, distance: float, dip: float) -> NDArray[np.bool_]:
+    """Whether two contacts show as two, for each placement of the row of sensors."""
+    half = distance / 2
+    count = int(np.ceil((half + spacing) / spacing)) + 1
+    placement = spacing * np.arange(_PLACEMENTS) / _PLACEMENTS
+    sensors = spacing * np.arange(-count, count + 1) + placement[:, None]
+    first, second = (np.interp(np.abs(sensors - place), offset, response, right=0.0) for place in (-half, half))
+    reading = first + second
+    from_left = np.maximum.accumulate(reading, axis=1)[:, :-2]
+    from_right = np.maximum.accumulate(reading[:, ::-1], axis=1)[:, ::-1][:, 2:]
+    depth = np.minimum(from_left, from_right) - reading[:, 1:-1]
+    return np.asarray(depth.max(axis=1) >= dip * response[0])

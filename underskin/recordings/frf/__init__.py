@@ -1,0 +1,1 @@
+"""FRFs from time series, their flat zone, and checks of signals."""

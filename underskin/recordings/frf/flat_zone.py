@@ -1,0 +1,264 @@
+"""The flat zone: the band of a campaign in which no recording shows a resonance (Seminara 2018, section 3.2.2).
+
+Re FRF of each recording, over its own level, is gathered in bins of equal width in log f and averaged over the
+recordings of one condition (indenter and preload: a contact resonance moves with both). The zone is the widest run of
+bins in which no condition leaves, beyond its noise, a power law common to all of them (a sensor's relaxation falls
+slowly over the whole band and is no resonance) by more than `FLATNESS`. Lines at the mains and its harmonics that
+stand out of their neighbours are left out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from underskin.errors import InvalidInput
+from underskin.recordings.frf.estimation import Frf
+from underskin.recordings.frf.flat_zone_reason import levels_of, reason_of
+from underskin.units import Complexes, Floats
+
+FLATNESS = 0.02
+STEEPEST = 0.1  # fall of ln FRF with ln f that relaxation may have (a loss tangent of 0.16)
+_BINS_PER_DECADE = 12
+_BEYOND_NOISE = 3.0
+_OUTSTANDING = 4.0  # scatter of a mains line over that of its neighbours
+_MAINS_HZ, _HARMONICS, _MAINS_WIDTH_HZ = (50.0, 60.0), 5, 3.0
+_NEIGHBOURS = 11
+
+Condition = tuple[float, float]  # indenter radius [mm], preload [N]
+
+
+@dataclass(frozen=True)
+class FlatZone:
+    """A band, limits included, the reason for it in words, and the lines inside it that are left out."""
+
+    low_hz: float
+    high_hz: float
+    reason: str
+    left_out_hz: tuple[float, ...] = ()
+    chosen_by_user: bool = False
+
+    def holds(self, frequency: Floats) -> NDArray[np.bool_]:
+        """Which lines are averaged."""
+        inside = (frequency >= self.low_hz) & (frequency <= self.high_hz)
+        return inside & ~np.isin(np.round(frequency, 6), self.left_out_hz)
+
+
+@dataclass(frozen=True)
+class Stack:
+    """Recordings of one grid: `rows` are their numbers; frequency (lines,), values (rows, lines), γ² or NaN."""
+
+    rows: NDArray[np.intp]
+    frequency: Floats
+    values: Complexes
+    coherence: Floats
+
+
+def stacked(frfs: Sequence[Frf]) -> list[Stack]:
+    """The recordings, put together where they share the same lines."""
+    members: dict[bytes, list[int]] = {}
+    for row, frf in enumerate(frfs):
+        members.setdefault(frf.frequency.tobytes(), []).append(row)
+    stacks = []
+    for rows in members.values():
+        coherence = [
+            np.full(len(frfs[row].values), np.nan) if frfs[row].coherence is None else frfs[row].coherence
+            for row in rows
+        ]
+        stacks.append(
+            Stack(
+                np.array(rows),
+                frfs[rows[0]].frequency,
+                np.array([frfs[row].values for row in rows]),
+                np.array(coherence),
+            )
+        )
+    return stacks
+
+
+def flat_zone(
+    stacks: Sequence[Stack], conditions: Sequence[Condition], band_hz: tuple[float, float] | None = None
+) -> FlatZone:
+    """The flat zone of a campaign's recordings (one condition each), or the user's band where given.
+
+    Raises InvalidInput where no line lies in the user's band.
+    """
+    frequencies = np.unique(np.concatenate([stack.frequency for stack in stacks]))
+    mains = _mains_lines(stacks)
+    if band_hz is not None:
+        inside = (frequencies >= band_hz[0]) & (frequencies <= band_hz[1])
+        if not inside.any():
+            raise InvalidInput(
+                "band_hz",
+                list(band_hz),
+                f"must hold at least one line; they lie at {frequencies[0]:g} to {frequencies[-1]:g} Hz",
+            )
+        return FlatZone(*band_hz, "the band given by the user", mains, chosen_by_user=True)
+    edges = _edges(frequencies)
+    ratio = _binned(stacks, edges, mains)
+    names, curves, noise = _by_condition(ratio, conditions)
+    filled = np.flatnonzero(np.isfinite(curves).any(axis=0))
+    if len(filled) < 2:
+        return FlatZone(
+            frequencies[0], frequencies[-1], "the whole recorded range: too few lines to look for less", mains
+        )
+    middle = np.sqrt(edges[1:] * edges[:-1])[filled]
+    curves, noise = curves[:, filled], noise[:, filled]
+    first, last, slope = _widest(np.log(middle), curves, noise)
+    low = frequencies[frequencies >= edges[filled[first]] * (1 - 1e-12)][0]
+    high = frequencies[frequencies <= edges[filled[last] + 1] * (1 + 1e-12)][-1]
+    left_out = tuple(line for line in mains if low <= line <= high)
+    reason = reason_of(low, high, middle, curves, names, (first, last), slope, left_out)
+    return FlatZone(float(low), float(high), reason, left_out)
+
+
+def band_average(stacks: Sequence[Stack], zone: FlatZone) -> tuple[Floats, Floats, Floats]:
+    """Re FRF averaged over the zone, its standard uncertainty by line noise, and the relative scatter of the lines.
+
+    One entry a recording; NaN where it has no line in the zone. Lines weigh by their coherence where known; of each
+    recording those that stand out by 6 times its scatter are left out. The gain error that the lines share is not in
+    the uncertainty: it is the mixed model's.
+    """
+    count = sum(len(stack.rows) for stack in stacks)
+    mean, uncertainty, scatter = (np.full(count, np.nan) for _ in range(3))
+    for stack in stacks:
+        inside = zone.holds(stack.frequency)
+        if not inside.any():
+            continue
+        real = stack.values.real[:, inside]
+        typical = np.median(real, axis=1, keepdims=True)
+        distance = np.abs(real - typical)
+        near = distance <= 6 * 1.4826 * np.median(distance, axis=1, keepdims=True) + 1e-30
+        weight = near * _line_weights(stack.coherence[:, inside])
+        total = weight.sum(axis=1)
+        value = (weight * real).sum(axis=1) / total
+        rest = real - value[:, None]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            effective = total**2 / (weight**2).sum(axis=1)
+            unbiased = effective / (effective - 1)
+            mean[stack.rows] = value
+            # From the scatter itself, so that weights that are off cost accuracy and not honesty.
+            uncertainty[stack.rows] = np.sqrt((weight**2 * rest**2).sum(axis=1) * unbiased) / total
+            scatter[stack.rows] = np.sqrt((weight * rest**2).sum(axis=1) / total * unbiased) / np.abs(value)
+    return mean, _where_one_line(mean, uncertainty, scatter), scatter
+
+
+def _where_one_line(mean: Floats, uncertainty: Floats, scatter: Floats) -> Floats:
+    """A recording of one line has no scatter of its own: it is given the others'."""
+    alone = np.isfinite(mean) & ~np.isfinite(uncertainty)
+    usual = float(np.nanmedian(scatter)) if np.isfinite(scatter).any() else 0.0
+    return np.where(alone, usual * np.abs(mean), uncertainty)
+
+
+def _line_weights(coherence: Floats) -> Floats:
+    """γ²/(1 − γ²), which line noise goes by; rounding of γ² near 1 is kept from ruling."""
+    weight = coherence / np.maximum(1 - coherence, 1e-3)
+    return np.where(np.isfinite(coherence), np.maximum(weight, 1e-9), 1.0)
+
+
+def _mains_lines(stacks: Sequence[Stack]) -> tuple[float, ...]:
+    """Lines at mains harmonics that scatter far more about their neighbours than those do."""
+    harmonics = np.outer(_MAINS_HZ, np.arange(1, _HARMONICS + 1)).ravel()
+    found: set[float] = set()
+    for stack in stacks:
+        near = np.abs(stack.frequency[:, None] - harmonics).min(axis=1) <= _MAINS_WIDTH_HZ
+        if not near.any() or len(near) < _NEIGHBOURS:
+            continue
+        smooth = median_filter(stack.values.real, (1, _NEIGHBOURS), mode="nearest") + 1j * median_filter(
+            stack.values.imag, (1, _NEIGHBOURS), mode="nearest"
+        )
+        scatter = np.median(np.abs(stack.values - smooth), axis=0)
+        beside = median_filter(np.where(near, np.median(scatter[~near]), scatter), _NEIGHBOURS, mode="nearest")
+        few = 1 + 1.5 / np.sqrt(len(stack.rows))  # scatter over few recordings is itself unsure
+        lines = stack.frequency[near & (scatter > _OUTSTANDING * few * beside)]
+        found.update(np.round(lines, 6).tolist())
+    return tuple(sorted(found))
+
+
+def _edges(frequencies: Floats) -> Floats:
+    decades = np.log10(frequencies[-1] / frequencies[0])
+    bins = max(1, round(_BINS_PER_DECADE * float(decades)))
+    return np.geomspace(frequencies[0], frequencies[-1], bins + 1)
+
+
+def _binned(stacks: Sequence[Stack], edges: Floats, mains: tuple[float, ...]) -> Floats:
+    """Median of Re FRF over each recording's level in each bin (recordings, bins); NaN without a line or a level."""
+    ratio = np.full((sum(len(stack.rows) for stack in stacks), len(edges) - 1), np.nan)
+    for stack in stacks:
+        real = stack.values.real
+        level = np.median(real, axis=1)
+        noise = np.median(np.abs(np.diff(real, axis=1)), axis=1) if real.shape[1] > 1 else np.zeros(len(real))
+        plain = np.abs(level) > 2 * noise  # a dead sensor has no level
+        kept = ~np.isin(np.round(stack.frequency, 6), mains)
+        bins = np.clip(np.searchsorted(edges, stack.frequency, side="right") - 1, 0, len(edges) - 2)
+        for number in np.unique(bins[kept]):
+            ratio[stack.rows[plain], number] = np.median(
+                real[np.ix_(plain, kept & (bins == number))] / level[plain, None], axis=1
+            )
+    return ratio
+
+
+def _by_condition(ratio: Floats, conditions: Sequence[Condition]) -> tuple[list[Condition], Floats, Floats]:
+    """The conditions, the median curve of each (conditions, bins) and its noise; the last row is that of all."""
+    names = sorted(set(conditions))
+    member = np.array([names.index(condition) for condition in conditions])
+    groups = [ratio[member == number] for number in range(len(names))]
+    sigma = _noise(ratio)
+    curves, noise = [], []
+    for group in [*groups, ratio]:
+        counts = np.isfinite(group).sum(axis=0)
+        curve = np.full(ratio.shape[1], np.nan)
+        curve[counts > 0] = np.nanmedian(group[:, counts > 0], axis=0)
+        curves.append(curve)
+        noise.append(sigma * 1.25 / np.sqrt(np.maximum(counts, 1)))
+    return names, np.array(curves), np.array(noise)
+
+
+def _noise(ratio: Floats) -> Floats:
+    """Noise of one recording in each bin, from how far a bin lies from the middle of its neighbours."""
+    filled = np.isfinite(ratio).any(axis=0)
+    known = ratio[:, filled]
+    sigma = np.zeros(ratio.shape[1])
+    if known.shape[1] < 3:
+        return sigma
+    bend = np.abs(known[:, 1:-1] - (known[:, :-2] + known[:, 2:]) / 2)
+    bend = bend[np.isfinite(bend).all(axis=1)]
+    if len(bend) == 0:
+        return sigma
+    inner = 1.4826 * np.median(bend, axis=0) / np.sqrt(1.5)
+    inner = median_filter(inner, 3, mode="nearest")
+    sigma[filled] = np.concatenate([inner[:1], inner, inner[-1:]])
+    return sigma
+
+
+def _widest(log_frequency: Floats, curves: Floats, noise: Floats) -> tuple[int, int, float]:
+    """First and last bin of the widest flat run, and the exponent of the common power law in it."""
+    best, width = (0, 0, 0.0), -1.0
+    bins = len(log_frequency)
+    for first in range(bins):
+        for last in range(bins - 1, first - 1, -1):
+            if log_frequency[last] - log_frequency[first] <= width:
+                break
+            slope = _slope(log_frequency[first : last + 1], curves[-1, first : last + 1])
+            if _is_flat(
+                log_frequency[first : last + 1], curves[:, first : last + 1], noise[:, first : last + 1], slope
+            ):
+                best, width = (first, last, slope), float(log_frequency[last] - log_frequency[first])
+                break
+    return best
+
+
+def _slope(log_frequency: Floats, curve: Floats) -> float:
+    if len(log_frequency) < 3:
+        return 0.0
+    slope = float(np.polyfit(log_frequency, curve / curve.mean(), 1)[0])
+    return float(np.clip(slope, -STEEPEST, 0.0))
+
+
+def _is_flat(log_frequency: Floats, curves: Floats, noise: Floats, slope: float) -> bool:
+    law = 1 + slope * (log_frequency - log_frequency.mean())
+    shape = curves / law
+    departure = np.abs(shape / levels_of(shape) - 1) - _BEYOND_NOISE * noise
+    return not bool(np.any(departure > FLATNESS))

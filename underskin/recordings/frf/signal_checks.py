@@ -1,0 +1,153 @@
+"""What may be wrong with a sampled signal: overload (clipping), held samples and jumps.
+
+A defect is a finding: the blocks it touches are left out of the FRF, and the rest is used.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+
+from underskin.recordings.frf.periodic import period_of
+from underskin.units import Floats
+
+_CLIPPED_RUN = 3  # samples in a row at the extreme value
+_CLIPPED_RATIO = 5.0  # a quantised sine's top level holds at most 1/(√2 − 1) = 2.4 times the samples of the next
+_HELD_RUN = 5  # samples in a row of one value
+_COARSE = 0.2  # share of samples that equal the one before, above which the levels are coarse
+_ONE_LEVEL = 1.5
+_BY_CHANCE = 1e-3  # runs as long in the whole signal
+_JUMP = 12.0  # second difference over its scale among neighbours; a sine stays below 1.5, noise below 6
+_BLOW, _ANSWER = 20.0, 6.0  # kurtosis; a sine has 1.5, noise 3, a hammer's blow hundreds, what rings after it tens
+_AS_SHARP = 0.5  # of a jump: the bend at its place in the next period, where a periodic signal begins anew
+_GIVE_OR_TAKE = 2  # samples: a period need not be a whole number of them
+_LOCAL = 64  # samples that make a neighbourhood
+
+
+@dataclass(frozen=True)
+class Defect:
+    """A run of samples that cannot be trusted: `kind` is overload, held_samples or jump."""
+
+    kind: str
+    channel: str
+    first_sample: int
+    samples: int
+
+    @property
+    def statement(self) -> str:
+        """The defect in words."""
+        reason = {
+            "overload": "stay at the end of the range: overload",
+            "held_samples": "repeat one value: samples were dropped and the last one held",
+            "jump": "break the signal's course: samples were dropped, or a spike",
+        }[self.kind]
+        return f"{self.channel}: {self.samples} samples from sample {self.first_sample} {reason}"
+
+
+def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
+    """Every defect of force and charge; no defect are the jumps where the force is a blow that the charge answers, and
+    those where a periodic force, such as a sweep, begins anew, which recur in each period."""
+    found = [*defects("force_n", force), *defects("charge_pc", charge)]
+    if _kurtosis(force) > _BLOW and _kurtosis(charge) > _ANSWER:
+        return [defect for defect in found if defect.kind != "jump"]
+    if all(defect.kind != "jump" for defect in found):
+        return found
+    period = period_of(force)
+    recurs = {name: _recurs(signal, period) for name, signal in (("force_n", force), ("charge_pc", charge))}
+    return [defect for defect in found if defect.kind != "jump" or not recurs[defect.channel][defect.first_sample]]
+
+
+def _recurs(signal: Floats, period: int) -> NDArray[np.bool_]:
+    """Where a signal bends as sharply a period before or after; nowhere without a period."""
+    bend = np.pad(np.abs(np.diff(signal, n=2)), 1)
+    if not period:
+        return np.zeros(len(signal), dtype=bool)
+    around = maximum_filter1d(bend, 2 * _GIVE_OR_TAKE + 1)
+    before, after = np.zeros((2, len(signal)))
+    before[period:], after[:-period] = around[:-period], around[period:]
+    return np.asarray(np.maximum(before, after) > _AS_SHARP * bend)
+
+
+def _kurtosis(signal: Floats) -> float:
+    centred = signal - signal.mean()
+    power = float(np.mean(centred**2))
+    return float(np.mean(centred**4)) / power**2 if power > 0 else 0.0
+
+
+def defects(channel: str, signal: Floats) -> list[Defect]:
+    """Every defect of a signal, in order of its kind.
+
+    Dropped samples are seen as a held value, or as a jump where the signal is sampled finely enough to be smooth.
+    """
+    clipped = _overload(signal)
+    held = _held(signal) & ~clipped
+    jump = _jumps(signal) & ~clipped & ~held
+    return [
+        Defect(kind, channel, first, count)
+        for kind, mask in (("overload", clipped), ("held_samples", held), ("jump", jump))
+        for first, count in _runs(mask)
+    ]
+
+
+def damaged(found: list[Defect], samples: int) -> NDArray[np.bool_]:
+    """Which of the samples any of the defects touches."""
+    mask = np.zeros(samples, dtype=bool)
+    for defect in found:
+        mask[defect.first_sample : defect.first_sample + defect.samples] = True
+    return mask
+
+
+def _overload(signal: Floats) -> NDArray[np.bool_]:
+    mask = np.zeros(len(signal), dtype=bool)
+    levels, counts = np.unique(signal, return_counts=True)
+    if len(levels) < 3:
+        return mask
+    for end, neighbour in ((0, 1), (-1, -2)):
+        if counts[end] > _CLIPPED_RATIO * counts[neighbour]:
+            mask |= _in_long_runs(signal == levels[end], _CLIPPED_RUN)
+    return mask
+
+
+def _held(signal: Floats) -> NDArray[np.bool_]:
+    """Runs of one value that end in more than one level's step (a slow signal turns on one level); where levels are so
+    coarse that neighbours are alike by chance, those that end in a leap."""
+    step = np.abs(np.diff(signal))
+    same = np.concatenate([[False], step == 0])
+    mask = np.zeros(len(signal), dtype=bool)
+    usual, width = float(same.mean()), 2 * _LOCAL + 1
+    around = uniform_filter1d(same.astype(float), width)
+    level, leap = float(step[step > 0].min(initial=np.inf)), 2 * np.quantile(step, 0.999)
+    for first, count in _runs(same):
+        after = step[first + count - 1] if first + count < len(signal) else 2 * level
+        alike = max(usual, around[first + count // 2] - count / width)
+        by_chance = usual > _COARSE or len(signal) * alike**count > _BY_CHANCE
+        if count >= _HELD_RUN - 1 and after > (leap if by_chance else _ONE_LEVEL * level):
+            mask[first - 1 : first + count] = True
+    return mask
+
+
+def _jumps(signal: Floats) -> NDArray[np.bool_]:
+    mask = np.zeros(len(signal), dtype=bool)
+    bend = np.abs(np.diff(signal, n=2))
+    blocks = max(1, len(bend) // _LOCAL)
+    parts = np.array_split(bend, blocks)
+    usual = np.array([1.4826 * np.median(part) for part in parts])
+    around = np.max([np.roll(usual, shift) for shift in (-1, 0, 1)], axis=0)
+    scale = np.repeat(around, [len(part) for part in parts])
+    mask[1:-1] = (bend > _JUMP * scale) & (scale > 0)
+    return mask
+
+
+def _in_long_runs(mask: NDArray[np.bool_], shortest: int) -> NDArray[np.bool_]:
+    long = np.zeros_like(mask)
+    for first, count in _runs(mask):
+        if count >= shortest:
+            long[first : first + count] = True
+    return long
+
+
+def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First index and length of each run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return [(int(first), int(last - first)) for first, last in zip(edges[::2], edges[1::2], strict=True)]

@@ -1,0 +1,106 @@
+"""FRFs of a campaign as a figure can show them: lines of single recordings, and the spread over recordings alike.
+
+A figure has fewer pixels than a recording lines: lines are gathered in bins of equal width in log f, of which the
+extremes are kept, so that no resonance is lost.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.recordings.frf.estimation import Frf
+from underskin.recordings.frf.flat_zone import Stack, stacked
+from underskin.units import Complexes, Floats, to_lab
+
+MOST_LINES = 240  # of one recording
+MOST_BINS = 80  # of a spread
+
+Condition = tuple[float, float]  # indenter radius [mm], preload [N]
+
+
+@dataclass(frozen=True)
+class FrfLines:
+    """One recording: frequency [Hz], magnitude [pC/N], phase [°], coherence γ² (NaN where not recorded)."""
+
+    name: str
+    frequency_hz: Floats
+    magnitude_pc_per_n: Floats
+    phase_deg: Floats
+    coherence: Floats
+
+
+@dataclass(frozen=True)
+class FrfSpread:
+    """Recordings of one condition: lowest, median and highest value in each bin, each (bins,)."""
+
+    indenter_radius_mm: float
+    preload_n: float
+    recordings: int
+    frequency_hz: Floats
+    magnitude_pc_per_n: tuple[Floats, Floats, Floats]
+    phase_deg: tuple[Floats, Floats, Floats]
+    coherence: tuple[Floats, Floats, Floats]
+
+
+def lines_of(name: str, frf: Frf) -> FrfLines:
+    """A recording's lines, thinned to MOST_LINES: of each bin those of the smallest and the largest magnitude."""
+    coherence = np.full(len(frf.values), np.nan) if frf.coherence is None else frf.coherence
+    magnitude, phase = _polar(frf.values)
+    chosen = _extremes(frf.frequency, magnitude)
+    return FrfLines(name, frf.frequency[chosen], magnitude[chosen], phase[chosen], coherence[chosen])
+
+
+def spreads(frfs: Sequence[Frf], conditions: Sequence[Condition]) -> list[FrfSpread]:
+    """The spread over the recordings of each condition, by indenter and preload; one more for each grid of lines."""
+    found = []
+    keys = np.array(conditions)
+    for stack in stacked(frfs):
+        for condition in np.unique(keys[stack.rows], axis=0):
+            alike = (keys[stack.rows] == condition).all(axis=1)
+            found.append(_spread(stack, alike, condition))
+    return sorted(found, key=lambda spread: (spread.indenter_radius_mm, spread.preload_n))
+
+
+def _spread(stack: Stack, alike: NDArray[np.bool_], condition: Floats) -> FrfSpread:
+    positive = stack.frequency > 0
+    frequency, start = _bins(stack.frequency[positive], MOST_BINS)
+    magnitude, phase = _polar(stack.values[alike][:, positive])
+    columns = [_levels(part, start) for part in (magnitude, phase, stack.coherence[alike][:, positive])]
+    return FrfSpread(float(condition[0]), float(condition[1]), int(alike.sum()), frequency, *columns)
+
+
+def _levels(values: Floats, start: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
+    """Lowest, median over recordings (mean of a bin's lines), and highest of each bin; `values` (recordings, lines)."""
+    low = np.minimum.reduceat(values, start, axis=1).min(axis=0)
+    high = np.maximum.reduceat(values, start, axis=1).max(axis=0)
+    count = np.diff([*start, values.shape[1]])
+    return low, np.median(np.add.reduceat(values, start, axis=1) / count, axis=0), high
+
+
+def _bins(frequency: Floats, most: int) -> tuple[Floats, NDArray[np.intp]]:
+    """The middle of each bin that holds lines, and its first line."""
+    if len(frequency) <= most:
+        return frequency, np.arange(len(frequency))
+    edges = np.geomspace(frequency[0], frequency[-1], most + 1)[1:-1]
+    start = np.unique(np.concatenate([[0], np.searchsorted(frequency, edges)]))
+    start = start[start < len(frequency)]
+    count = np.diff([*start, len(frequency)])
+    return np.exp(np.add.reduceat(np.log(frequency), start) / count), start
+
+
+def _extremes(frequency: Floats, magnitude: Floats) -> NDArray[np.intp]:
+    positive = np.flatnonzero(frequency > 0)
+    if len(positive) <= MOST_LINES:
+        return positive
+    _, start = _bins(frequency[positive], MOST_LINES // 2)
+    parts = np.split(positive, start[1:])
+    chosen = [part[[np.argmin(magnitude[part]), np.argmax(magnitude[part])]] for part in parts]
+    return np.unique(np.concatenate(chosen))
+
+
+def _polar(values: Complexes) -> tuple[Floats, Floats]:
+    """Magnitude [pC/N], and phase [°] from −270 to 90: past a resonance it falls to −180, where noise must not jump."""
+    phase = np.mod(np.degrees(np.angle(values)) + 270.0, 360.0) - 270.0
+    return to_lab("frf_pc_per_n", np.abs(values)), phase

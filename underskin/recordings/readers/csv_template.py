@@ -1,0 +1,236 @@
+"""Campaigns as CSV, by one template: lines about the skin, then a table with a row per line or sample.
+
+    schema,campaign/1
+    name,palm 3 in May
+    skin.thickness_mm,2.5
+    sensor,s01,0,0
+
+    id,sensor,preload_n,frequency_hz,frf_re_pc_per_n,frf_im_pc_per_n
+    r1,s01,1.0,10,7.1,-0.5
+    ,,,20,7.2,-0.6
+
+Separator, decimal mark and units are the file's own: `;` and `,` work, `preload [mN]` is converted. A cell in quotes
+may hold the separator. An empty cell under a quantity that a recording has once repeats the one above; an empty `id`
+continues the recording, and so does its own id where every row has it. A cell too many, a field that comes again and a
+recording that begins twice are refused.
+"""
+
+from collections.abc import Iterator
+from dataclasses import fields
+from typing import Any, BinaryIO
+
+from underskin.errors import FileError
+from underskin.recordings.campaign import COLUMNS, KINDS, SCHEMA, SkinDescription
+from underskin.recordings.readers import text
+from underskin.recordings.readers.unit_labels import lab_field, labelled_unit
+from underskin.units import LAB, LabField
+
+_FIRST_LINE = 200
+_SEPARATORS = ("\t", ";", ",")
+_POSITION = ("position_x_mm", "position_y_mm")
+_SENSOR = ("id", "x_mm", "y_mm")
+_TEXTS = ("id", "kind", "sensor", "recorded_at", "name", "skin.id")
+_SKIN_FIELDS = tuple(f"skin.{entry.name}" for entry in fields(SkinDescription) if entry.name != "sensors")
+_KNOWN = {entry.name for kind in KINDS.values() for entry in fields(kind)} | set(_POSITION)
+_FLAGS = {"true": True, "false": False}
+
+
+def is_template(content: str) -> bool:
+    """Whether a text begins as the template does."""
+    return _separator(content) is not None
+
+
+def read(stream: BinaryIO, file: str) -> dict[str, Any]:
+    """The campaign document of a filled-in template; raises FileError that names the line."""
+    content = text.content(stream, file)
+    separator = _separator(content)
+    if separator is None:
+        raise FileError(file, "line 1", f"must be schema,{SCHEMA}")
+    return _Template(file, list(_rows(content, separator, file)), separator).document()
+
+
+def _separator(content: str) -> str | None:
+    first = text.lines(content[:_FIRST_LINE])[0]
+    return next((mark for mark in _SEPARATORS if _first_cells(first, mark) == ["schema", SCHEMA]), None)
+
+
+def _first_cells(line: str, separator: str) -> list[str]:
+    try:
+        return text.cells(line, separator)[:2]
+    except ValueError:
+        return []
+
+
+def _rows(content: str, separator: str, file: str) -> Iterator[list[str]]:
+    for number, line in enumerate(text.lines(content), start=1):
+        try:
+            yield text.cells(line, separator)
+        except ValueError as error:
+            raise FileError(file, f"line {number}", str(error)) from None
+
+
+class _Template:
+    def __init__(self, file: str, rows: list[list[str]], separator: str) -> None:
+        self.file = file
+        self.rows = rows
+        self.separator = separator
+        self.decimal = text.decimal_mark(rows, separator)
+        self.lines: dict[str, int] = {}  # where the fields above the table stand
+
+    def document(self) -> dict[str, Any]:
+        table = next((index for index, row in enumerate(self.rows) if row[0].lower() == "id"), None)
+        if table is None:
+            raise self._error(len(self.rows) - 1, "the table is missing: no line begins with id")
+        document: dict[str, Any] = {"schema": SCHEMA, "skin": {}, "recordings": []}
+        for index, row in enumerate(self.rows[:table]):
+            if any(row):
+                self._about(document, row, index)
+        document["recordings"] = self._recordings(table)
+        return document
+
+    def _about(self, document: dict[str, Any], row: list[str], index: int) -> None:
+        """A line above the table: of the campaign, of the skin, or a sensor."""
+        name = row[0]
+        self._require_few(row, index, 4 if name == "sensor" else 2)
+        cell = row[1] if len(row) > 1 else ""
+        if name == "sensor":
+            values = [*row[1:], "", "", ""]
+            sensor = {key: self._value(key, values[place], (index, place + 1)) for place, key in enumerate(_SENSOR)}
+            document["skin"].setdefault("sensors", []).append(sensor)
+        elif name in ("schema", "name", "units_checked"):
+            self._require_first(name, index)
+            document[name] = _FLAGS.get(cell.lower(), cell) if name == "units_checked" else cell
+        else:
+            field, factor = self._field(name.removeprefix("skin."), index)
+            if f"skin.{field}" not in _SKIN_FIELDS or not name.startswith("skin."):
+                raise self._error(index, f"{name!r} is neither of the campaign nor of its skin")
+            self._require_first(f"skin.{field}", index)
+            document["skin"][field] = self._value(f"skin.{field}", cell, (index, 1), factor)
+            if factor != 1.0 and not self._units_checked():
+                self._require_meant(name, field, cell, document["skin"][field], index)
+
+    def _require_few(self, row: list[str], index: int, most: int) -> None:
+        """Refuses cells behind those that a line above the table has, such as what follows a decimal comma."""
+        if len(row) > most:
+            point = ", decimals are written with a point" if self.separator == "," else ""
+            hint = f"cells that hold {self.separator!r} go in quotes{point}"
+            raise self._error(index, f"{row[most]!r} is a cell too many under {row[0]}: {hint}", most)
+
+    def _require_first(self, field: str, index: int) -> None:
+        """Refuses a field that stands above already."""
+        before = self.lines.setdefault(field, index)
+        if before != index:
+            raise self._error(index, f"{field} is given on line {before + 1} already", 0)
+
+    def _units_checked(self) -> bool:
+        return any([cell.lower() for cell in row[:2]] == ["units_checked", "true"] for row in self.rows)
+
+    def _require_meant(self, heading: str, field: str, cell: str, converted: Any, index: int) -> None:
+        """Refuses a value that is likely in the field's unit and unlikely in the one that its heading says."""
+        number, known = text.number(cell, self.decimal), LAB[field]
+        if number is None or known.likely is None or _likely(known, converted) or not _likely(known, number):
+            return
+        said = f"{cell} {labelled_unit(heading)} is {converted:g} {known.unit}: was {cell} {known.unit} meant?"
+        raise self._error(index, f"{heading} = {cell}: {said} (if not, units_checked,true)")
+
+    def _recordings(self, table: int) -> list[dict[str, Any]]:
+        headings = self._headings(table)
+        recordings: dict[str, dict[str, Any]] = {}
+        begun: dict[str, int] = {}
+        current, continued = "", False  # the id of the recording, and whether rows without it have followed
+        for index, row in enumerate(self.rows[table + 1 :], start=table + 1):
+            if not any(row):
+                continue
+            if row[0] and (row[0] != current or continued):
+                if row[0] in begun:
+                    raise self._error(index, f"recording {row[0]!r} began on line {begun[row[0]] + 1} already", 0)
+                current, begun[row[0]] = row[0], index
+            continued = not row[0]
+            if not current:
+                raise self._error(index, "the first row of the table needs an id")
+            if len(row) > len(headings):
+                reason = f"has {len(row)} cells under {len(headings)} headings"
+                raise self._error(index, reason, len(headings))
+            self._add_row(recordings.setdefault(current, {}), self._line(headings, row, index), index)
+        return [_as_documented(recording) for recording in recordings.values()]
+
+    def _line(self, headings: list[tuple[str, float]], row: list[str], index: int) -> dict[str, Any]:
+        """The values of a row by field."""
+        cells = [*row, *[""] * (len(headings) - len(row))]
+        return {
+            field: self._value(field, cell, (index, column), factor)
+            for column, ((field, factor), cell) in enumerate(zip(headings, cells, strict=True))
+        }
+
+    def _add_row(self, recording: dict[str, Any], line: dict[str, Any], index: int) -> None:
+        self._add_entries(recording, {field: line.pop(field) for field in COLUMNS if field in line})
+        for field, value in line.items():
+            if value is not None:
+                self._add(recording, field, value, index)
+
+    def _headings(self, table: int) -> list[tuple[str, float]]:
+        """The field of each column and the factor to its unit, each field once."""
+        headings: dict[str, float] = {}
+        for cell in self.rows[table]:
+            field, factor = self._field(cell, table)
+            if field in headings:
+                raise self._error(table, f"{cell!r} is a second column of {field}")
+            headings[field] = factor
+        return list(headings.items())
+
+    def _add_entries(self, recording: dict[str, Any], line: dict[str, Any]) -> None:
+        """A row's entries of the columns, if it has any; one that is missing beside others is for the checks."""
+        if any(value is not None for value in line.values()):
+            for field, value in line.items():
+                recording.setdefault(field, []).append(value)
+
+    def _add(self, recording: dict[str, Any], field: str, value: Any, index: int) -> None:
+        before = recording.setdefault(field, value)
+        if before != value:
+            raise self._error(index, f"{field} = {value!r}, but {before!r} above it")
+
+    def _field(self, heading: str, index: int) -> tuple[str, float]:
+        """The field of a heading and the factor to its unit."""
+        if heading in _KNOWN or f"skin.{heading}" in _SKIN_FIELDS:
+            return heading, 1.0
+        found = lab_field(heading)
+        if found is None:
+            raise self._error(index, f"{heading!r} is no field, or its unit is not of the field")
+        return found
+
+    def _value(self, field: str, cell: str, place: tuple[int, int], factor: float = 1.0) -> Any:
+        """The number in the cell at a place (row and column, from 0).
+
+        What is no number stays as it is, for the campaign's checks to refuse.
+        """
+        if not cell or field in _TEXTS:
+            return cell or None
+        number = text.number(cell, self.decimal)
+        if number is not None:
+            return number * factor
+        if text.is_grouped(cell):
+            raise self._error(place[0], f"{field} = {cell!r} {text.ungrouped(cell)}", place[1])
+        return cell
+
+    def _error(self, index: int, reason: str, column: int | None = None) -> FileError:
+        """What is wrong with a row, or with its cell in a column (both from 0)."""
+        place = f"line {index + 1}" if column is None else f"line {index + 1}, column {column + 1}"
+        return FileError(self.file, place, reason)
+
+
+def _likely(known: LabField, value: float) -> bool:
+    assert known.likely is not None
+    return known.likely[0] <= value <= known.likely[1]
+
+
+def _as_documented(recording: dict[str, Any]) -> dict[str, Any]:
+    """The recording as in a campaign: one position, and no columns that it leaves empty, which are another kind's."""
+    documented = {
+        name: value
+        for name, value in recording.items()
+        if name not in _POSITION and (name not in COLUMNS or any(entry is not None for entry in value))
+    }
+    position = [recording.get(name) for name in _POSITION]
+    if position != [None, None]:
+        documented.setdefault("position_mm", position)
+    return documented

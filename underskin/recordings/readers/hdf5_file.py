@@ -1,0 +1,102 @@
+"""Campaigns as HDF5, field for field as in JSON, and back without loss.
+
+/                        attributes schema, name, units_checked
+/skin                    attributes as in the document
+/skin/sensors            datasets id, x_mm, y_mm
+/recordings/<number>     attributes for single values, a dataset for each column
+"""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import h5py
+import numpy as np
+
+from underskin.errors import FileError
+from underskin.recordings.campaign import COLUMNS, SCHEMA, Campaign, to_dict
+from underskin.recordings.readers import hdf5_links
+from underskin.recordings.readers.hdf5_damage import damage
+
+MAGIC = b"\x89HDF\r\n\x1a\n"
+
+
+def write(campaign: Campaign, stream: BinaryIO) -> None:
+    """Write the campaign into an open binary file."""
+    document = to_dict(campaign)
+    write_document(document, document["recordings"], stream)
+
+
+def write_document(about: Mapping[str, Any], recordings: Iterable[Mapping[str, Any]], file: Path | BinaryIO) -> None:
+    """Write a campaign document whose recordings come one by one; what `about` has of them is not read."""
+    with h5py.File(file, "w", libver="latest") as target:
+        _write_attributes(target, {name: about[name] for name in about if name not in ("skin", "recordings")})
+        skin = dict(about["skin"])
+        sensors = skin.pop("sensors", [])
+        _write_attributes(target.create_group("skin"), skin)
+        for name in ("id", "x_mm", "y_mm") if sensors else ():
+            target[f"skin/sensors/{name}"] = [sensor[name] for sensor in sensors]
+        groups = target.create_group("recordings")
+        for number, recording in enumerate(recordings):
+            group = groups.create_group(f"{number:06d}")
+            _write_attributes(group, {name: value for name, value in recording.items() if name not in COLUMNS})
+            for name in recording.keys() & set(COLUMNS):
+                group[name] = np.array(recording[name], dtype=np.float64)
+
+
+def _write_attributes(group: Any, values: dict[str, Any]) -> None:
+    for name, value in values.items():
+        if value is not None:
+            group.attrs[name] = value
+
+
+def read(stream: BinaryIO, file: str) -> dict[str, Any]:
+    """The campaign document of an HDF5 file; raises FileError that names the object."""
+    stream.seek(0)
+    try:
+        with h5py.File(stream, "r") as source:
+            hdf5_links.refuse_outside(source, file)
+            return _document(source, file)
+    except (MemoryError, FileError):
+        raise
+    except Exception as error:
+        raise FileError(file, "", f"the HDF5 file {damage(error)}") from None
+
+
+def _document(source: Any, file: str) -> dict[str, Any]:
+    about = _attributes(source)
+    schema = about.get("schema")
+    if str(schema).startswith("skin-export/"):
+        how = "it comes in alone, on the upload page or by `underskin import FILE`"
+        raise FileError(file, "/", f"is a whole skin as `underskin export` writes it: {how}")
+    if schema != SCHEMA or "skin" not in source or "recordings" not in source:
+        needed = f"it needs the attribute schema = {SCHEMA}, /skin and /recordings"
+        raise FileError(file, "/", f"is HDF5, but no campaign: {needed}; other HDF5 is read from MATLAB 7.3 only")
+    skin = _attributes(source["skin"])
+    if "sensors" in source["skin"]:
+        columns = [_entries(source["skin/sensors"], name) for name in ("id", "x_mm", "y_mm")]
+        skin["sensors"] = [dict(zip(("id", "x_mm", "y_mm"), row, strict=True)) for row in zip(*columns, strict=True)]
+    return {
+        **about,
+        "skin": skin,
+        "recordings": [_recording(source["recordings"][name]) for name in source["recordings"]],
+    }
+
+
+def _recording(group: Any) -> dict[str, Any]:
+    return {**_attributes(group), **{name: group[name][()] for name in group}}
+
+
+def _entries(group: Any, name: str) -> list[Any]:
+    dataset = group[name]
+    return list(dataset.asstr()[()]) if name == "id" else dataset[()].tolist()
+
+
+def _attributes(group: Any) -> dict[str, Any]:
+    return {name: _plain(value) for name, value in group.attrs.items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return value.decode()
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value

@@ -1,0 +1,177 @@
+"""Files from outside, parsed in a process of their own that has a limit on memory and on time.
+
+The child gets the open file, no name and no path, cannot write more than it may hold, and answers in JSON and plain
+arrays, so that nothing it says is run here. When it dies, that is an error that names the file.
+"""
+
+import importlib
+import os
+import secrets
+import struct
+import subprocess
+import sys
+import tempfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import orjson
+
+from underskin.errors import FileError
+from underskin.recordings.channels import Block, Channel, Contents
+from underskin.recordings.readers.formats import parse
+from underskin.recordings.validation import shown
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one file may take: `memory_bytes` beyond the interpreter's own, `seconds` by the clock. The answer about it
+    may be `unfolding` times as long as the file, and 16 MB."""
+
+    memory_bytes: int = 1 << 30
+    seconds: float = 60.0
+    unfolding: float = 16.0
+
+    def answer_bytes(self, file_bytes: int) -> int:
+        """How long the answer about a file of this size may be."""
+        return min(self.memory_bytes, _SHORT_ANSWER + int(self.unfolding * file_bytes))
+
+
+_DEFAULT = Limits()
+_SHORT_ANSWER = 16 << 20
+_INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR")
+_LAST_WORDS = 500
+_LENGTH = struct.Struct("<Q")
+
+
+def parse_apart(name: str, stream: BinaryIO, file: str, limits: Limits = _DEFAULT) -> Contents | dict[str, Any]:
+    """As formats.parse, in a child process; raises FileError also where the child dies or breaks a limit."""
+    told = call_apart(f"{__name__}:_parsed", stream, file, name, what=name, limits=limits)
+    if "document" in told:
+        return dict(told["document"])
+    blocks = [
+        Block(**{**block, "channels": tuple(Channel(**channel) for channel in block["channels"])})
+        for block in told["blocks"]
+    ]
+    return Contents(tuple(blocks), told["properties"], tuple(told["warnings"]))
+
+
+def call_apart(
+    function: str, stream: BinaryIO, file: str, *given: str, what: str, limits: Limits = _DEFAULT
+) -> dict[str, Any]:
+    """What `function` ("module:name", called with the stream and the texts given) answers, in a child process.
+
+    The answer is made of what JSON has and arrays of one axis; `what` the file is read as goes into errors. Raises
+    FileError as `parse_apart`.
+    """
+    longest = limits.answer_bytes(stream.seek(0, os.SEEK_END))
+    stream.seek(0)
+    environment = {key: os.environ[key] for key in _INHERITED if key in os.environ}
+    environment |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "HDF5_PLUGIN_PATH": os.devnull}
+    environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))  # the packages of this process
+    bounds = [str(limits.memory_bytes), str(limits.seconds), str(longest)]
+    command = [sys.executable, "-P", "-m", __name__, function, *bounds, *given]
+    with tempfile.TemporaryFile() as answer, tempfile.TemporaryFile() as said:
+        child = subprocess.Popen(command, stdin=stream, stdout=answer, stderr=said, env=environment)
+        try:
+            status = child.wait(limits.seconds)
+        except subprocess.TimeoutExpired:
+            raise FileError(
+                file, "", f"reading it as {what} took more than {limits.seconds:g} s and was stopped"
+            ) from None
+        finally:
+            child.kill()
+            child.wait()
+        if status != 0:
+            raise FileError(file, "", f"the process that read it as {what} {_end(status, said)}")
+        answer.seek(0)
+        return _understood(answer.read(), file)
+
+
+def _end(status: int, said: BinaryIO) -> str:
+    """How the child ended: by a signal, or with what it said last."""
+    if status < 0:
+        return f"was killed by signal {-status}"
+    said.seek(max(0, said.seek(0, os.SEEK_END) - _LAST_WORDS))
+    last = "".join(said.read().decode("utf-8", "replace").strip().splitlines()[-1:])
+    return f"ended with status {status}: {last}"
+
+
+def _understood(answer: bytes, file: str) -> dict[str, Any]:
+    (size,) = _LENGTH.unpack_from(answer)
+    header = orjson.loads(answer[_LENGTH.size : _LENGTH.size + size])
+    told = header["told"]
+    if "error" in told:
+        raise FileError(file, told["error"]["place"], told["error"]["reason"])
+    return dict(_with_arrays(told, header["mark"], memoryview(answer)[_LENGTH.size + size :]))
+
+
+def _with_arrays(told: Any, mark: str, buffer: memoryview) -> Any:
+    """What was told, with the array that each {mark: [type, start, count]} stands for."""
+    if isinstance(told, list):
+        return [_with_arrays(entry, mark, buffer) for entry in told]
+    if not isinstance(told, dict):
+        return told
+    if told.keys() == {mark}:
+        kind, start, count = told[mark]
+        return np.frombuffer(buffer, dtype=kind, count=count, offset=start).copy()
+    return {name: _with_arrays(value, mark, buffer) for name, value in told.items()}
+
+
+def _parsed(stream: BinaryIO, name: str) -> dict[str, Any]:
+    contents = parse(name, stream, "")
+    return asdict(contents) if isinstance(contents, Contents) else {"document": contents}
+
+
+def _main() -> None:
+    """The child: file on standard input, answer on standard output."""
+    function, memory_bytes, seconds, longest, *given = sys.argv[1:]
+    _limit(int(memory_bytes), float(seconds))
+    module, _, name = function.partition(":")
+    try:
+        with os.fdopen(0, "rb") as stream:
+            answer = _encoded(getattr(importlib.import_module(module), name)(stream, *given))
+        if sum(memoryview(part).nbytes for part in answer) > int(longest):
+            raise FileError("", "", f"it unfolds to more than {int(longest) >> 20} MB, too much for a file of its size")
+    except FileError as error:
+        answer = _encoded({"error": {"place": error.place, "reason": error.reason}})
+    except MemoryError:
+        reason = f"reading it takes more than {int(memory_bytes) / (1 << 30):.3g} GB of memory"
+        answer = _encoded({"error": {"place": "", "reason": reason}})
+    with os.fdopen(1, "wb") as out:
+        for part in answer:
+            out.write(part)
+
+
+def _limit(memory_bytes: int, seconds: float) -> None:
+    import resource  # not on Windows, where no server runs
+
+    own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (own + memory_bytes, own + memory_bytes))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (memory_bytes, memory_bytes))
+    resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 1))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _encoded(answer: dict[str, Any]) -> list[Any]:
+    """The answer's parts. Nothing in a file can pass for an array: their mark is not to be guessed."""
+    mark = secrets.token_hex(16)
+    arrays: list[Any] = []
+    position = 0
+
+    def plain(value: Any) -> Any:
+        nonlocal position
+        if not isinstance(value, np.ndarray) or value.dtype.kind not in "iufc" or value.ndim != 1:
+            return shown(value)
+        array = np.ascontiguousarray(value)
+        arrays.append(array.data)
+        start, position = position, position + array.nbytes
+        return {mark: [array.dtype.str, start, array.size]}
+
+    header = orjson.dumps({"mark": mark, "told": answer}, default=plain)
+    return [_LENGTH.pack(len(header)), header, *arrays]
+
+
+if __name__ == "__main__":
+    _main()

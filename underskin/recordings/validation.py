@@ -1,0 +1,286 @@
+"""Checks of single campaign fields: each takes the field's name and value and returns what the model keeps.
+
+Every check raises InvalidInput that names the field, the value and what is allowed. A model names the check of each
+field in its annotation, by one of the types at the end.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, fields
+from datetime import datetime
+from functools import cache
+from itertools import islice
+from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from underskin.errors import InvalidInput
+from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.units import Floats, checked
+
+Model = TypeVar("Model")
+Check = Callable[[str, Any, bool], Any]  # name, value, units_checked
+
+LONGEST_NAME = 200
+_LARGEST_COUNT = 2**53
+_FREQUENCIES_HZ = (1e-6, 1e9)
+_MOST_UNKNOWN = 20  # unknown fields of one object that are told; a document may hold millions
+_COHERENCE_ROUNDING = 1e-6  # single-precision instruments write 1.0000001
+
+
+def check_fields(
+    model: Any, document: Mapping[str, Any], *, units_checked: bool
+) -> tuple[dict[str, Any], list[InvalidInput]]:
+    """The checked values of a document's fields, by the check that `model` annotates each with, and every refusal.
+
+    `model` is a dataclass; a field that has a default may be left out or null.
+    """
+    known = _checks(model)
+    unknown = (name for name in document if name not in known)
+    refused = [
+        InvalidInput(named(name), shown(document[name]), f"unknown field; known: {', '.join(known)}")
+        for name in islice(unknown, _MOST_UNKNOWN)
+    ]
+    values: dict[str, Any] = {}
+    for name, (field_check, default) in known.items():
+        value = document.get(name)
+        try:
+            if value is None and default is MISSING:
+                raise InvalidInput(name, None, "required")
+            values[name] = default if value is None else field_check(name, value, units_checked)
+        except InvalidInput as refusal:
+            refused.append(refusal)
+    return values, refused
+
+
+def mapping(field: str, value: Any) -> Mapping[str, Any]:
+    """A JSON object."""
+    if not isinstance(value, Mapping):
+        raise InvalidInput(field, shown(value), "must be an object with named fields")
+    return value
+
+
+def build(model: type[Model], prefix: str, document: Any, units_checked: bool) -> Model:
+    """A model of a document; raises InvalidInput at the first field refused, its name led by `prefix`."""
+    values, refused = check_fields(model, mapping(prefix, document), units_checked=units_checked)
+    if refused:
+        raise InvalidInput(f"{prefix}.{refused[0].field}", refused[0].value, refused[0].allowed, refused[0].index)
+    return model(**values)
+
+
+@cache
+def _checks(model: Any) -> dict[str, tuple[Check, Any]]:
+    """Each field's check and default."""
+    hints = get_type_hints(model, include_extras=True)
+    return {field.name: (_annotated_check(hints[field.name]), field.default) for field in fields(model)}
+
+
+def _annotated_check(hint: Any) -> Check:
+    parts = [hint, *get_args(hint)]
+    return next(part.__metadata__[0] for part in parts if get_origin(part) is Annotated)
+
+
+def name(field: str, value: Any, units_checked: bool) -> str:  # noqa: ARG001
+    """A short printable text, such as an id."""
+    if not isinstance(value, str) or not value.strip() or len(value) > LONGEST_NAME or not value.isprintable():
+        raise InvalidInput(field, shown(value), f"must be a printable text of 1 to {LONGEST_NAME} characters")
+    return value
+
+
+def flag(field: str, value: Any, units_checked: bool) -> bool:  # noqa: ARG001
+    """true or false."""
+    if not isinstance(value, bool):
+        raise InvalidInput(field, shown(value), "must be true or false")
+    return value
+
+
+def number(field: str, value: Any, units_checked: bool = False) -> float:  # noqa: ARG001
+    """A finite number."""
+    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
+        raise InvalidInput(field, shown(value), "must be a number")
+    try:
+        result = float(value)
+    except OverflowError:
+        result = math.inf
+    if not math.isfinite(result):
+        raise InvalidInput(field, shown(result), "must be finite")
+    return result
+
+
+def positive(field: str, value: Any, units_checked: bool) -> float:  # noqa: ARG001
+    """A measured or chosen quantity greater than 0, of any magnitude."""
+    result = number(field, value)
+    if result <= 0:
+        raise InvalidInput(field, result, "must be greater than 0")
+    return result
+
+
+def not_negative(field: str, value: Any, units_checked: bool) -> float:  # noqa: ARG001
+    """A number that is 0 or greater."""
+    result = number(field, value)
+    if result < 0:
+        raise InvalidInput(field, result, "must be 0 or greater")
+    return result
+
+
+def declared(field: str, value: Any, units_checked: bool) -> float:
+    """A declared geometry, modulus, preload or d33 in lab units: an unlikely magnitude is refused with a guess."""
+    result = number(field, value)
+    checked(field, result, units_checked=units_checked)
+    return result
+
+
+def poisson_ratio(field: str, value: Any, units_checked: bool) -> float:  # noqa: ARG001
+    """0 to 0.5."""
+    result = number(field, value)
+    if not 0 <= result <= INCOMPRESSIBLE:
+        raise InvalidInput(field, result, f"must be 0 to {INCOMPRESSIBLE}")
+    return result
+
+
+def count(field: str, value: Any, units_checked: bool) -> int:  # noqa: ARG001
+    """A whole number, 0 to 2⁵³: as far as floats, and so JSON, hold every one."""
+    result = number(field, value)
+    if result < 0 or not result.is_integer() or int(value) > _LARGEST_COUNT:
+        raise InvalidInput(field, shown(value), f"must be a whole number, 0 to {_LARGEST_COUNT}")
+    return int(value)
+
+
+def time_of_day(field: str, value: Any, units_checked: bool) -> str:
+    """Date and time as ISO 8601 writes it, kept as written."""
+    text = name(field, value, units_checked)
+    try:
+        datetime.fromisoformat(text)
+    except ValueError:
+        raise InvalidInput(field, text, "must be a date and time like 2017-05-03T09:00:00Z") from None
+    return text
+
+
+def position(field: str, value: Any, units_checked: bool) -> tuple[float, float]:
+    """x and y."""
+    x, y = _pair(field, value)
+    return number(f"{field}[0]", x, units_checked), number(f"{field}[1]", y, units_checked)
+
+
+def _pair(field: str, value: Any) -> tuple[Any, Any]:
+    if not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
+        raise InvalidInput(field, shown(value), "must be two numbers, x and y")
+    return value[0], value[1]
+
+
+def series(field: str, value: Any, units_checked: bool) -> Floats:  # noqa: ARG001
+    """A column of at least one finite number."""
+    column = _column(field, value)
+    if column.size == 0:
+        raise InvalidInput(field, shown(value), "must hold at least one number")
+    _refuse_where(field, column, ~np.isfinite(column), "must be finite")
+    return column
+
+
+def increasing(field: str, value: Any, units_checked: bool) -> Floats:
+    """A column of finite numbers, each greater than the one before."""
+    column = series(field, value, units_checked)
+    _refuse_where(field, column, np.diff(column, prepend=-math.inf) <= 0, "must be greater than the entry before")
+    return column
+
+
+def rows(field: str, value: Any, units_checked: bool) -> Floats:
+    """Rows of finite numbers, equally many in each: (rows, columns)."""
+    if not isinstance(value, list | tuple) or not value:
+        raise InvalidInput(field, shown(value), "must be a list of rows of numbers")
+    found = [series(f"{field}[{index}]", row, units_checked) for index, row in enumerate(value)]
+    for index, row in enumerate(found):
+        if row.size != found[0].size:
+            raise InvalidInput(field, f"{row.size} columns", f"must have as many as row 0 ({found[0].size})", index)
+    return np.stack(found)
+
+
+def frequencies(field: str, value: Any, units_checked: bool) -> Floats:
+    """An increasing column of frequencies above 0, from far below to far above what any instrument records."""
+    column = increasing(field, value, units_checked)
+    _refuse_where(field, column, column <= 0, "must be greater than 0 (leave out the line at 0 Hz)")
+    low, high = _FREQUENCIES_HZ
+    _refuse_where(field, column, (column < low) | (column > high), f"must be {low:g} to {high:g} Hz")
+    return column
+
+
+def not_falling(field: str, value: Any, units_checked: bool) -> Floats:
+    """A column of times: none before the one above it."""
+    column = series(field, value, units_checked)
+    _refuse_where(field, column, np.diff(column, prepend=-math.inf) < 0, "must not be before the entry above it")
+    return column
+
+
+def coherence(field: str, value: Any, units_checked: bool) -> Floats:
+    """A column of coherences γ², 0 to 1."""
+    column = series(field, value, units_checked)
+    _refuse_where(field, column, (column < 0) | (column > 1 + _COHERENCE_ROUNDING), "must be 0 to 1")
+    return column
+
+
+def _column(field: str, value: Any) -> Floats:
+    if isinstance(value, np.ndarray):
+        if value.ndim != 1 or value.dtype.kind not in "iuf":
+            raise InvalidInput(field, shown(value), "must be a list of numbers")
+        return value.astype(np.float64)
+    if not isinstance(value, list | tuple):
+        raise InvalidInput(field, shown(value), "must be a list of numbers")
+    for index, entry in enumerate(value):
+        if type(entry) is not float and type(entry) is not int:
+            raise InvalidInput(field, shown(entry), "must be a number", index=index)
+    try:
+        return np.array(value, dtype=np.float64)
+    except OverflowError:
+        raise InvalidInput(field, shown(value), "holds a number too large to keep") from None
+
+
+def _refuse_where(field: str, column: Floats, bad: Any, allowed: str) -> None:
+    if bad.any():
+        first = int(np.argmax(bad))
+        raise InvalidInput(field, shown(float(column[first])), allowed, index=first)
+
+
+def shown(value: Any) -> Any:
+    """A value as an error may show it: short, and plain JSON."""
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, int | float | np.integer | np.floating):
+        return _shown_number(value)
+    if isinstance(value, str):
+        short = value if len(value) <= LONGEST_NAME else value[:LONGEST_NAME] + "…"
+        return short.encode("utf-8", "replace").decode("utf-8")
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}"
+    return f"a value of type {type(value).__name__}"
+
+
+def named(name: Any) -> str:
+    """A field's name as an error may show it, an empty one too."""
+    return str(shown(name)) or '""'
+
+
+def _shown_number(value: Any) -> Any:
+    try:
+        as_float = float(value)
+    except OverflowError:
+        return "a whole number beyond the range of floats"
+    if not math.isfinite(as_float):
+        return str(as_float)
+    return int(value) if as_float.is_integer() and abs(as_float) < 2**53 else as_float
+
+
+Name = Annotated[str, name]
+Number = Annotated[float, number]
+Positive = Annotated[float, positive]
+NotNegative = Annotated[float, not_negative]
+Declared = Annotated[float, declared]
+PoissonRatio = Annotated[float, poisson_ratio]
+Count = Annotated[int, count]
+TimeOfDay = Annotated[str, time_of_day]
+Position = Annotated[tuple[float, float], position]
+Series = Annotated[Floats, series]
+Increasing = Annotated[Floats, increasing]
+Rows = Annotated[Floats, rows]
+Frequencies = Annotated[Floats, frequencies]
+Times = Annotated[Floats, not_falling]
+Coherence = Annotated[Floats, coherence]

@@ -1,0 +1,79 @@
+"""A digest of what Python sources compute, whatever their modules are called and however they are described.
+
+Work that takes hours is kept as long as the code that made it computes the same. So the digest is of the syntax trees
+without docstrings, comments and layout, and each module counts by its content and not by its name or place. A name that
+is imported stands for what it is: of a module among those digested for the content of that module, of another package
+for its full name, of another module of this project for its last name. Any other change, also of the name of a function
+or of a variable, makes another digest.
+"""
+
+import ast
+import hashlib
+from collections.abc import Mapping
+from typing import Any
+
+_IMPORTS = (ast.Import, ast.ImportFrom)
+_DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+
+
+def source_digest(sources: Mapping[str, str]) -> str:
+    """SHA-256, in hexadecimal, of the texts of modules by their dotted names."""
+    trees = {name: _without_docstrings(ast.parse(source)) for name, source in sources.items()}
+    first = {name: _digest(tree, dict.fromkeys(trees, "module")) for name, tree in trees.items()}
+    digests = sorted(_digest(tree, first) for tree in trees.values())
+    return hashlib.sha256("\n".join(digests).encode()).hexdigest()
+
+
+def _without_docstrings(tree: ast.Module) -> ast.Module:
+    for node in ast.walk(tree):
+        if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            node.body = node.body[1:] or [ast.Pass()]
+    return tree
+
+
+def _digest(tree: ast.Module, identities: Mapping[str, str]) -> str:
+    """Of one module, with identities for the modules that it may import."""
+    meanings = _meanings(tree, identities)
+    parts = [
+        meanings.get(node.id, node.id) if isinstance(node, ast.Name) else ast.dump(_bare(node), annotate_fields=False)
+        for node in ast.walk(tree)
+        if not isinstance(node, (*_IMPORTS, ast.alias))
+    ]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def _bare(node: ast.AST) -> ast.AST:
+    """A node with the kinds of its children in their places: what they are is told of them."""
+    fields: dict[str, Any] = {}
+    for name, value in ast.iter_fields(node):
+        if isinstance(value, ast.AST):
+            fields[name] = type(value).__name__
+        elif isinstance(value, list):
+            kept = [entry for entry in value if not isinstance(entry, _IMPORTS)]
+            fields[name] = [type(entry).__name__ if isinstance(entry, ast.AST) else entry for entry in kept]
+        else:
+            fields[name] = value
+    return type(node)(**fields)
+
+
+def _meanings(tree: ast.Module, identities: Mapping[str, str]) -> dict[str, str]:
+    """What each imported name stands for."""
+    ours = {name.partition(".")[0] for name in identities}
+    meanings = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                bound = alias.asname or alias.name.partition(".")[0]
+                meanings[bound] = f"<{identities.get(alias.name, alias.name if alias.asname else bound)}>"
+        elif isinstance(node, ast.ImportFrom):
+            module = node.module or ""
+            for alias in node.names:
+                whole = f"{module}.{alias.name}"
+                if whole in identities:
+                    meaning = identities[whole]
+                elif module in identities:
+                    meaning = f"{identities[module]}.{alias.name}"
+                else:
+                    meaning = alias.name if module.partition(".")[0] in ours else whole
+                meanings[alias.asname or alias.name] = f"<{meaning}>"
+    return meanings

@@ -1,0 +1,109 @@
+"""σ beside the sensor's centre, and what a scatter of the sphere's position does to it.
+
+An offset sensor averages the table's bottom profile T3(r; a/h, L) over its disc:
+    σ(e) = (1/πρ²) ∫_disc profile(|e + s|) d²s, lengths in units of h.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline, make_interp_spline
+
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats
+
+_SPACING = 0.05  # of the grids in r/h and e/h; the profile turns over lengths of 0.3 h and more
+_RADIAL, _ANGULAR = 10, 20  # quadrature over the disc
+_SCATTER_NODES = 7  # Gauss–Hermite, in x and y
+
+
+@dataclass(frozen=True)
+class PositionedSigma:
+    """σ against the offset for each row (contact): `sigma` at the commanded offset, and what scatter makes of it.
+
+    NaN where the table's profile does not reach: at that contact, or so far off. Scatter is followed as far as it does,
+    and beyond that σ, all but gone there, is held.
+    """
+
+    sigma: Floats
+    _offset_over_h: Floats
+    _curve: CubicSpline
+
+    def scattered(self, scatter_over_h: float) -> tuple[Floats, Floats]:
+        """Mean and variance of σ(e + δ)/σ(e), δ normal in x and y with this standard deviation (rows,)."""
+        nodes, weights = np.polynomial.hermite_e.hermegauss(_SCATTER_NODES)
+        weights = weights / weights.sum()
+        x = self._offset_over_h[:, None, None] + scatter_over_h * nodes[:, None]
+        distance = np.hypot(x, scatter_over_h * nodes)
+        ratio = _each_row(self._curve, distance.reshape(len(x), -1)).reshape(distance.shape) / self.sigma[:, None, None]
+        weight = np.outer(weights, weights)
+        mean = (ratio * weight).sum(axis=(1, 2))
+        return mean, (ratio**2 * weight).sum(axis=(1, 2)) - mean**2
+
+
+def positioned_sigma(
+    table: SigmaTable,
+    a_over_h: Floats,
+    rt_over_h: float,
+    load_parameter: Floats,
+    offset_over_h: Floats,
+    largest_scatter_over_h: float,
+) -> PositionedSigma:
+    """σ(e) of contacts (rows) on one skin, ready for scatter up to the largest given."""
+    farthest, largest_disc = table.profile_reach, table.domain["rt_over_h"][1]
+    disc_known = rt_over_h <= largest_disc
+    rt_over_h = min(rt_over_h, largest_disc)
+    reach = float(np.max(offset_over_h, initial=0.0)) + 4 * largest_scatter_over_h
+    offsets = _grid(min(reach + 4 * _SPACING, farthest - rt_over_h))
+    radii = np.minimum(_grid(min(offsets[-1] + rt_over_h + 4 * _SPACING, farthest)), farthest)
+    profile = table.profile(radii, a_over_h[:, None], load_parameter[:, None])
+    sigma = profile @ _disc_average(radii, offsets, rt_over_h).T
+    curve = CubicSpline(offsets, np.nan_to_num(sigma), axis=1, bc_type=((1, np.zeros(len(sigma))), "not-a-knot"))
+    commanded = _each_row(curve, offset_over_h[:, None])[:, 0]
+    seen = disc_known & (offset_over_h <= offsets[-1]) & np.isfinite(sigma).all(axis=1)
+    return PositionedSigma(np.where(seen, commanded, np.nan), offset_over_h, curve)
+
+
+def sigma_beside(table: SigmaTable, a_over_h: float, rt_over_h: float, load_parameter: float) -> tuple[Floats, Floats]:
+    """Offsets e/h, from 0 as far as the table's profile reaches, and σ there of one contact; NaN outside the domain."""
+    farthest = table.profile_reach
+    offsets = _grid(farthest - rt_over_h)
+    radii = np.minimum(_grid(farthest), farthest)
+    profile = table.profile(radii, a_over_h, load_parameter)
+    if not np.isfinite(profile).all():
+        return offsets, np.full(len(offsets), np.nan)
+    distance, weight = _over_disc(offsets, rt_over_h)
+    return offsets, np.einsum("r,ora->o", weight, make_interp_spline(radii, profile, k=3)(distance))
+
+
+def _grid(end: float) -> Floats:
+    """0 to the end, which a last point may pass by rounding alone."""
+    return _SPACING * np.arange(np.floor(end / _SPACING + 1e-9) + 1)
+
+
+def _disc_average(radii: Floats, offsets: Floats, rt_over_h: float) -> Floats:
+    """The matrix (offsets, radii) that averages a profile given at the radii over the offset disc."""
+    distance, weight = _over_disc(offsets, rt_over_h)
+    basis = make_interp_spline(radii, np.eye(len(radii)), k=3)(distance)
+    return np.einsum("r,orak->ok", weight, basis)
+
+
+def _over_disc(offsets: Floats, rt_over_h: float) -> tuple[Floats, Floats]:
+    """How far the points of a quadrature over the offset disc are from the contact (offsets, radial, angular), and the
+    weights of those at each radius."""
+    x, weight = np.polynomial.legendre.leggauss(_RADIAL)
+    s = rt_over_h * (x + 1) / 2
+    weight = weight * (x + 1) / 2 / _ANGULAR
+    angle = np.pi * (np.arange(_ANGULAR) + 0.5) / _ANGULAR
+    across = offsets[:, None, None]
+    return np.sqrt(across**2 + s[:, None] ** 2 + 2 * across * s[:, None] * np.cos(angle)), weight
+
+
+def _each_row(curve: CubicSpline, at: Floats) -> Floats:
+    """Row i of the curve at the points of row i (rows, points); beyond its end, the curve's end."""
+    at = np.minimum(at, curve.x[-1])
+    cell = np.minimum((at / _SPACING).astype(int), len(curve.x) - 2)
+    step = at - curve.x[cell]
+    row = np.arange(len(at))[:, None]
+    c = curve.c  # (power, cell, row), highest power first
+    return ((c[0, cell, row] * step + c[1, cell, row]) * step + c[2, cell, row]) * step + c[3, cell, row]

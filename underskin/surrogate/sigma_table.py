@@ -1,0 +1,155 @@
+"""σ(a/h, rT/h, L) from the finite-element table: values, derivatives, error and domain.
+
+A cubic spline in a/h, rT/h and L^(1/3) passes through the table's nodes; σ is smooth in L^(1/3), which is
+proportional to the strain (a/R, Seminara 2018, equation 16). Rows outside the domain are NaN, never extrapolated.
+"""
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import NdBSpline, make_interp_spline
+
+from underskin.physics.charge_response import Sigma
+from underskin.surrogate.hdf5_format import SIGMA_SCHEMA
+from underskin.surrogate.point_spline import PointSpline, cell_of
+from underskin.surrogate.table_file import Table
+from underskin.units import Floats
+
+SIGMA_TABLE = "sigma.h5"
+
+
+class SigmaTable(Table):
+    """A verified table of σ, ready to answer; see the module."""
+
+    schema = SIGMA_SCHEMA
+
+    def _take(self, data: Mapping[str, Floats]) -> None:
+        self.axes = tuple(data[f"sigma/{name}"] for name in ("a_over_h", "rt_over_h", "cbrt_load_parameter"))
+        self._sigma = _spline(self.axes, data["sigma/sigma"])
+        self._point_sigma = PointSpline(self._sigma)
+        self._point_axes = [axis.tolist() for axis in self.axes]
+        self._cell_error = _largest_at_corners(data["sigma/discretisation_error"] + data["sigma/interpolation_error"])
+        self.fem_linear_error = data["sigma/fem_linear_error"]
+        self._profile_axes = (data["profile/a_over_h"], data["profile/r_over_h"], self.axes[2])
+        self._profile = _spline(self._profile_axes, data["profile/profile"])
+
+    @property
+    def domain(self) -> dict[str, tuple[float, float]]:
+        """Lowest and highest a_over_h, rt_over_h and load_parameter, limits included."""
+        a, rho, x = self.axes
+        return {
+            "a_over_h": (float(a[0]), float(a[-1])),
+            "rt_over_h": (float(rho[0]), float(rho[-1])),
+            "load_parameter": (float(x[0]) ** 3, float(x[-1]) ** 3),
+        }
+
+    @property
+    def profile_reach(self) -> float:
+        """The largest r/h of the profile, included."""
+        return float(self._profile_axes[1][-1])
+
+    def sigma(self, a_over_h: ArrayLike, rt_over_h: ArrayLike, load_parameter: ArrayLike = 0.0) -> Sigma:
+        """σ with its error; the arguments broadcast. Raises nothing: rows outside the domain are NaN."""
+        points, inside, shape = _points(self.axes, a_over_h, rt_over_h, load_parameter)
+        sigma = self._sigma(points)
+        rel_error = self._cell_error[_cells(self.axes, points)]
+        outside = ~inside
+        if outside.any():
+            sigma[outside] = np.nan
+            rel_error[outside] = np.nan
+        return Sigma(sigma.reshape(shape), rel_error.reshape(shape), inside.reshape(shape))
+
+    def at(self, a_over_h: float, rt_over_h: float, load_parameter: float = 0.0) -> tuple[float, float] | None:
+        """σ and the bound on its relative error at one point, without the cost of arrays; None outside the domain."""
+        point = (a_over_h, rt_over_h, math.cbrt(load_parameter))
+        cell = self._point_sigma.cell(*point)
+        if cell is None:
+            return None
+        # The spline's cells are not the table's: next to its ends one spans two of them (not-a-knot).
+        a, rho, x = map(cell_of, self._point_axes, point)
+        return self._point_sigma.value(cell, *point), float(self._cell_error[a, rho, x])
+
+    def gradient(
+        self, a_over_h: ArrayLike, rt_over_h: ArrayLike, load_parameter: ArrayLike = 0.0
+    ) -> tuple[Floats, Floats, Floats]:
+        """∂σ/∂(a/h), ∂σ/∂(rT/h) and ∂σ/∂L, NaN outside the domain.
+
+        ∂σ/∂L is infinite at L = 0, where σ grows like L^(1/3).
+        """
+        points, inside, shape = _points(self.axes, a_over_h, rt_over_h, load_parameter)
+        slopes = [self._sigma(points, nu=order) for order in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
+        with np.errstate(divide="ignore"):
+            slopes[2] = slopes[2] / (3 * points[:, 2] ** 2)
+        da, drho, dload = (np.where(inside, slope, np.nan).reshape(shape) for slope in slopes)
+        return da, drho, dload
+
+    def profile(self, r_over_h: ArrayLike, a_over_h: ArrayLike, load_parameter: ArrayLike = 0.0) -> Floats:
+        """The stress on the base at r/h from the contact's axis, in σ's scale: T3 = −(3F/2πh²) · profile.
+
+        A sensor beside the axis averages it over its disc. NaN outside the domain.
+        """
+        points, inside, shape = _points(self._profile_axes, a_over_h, r_over_h, load_parameter)
+        return np.where(inside, self._profile(points), np.nan).reshape(shape)
+
+
+def tables_folder() -> Path:
+    """Where the tables are: `UNDERSKIN_TABLES`, else inside the installed package, else beside it in a checkout."""
+    override = os.environ.get("UNDERSKIN_TABLES")
+    if override:
+        return Path(override)
+    package = Path(__file__).parents[1]
+    shipped = package / "tables"
+    return shipped if shipped.is_dir() else package.parent / "tables"
+
+
+def load_table(path: Path | None = None) -> SigmaTable:
+    """The σ table at `path`, or the default one; raises TableError with the reason."""
+    return SigmaTable(path or tables_folder() / SIGMA_TABLE)
+
+
+def interpolation_coefficients(axes: Sequence[Floats], values: Floats) -> tuple[tuple[Floats, ...], Floats]:
+    """Knots and coefficients of the cubic spline through values on a grid (not-a-knot ends)."""
+    knots = []
+    for axis, nodes in enumerate(axes):
+        spline = make_interp_spline(nodes, values, k=3, axis=axis)
+        knots.append(np.asarray(spline.t))
+        values = np.moveaxis(np.asarray(spline.c), 0, axis)
+    return tuple(knots), values
+
+
+def _spline(axes: Sequence[Floats], values: Floats) -> NdBSpline:
+    knots, coefficients = interpolation_coefficients(axes, values)
+    return NdBSpline(knots, np.ascontiguousarray(coefficients), 3)
+
+
+def _points(
+    axes: Sequence[Floats], a_over_h: ArrayLike, second: ArrayLike, load_parameter: ArrayLike
+) -> tuple[Floats, NDArray[np.bool_], tuple[int, ...]]:
+    """Grid coordinates (rows, 3), which rows are inside, and the broadcast shape; outside rows are moved inside."""
+    columns = np.broadcast_arrays(
+        np.asarray(a_over_h, dtype=float), np.asarray(second, dtype=float), np.cbrt(load_parameter)
+    )
+    points = np.stack([column.ravel() for column in columns], axis=-1)
+    low = np.array([axis[0] for axis in axes])
+    high = np.array([axis[-1] for axis in axes])
+    inside: NDArray[np.bool_] = np.all((points >= low) & (points <= high), axis=1)
+    if not inside.all():
+        points[~inside] = low
+    return points, inside, columns[0].shape
+
+
+def _cells(axes: Sequence[Floats], points: Floats) -> tuple[NDArray[np.intp], ...]:
+    return tuple(np.searchsorted(axis[1:-1], points[:, number], side="right") for number, axis in enumerate(axes))
+
+
+def _largest_at_corners(values: Floats) -> Floats:
+    """The largest value at the corners of each cell of the grid."""
+    for axis in range(values.ndim):
+        count = values.shape[axis]
+        low, high = (np.take(values, range(first, count - 1 + first), axis=axis) for first in (0, 1))
+        values = np.maximum(low, high)
+    return values
