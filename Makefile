@@ -13,7 +13,7 @@ PYTEST = $(PYTHON) -m pytest --numprocesses 2 --dist loadfile
 PIP_INSTALL = $(PYTHON) -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test check tables paper tour mechanisms proof bench soak lock clean
+.PHONY: help serve test check docs tables paper tour mechanisms proof bench soak lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -34,6 +34,10 @@ check: $(VENV)/.dev ## format, lint, strict types, import direction
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m mypy
 	$(VENV)/bin/lint-imports
+
+# The variable silences a notice of the theme about its successor.
+docs: $(VENV)/.dev ## build the pages as a site into build/site, and check every link
+	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict
 
 tables: $(VENV)/.runtime ## solve the shipped tables again
 	$(VENV)/bin/underskin tablegen sigma --out tables/sigma.h5

@@ -33,9 +33,9 @@ def _pattern(shown: str) -> tuple[str, list[tuple[str, bool]]]:
         number = piece["cut"] or piece["whole"]
         if number:
             numbers.append((number, bool(piece["cut"])))
-            parts.append(f"({_NUMBER})")
+            parts.append(rf"(?<![\w.])((?>{_NUMBER}))")  # a number as a whole: parts of it are tried for no other
         else:
-            parts.append(r"\s*" if piece["space"] else r"[\s\S]*" if piece["any"] else rf"{re.escape(piece[0])}")
+            parts.append(r"\s*+" if piece["space"] else r"[\s\S]*?" if piece["any"] else re.escape(piece[0]))
     return "".join(parts), numbers
 
 

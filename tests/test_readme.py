@@ -1,10 +1,11 @@
-"""The README keeps its word: its commands print what it shows, its links lead somewhere, its lists are complete."""
+"""README, CONTRIBUTING and the pages by task: their commands print what is shown, their lists are complete."""
 
+import ast
 import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -14,27 +15,46 @@ from tests.conftest import running
 from tests.shown import is_as_shown
 
 ROOT = Path(__file__).parent.parent
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = (
+    "README.md",
+    "CONTRIBUTING.md",
+    "docs/index.md",
+    "docs/quickstart.md",
+    "docs/http-api.md",
+    "docs/command-line.md",
+    "docs/recordings.md",
+    "docs/diagnosis.md",
+    "docs/findings.md",
+    "docs/extending.md",
+    "docs/glossary.md",
+    "docs/deploy.md",  # the last: it makes keys
+)
 PYTHON = ".venv/bin/python"
 ADDRESS = "http://127.0.0.1:8000"
+README_LIMIT = 7000  # bytes
+_PRINTS = "# prints "
 
 
-def blocks(language: str) -> list[str]:
-    """Contents of the code blocks of a language."""
-    return re.findall(rf"^```{language}\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
+def text(page: str) -> str:
+    return (ROOT / page).read_text(encoding="utf-8")
 
 
-def sessions() -> list[tuple[str, str]]:
-    """Commands of the console blocks, each with the output that is shown for it.
+def commands(page: str) -> list[tuple[list[str], str]]:
+    """What a reader of the page runs, in its order, each with the output that is shown for it.
 
-    A command ends where its quotes and here-documents are closed, as bash sees it.
+    In a console block a command begins with `$ ` and ends where its quotes and here-documents are closed, as bash sees
+    it. A Python block says in a comment what it prints; one without that comment is not run.
     """
     pairs = []
-    for block in blocks("console"):
+    for language, block in re.findall(r"^```(console|python)\n(.*?)^```$", text(page), flags=re.M | re.S):
+        if language == "python":
+            pairs += [([PYTHON, "-c", block], shown) for shown in re.findall(f"{_PRINTS}(.*)", block)]
+            continue
         for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
             lines = part.splitlines()
             length = next(n for n in range(1, len(lines) + 1) if is_complete("\n".join(lines[:n])))
-            pairs.append(("\n".join(lines[:length]), "\n".join(lines[length:])))
+            command = ["bash", "-euo", "pipefail", "-c", "\n".join(lines[:length])]
+            pairs.append((command, "\n".join(lines[length:])))
     return pairs
 
 
@@ -54,7 +74,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def newcomer(folder: Path) -> Iterator[Run]:
-    """Runs a command as one who follows the page from its first line, with a service of one's own."""
+    """Runs a command as one who follows the pages from their first line, with a service of one's own."""
     with running(folder) as server:
         environment = os.environ | {
             "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
@@ -70,31 +90,64 @@ def newcomer(folder: Path) -> Iterator[Run]:
         yield run
 
 
-@pytest.mark.parametrize(("command", "shown"), sessions())
-def test_command_prints_what_the_readme_shows(command: str, shown: str, newcomer: Run, folder: Path) -> None:
-    answer = newcomer(["bash", "-euo", "pipefail", "-c", command])
+@pytest.mark.parametrize(
+    ("command", "shown"),
+    [
+        pytest.param(*pair, id=f"{page}-{number}")
+        for page in PAGES
+        for number, pair in enumerate(commands(page), start=1)
+    ],
+)
+def test_command_prints_what_the_page_shows(command: list[str], shown: str, newcomer: Run, folder: Path) -> None:
+    answer = newcomer(command)
     assert answer.returncode == 0, answer.stderr
     printed = answer.stdout.replace(f"{folder}/", "/tmp/")
-    assert is_as_shown(shown, printed), f"{command}\nprints\n{answer.stdout}"
+    assert is_as_shown(shown, printed), f"{command[-1]}\nprints\n{answer.stdout}"
 
 
-@pytest.mark.parametrize("block", blocks("python"))
-def test_python_block_runs_and_prints_what_its_comment_says(block: str, newcomer: Run) -> None:
-    """After the commands, which send what the second block asks for."""
-    (shown,) = re.findall(r"# prints (.*)", block)
-    answer = newcomer([PYTHON, "-c", block])
-    assert answer.returncode == 0, answer.stderr
-    assert is_as_shown(shown, answer.stdout), answer.stdout
+def test_readme_is_short() -> None:
+    assert len(text("README.md").encode()) <= README_LIMIT
 
 
-def test_links_lead_to_files() -> None:
-    links = set(re.findall(r"\]\(([^)#:]+)\)", README))
-    assert len(links) > 5
-    assert [link for link in sorted(links) if not (ROOT / link).exists()] == []
+def test_every_page_has_a_task_and_the_index_leads_to_it() -> None:
+    index = text("docs/index.md")
+    pages = sorted(file.name for file in (ROOT / "docs").glob("*.md") if file.name != "index.md")
+    assert [name for name in pages if f"]({name})" not in index] == []
 
 
-def test_every_make_target_and_setting_is_listed() -> None:
+def test_every_make_target_is_listed() -> None:
     targets = re.findall(r"^(\w+):.*## ", (ROOT / "Makefile").read_text(), flags=re.MULTILINE)
-    wanted = [f"`make {target}`" for target in targets if target != "help"]
-    wanted += [f"`UNDERSKIN_{name.upper()}`" for name in Settings.model_fields]
-    assert [name for name in wanted if f"| {name} |" not in README] == []
+    listed = text("CONTRIBUTING.md")
+    assert [target for target in targets if target != "help" and f"| `make {target}` |" not in listed] == []
+
+
+def test_every_setting_is_listed_with_its_meaning() -> None:
+    listed = text("docs/deploy.md")
+    names = [f"`UNDERSKIN_{name.upper()}`" for name in Settings.model_fields]
+    assert [name for name in names if f"| {name} |" not in listed] == []
+
+
+def finding_codes() -> set[str]:
+    """The codes of a report's findings as they stand in the code: of `Finding` (code, recording, field, statement), of
+    a `Slip`, and of what the service adds to a report."""
+    codes: set[str] = set()
+    for source in (*(ROOT / "underskin").rglob("*.py"), *(ROOT / "service").rglob("*.py")):
+        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+            candidates: Sequence[ast.expr | None] = ()
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 4:
+                candidates = {"Finding": node.args[:1], "Slip": node.args[3:]}.get(node.func.id, ())
+            elif isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "code":
+                candidates = [node.value]
+            elif isinstance(node, ast.Dict):
+                keys = [ast.unparse(key) for key in node.keys if key is not None]
+                if {"'code'", "'recording'", "'statement'"} <= set(keys):
+                    candidates = [node.values[keys.index("'code'")]]
+            values = (entry.value for entry in candidates if isinstance(entry, ast.Constant))
+            codes |= {value for value in values if isinstance(value, str) and value}
+    return codes
+
+
+def test_every_finding_code_is_explained() -> None:
+    explained = re.findall(r"^\| `(\w+)` \|", text("docs/findings.md"), flags=re.MULTILINE)
+    assert len(explained) == len(set(explained))
+    assert set(explained) == finding_codes()

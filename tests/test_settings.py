@@ -46,9 +46,3 @@ def test_every_route_is_documented(http: httpx.Client) -> None:
     document: dict[str, Any] = http.get("/openapi.json").json()
     routes = {f"{method.upper()} {path}" for path, methods in document["paths"].items() for method in methods}
     assert set(rows("Routes")) == routes
-
-
-def test_the_readme_lists_every_setting() -> None:
-    text = (ROOT / "README.md").read_text()
-    for name in Settings.model_fields:
-        assert f"| `UNDERSKIN_{name.upper()}` |" in text

@@ -33,6 +33,10 @@ def test_what_is_the_same_agrees(shown: str, printed: str) -> None:
         ("s01,1", "s02,1"),
         ("0.75,ok", "0.75,out_of_domain"),
         ("7.3957", "7.3958"),
+        (
+            3 * "0.5 0.41274 0.16510 0.0019531 … 0.037511 7.4243 ok\n" + "1 s",  # a table is told apart at once
+            3 * "0.5 0.41274 0.16510 0.0019531 8.1e-07 0.037511 7.4243 ok\n" + "1 t",
+        ),
     ],
 )
 def test_what_differs_does_not(shown: str, printed: str) -> None:

@@ -159,7 +159,7 @@ STEPS = (
         "Design",
         "The design view starts from a skin and answers while you move a slider: what reaches a sensor, how finely the "
         "array tells where a sphere presses, and how far apart two of them must be. "
-        "[What the words mean](../README.md#before-you-build-one).",
+        "[What the words mean](http-api.md#design-of-a-skin).",
         _design,
     ),
 )
