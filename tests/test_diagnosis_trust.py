@@ -8,6 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from docs.tour.steps import VERDICT
+from rig.draw import drawn, record
+from rig.recorded import campaign as rig_campaign
 from tests.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.laplace import levels_covariance
@@ -16,7 +18,7 @@ from underskin.diagnosis.reporting.html_report import page
 from underskin.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings import read_file
-from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, SkinDescription
+from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, SkinDescription, from_dict
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Floats
 
@@ -129,10 +131,16 @@ def test_recordings_of_noise_tell_nothing(table: SigmaTable) -> None:
     assert "stands out of its noise" in report["statement"]
 
 
-def test_scatter_far_beyond_its_noise_model_is_no_agreement(table: SigmaTable) -> None:
-    report = diagnosis_report(campaign(Made(gain=0.12, seed=2), table), table)
-    assert report["verdict"] != "no_mismatch"
-    assert report["d33"] is None
+def test_the_noise_floor_counts_positioning_scatter_of_centred_presses(table: SigmaTable) -> None:
+    """A press on its sensor's centre feels it in second order: errors looked far above a floor that left that out."""
+    centred, _ = from_dict(rig_campaign(record(drawn(20261122, 1, "none"))))
+    report = diagnosis_report(centred, table)
+    assert report["verdict"] == "no_mismatch"
+    fit = report["fit"]
+    assert fit["noise"]["position_mm"] > 0.1
+    assert fit["after"]["rmse_percent"] == pytest.approx(fit["noise_floor_percent"], rel=0.2)
+    assert fit["after"]["heldout_rmse_percent"] == pytest.approx(fit["noise_floor_percent"], rel=0.2)
+    assert report["d33"]["quotable"]
 
 
 def test_no_d33_is_given_where_several_answers_are_left(table: SigmaTable) -> None:

@@ -27,7 +27,6 @@ _WORTH_TELLING, _LEAST_TOLD = 2.0, 3e-3  # times the noise, and of the largest f
 NOISY = 2.0  # times what the lines' own roughness says
 _STRUCTURED = 2.0**0.5  # the same, where what is added is as large as the noise
 REACHES_NOISE = 1.5  # times the noise floor: an error that noise explains
-_LEAST_RECORDINGS = 12  # whose error then is not larger by chance (once in 500)
 _ALONG_CURVES = {"displacement_mm": "mm", "time_s": "s"}
 _BEFORE = "the preload of the recording before over its own"
 _LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n", "load_cycles", "dwell_s", "frequency_hz", _BEFORE)
@@ -62,16 +61,12 @@ def worth_telling(bench: Workbench, explanation: Explanation, groups: Sequence[H
 
 
 def contradicts(bench: Workbench, null: Explanation) -> bool:
-    """Whether the recordings contradict the null hypothesis, however improbable its rivals are: its residual is larger
-    than its own noise, or keeps structure above the noise: of curves a smooth part, of FRFs lines that scatter about
-    the model more than about their neighbours by as much as those do."""
+    """Whether the recordings contradict the null hypothesis, however improbable its rivals are: its residual keeps
+    structure above the noise. Of curves that is a smooth part, of FRFs lines that scatter about the model more than
+    about their neighbours by as much as those do."""
     if bench.lines.smooth is not None:
         return _is_above_noise(*_smooth_part(bench, null))
-    inside = in_sample(bench, null)
-    beyond_noise = bench.lines.recordings >= _LEAST_RECORDINGS and inside.rmse_percent > (
-        REACHES_NOISE * inside.floor_percent
-    )
-    return beyond_noise or null.best.at.marginal.levels.level > _STRUCTURED
+    return null.best.at.marginal.levels.level > _STRUCTURED
 
 
 def largest_floor_percent(bench: Workbench, null: Explanation, groups: Sequence[HeldOut]) -> float:

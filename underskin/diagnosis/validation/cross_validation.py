@@ -150,7 +150,10 @@ def _predict(smaller: Workbench, explanation: Explanation, bench: Workbench, row
     gains = np.zeros(max(int(left.sensor.max()), int(smaller.lines.sensor.max())) + 1)
     found = explanation.best.at.marginal.sensor_gains
     gains[: len(found)] = found
+    # A contact on an extremum of σ feels positioning scatter in second order, as in the likelihood
+    p2, curvature, recording = levels.position**2, bench.curvature, bench.lines.recording[rows]
     value = prediction.value * np.exp(gains[left.sensor])[left.recording]
+    value = value * np.exp(0.5 * p2 * curvature.laplacian)[recording]
     scatter = levels.gain**2 + np.where(seen, 0.0, levels.spread**2)
     noise = (
         scatter[left.recording] * np.abs(value) ** 2 + (1 if left.curves else 2) * (levels.level * left.deviation) ** 2
@@ -158,7 +161,8 @@ def _predict(smaller: Workbench, explanation: Explanation, bench: Workbench, row
     if left.smooth is not None:
         noise = noise + (levels.smooth * left.smooth.scale) ** 2
     if prediction.position_slopes is not None:
-        noise = noise + levels.position**2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
+        noise = noise + p2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
+        noise = noise + 0.5 * p2**2 * curvature.square[recording] * np.abs(value) ** 2
     picked_up = 2 * pickup_variance[rows]
     noise = noise + picked_up
     square = np.abs(left.value - value) ** 2
