@@ -21,6 +21,7 @@ VERSIONS = (
     "0006",
     "0007",
     "0008",
+    "0009",
 )  # oldest first; one file each in migrations/versions
 SCRIPTS = Path(__file__).parent / "migrations"
 _LOCK = 7236411  # any number, the same for all servers of a database
