@@ -181,7 +181,7 @@ def _stays(connection: Connection, campaign: Campaign, terms: Terms) -> list[str
 
 def _repeats(connection: Connection, campaign: Campaign, terms: Terms) -> list[str]:
     """What is said of recordings that are here already."""
-    earlier = repeats.already_kept(connection, campaign, terms.corrects)
+    earlier = repeats.already_kept(connection, campaign, terms.skin, terms.corrects)
     if earlier is None:
         return []
     said, campaign_id = earlier

@@ -8,7 +8,7 @@ import typer
 
 from service import data_folder
 from service.commands import read_settings
-from service.keys import KeyStore
+from service.keys import KeyStore, keys_missing
 from service.store import StoreError, database
 from service.store import backup as backups
 from service.store import restore as restoring
@@ -50,7 +50,4 @@ def _of_keys(keys: KeyStore) -> str:
     """What whoever restored a store in which keys are needed is told."""
     if keys.file_exists():
         return f"keys are needed: those in {keys.path}"
-    return (
-        f"keys are needed, and {keys.path}, which no backup holds, is missing: put it back, or make a key with "
-        "`underskin key create NAME`"
-    )
+    return keys_missing(keys)

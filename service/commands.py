@@ -20,12 +20,13 @@ from service.app import create_app
 from service.gate import LOOPBACK_NAMES, Gate
 from service.http_protocol import LimitedHttpProtocol
 from service.key_requirement import KeyRequirement
-from service.keys import KeyStore, Scope
+from service.keys import KeyStore, Scope, keys_missing
 from service.log import configure_logging
 from service.settings import Settings
 from service.store import StoreError, database, key_requirement, open_store
 from service.store.engine import StorageFull
 from service.store.errors import StoreMoved
+from service.store.restore import keys_needed
 from underskin import TableError, UnderskinError
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
 
@@ -98,10 +99,14 @@ def create_key(
 @key.command("list")
 def list_keys() -> None:
     """Names, scopes and dates of all keys."""
+    settings = read_settings()
+    keys = KeyStore(settings.data)
     try:
-        for entry in _keys().entries():
+        for entry in keys.entries():
             typer.echo(f"{entry.name}\t{entry.scope}\t{entry.created}")
-    except (OSError, ValueError) as error:
+        if not keys.file_exists() and _keys_needed(settings):
+            typer.echo(f"underskin: {keys_missing(keys)}", err=True)
+    except (*_STORE_FAILED, OSError, ValueError) as error:
         _fail(str(error))
 
 
@@ -126,19 +131,21 @@ def open_to_all(
     """
     settings = read_settings()
     keys = KeyStore(settings.data)
+    there = keys.file_exists()
     if not yes:
+        does = f"this revokes all keys in {keys.path} and" if there else f"there is no {keys.path}; this"
         typer.echo(
-            f"underskin: this revokes all keys in {keys.path} and lets whoever reaches the service in without one; "
-            "to do it: underskin key open --yes",
+            f"underskin: {does} lets whoever reaches the service in without a key; to do it: underskin key open --yes",
             err=True,
         )
         raise typer.Exit(2)
+    done = "all keys are revoked" if there else f"there is no {keys.path}, so that no key is known"
     try:
         keys.remove()
         _note(settings, key_requirement.lift)
     except (*_STORE_FAILED, OSError) as error:
-        _fail(f"all keys are revoked, but the store still says that keys are needed; do it again: {error}")
-    typer.echo("all keys are revoked; a service that listens on this machine alone answers without one")
+        _fail(f"{done}, but the store still says that keys are needed; do it again: {error}")
+    typer.echo(f"{done}; a service that listens on this machine alone answers without one")
 
 
 def _note(settings: Settings, change: Callable[[Connection], None]) -> None:
@@ -149,6 +156,12 @@ def _note(settings: Settings, change: Callable[[Connection], None]) -> None:
         with store.writing() as connection:
             if key_requirement.is_known(connection):
                 change(connection)
+
+
+def _keys_needed(settings: Settings) -> bool:
+    """Whether the store says that requests need a key; one that is still to be made does not."""
+    with closing(database(settings.database_url, settings.data)) as store:
+        return store.is_made() and keys_needed(store)
 
 
 def _fail(reason: str) -> NoReturn:

@@ -11,7 +11,7 @@ from pydantic import Field
 from service.adopted import press, serving_of
 from service.answers import Accept, Columns, FindingModel
 from service.columns import NonNegative, Numbers, NumbersPerRow, Signed, rows
-from service.dependencies import Store, Table, columns_body, columns_route
+from service.dependencies import StoreToRead, Table, columns_body, columns_route
 from service.frf import EXAMPLE as FRF_EXAMPLE
 from service.skin_columns import (
     ADOPTED_COLUMNS,
@@ -217,7 +217,9 @@ _ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": D33Answer, "content":
     responses=_ANSWER,
     openapi_extra=columns_body(D33Columns, EXAMPLE),
 )
-async def d33_columns(request: Request, table: Table, store: Store, accept: Accept = "application/json") -> Response:
+async def d33_columns(
+    request: Request, table: Table, store: StoreToRead, accept: Accept = "application/json"
+) -> Response:
     """In columns: a list has an entry a row, a single number holds for all rows. Accept: text/csv gives CSV."""
 
     def work(table: SigmaTable, columns: D33Columns) -> Columns:

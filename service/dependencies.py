@@ -25,9 +25,17 @@ def _table(request: Request) -> SigmaTable:
 Table = Annotated[SigmaTable, Depends(_table)]
 
 
-def _store(request: Request) -> Database:
-    """The store; for requests that may change it, only where it keeps what it is told: otherwise StoreMoved."""
+def _store_to_read(request: Request) -> Database:
     store: Database = request.app.state.store
+    return store
+
+
+# For routes that keep nothing, whatever their method.
+StoreToRead = Annotated[Database, Depends(_store_to_read)]
+
+
+def _store(request: Request, store: StoreToRead) -> Database:
+    """The store; for requests that may change it, only where it keeps what it is told: otherwise StoreMoved."""
     if request.method not in SAFE:
         store.require_in_place()
     return store

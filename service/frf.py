@@ -9,7 +9,7 @@ from pydantic import Field
 from service.adopted import press, serving_of
 from service.answers import Accept, Columns
 from service.columns import Numbers, Signed, rows
-from service.dependencies import Store, Table, columns_body, columns_route
+from service.dependencies import StoreToRead, Table, columns_body, columns_route
 from service.skin_columns import (
     ADOPTED_COLUMNS,
     FIELDS,
@@ -139,7 +139,9 @@ _ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": FrfAnswer, "content":
     responses=_ANSWER,
     openapi_extra=columns_body(FrfColumns, EXAMPLE),
 )
-async def frf_columns(request: Request, table: Table, store: Store, accept: Accept = "application/json") -> Response:
+async def frf_columns(
+    request: Request, table: Table, store: StoreToRead, accept: Accept = "application/json"
+) -> Response:
     """In columns: a list has an entry a row, a single number holds for all rows. Accept: text/csv gives CSV."""
 
     def work(table: SigmaTable, columns: FrfColumns) -> Columns:

@@ -66,10 +66,10 @@ class KeyRequirement:
         while not self._ending.wait(_LOOK_S):
             try:
                 self.look()
+                self._warn_of_missing_keys()
                 self._failure.is_over()
             except (SQLAlchemyError, StorageFull, StoreMoved, OSError) as error:
                 self._failure.log("whether keys are needed cannot be looked up", error)
-            self._warn_of_missing_keys()
 
     def _warn_of_missing_keys(self) -> None:
         missing = self.needed and not self._keys.file_exists()

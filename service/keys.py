@@ -136,6 +136,14 @@ class KeyStore:
             yield
 
 
+def keys_missing(keys: KeyStore) -> str:
+    """What is said where keys are needed and there is no file of them."""
+    return (
+        f"keys are needed, and {keys.path}, which no backup holds, is missing: put it back, or make a key with "
+        "`underskin key create NAME`"
+    )
+
+
 def _read(path: Path) -> tuple[Key, ...]:
     keys = tuple(Key(**entry) for entry in json.loads(path.read_text())["keys"])
     for key in keys:

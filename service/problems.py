@@ -116,6 +116,14 @@ def invalid_input(errors: Iterable[InvalidInput]) -> Refusal:
     return Refusal(422, "; ".join(str(error) for error in found), title="Invalid input", errors=entries)
 
 
+def given_twice(field: str, place: str) -> Refusal:
+    """The problem of a key that comes again in its JSON object, at `place`: 422."""
+    name = _brief(field)
+    allowed = f"is given twice: must be given once in its object; it comes again at {place}"
+    error = {"field": name, "index": None, "value": None, "allowed": allowed}
+    return Refusal(422, f"{name} {allowed}", title="Invalid input", errors=[error])
+
+
 def unexpected() -> Refusal:
     """The problem of an error that nobody foresaw: 500."""
     return Refusal(500, "Something went wrong in the server; its log has the request's id.")
@@ -137,6 +145,8 @@ _WORDS = {
     "finite_number": "must be finite",
     "model_type": "must be a JSON object with the fields as columns",
     "too_short": "must not be empty",
+    "bool_parsing": "must be true or false",
+    "bool_type": "must be true or false",
 }
 _NOT_FIELDS = {"body", "query", "scalar", "column"}
 

@@ -8,7 +8,7 @@ import orjson
 
 from service.problems import Refusal
 from service.store import skins
-from service.unique_keys import repeated
+from service.unique_keys import require_unique_keys
 from service.uploads import Upload
 from underskin import InvalidInput
 from underskin.errors import FileError
@@ -159,9 +159,15 @@ def _read_json(upload: Upload, most_bytes: int) -> list[Found]:
             ) from None
         allowed = f"must be JSON; line {error.lineno}, column {error.colno}: {error.msg}"
         return [Found(upload.label, errors=[_error("file", upload.label, allowed)])]
-    twice = repeated(content)
-    if twice is not None:
-        return [Found(upload.label, errors=[_invalid(twice)])]
+    try:
+        require_unique_keys(content)
+    except Refusal as twice:
+        return [
+            Found(
+                upload.label,
+                errors=[_error(error["field"], error["value"], error["allowed"]) for error in twice.errors],
+            )
+        ]
     if not isinstance(document, list):
         require_few(1, _recordings_in(document))
         return [_checked(upload.label, document)]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection
 
-from service.store import repeated
+from service.store import campaigns, repeated
 from underskin.recordings.campaign import Campaign
 
 Point = tuple[str, str]  # of a history: id of the campaign, sensor
@@ -30,9 +30,16 @@ class Repeat:
         return f"{which} in campaign {self.campaign_id}: identical recordings count once"
 
 
-def already_kept(connection: Connection, campaign: Campaign, corrects: str | None) -> tuple[str, str] | None:
-    """In which campaign a campaign's recordings are already, as a sentence, and its id; `corrects` is not looked at."""
-    earlier = repeated.most_alike(connection, campaign, corrects)
+def already_kept(
+    connection: Connection, campaign: Campaign, skin_id: str | None, corrects: str | None
+) -> tuple[str, str] | None:
+    """In which campaign a campaign's recordings are already, as a sentence, and its id; `corrects` is not looked at.
+
+    `skin_id`: the skin that it is sent for, where that is said.
+    """
+    if skin_id is None:
+        skin_id = campaign.skin.id if corrects is None else campaigns.find(connection, corrects).skin_id
+    earlier = repeated.most_alike(connection, campaign, skin_id, corrects)
     if earlier is None:
         return None
     some = f"{earlier.identical} of these {earlier.of} recordings {'is' if earlier.identical == 1 else 'are'}"

@@ -6,24 +6,15 @@ from typing import Any
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
 
-from service.problems import invalid_input
-from underskin import InvalidInput
+from service.problems import given_twice
 from underskin.recordings.readers.repeated_keys import repeated_key
 
 
-def repeated(body: bytes) -> InvalidInput | None:
-    """What is wrong with a valid JSON body in which a key comes twice in one object."""
-    found = repeated_key(body)
-    if found is None:
-        return None
-    return InvalidInput(found.key, "given twice", f"must be given once in its object; it comes again at {found.place}")
-
-
 def require_unique_keys(body: bytes) -> None:
-    """Raises Refusal (422) that names the key, its line and its column."""
-    error = repeated(body)
-    if error is not None:
-        raise invalid_input([error])
+    """Raises Refusal (422) that names the key, its line and its column; `body` must be valid JSON."""
+    found = repeated_key(body)
+    if found is not None:
+        raise given_twice(found.key, found.place)
 
 
 class _JsonRequest(Request):

@@ -134,7 +134,8 @@ def test_warnings_are_told_once() -> None:
 
 
 def test_copies_of_a_recording_count_once() -> None:
-    found = join("all", [(f"{name}.csv", reading(press(name))) for name in "abcdefgh"])
+    time = "2017-05-03T09:00:00Z"
+    found = join("all", [(f"{name}.csv", reading(replace(press(name), recorded_at=time))) for name in "abcdefgh"])
     assert ids(found) == ["a"]
     (warning,) = found.warnings
     assert warning == (
@@ -151,9 +152,9 @@ def test_a_recording_is_a_copy_by_its_numbers_its_sensor_and_its_contact() -> No
     )  # fmt: skip
     apart: list[dict[str, object]] = [
         {"sensor": "s2"}, {"preload_n": 2.0}, {"indenter_radius_mm": 5.0}, {"frf_re_pc_per_n": noisy + 1e-9},
-        {"coherence": np.full(20, 0.9)},
+        {"coherence": np.full(20, 0.9)}, {"dynamic_force_n": 0.2}, {"position_mm": (1.0, 0.0)},
     ]  # fmt: skip
-    copies: list[dict[str, object]] = [{"recorded_at": None}, {"dwell_s": 3.0}, {"dynamic_force_n": 0.2}]
+    copies: list[dict[str, object]] = [{"recorded_at": None}, {"dwell_s": 3.0}, {"load_cycles": 9}]
     for changes, kept in [*((one, ["a", "b"]) for one in apart), *((one, ["a"]) for one in copies)]:
         other = replace(first, id="b", **changes)  # type: ignore[arg-type]
         assert ids(join("both", [("a.csv", reading(first)), ("b.csv", reading(other))])) == kept, changes
@@ -165,6 +166,11 @@ def test_few_numbers_may_agree_by_chance_at_another_time() -> None:
         for name, day in (("a", "03"), ("b", "03"), ("c", "04"))
     )
     assert ids(join("all", [("a.csv", first), ("b.csv", again), ("c.csv", later)])) == ["a", "c"]
+
+
+def test_few_numbers_without_a_time_are_no_copies() -> None:
+    found = join("all", [(f"{name}.csv", reading(press(name))) for name in "abc"])
+    assert (ids(found), found.warnings) == (["a", "b", "c"], [])
 
 
 def test_a_press_a_file_as_an_instrument_writes_it() -> None:

@@ -122,8 +122,16 @@ def test_a_form_tells_it_of_its_file(http: httpx.Client) -> None:
     answer = http.post("/v1/campaigns", files=[("file", ("monday.json", TWICE.encode()))])
     (error,) = answer.json()["errors"]
     assert answer.status_code == 422
-    assert (error["field"], error["value"]) == ("thickness_mm", "given twice")
-    assert error["allowed"].startswith("must be given once in its object; it comes again at line ")
+    assert (error["field"], error["value"]) == ("thickness_mm", None)
+    assert error["allowed"].startswith("is given twice: must be given once in its object; it comes again at line ")
+
+
+def test_a_problem_says_what_comes_twice(http: httpx.Client) -> None:
+    body = '{"thickness_mm": 2.5, "thickness_mm": 5}'
+    problem = http.post("/v1/frf", content=body, headers={"Content-Type": "application/json"}).json()
+    said = "is given twice: must be given once in its object; it comes again at line 1, column 23"
+    assert problem["detail"] == f"thickness_mm {said}"
+    assert problem["errors"] == [{"field": "thickness_mm", "index": None, "value": None, "allowed": said}]
 
 
 def test_the_command_line_names_file_line_and_column(tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ def test_every_route_refuses_a_parameter_that_it_does_not_know(http: httpx.Clien
     ("request_line", "field", "says"),
     [
         ("POST /v1/campaigns?skn=palm-3", "skn", "did you mean skin? Known: skin, corrects, reason, all_or_nothing"),
+        ("POST /v1/campaigns?all_or_nothing=maybe", "all_or_nothing", "must be true or false"),
         ("POST /v1/campaigns?All_or_nothing=true", "All_or_nothing", "did you mean all_or_nothing?"),
         ("GET /v1/campaigns?recorded=2017", "recorded", "did you mean recorded_to?"),
         ("GET /v1/skins/a/history?modell=adopted", "modell", "did you mean model? Known: model"),

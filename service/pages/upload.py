@@ -238,7 +238,9 @@ def _look(request: Request, shelved: Shelved) -> None:
         found = _looked(request, shelved, number)
         recordings += sum(one.recordings for one in found.found)
         require_few(len(summaries) + len(found.found), recordings)
-        summaries.append(seen(upload, found, upload_before.worth_knowing(request, found, shelved.corrects)))
+        summaries.append(
+            seen(upload, found, upload_before.worth_knowing(request, found, shelved.skin, shelved.corrects))
+        )
         if number == 0:
             drawn = figures(found, f"/upload/{shelved.id}/0/")
     shelved.seen, shelved.drawn = summaries, {0: drawn}

@@ -15,24 +15,25 @@ from service.store.engine import Database
 from underskin.recordings.campaign import Campaign
 
 
-def worth_knowing(request: Request, look: Look, corrects: str | None) -> list[str]:
-    """In sentences, of the campaigns of one file; `corrects`: the campaign whose place they take."""
+def worth_knowing(request: Request, look: Look, skin_id: str | None, corrects: str | None) -> list[str]:
+    """In sentences, of the campaigns of one file, sent for the skin `skin_id` where that is said; `corrects`: the
+    campaign whose place they take."""
     store, table = request.app.state.store, request.app.state.table
     found = [one.campaign for one in map(arrived_as, look.found) if one.campaign is not None]
     return [
         said
         for campaign in found
         for said in (
-            *_kept(store, campaign, corrects),
+            *_kept(store, campaign, skin_id, corrects),
             *_elsewhere(store, campaign, corrects),
             *inverting.foreseen(table, campaign),
         )
     ]
 
 
-def _kept(store: Database, campaign: Campaign, corrects: str | None) -> Iterator[str]:
+def _kept(store: Database, campaign: Campaign, skin_id: str | None, corrects: str | None) -> Iterator[str]:
     with store.reading() as connection:
-        earlier = repeats.already_kept(connection, campaign, corrects)
+        earlier = repeats.already_kept(connection, campaign, skin_id, corrects)
     if earlier is not None:
         yield earlier[0]
 

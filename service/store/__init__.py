@@ -5,7 +5,8 @@ from pathlib import Path
 from sqlalchemy.exc import DBAPIError
 
 from service.store import migrate
-from service.store.engine import Database, StoreError, database
+from service.store.engine import Database, database
+from service.store.errors import StoreError
 
 __all__ = ["Database", "StoreError", "database", "open_store"]
 

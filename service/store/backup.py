@@ -12,7 +12,8 @@ import tempfile
 from contextlib import closing, suppress
 from pathlib import Path
 
-from service.store.engine import Database, StoreError
+from service.store.engine import Database
+from service.store.errors import StoreError
 from service.store.tables import metadata
 
 

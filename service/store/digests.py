@@ -1,4 +1,4 @@
-"""Which recordings of the store are identical: a digest of each, kept beside it."""
+"""Which recordings of the store are identical: a digest of each that another can repeat, kept beside it."""
 
 from collections.abc import Iterable
 
@@ -10,9 +10,11 @@ from underskin.recordings.repeats import digest
 
 
 def keep(connection: Connection, number: int, recordings: Iterable[Recording]) -> None:
-    """Keep those of the recordings of the campaign `number`, in their order."""
+    """Keep those of the recordings of the campaign `number`, in their order; not all have one."""
     rows = [
-        {"campaign": number, "position": position, "digest": digest(recording)}
+        {"campaign": number, "position": position, "digest": made}
         for position, recording in enumerate(recordings)
+        if (made := digest(recording)) is not None
     ]
-    connection.execute(insert(recording_digests), rows)
+    if rows:
+        connection.execute(insert(recording_digests), rows)

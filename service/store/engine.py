@@ -12,16 +12,13 @@ import orjson
 from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url, text
 from sqlalchemy.exc import ArgumentError, DBAPIError
 
+from service.store.errors import StoreError
 from service.store.sqlite_files import SqliteFiles
 
 SQLITE_FILE = "underskin.sqlite3"
 _PG_DISK_FULL = "53100"
 _PG_WRITING = 7236412  # any number, the same for all servers of a database; a migration has another
 _SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
-
-
-class StoreError(Exception):
-    """The store cannot be used; the message says why and what to do."""
 
 
 class StorageFull(Exception):

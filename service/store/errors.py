@@ -1,4 +1,8 @@
-"""What the store refuses."""
+"""What the store raises."""
+
+
+class StoreError(Exception):
+    """The store cannot be used; the message says why and what to do."""
 
 
 class Missing(LookupError):

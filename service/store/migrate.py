@@ -9,7 +9,8 @@ from pathlib import Path
 from sqlalchemy import Connection, inspect, text
 
 from service.store import backup
-from service.store.engine import Database, StoreError
+from service.store.engine import Database
+from service.store.errors import StoreError
 
 VERSIONS = (
     "0001",

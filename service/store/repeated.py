@@ -25,25 +25,30 @@ class Earlier:
     of: int
 
 
-def most_alike(connection: Connection, campaign: Campaign, corrects: str | None) -> Earlier | None:
-    """The current campaign with the most recordings of this one, whatever their ids, the latest of several.
+def most_alike(connection: Connection, campaign: Campaign, skin_id: str | None, corrects: str | None) -> Earlier | None:
+    """The current campaign with the most recordings of this one, whatever their ids.
 
-    `corrects`: the id of a campaign that is passed over, as this one takes its place.
+    Of several one of the skin `skin_id`, and of those the one that came first, which histories count. `corrects`: the
+    id of a campaign that is passed over, as this one takes its place.
     """
-    coming = sorted({digest(recording) for recording in campaign.recordings})
+    digests = [digest(recording) for recording in campaign.recordings]
+    coming = sorted({known for known in digests if known is not None})
     alike: Counter[int] = Counter()
+    skin_of: dict[int, str] = {}
     for start in range(0, len(coming), _AT_A_TIME):
         these = recording_digests.c.digest.in_(coming[start : start + _AT_A_TIME])
-        query = select(campaigns.c.number, func.count(recording_digests.c.digest.distinct()))
+        query = select(campaigns.c.number, campaigns.c.skin_id, func.count(recording_digests.c.digest.distinct()))
         query = query.join(recording_digests, recording_digests.c.campaign == campaigns.c.number)
-        query = query.where(these, CURRENT, campaigns.c.id != (corrects or "")).group_by(campaigns.c.number)
-        for number, count in connection.execute(query):
+        query = query.where(these, CURRENT, campaigns.c.id != (corrects or ""))
+        for number, skin, count in connection.execute(query.group_by(campaigns.c.number, campaigns.c.skin_id)):
             alike[number] += count
+            skin_of[number] = skin
     if not alike:
         return None
-    number = max(alike, key=lambda number: (alike[number], number))
+    ours = set() if skin_id is None else set(connection.execute(skins.members(skins.root_of(skin_id))).scalars())
+    number = max(alike, key=lambda number: (alike[number], skin_of[number] in ours, -number))
     row = connection.execute(select(campaigns).where(campaigns.c.number == number)).one()
-    return Earlier(row, alike[number], len(coming))
+    return Earlier(row, alike[number], len(coming) + digests.count(None))
 
 
 def shared(connection: Connection, root: str) -> Sequence[AnyRow]:

@@ -5,7 +5,8 @@ from contextlib import closing
 from pathlib import Path
 
 from service.store import backup, key_requirement
-from service.store.engine import Database, StoreError
+from service.store.engine import Database
+from service.store.errors import StoreError
 from service.store.migrate import migrate, require_known, version
 
 

@@ -8,7 +8,7 @@ import sqlite3
 import threading
 from pathlib import Path
 
-from service.store.errors import StoreMoved
+from service.store.errors import StoreError, StoreMoved
 
 _BUSY_S = 60.0  # how long a write waits for another process's write
 _SUFFIXES = ("", "-wal", "-shm")  # the database, its write-ahead log, and the log's index
@@ -29,13 +29,24 @@ class SqliteFiles:
         self._held: list[_Identity] = []
 
     def make(self) -> None:
-        """Make the database, empty, where it is missing."""
+        """Make the database, empty, where it is missing; raises StoreError where its write-ahead log is there."""
+        self._require_whole()
         if not self.is_made():
             self._path.touch()
 
     def is_made(self) -> bool:
         """Whether the database is there."""
         return self._path.exists()
+
+    def _require_whole(self) -> None:
+        """Raises StoreError where a write-ahead log has lost its database: an empty one in its place overwrites it."""
+        log = Path(f"{self._path}-wal")
+        if log.exists() and not self._path.exists():
+            raise StoreError(
+                f"{self._path} is missing, and its write-ahead log {log.name}, which may hold what was kept last, is "
+                f"there: put {self._path.name} back beside it. To start without it, empty or from a backup, move "
+                f"{log.name} and {self._path.name}-shm out of {self._path.parent}."
+            )
 
     def connect(self) -> sqlite3.Connection:
         """A connection to the files that were opened first; raises StoreMoved where the disk has others."""
@@ -62,7 +73,8 @@ class SqliteFiles:
                 happened = "was removed" if there is None else "was replaced by another file"
                 raise StoreMoved(
                     f"{self._path}{suffix} {happened} while the service runs: nothing is kept until the file that was "
-                    "there is back, or the service is restarted with what is there now."
+                    "there is back. Put it back. Where that cannot be, save what can still be read with `underskin "
+                    "export` before the service ends: a restart starts from what is on the disk."
                 )
 
     def close(self) -> None:

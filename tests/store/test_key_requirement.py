@@ -217,3 +217,42 @@ def test_what_is_noted_stays_noted_from_when_it_was(place: Place) -> None:
     store.close()
     assert noted[0] == noted[1]
     assert database(place.database_url, place.folder).is_made()
+
+
+@on_sqlite
+def test_a_file_of_keys_that_cannot_be_looked_at_ends_no_watch(place: Place, tmp_path: Path) -> None:
+    """As where its disk has an error: here its name leads to one that is too long."""
+    there = place.folder / "keys.json"
+    with running(place, **QUIET) as server:
+        make_key(place)
+        assert status_in_time(server, 401) == 401
+        there.rename(tmp_path / "aside")
+        there.symlink_to("x" * 300)
+        time.sleep(1.5)
+        there.unlink()
+        (tmp_path / "aside").rename(there)
+        assert place.command("key", "open", "--yes").returncode == 0
+        assert status_in_time(server, 200) == 200
+    log = (place.folder.parent / f"{place.folder.name}.log").read_text()
+    assert log.count("whether keys are needed cannot be looked up: ") == 1
+
+
+def test_commands_say_that_the_file_of_keys_is_missing(place: Place) -> None:
+    never = place.command("key", "list")
+    assert (never.returncode, never.stdout, never.stderr) == (0, "", "")
+    with running(place, **QUIET):
+        make_key(place)
+        listed = place.command("key", "list")
+        assert (listed.stdout.split("\t")[:2], listed.stderr) == (["lab", "write"], "")
+        (place.folder / "keys.json").unlink()
+        missing = place.command("key", "list")
+        assert (missing.returncode, missing.stdout) == (0, "")
+        assert f"keys are needed, and {place.folder / 'keys.json'}" in missing.stderr
+        assert "is missing" in missing.stderr
+        assert "underskin key create NAME" in missing.stderr
+        for said in (place.command("key", "open").stderr, place.command("key", "open", "--yes").stdout):
+            assert f"there is no {place.folder / 'keys.json'}" in said
+            assert "all keys" not in said
+            assert "revokes" not in said
+        lifted = place.command("key", "list")
+        assert (lifted.returncode, lifted.stdout, lifted.stderr) == (0, "", "")

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from service.d33 import EXAMPLE as D33
+from service.frf import EXAMPLE as FRF
 from tests.store.server import Place, Server, campaign, running
 
 DATABASE = "underskin.sqlite3"
@@ -39,12 +41,11 @@ def names(server: Server) -> set[str]:
 
 def assert_closed(server: Server, said: str) -> None:
     """No write is acknowledged, and the server says why."""
-    columns = {"name": "x", "reason": "y"}
     for answer in (
         server.http.post("/v1/campaigns", json=campaign("lost")),
         server.http.post("/v1/campaigns", files={"file": ("lost.json", json.dumps(campaign("lost")))}),
         server.http.post("/v1/skins/import", content=b"x"),
-        server.http.delete("/v1/skins/palm/model", params=columns),
+        server.http.delete("/v1/skins/palm/model", params={"reason": "wrong sphere"}),
     ):
         assert answer.status_code == 503, answer.text
         assert answer.headers["content-type"] == "application/problem+json"
@@ -53,6 +54,8 @@ def assert_closed(server: Server, said: str) -> None:
     assert (ready.status_code, said in ready.json()["detail"]) == (503, True), ready.text
     assert server.http.get("/health").status_code == 200
     assert server.http.get("/v1/sigma?a_over_h=0.3&rt_over_h=0.6").status_code == 200
+    assert server.http.post("/v1/frf", json=FRF).status_code == 200
+    assert server.http.post("/v1/d33", json=D33).status_code == 200
 
 
 def assert_open(server: Server, name: str, *kept: str) -> None:
@@ -75,13 +78,32 @@ def test_what_was_in_a_removed_file_can_still_be_saved(server: Server, tmp_path:
     skin = server.http.get("/v1/campaigns").json()["campaigns"][0]["skin_id"]
     (server.place.folder / DATABASE).unlink()
     assert names(server) == {"one", "two"}
-    (tmp_path / "saved.h5").write_bytes(server.http.get(f"/v1/skins/{skin}/export").raise_for_status().content)
+    assert_closed(server, "save what can still be read with `underskin export` before the service ends")
+    done = server.place.command("export", skin, str(tmp_path / "saved.h5"), "--url", str(server.http.base_url))
+    assert done.returncode == 0, done.stderr
     elsewhere = Place(tmp_path / "elsewhere")
     elsewhere.folder.mkdir()
     with running(elsewhere, UNDERSKIN_DIAGNOSIS_WORKERS="0") as other:
         content = (tmp_path / "saved.h5").read_bytes()
         assert other.http.post("/v1/skins/import", content=content).status_code == 200
         assert len(names(other)) == 1
+
+
+def test_a_write_ahead_log_that_lost_its_database_is_not_overwritten(server: Server, tmp_path: Path) -> None:
+    assert server.place.command("backup", str(tmp_path / "kept")).returncode == 0
+    log = server.place.folder / f"{DATABASE}-wal"
+    server.kill()
+    (server.place.folder / DATABASE).rename(tmp_path / "aside")
+    before = log.read_bytes()
+    assert before
+    with pytest.raises(AssertionError, match=f"{DATABASE} is missing, and its write-ahead log"), running(server.place):
+        pass  # a start that is refused
+    assert "is missing, and its write-ahead log" in server.place.command("restore", str(tmp_path / "kept")).stderr
+    assert not (server.place.folder / DATABASE).exists()
+    assert log.read_bytes() == before
+    (tmp_path / "aside").rename(server.place.folder / DATABASE)
+    with running(server.place, UNDERSKIN_DIAGNOSIS_WORKERS="0") as later:
+        assert_open(later, "three", "one", "two")
 
 
 def test_a_repeated_request_is_not_acknowledged_either(server: Server) -> None:

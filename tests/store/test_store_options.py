@@ -57,7 +57,7 @@ def test_every_option_of_the_query_is_a_field_of_the_form_too(server: Server) ->
         ({"campaign": "x"}, "?skin=palm-3", "campaign", "is not a form field of this request"),
         ({"skin": ["a", "b"]}, "", "skin", "must be given once"),
         ({"skin": "a"}, "?skin=b", "skin", "must be 'b', as in the query, or be given once"),
-        ({"all_or_nothing": "perhaps"}, "", "all_or_nothing", "boolean"),
+        ({"all_or_nothing": "perhaps"}, "", "all_or_nothing", "must be true or false"),
         ({"reason": "x" * 5000, "corrects": "c-1"}, "", "reason", "at most 4096 bytes"),
         ({"skin": b"\xff"}, "", "skin", "must be text in UTF-8"),
         ({"skin": "a/b"}, "", "skin", "without /"),

@@ -101,6 +101,30 @@ def test_of_two_points_that_share_a_recording_the_fuller_counts(server: Server) 
     assert "sensor s0: its recordings count in campaign" in page
 
 
+def test_recordings_typed_by_hand_without_a_time_are_all_kept(server: Server) -> None:
+    day = campaign("typed", sensors=1, lines=5)
+    typed = {"frf_re_pc_per_n": [7.0] * 5, "frf_im_pc_per_n": [0.0] * 5}
+    base = {name: value for name, value in day["recordings"][0].items() if name not in ("recorded_at", "coherence")}
+    places: list[Document] = [{}, {}, {"position_mm": [1.0, 0.0]}]
+    documents = [
+        {**day, "recordings": [{**base, **typed, **place, "id": f"r{number}"}]} for number, place in enumerate(places)
+    ]
+    answer = server.http.post("/v1/campaigns?together=typed&skin=palm", json=documents)
+    assert answer.status_code == 201, answer.text
+    (kept,) = answer.json()["campaigns"]
+    assert [entry["id"] for entry in kept["recordings"]] == ["r0", "r1", "r2"]
+    assert not [note for note in kept["notes"] if "count once" in note]
+    again = post(
+        server, {**day, "recordings": [{**base, **typed, "id": "typed"}, *campaign("noisy", sensors=1)["recordings"]]}
+    )
+    assert again["notes"] == []
+    third = post(
+        server,
+        {**day, "recordings": [{**base, **typed, "id": "typed"}, *campaign("noisy", sensors=1)["recordings"][1:]]},
+    )
+    assert third["notes"][0].startswith("1 of these 2 recordings is in campaign typed of skin palm already")
+
+
 def test_an_excluded_recording_keeps_no_other_from_counting(server: Server) -> None:
     day = made("monday")
     first = post(server, day)["id"]
@@ -119,7 +143,7 @@ def test_a_copy_is_known_at_another_time_and_on_another_skin_but_not_with_other_
     post(server, renamed(day, "later", recorded_at="2018-01-03T09:00:00Z"))
     assert points(server, "palm") == [first]
     other = post(server, renamed(day, "other"), skin="finger")
-    assert "in campaign later of skin palm already" in other["notes"][0]
+    assert "in campaign monday of skin palm already" in other["notes"][0]
     assert points(server, "finger") == [other["id"]]
     server.http.post("/v1/skins/palm/join", json={"skin_id": "finger", "reason": "one skin"}).raise_for_status()
     assert points(server, "palm") == [first]
@@ -128,6 +152,19 @@ def test_a_copy_is_known_at_another_time_and_on_another_skin_but_not_with_other_
     changed = post(server, day)
     assert changed["notes"] == []
     assert points(server, "palm") == [first, changed["id"]]
+
+
+def test_the_note_names_the_campaign_that_counts(server: Server) -> None:
+    day = made("monday")
+    elsewhere = post(server, day, skin="finger")
+    first = post(server, renamed(day, "first"))
+    second = post(server, renamed(day, "second"))
+    third = post(server, renamed(day, "third"))
+    assert points(server, "palm") == [first["id"]]
+    for answer, counts in ((first, elsewhere), (second, first), (third, first)):
+        assert f"That is {counts['id']};" in answer["notes"][0]
+    corrected = post(server, renamed(day, "right"), corrects=third["id"], reason="a slip in the name")
+    assert f"That is {first['id']};" in corrected["notes"][0]
 
 
 def test_repeats_within_one_request_are_told(server: Server) -> None:

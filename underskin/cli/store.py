@@ -118,11 +118,9 @@ def _is_export(file: Path) -> bool:
 
 def _told(client: "Client", result: dict[str, Any]) -> list[tuple[bool, str]]:
     kept = [entry for entry in result["recordings"] if entry["status"] == "ok"]
-    lines = [(False, f"{error['field']} = {error['value']!r}: {error['allowed']}") for error in result["errors"]]
+    lines = [(False, _refused(error)) for error in result["errors"]]
     lines += [
-        (False, f"{entry['id']} {error['field']} = {error['value']!r}: {error['allowed']}")
-        for entry in result["recordings"]
-        for error in entry["errors"]
+        (False, f"{entry['id']} {_refused(error)}") for entry in result["recordings"] for error in entry["errors"]
     ]
     lines += [(True, note) for note in result["notes"]]
     if result["status"] == "ok":
@@ -132,6 +130,12 @@ def _told(client: "Client", result: dict[str, Any]) -> list[tuple[bool, str]]:
         lines.insert(0, (True, f"campaign {result['id']} of skin {result['skin_id']}{before}, {count}: {figures}"))
         lines += [(True, remark) for remark in remarks]
     return lines
+
+
+def _refused(error: Mapping[str, Any]) -> str:
+    """What is wrong with a value; without it where none was sent, or where the value is not what is wrong."""
+    value = "" if error["value"] is None else f" = {error['value']!r}"
+    return f"{error['field']}{value}: {error['allowed']}"
 
 
 def _figures(client: "Client", campaign_id: str) -> tuple[str, list[str]]:

@@ -145,12 +145,16 @@ def _renamed(files: Files, names: Sequence[dict[str, str]]) -> Iterator[str]:
 def _once(recordings: Sequence[Recording]) -> tuple[list[Recording], dict[str, str]]:
     """Without those that are identical to an earlier one; of these each one's id, and the earlier one's."""
     first: dict[str, Recording] = {}
+    once = []
     repeats = {}
     for recording in recordings:
-        earlier = first.setdefault(digest(recording), recording)
-        if earlier is not recording:
+        known = digest(recording)
+        earlier = recording if known is None else first.setdefault(known, recording)
+        if earlier is recording:
+            once.append(recording)
+        else:
             repeats[recording.id] = earlier.id
-    return list(first.values()), repeats
+    return once, repeats
 
 
 def _repeated(repeats: Mapping[str, str]) -> Iterator[str]:
