@@ -115,16 +115,3 @@ def test_an_older_store_is_taken_up_with_all_that_it_holds(older: Place, rows: R
         assert names == {"explained", "gone", "stays"}
         again = server.http.post("/v1/campaigns?skin=finger", json=campaign("stays")).raise_for_status().json()
         assert again["notes"][0].startswith("these recordings are in campaign stays of skin finger already")
-
-
-def test_recordings_of_an_older_store_are_known_again_by_what_describes_them_today(place: Place) -> None:
-    with running(place, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
-        server.http.post("/v1/campaigns?skin=palm", json=campaign("monday")).raise_for_status()
-    store = database(place.database_url, place.folder)
-    with store.writing() as connection:
-        connection.execute(text("UPDATE recording_digests SET digest = 'of less'"))
-        connection.execute(text("UPDATE alembic_version SET version_num = '0008'"))
-    store.close()
-    with running(place, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
-        again = server.http.post("/v1/campaigns?skin=palm", json=campaign("monday")).raise_for_status().json()
-        assert again["notes"][0].startswith("these recordings are in campaign monday of skin palm already")
