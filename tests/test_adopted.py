@@ -148,6 +148,7 @@ def test_a_skin_that_is_declared_otherwise_is_not_translated() -> None:
 @pytest.mark.parametrize(
     "changes",
     [
+        {"d33": {"low": 2000.0, "high": 2400.0}},  # no PVDF has it
         {"verdict": "ambiguous"},
         {"mechanisms": [{"name": "phlogiston", "parameters": []}]},
         {"mechanisms": [{"name": "platen_friction", "parameters": []}]},

@@ -129,14 +129,13 @@ def adopt(request: Request, diagnosis_id: DiagnosisId, sent: Form, store: Store)
 
 def _not_adopted(report: Mapping[str, Any]) -> str | None:
     """Why a report cannot become a model, and what to do; None where it can."""
-    from underskin.prediction.adopted_model import NOT_ADOPTED
-    from underskin.prediction.plausibility import implausible
+    from underskin.prediction.adopted_model import NOT_ADOPTED, implausible_d33
 
     if report["verdict"] == "explained":
         if report["d33"] is None:
             return "it is of curves, which have no d33: a model of a skin is of FRFs"
-        reason = implausible(report["d33"]["value"])
-        return None if reason is None else f"its d33 is {report['d33']['value']:.4g} pC/N, {reason}"
+        reason = implausible_d33(report)
+        return None if reason is None else f"its d33 cannot be right: {reason}"
     return NOT_ADOPTED[report["verdict"]].removeprefix("must be explained: ")
 
 

@@ -154,9 +154,9 @@ def adopted(report: Mapping[str, Any], campaign: Campaign) -> AdoptedModel:
         raise InvalidInput(
             "diagnosis_id", f"a diagnosis of verdict {report['verdict']}", NOT_ADOPTED[report["verdict"]]
         )
-    implausible = report["d33"] and plausibility.implausible(report["d33"]["value"])
-    if implausible:
-        raise InvalidInput("diagnosis_id", f"a d33 of {report['d33']['value']} pC/N", implausible)
+    reason = implausible_d33(report)
+    if reason is not None:
+        raise InvalidInput("diagnosis_id", "a diagnosis", f"its d33 cannot be right: {reason}")
     if not any(isinstance(entry, FrfRecording) for entry in campaign.recordings):
         raise InvalidInput("diagnosis_id", "a diagnosis of curves", "must be of a campaign with recordings of kind frf")
     parameters = {
@@ -172,6 +172,16 @@ def adopted(report: Mapping[str, Any], campaign: Campaign) -> AdoptedModel:
             raise InvalidInput("diagnosis_id", name, allowed)
     d33 = report["d33"]
     return AdoptedModel(campaign.skin, parameters, float(np.log(d33["high"] / d33["low"])) / _REPORTED_SDS)
+
+
+def implausible_d33(report: Mapping[str, Any]) -> str | None:
+    """Why the d33 of a `report/1`, by the middle of its interval, is none that PVDF can have; None where it may be."""
+    interval = report["d33"] or {}
+    if not {"low", "high"} <= set(interval):
+        return None
+    d33 = float(np.sqrt(interval["low"] * interval["high"]))
+    reason = plausibility.implausible(d33)
+    return None if reason is None else f"{d33:.4g} pC/N, {reason}"
 
 
 def pressed_campaign(
