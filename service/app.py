@@ -7,7 +7,16 @@ from fastapi import APIRouter, Depends, FastAPI, Security
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp
 
-from service import (
+from service import pages
+from service.auth.access_control import Gate
+from service.dependencies import authorised
+from service.ingest.uploads import UploadFolder
+from service.jobs import Planner, Runner, Terms
+from service.middleware import request_log
+from service.middleware.asgi_middleware import Front
+from service.middleware.error_handlers import install_handlers
+from service.pages.upload.pending_uploads import Shelf
+from service.routes import (
     campaigns,
     d33,
     design,
@@ -18,24 +27,15 @@ from service import (
     metrics,
     models,
     openapi,
-    pages,
-    record,
     sigma,
     skins,
     stress,
     tables,
     umbridge,
 )
-from service.dependencies import authorised
-from service.diagnosing import Planner, Runner, Terms
-from service.front import Front
-from service.gate import Gate
-from service.handlers import install_handlers
-from service.pages.upload_shelf import Shelf
-from service.query import known_query
+from service.routes.query_guard import known_query
 from service.settings import Settings
 from service.store import Database
-from service.uploads import UploadFolder
 from underskin import __version__
 from underskin.surrogate.sigma_table import SIGMA_TABLE, SigmaTable
 
@@ -53,7 +53,7 @@ async def _lifespan(api: FastAPI) -> AsyncIterator[None]:
     await run_in_threadpool(state.planner.stop)
     state.uploads.close()
     state.store.close()
-    record.flush()
+    request_log.flush()
 
 
 def create_api(settings: Settings, table: SigmaTable, gate: Gate, store: Database) -> FastAPI:

@@ -8,11 +8,11 @@ import numpy as np
 from fastapi import Depends, Path, Request, Response
 from fastapi.security import SecurityScopes
 
-from service.answers import Accept, Columns, respond
-from service.columns import ColumnsRequest, parse
-from service.gate import SAFE
-from service.keys import Key
+from service.auth.access_control import SAFE
+from service.auth.keys import Key
 from service.problems import Refusal
+from service.schemas.columns import ColumnsRequest, parse
+from service.schemas.columns_answer import Accept, Columns, respond
 from service.store import Database
 from underskin.surrogate.sigma_table import SigmaTable
 

@@ -13,9 +13,9 @@ import jsonschema_rs
 import pytest
 
 from service.app import create_api
-from service.gate import Gate
-from service.key_requirement import KeyRequirement
-from service.keys import KeyStore
+from service.auth.access_control import Gate
+from service.auth.key_requirement import KeyRequirement
+from service.auth.keys import KeyStore
 from service.settings import Settings
 from service.store import open_store
 from tests.conftest import Server, running

@@ -10,10 +10,10 @@ import httpx
 import pytest
 
 from service.app import create_api
-from service.front import Front
-from service.gate import Gate
-from service.key_requirement import KeyRequirement
-from service.keys import KeyStore
+from service.auth.access_control import Gate
+from service.auth.key_requirement import KeyRequirement
+from service.auth.keys import KeyStore
+from service.middleware.asgi_middleware import Front
 from service.problems import Problem
 from service.settings import Settings
 from service.store import open_store

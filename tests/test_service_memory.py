@@ -12,7 +12,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.keys import KeyStore
+from service.auth.keys import KeyStore
 from tests.conftest import Server, running
 from tests.test_service_limits import assert_too_large, connect, read_answer
 

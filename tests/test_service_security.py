@@ -13,8 +13,8 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.keys import KeyStore
-from service.session import COOKIE, logged_in
+from service.auth.keys import KeyStore
+from service.auth.session import COOKIE, logged_in
 from tests.conftest import UNDERSKIN, Server, running
 from tests.test_service_errors import SIGMA, all_routes, problem_of
 from tests.test_service_limits import BODIES

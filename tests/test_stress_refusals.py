@@ -11,7 +11,7 @@ import httpx
 import numpy as np
 import pytest
 
-from service.stress import EXAMPLE
+from service.routes.stress import EXAMPLE
 from tests.stress_documents import COMMAND, PRESS, SKIN, Document, document, posted
 
 

@@ -1,25 +1,20 @@
 """The pages: what a browser sees of the service, without JavaScript to build and with nothing from outside."""
 
 from fastapi import APIRouter
-from fastapi.routing import APIRoute
 
-from service.pages import (
-    assets,
-    campaign,
-    design,
-    diagnosis,
-    example,
-    joining,
-    loads,
-    login,
-    measured,
-    plan,
-    pressure_map,
-    skin,
-    start,
-    tables,
-    upload,
-)
+from service.pages.array import loads, pressure_map
+from service.pages.campaign import page as campaign
+from service.pages.design import page as design
+from service.pages.diagnosis import page as diagnosis
+from service.pages.diagnosis import plan
+from service.pages.measured import page as measured
+from service.pages.shared import assets
+from service.pages.skin import join
+from service.pages.skin import page as skin
+from service.pages.start import example, login
+from service.pages.start import page as start
+from service.pages.tables import page as tables
+from service.pages.upload import page as upload
 
 _PAGES = (
     start,
@@ -30,7 +25,7 @@ _PAGES = (
     upload,
     design,
     example,
-    joining,
+    join,
     loads,
     pressure_map,
     measured,
@@ -40,17 +35,5 @@ _PAGES = (
 )
 
 router = APIRouter(include_in_schema=False)
-for page in _PAGES:
-    router.include_router(page.router)
-
-
-def methods(path: str) -> list[str]:
-    """All that a page's path takes; pages are not in the OpenAPI document."""
-    found = {
-        method
-        for page in _PAGES
-        for route in page.router.routes
-        if isinstance(route, APIRoute) and route.path == path
-        for method in route.methods or ()
-    }
-    return sorted(found)
+for _page in _PAGES:
+    router.include_router(_page.router)

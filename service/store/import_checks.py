@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import orjson
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from service.campaign_models import RecordingResult
+from service.schemas.campaigns import RecordingResult
 from service.store import codec
 from service.store.skins import require_usable
 from underskin import InvalidInput

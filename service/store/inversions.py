@@ -5,7 +5,7 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, delete, insert, select
 
-from service.d33_models import ANSWER_VERSION
+from service.schemas.campaign_d33 import ANSWER_VERSION
 from service.store import skins
 from service.store.codec import compressed, decompressed
 from service.store.tables import AnyRow, adopted_inversions, campaigns, inversions, sensor_d33

@@ -112,10 +112,12 @@ inversions = Table(
     Column("revision", Integer, nullable=False),
     Column("table_sha256", String, nullable=False),
     Column("document", LargeBinary, nullable=False),  # the answer of /v1/campaigns/{id}/d33, compressed JSON
-    Column("answer_version", Integer, nullable=False, server_default="0"),  # service.d33_models.ANSWER_VERSION
+    Column(
+        "answer_version", Integer, nullable=False, server_default="0"
+    ),  # service.schemas.campaign_d33.ANSWER_VERSION
     Column(
         "numbers", LargeBinary
-    ),  # service.campaign_numbers, compressed JSON; null where an earlier underskin kept it
+    ),  # service.usecases.figure_data, compressed JSON; null where an earlier underskin kept it
 )
 
 sensor_d33 = Table(
@@ -164,7 +166,7 @@ adopted_inversions = Table(
     Column("model_id", String, nullable=False),
     Column("revision", Integer, nullable=False),
     Column("table_sha256", String, nullable=False),
-    Column("answer_version", Integer, nullable=False),  # service.d33_models.ANSWER_VERSION
+    Column("answer_version", Integer, nullable=False),  # service.schemas.campaign_d33.ANSWER_VERSION
     Column("document", LargeBinary, nullable=False),  # compressed JSON
 )
 

@@ -8,8 +8,8 @@ import httpx
 import pytest
 from playwright.sync_api import Browser
 
-from service import session
-from service.keys import KeyStore
+from service.auth import session
+from service.auth.keys import KeyStore
 from tests.pages.conftest import Visit, visit
 from tests.store.server import Server, campaign
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.pages.upload_shelf import Shelf
+from service.ingest.uploads import Upload
+from service.pages.upload.pending_uploads import Shelf
 from service.store.errors import Missing
-from service.uploads import Upload
 from tests.pages.test_pages_security import BROWSING, token_of
 from tests.pages.test_pages_upload import as_json, campaigns_of
 from tests.store.server import Place, Server, campaign, running

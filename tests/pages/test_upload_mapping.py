@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 import yaml
 
-from service.pages.upload_mapping import CHANNELS, KINDS, document_of, field_words, guessed, sensors_text, what_to_do
-from service.pages.upload_seen import ChannelSeen
+from service.pages.upload.file_summary import ChannelSeen
+from service.pages.upload.mapping import CHANNELS, KINDS, document_of, field_words, guessed, sensors_text, what_to_do
 from underskin.recordings import rig_description
 
 RIGS = sorted((Path(__file__).parents[2] / "examples" / "formats" / "rigs").glob("*.yaml"))

@@ -32,7 +32,7 @@ def workers_of(server: Server) -> list[int]:
     found = []
     for entry in Path("/proc").iterdir():
         with suppress(OSError):
-            if entry.name.isdigit() and b"service.diagnosing.worker" in (entry / "cmdline").read_bytes():
+            if entry.name.isdigit() and b"service.jobs.worker" in (entry / "cmdline").read_bytes():
                 fields = (entry / "stat").read_text().rpartition(")")[2].split()
                 if fields[0] != "Z" and int(fields[1]) == server.process.pid:
                     found.append(int(entry.name))

@@ -8,11 +8,11 @@ import orjson
 import pytest
 from sqlalchemy import insert, select, text, update
 
-from service import inverting
-from service.d33_models import ANSWER_VERSION, D33
+from service.schemas.campaign_d33 import ANSWER_VERSION, D33
 from service.store import campaigns, database, digests, migrate, open_store
 from service.store.codec import compressed, decompressed
 from service.store.tables import inversions, sensor_d33
+from service.usecases import d33_cache
 from tests.store.server import Place, Server, campaign, running
 from underskin import load_table
 from underskin.inversion.invert import invert
@@ -92,7 +92,7 @@ def test_what_a_store_of_the_first_schema_kept_is_computed_anew(place: Place, mo
         connection.execute(insert(sensor_d33), {"campaign": row.number, **point})
     store.close()
     store = open_store(place.database_url, place.folder)
-    assert D33(**inverting.answer(store, table, row, None)).status == "ok"
+    assert D33(**d33_cache.answer(store, table, row, None)).status == "ok"
     with store.reading() as connection:
         assert 99.0 not in connection.execute(select(sensor_d33.c.d33_pc_per_n)).scalars().all()
     store.close()

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from service import inverting
-from service.d33_models import D33
+from service.schemas.campaign_d33 import D33
 from service.store import Database, backup, campaigns, inversions, open_store
 from service.store.restore import restore
 from service.store.tables import AnyRow
+from service.usecases import d33_cache
 from tests.store.server import Place, Server, campaign
 from underskin import load_table
 from underskin.inversion import invert
@@ -60,11 +60,11 @@ def test_figures_that_cannot_be_computed_are_an_answer_and_tried_again(
     with monkeypatch.context() as broken:
         broken.setattr(invert, "invert", fail)
         for band in (None, (10.0, 100.0)):
-            told = D33(**inverting.answer(store, table, row, band))
+            told = D33(**d33_cache.answer(store, table, row, band))
             assert (told.status, str(error) in str(told.reason), told.sensors) == ("none", True, [])
-        inverting.complete(store, table, "palm")
+        d33_cache.complete(store, table, "palm")
     assert {record.levelname for record in caplog.records} == {"ERROR"}
-    assert inverting.answer(store, table, row, None)["status"] == "ok"
+    assert d33_cache.answer(store, table, row, None)["status"] == "ok"
     with store.reading() as connection:
         assert len(inversions.history(connection, "palm", table.sha256)) == 3
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from service.d33 import EXAMPLE as D33
-from service.frf import EXAMPLE as FRF
+from service.routes.d33 import EXAMPLE as D33
+from service.routes.frf import EXAMPLE as FRF
 from tests.store.server import Place, Server, campaign, running
 
 DATABASE = "underskin.sqlite3"

@@ -11,7 +11,7 @@ import numpy as np
 import orjson
 import pytest
 
-from service.keys import KeyStore
+from service.auth.keys import KeyStore
 from tests.store.diagnosed import D33, diagnosed, report, resonant
 from tests.store.server import Place, Server, running
 from tests.store.test_adopted_models import FREQUENCY, PRESSED

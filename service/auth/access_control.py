@@ -1,0 +1,171 @@
+"""Who may pass: known Host, own Origin, a key where keys are needed, a body within the limit."""
+
+import logging
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from urllib.parse import quote
+
+from service.auth import session
+from service.auth.key_requirement import KeyRequirement
+from service.auth.keys import Key, KeyStore, KeysUnreadable
+from service.problems import RETRY_LATER, Refusal, is_browsing
+
+logger = logging.getLogger("underskin")
+
+LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
+OPEN = frozenset({"/health", "/ready"})
+_OPEN_PAGES = ("/login", "/static/")
+_UPLOADS = frozenset({"/v1/campaigns", "/v1/skins/import", "/upload"})
+_MOST_OPEN_BYTES = 8000  # of a body that anybody may send: a key and a path fit
+SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
+
+
+class Gate:
+    """Refuses what must not reach a route."""
+
+    def __init__(
+        self,
+        *,
+        host_names: frozenset[str],
+        keys: KeyStore,
+        requirement: KeyRequirement,
+        keys_always: bool,
+        max_body_bytes: int,
+        max_upload_bytes: int,
+    ) -> None:
+        """`keys_always`: to be reached from other machines, so that no request passes without a key; otherwise
+        keys are needed once one has been made, by `requirement`."""
+        self._hosts = frozenset(name.encode() for name in host_names | LOOPBACK_NAMES)
+        self._keys = keys
+        self.requirement = requirement
+        self._damage = ""  # of keys.json, as it was logged last
+        self._keys_always = keys_always
+        self._max_body_bytes = max_body_bytes
+        self._max_upload_bytes = max_upload_bytes
+
+    def check(self, method: str, path: str, headers: Mapping[bytes, bytes]) -> Key | None:
+        """The key that came with the request, None where none is needed; raises Refusal."""
+        host = headers.get(b"host", b"")
+        if _name(host) not in self._hosts:
+            raise Refusal(
+                421, f"The service is not known as {host.decode('latin-1')!r}; UNDERSKIN_HOSTS lists its names."
+            )
+        if method not in SAFE:
+            _check_origin(headers.get(b"origin"), host)
+            self.check_size(_number(headers.get(b"content-length", b"")), path, headers)
+        return None if path in OPEN else self._check_key(method, path, headers)
+
+    def keys_needed(self) -> bool:
+        """Whether a request without a key is refused."""
+        return self._keys_always or self.requirement.needed or self._keys.in_use()
+
+    def keys_missing(self) -> bool:
+        """Whether keys are needed and keys.json is not there."""
+        return self.keys_needed() and not self._keys.in_use()
+
+    def check_size(self, size: int, path: str, headers: Mapping[bytes, bytes]) -> None:
+        """Refuses a body of more bytes than `path` takes.
+
+        The connection stays open, so that the server reads and drops what is still under way: a client, or a proxy,
+        that cannot finish sending would report a broken connection instead of the refusal.
+        """
+        if path in OPEN or path.startswith(_OPEN_PAGES):
+            most, setting, smaller = _MOST_OPEN_BYTES, "", "a key and nothing else"
+        elif _takes_files(path, headers):
+            most, setting, smaller = self._max_upload_bytes, " (UNDERSKIN_MAX_UPLOAD_MB)", "fewer files a request"
+        else:
+            most, setting, smaller = self._max_body_bytes, " (UNDERSKIN_MAX_BODY_MB)", "fewer rows a request"
+        if size > most:
+            limit = f"{most / 1e6:g} MB{setting}"
+            raise Refusal(413, f"The body exceeds {limit}; send {smaller}.", title="Body too large")
+
+    def key_of_login(self, token: str) -> Key | None:
+        """The key that somebody typed, None where it is not known; raises Refusal."""
+        with self._readable_keys():
+            return self._keys.find(token.strip().encode())
+
+    def _check_key(self, method: str, path: str, headers: Mapping[bytes, bytes]) -> Key | None:
+        if not self.keys_needed():
+            return None
+        is_open = path.startswith(_OPEN_PAGES)
+        authorization = headers.get(b"authorization", b"")
+        try:
+            with self._readable_keys():
+                key = self._key_of_session(method, headers) if not authorization else self._key_of(authorization)
+        except Refusal:
+            if is_open:
+                return None
+            raise
+        if key is None and not is_open:
+            browsing = is_browsing(path, headers.get(b"accept", b"").decode("latin-1"))
+            raise _login_first(method, path) if browsing else _key_first(authorization, self.keys_missing())
+        return key
+
+    @contextmanager
+    def _readable_keys(self) -> Iterator[None]:
+        """Refuses a request that needs the keys while they cannot be read; the log says why, once a change."""
+        try:
+            self._keys.entries()
+            self._damage = ""
+            yield
+        except KeysUnreadable as error:
+            if str(error) != self._damage:
+                self._damage = str(error)
+                logger.error("%s", error)
+            raise Refusal(
+                503, "The API keys of this service cannot be read; its log says why.", headers=RETRY_LATER
+            ) from error
+
+    def _key_of(self, authorization: bytes) -> Key | None:
+        scheme, _, token = authorization.partition(b" ")
+        return self._keys.find(token.strip()) if scheme.lower() == b"bearer" else None
+
+    def _key_of_session(self, method: str, headers: Mapping[bytes, bytes]) -> Key | None:
+        """A browser sends its cookie by itself, so a request that changes something must say whose page it is of."""
+        if method not in SAFE and b"origin" not in headers:
+            return None
+        return session.key_of(session.cookie_in(headers), self._keys)
+
+
+def _takes_files(path: str, headers: Mapping[bytes, bytes]) -> bool:
+    """Whether a body may be as large as uploads may: files do not go through memory, JSON does."""
+    return path in _UPLOADS and not headers.get(b"content-type", b"").startswith(b"application/json")
+
+
+def _login_first(method: str, path: str) -> Refusal:
+    back = quote(path) if method == "GET" else "/"
+    return Refusal(303, "Log in with a key first.", headers={"Location": f"/login?next={back}"})
+
+
+def _key_first(authorization: bytes, missing: bool) -> Refusal:
+    known = "This key is not known; it may have been revoked." if authorization else "A key is needed."
+    if missing:
+        known = (
+            "A key is needed, and the service knows none: keys.json is missing from its data folder. "
+            "Put it back, or make a key."
+        )
+    return Refusal(
+        401,
+        f"{known} Send Authorization: Bearer KEY (`underskin key create NAME` makes one).",
+        headers={"WWW-Authenticate": "Bearer"},
+    )
+
+
+def _check_origin(origin: bytes | None, host: bytes) -> None:
+    """A page of another origin must not change anything here, nor spend this machine's time."""
+    if origin is not None and origin.lower().partition(b"://")[2] != host.lower():
+        raise Refusal(
+            403,
+            f"Pages of {origin.decode('latin-1')!r} may not call this service; its own are of "
+            f"{host.decode('latin-1')!r}.",
+        )
+
+
+def _name(host: bytes) -> bytes:
+    """A Host header without its port, in lower case."""
+    name, colon, port = host.rpartition(b":")
+    return (name if colon and port.isdigit() else host).lower()
+
+
+def _number(content_length: bytes) -> int:
+    return int(content_length) if content_length.isdigit() else 0

@@ -1,0 +1,81 @@
+"""Whether requests need a key: from the first key on, whatever becomes of keys.json, until `underskin key open`."""
+
+import logging
+import threading
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from service.auth.keys import KeyStore
+from service.lasting_failure import LastingFailure
+from service.store import key_requirement
+from service.store.engine import Database, StorageFull
+from service.store.errors import StoreMoved
+
+logger = logging.getLogger("underskin")
+
+_LOOK_S = 0.5  # how often: revoking and opening take effect within a second
+_JOIN_S = 10.0
+
+
+class KeyRequirement:
+    """What the store says, and keys.json where it is there; a thread of the server looks between `start` and `stop`.
+
+    What was needed stays needed until the store says that it was lifted: neither a store that does not answer nor one
+    that was restored from before the first key opens anything.
+    """
+
+    def __init__(self, keys: KeyStore, store: Database) -> None:
+        """Nothing is looked at yet."""
+        self.needed = False
+        self._keys = keys
+        self._store = store
+        self._missing = False
+        self._failure = LastingFailure(logger)
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="key requirement", daemon=True)
+
+    def look(self) -> None:
+        """Bring `needed` up to date, and the store where keys.json shows that a key was made."""
+        with self._store.reading() as connection:
+            row = key_requirement.find(connection)
+        if self._keys.file_exists():
+            self.needed = True
+        elif row is not None:
+            self.needed = row.lifted_at is None
+        if self.needed and (row is None or row.lifted_at is not None):
+            self._note()
+
+    def start(self) -> None:
+        """Look from now on."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Look no more."""
+        self._ending.set()
+        if self._thread.ident is not None:
+            self._thread.join(_JOIN_S)
+
+    def _note(self) -> None:
+        with self._store.writing() as connection:
+            row = key_requirement.find(connection)
+            # `underskin key open` removes keys.json before it lifts the requirement.
+            if row is None or self._keys.file_exists():
+                key_requirement.require(connection)
+
+    def _watch(self) -> None:
+        while not self._ending.wait(_LOOK_S):
+            try:
+                self.look()
+                self._warn_of_missing_keys()
+                self._failure.is_over()
+            except (SQLAlchemyError, StorageFull, StoreMoved, OSError) as error:
+                self._failure.log("whether keys are needed cannot be looked up", error)
+
+    def _warn_of_missing_keys(self) -> None:
+        missing = self.needed and not self._keys.file_exists()
+        if missing and not self._missing:
+            logger.warning(
+                "keys are needed and %s is missing: put it back, or make a key with `underskin key create NAME`",
+                self._keys.path,
+            )
+        self._missing = missing

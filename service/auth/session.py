@@ -1,0 +1,68 @@
+"""The browser's session: a cookie that says which key was logged in with, and the token that its forms must carry.
+
+A session is signed with the kept digest of its key, so that nothing is stored, a restart ends none, and a revoked key
+ends all of its own. Before a login, or where no key is needed, the cookie is a random text that binds the forms alone.
+"""
+
+import base64
+import hmac
+import secrets
+import time
+from collections.abc import Mapping
+
+from service.auth.keys import Key, KeyStore
+
+COOKIE = "underskin_session"
+LASTS_S = 7 * 86400
+_ID_DIGITS = 16
+
+
+def anonymous() -> str:
+    """A cookie for who has not logged in."""
+    return secrets.token_urlsafe(24)
+
+
+def logged_in(key: Key) -> str:
+    """A cookie for who has shown a key."""
+    body = f"{anonymous()}.{key.sha256[:_ID_DIGITS]}.{int(time.time()) + LASTS_S}"
+    return f"{body}.{_signature(key, body)}"
+
+
+def key_of(cookie: str, keys: KeyStore) -> Key | None:
+    """The key that was logged in with; None where the cookie is anonymous, too old, or not of a key that is known."""
+    body, dot, signature = cookie.rpartition(".")
+    parts = body.split(".")
+    if not dot or len(parts) != 3 or not parts[2].isdigit() or int(parts[2]) < time.time():
+        return None
+    for key in keys.entries():
+        if key.sha256.startswith(parts[1]) and hmac.compare_digest(signature, _signature(key, body)):
+            return key
+    return None
+
+
+def form_token(cookie: str) -> str:
+    """What a form of this session carries: another site can neither read the cookie nor guess it."""
+    return _digest(cookie.encode(), b"form")
+
+
+def is_form_token(cookie: str, token: str) -> bool:
+    """Whether a form was made for this session."""
+    return bool(cookie) and hmac.compare_digest(form_token(cookie).encode(), token.encode("utf-8", "replace"))
+
+
+def cookie_in(headers: Mapping[bytes, bytes]) -> str:
+    """The session's cookie of a request; empty where it has none."""
+    # By hand: other services of the same host may have set cookies that http.cookies stops at.
+    for part in headers.get(b"cookie", b"").decode("latin-1").split(";"):
+        name, _, value = part.strip().partition("=")
+        if name == COOKIE:
+            return value
+    return ""
+
+
+def _signature(key: Key, body: str) -> str:
+    return _digest(bytes.fromhex(key.sha256), f"session {body}".encode())
+
+
+def _digest(secret: bytes, message: bytes) -> str:
+    return base64.urlsafe_b64encode(hmac.digest(secret, message, "sha256")).decode().rstrip("=")

@@ -1,0 +1,52 @@
+"""Commands on the store as a whole: backup and restore, while servers run."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from service.auth.keys import KeyStore, keys_missing
+from service.cli.shared import read_settings
+from service.store import StoreError, data_folder, database
+from service.store import backup as backups
+from service.store import restore as restoring
+from underskin import UnderskinError
+
+
+def backup(
+    file: Annotated[Path, typer.Argument(help="Where to write it; a file of that name is replaced.")],
+) -> None:
+    """Write all that the store keeps into one file, read back to be sure, while servers run."""
+    settings = read_settings()
+    try:
+        backups.make(database(settings.database_url, settings.data), file)
+    except (StoreError, OSError) as error:
+        raise UnderskinError(str(error)) from error
+    typer.echo(f"{file}: {file.stat().st_size / 1e6:.1f} MB, read back and whole")
+
+
+def restore(
+    file: Annotated[Path, typer.Argument(help="A file that `underskin backup` wrote.")],
+) -> None:
+    """Put a backup in place of the store, while servers run; what was there is backed up first."""
+    settings = read_settings()
+    try:
+        data_folder.make(settings.data)
+        store = database(settings.database_url, settings.data)
+        stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+        before = settings.data / "backups" / f"before-restore-{stamp}{backups.suffix(store)}"
+        restoring.restore(store, file, before)
+        needed = restoring.keys_needed(store)
+    except (StoreError, OSError) as error:
+        raise UnderskinError(str(error)) from error
+    typer.echo(f"restored {file}" + (f"; what was there before is in {before}" if before.exists() else ""))
+    if needed:
+        typer.echo(_of_keys(KeyStore(settings.data)))
+
+
+def _of_keys(keys: KeyStore) -> str:
+    """What whoever restored a store in which keys are needed is told."""
+    if keys.file_exists():
+        return f"keys are needed: those in {keys.path}"
+    return keys_missing(keys)

@@ -1,0 +1,96 @@
+"""The command that serves."""
+
+import errno
+import ipaddress
+import socket
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+import typer
+import uvicorn
+
+from service.app import create_app
+from service.auth.access_control import LOOPBACK_NAMES, Gate
+from service.auth.key_requirement import KeyRequirement
+from service.auth.keys import KeyStore
+from service.cli.shared import STORE_ERRORS, fail, read_settings
+from service.log import configure_logging
+from service.middleware.http_protocol import LimitedHttpProtocol
+from service.store import data_folder, open_store
+from underskin import TableError
+from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
+
+
+def serve(
+    host: Annotated[str, typer.Option(help="Address to bind to; any but loopback needs a key.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port to listen on.", min=0, max=65535)] = 8000,
+) -> None:
+    """Serve σ, FRF and d33 over HTTP."""
+    settings = read_settings()
+    keys = KeyStore(settings.data)
+    # Other names than loopback's mean a proxy in front, which lets other machines in.
+    private = _is_loopback(host) and settings.host_names <= LOOPBACK_NAMES
+    try:
+        _require_writable(settings.data)
+        known = keys.entries()  # a damaged file ends the start, not every request
+        if not private and not known:
+            where = f"as {settings.hosts}" if _is_loopback(host) else f"on {host}"
+            fail(f"refusing to serve {where} without API keys: make one with `underskin key create NAME`")
+        table = load_table(settings.tables / SIGMA_TABLE)
+        store = open_store(settings.database_url, settings.data)
+        requirement = KeyRequirement(keys, store)
+        requirement.look()
+        listener = _listen(host, port)
+    except (TableError, *STORE_ERRORS, OSError, ValueError) as error:
+        fail(str(error))
+    configure_logging()
+    typer.echo(f"underskin serves on http://{_host_name(host)}:{listener.getsockname()[1]} (Ctrl+C ends it)")
+    gate = Gate(
+        host_names=settings.host_names | {_host_name(host)},
+        keys=keys,
+        requirement=requirement,
+        keys_always=not private,
+        max_body_bytes=settings.max_body_bytes,
+        max_upload_bytes=settings.max_upload_bytes,
+    )
+    config = uvicorn.Config(
+        create_app(settings, table, gate, store),
+        access_log=False,
+        log_config=None,
+        server_header=False,
+        proxy_headers=False,
+        http=LimitedHttpProtocol,
+        timeout_graceful_shutdown=10,
+    )
+    uvicorn.Server(config).run(sockets=[listener])
+
+
+def _require_writable(folder: Path) -> None:
+    try:
+        data_folder.make(folder)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OSError(f"the data folder {folder} (UNDERSKIN_DATA) is not writable: {error.strerror}") from error
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _host_name(host: str) -> str:
+    """The address as a Host header spells it."""
+    return f"[{host.lower()}]" if ":" in host else host.lower()
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    try:
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        return socket.create_server(address, family=family, backlog=2048)
+    except OSError as error:
+        other = "; take another: --port PORT, or make serve PORT=..." if error.errno == errno.EADDRINUSE else ""
+        raise OSError(f"cannot listen on {host} port {port}: {error.strerror}{other}") from error

@@ -1,0 +1,30 @@
+"""What the commands share: settings, and how a command fails."""
+
+from typing import NoReturn
+
+import typer
+from pydantic import ValidationError
+from sqlalchemy.exc import DBAPIError
+
+from service.settings import Settings
+from service.store import StoreError
+from service.store.engine import StorageFull
+from service.store.errors import StoreMoved
+
+STORE_ERRORS = (StoreError, StoreMoved, StorageFull, DBAPIError)
+
+
+def fail(reason: str) -> NoReturn:
+    """Say why on standard error, and end with status 1."""
+    typer.echo(f"underskin: {reason}", err=True)
+    raise typer.Exit(1)
+
+
+def read_settings() -> Settings:
+    """The settings; a wrong one ends the command."""
+    try:
+        return Settings()
+    except ValidationError as error:
+        first = error.errors()[0]
+        reason = first["msg"].removeprefix("Value error, ")
+        fail(f"UNDERSKIN_{str(first['loc'][0]).upper()} = {first['input']!r}: {reason[:1].lower()}{reason[1:]}")

@@ -1,0 +1,59 @@
+"""The parts of a multipart form by their names: files, and texts, of which a request knows some."""
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+
+from service.ingest.uploads import Upload
+from service.problems import invalid_input
+from service.spelling import unknown
+from underskin import InvalidInput
+
+FILE = "file"  # a part of this name is a file, also where its sender gives no file name
+_LONGEST_TEXT = 4096  # bytes
+
+
+def split(
+    uploads: Sequence[Upload], texts: Collection[str] = (), single_files: Collection[str] = ()
+) -> tuple[dict[str, str], list[Upload]]:
+    """The values of the fields `texts`, and all other parts, which are files; a body that is no form is a file.
+
+    A part with a file name is a file, whatever the part is called; `single_files` are called what comes once at most.
+    Raises Refusal (422) that names each field that is unknown, given twice, or a file where a text belongs.
+    """
+    form = [upload for upload in uploads if upload.in_form]
+    errors = [error for upload in form for error in _errors(upload, texts, single_files)]
+    count = Counter(upload.field for upload in form)
+    once = (*texts, *single_files)
+    errors += [InvalidInput(name, f"{count[name]} parts", "must be given once") for name in once if count[name] > 1]
+    if errors:
+        raise invalid_input(errors)
+    values = {str(one.field): one.path.read_bytes().decode() for one in form if one.field in texts}
+    return values, [one for one in uploads if one.field not in texts]
+
+
+def _errors(upload: Upload, texts: Collection[str], single_files: Collection[str]) -> Iterator[InvalidInput]:
+    """What is wrong with one part of a form."""
+    name = upload.field or ""
+    known = (*texts, FILE, *single_files)
+    if upload.label is None and name not in known:
+        yield unknown(name, _start(upload), known, "form field")
+    elif name in texts and upload.label is not None:
+        yield InvalidInput(name, upload.label, "must be a text, not a file")
+    elif name in texts and not _is_short_text(upload):
+        yield InvalidInput(name, _start(upload), f"must be text in UTF-8 of at most {_LONGEST_TEXT} bytes")
+
+
+def _is_short_text(upload: Upload) -> bool:
+    if upload.path.stat().st_size > _LONGEST_TEXT:
+        return False
+    try:
+        upload.path.read_bytes().decode()
+    except UnicodeDecodeError:
+        return False
+    return True
+
+
+def _start(upload: Upload) -> str:
+    """As much of a text as an error shows."""
+    with upload.path.open("rb") as file:
+        return file.read(100).decode("utf-8", "replace")

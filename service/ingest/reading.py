@@ -1,0 +1,202 @@
+"""From uploaded files to campaigns, with what is wrong in each."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import orjson
+
+from service.ingest.uploads import Upload
+from service.middleware.unique_keys import require_unique_keys
+from service.problems import Refusal
+from service.store import skins
+from underskin import InvalidInput
+from underskin.errors import FileError
+from underskin.recordings import join
+from underskin.recordings.campaign import Campaign, from_dict
+from underskin.recordings.channels import Contents
+from underskin.recordings.readers import formats
+from underskin.recordings.reading import Reading, read_contents, understood
+from underskin.recordings.rig_description import RigDescription
+
+_BOM = b"\xef\xbb\xbf"
+_UNNAMED = "the upload"
+
+MOST_CAMPAIGNS = 1000  # a request
+MOST_RECORDINGS = 50_000  # a request, good or not
+_MOST_ERRORS = 100  # told of each campaign
+
+
+@dataclass(frozen=True)
+class Found:
+    """What was read of one campaign, or why the whole is refused."""
+
+    file: str | None
+    reading: Reading | None = None
+    errors: list[dict[str, Any]] = field(default_factory=list)
+    by_rig: bool = False  # whether a rig description was needed to read it
+    in_list: bool = False  # whether it came in a JSON list
+
+    @property
+    def recordings(self) -> int:
+        """How many were sent, good or not."""
+        if self.reading is None:
+            return 0
+        refused = {problem.recording for problem in self.reading.problems}
+        return len(refused) + len(self.reading.campaign.recordings)
+
+
+@dataclass(frozen=True)
+class Arrived:
+    """What one campaign became: None where the whole was refused; `refused` has one entry a recording."""
+
+    file: str | None
+    campaign: Campaign | None = None
+    errors: list[dict[str, Any]] = field(default_factory=list)
+    refused: list[dict[str, Any]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    by_rig: bool = False
+    in_list: bool = False
+    untold: int = 0  # errors beyond those listed
+
+
+def read(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> list[Found]:
+    """The campaigns of a file, by its content: JSON may hold one or a list of them."""
+    return look(upload, rig, most_json_bytes).found
+
+
+@dataclass(frozen=True)
+class Look:
+    """A file before anything of it is kept: its format, its channels where it holds such, its campaigns."""
+
+    kind: str
+    contents: Contents | None
+    found: list[Found]
+
+
+def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> Look:
+    """As `read`, with what it was read from."""
+    label = upload.label or _UNNAMED
+    kind, contents = "", None
+    try:
+        with upload.path.open("rb") as stream:
+            kind = formats.detect(stream, label)
+        if kind == "JSON":
+            return Look(kind, None, _read_json(upload, most_json_bytes))
+        held = read_contents(upload.path, label)
+        contents = held if isinstance(held, Contents) else None
+        found = understood(held, label, rig)
+        _require_usable(found.campaign)
+    except FileError as error:
+        allowed = ": ".join(part for part in (error.place, error.reason) if part)
+        return Look(kind, contents, [Found(upload.label, errors=[_error("file", upload.label, allowed)])])
+    except InvalidInput as error:
+        return Look(kind, contents, [Found(upload.label, errors=[_invalid(error)])])
+    return Look(kind, contents, [Found(upload.label, found, by_rig=rig is not None)])
+
+
+def arrived_as(found: Found) -> Arrived:
+    """A campaign with its refused recordings; one of which nothing is left is refused as a whole."""
+    whole = Arrived(found.file, errors=found.errors, by_rig=found.by_rig, in_list=found.in_list)
+    if found.reading is None:
+        return whole
+    campaign, notes = found.reading.campaign, found.reading.warnings
+    refused: dict[str, list[Mapping[str, Any]]] = {}
+    for number, problem in enumerate(found.reading.problems):
+        told = refused.setdefault(problem.recording, [])
+        if number < _MOST_ERRORS:
+            told.append(_error(problem.field, problem.value, problem.allowed))
+    count = len(found.reading.problems)
+    untold = max(0, count - _MOST_ERRORS)
+    if untold:
+        notes = [*notes, f"{len(refused)} recordings have {count} errors; the first {_MOST_ERRORS} are told"]
+    entries = [{"id": name, "errors": errors} for name, errors in refused.items()]
+    whole = replace(whole, refused=entries, notes=notes, untold=untold)
+    if campaign.recordings:
+        return replace(whole, campaign=campaign)
+    return replace(whole, errors=[_nothing(len(entries))])
+
+
+def joined(found: Sequence[Found], name: str, skin_id: str | None) -> Arrived:
+    """All of them as one campaign; a file that cannot be read is a refused recording, by the file's name.
+
+    Raises InvalidInput where they are not of one skin.
+    """
+    files = [(one.file or _UNNAMED, one.reading) for one in found if one.reading is not None]
+    unread = [{"id": one.file or _UNNAMED, "errors": one.errors} for one in found if one.reading is None]
+    in_list = found[0].in_list
+    if not files:
+        return Arrived(None, errors=[_nothing(len(unread))], refused=unread, in_list=in_list)
+    by_rig = any(one.by_rig for one in found)
+    together = arrived_as(Found(None, join(name, files, skin_id), by_rig=by_rig, in_list=in_list))
+    origin = f"joined from {files[0][0]}" + (f" to {files[-1][0]}, {len(files)} files" if len(files) > 1 else "")
+    return replace(together, refused=unread + together.refused, notes=[origin, *together.notes])
+
+
+def require_few(campaigns: int, recordings: int) -> None:
+    """Refuses a request of more than can be answered in one go."""
+    for count, most, noun in ((campaigns, MOST_CAMPAIGNS, "campaigns"), (recordings, MOST_RECORDINGS, "recordings")):
+        if count > most:
+            raise Refusal(413, f"A request may bring up to {most} {noun}; send more in several requests.")
+
+
+def _require_usable(campaign: Campaign) -> None:
+    if campaign.skin.id is not None:
+        skins.require_usable("skin.id", campaign.skin.id)
+
+
+def _read_json(upload: Upload, most_bytes: int) -> list[Found]:
+    if upload.path.stat().st_size > most_bytes:
+        limit = f"{most_bytes / 1e6:g} MB (UNDERSKIN_MAX_BODY_MB)"
+        raise Refusal(413, f"JSON may have up to {limit}; send more in several requests, or as HDF5.")
+    content = upload.path.read_bytes().removeprefix(_BOM)
+    try:
+        document = orjson.loads(content)
+    except orjson.JSONDecodeError as error:
+        if not upload.in_form:
+            raise Refusal(
+                400, f"The body is not JSON: line {error.lineno}, column {error.colno}: {error.msg}."
+            ) from None
+        allowed = f"must be JSON; line {error.lineno}, column {error.colno}: {error.msg}"
+        return [Found(upload.label, errors=[_error("file", upload.label, allowed)])]
+    try:
+        require_unique_keys(content)
+    except Refusal as twice:
+        return [
+            Found(
+                upload.label,
+                errors=[_error(error["field"], error["value"], error["allowed"]) for error in twice.errors],
+            )
+        ]
+    if not isinstance(document, list):
+        require_few(1, _recordings_in(document))
+        return [_checked(upload.label, document)]
+    require_few(len(document), sum(map(_recordings_in, document)))
+    return [replace(_checked(upload.label, entry), in_list=True) for entry in document]
+
+
+def _recordings_in(document: Any) -> int:
+    recordings = document.get("recordings") if isinstance(document, dict) else None
+    return len(recordings) if isinstance(recordings, list) else 0
+
+
+def _checked(label: str | None, document: Any) -> Found:
+    try:
+        campaign, problems = from_dict(document)
+        _require_usable(campaign)
+    except InvalidInput as error:
+        return Found(label, errors=[_invalid(error)])
+    return Found(label, Reading(campaign, problems, []))
+
+
+def _nothing(refused: int) -> dict[str, Any]:
+    return _error("recordings", f"{refused} refused", "must hold at least one recording without errors")
+
+
+def _invalid(error: InvalidInput) -> dict[str, Any]:
+    place = error.field if error.index is None else f"{error.field}[{error.index}]"
+    return _error(place, error.value, error.allowed)
+
+
+def _error(name: str, value: Any, allowed: str) -> dict[str, Any]:
+    return {"field": name, "value": value, "allowed": allowed}

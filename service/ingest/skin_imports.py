@@ -1,0 +1,132 @@
+"""An exported skin: looked at, and brought in. Every part of its file is checked before the first is kept."""
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+from pydantic import BaseModel, Field, ValidationError
+
+from service.ingest.uploads import Upload
+from service.store import diagnosis_export, import_checks, importing
+from service.store.engine import Database
+from service.store.errors import Conflict
+from underskin import InvalidInput
+from underskin.errors import FileError
+from underskin.recordings.skin_export import ExportedCampaign, Overview, read_campaigns, read_overview
+
+_AT_A_TIME = 8  # campaigns in memory
+one = asyncio.Semaphore(1)  # export that is looked at or brought in at a time
+
+
+class Imported(BaseModel):
+    """What an import brought."""
+
+    skin_id: str = Field(description="The skin.")
+    kept: int = Field(description="How many campaigns are new here.")
+    present: int = Field(description="How many were here already, the same.")
+
+
+@dataclass(frozen=True)
+class CampaignFound:
+    """A campaign of the file; `present`: it is in the store already, where it `differs` or is the same."""
+
+    id: str
+    name: str
+    recorded_at: str | None
+    recordings: int
+    excluded: int
+    present: bool
+    differs: bool
+
+
+@dataclass(frozen=True)
+class Found:
+    """A file of which every part was checked; `clashes`: sentences, what of it contradicts the store."""
+
+    overview: Overview
+    skins: import_checks.CheckedOverview
+    diagnosed: diagnosis_export.Checked
+    campaigns: list[CampaignFound]
+    known: set[str]  # ids of those diagnoses and models that are in the store
+    clashes: list[str]
+
+
+def look(store: Database, upload: Upload) -> Found:
+    """Check a file against itself and against the store; raises InvalidInput that names what in it is wrong."""
+    with upload.path.open("rb") as stream, _told(upload, ""):
+        overview = read_overview(stream, _label(upload))
+        skins = import_checks.overview(overview)
+        diagnosed = diagnosis_export.checked(
+            overview.diagnoses, overview.models, overview.campaigns, [row["id"] for row in overview.skins]
+        )
+        with store.reading() as connection:
+            clashes = importing.otherwise_joined(connection, skins.skins)
+            clashes += diagnosis_export.clashes(connection, diagnosed)
+            diagnosed_here = diagnosis_export.known(connection, diagnosed)
+            campaigns_here = importing.known(connection, overview.campaigns)
+        found = []
+        for name, campaign in _campaigns(stream, upload, overview.campaigns):
+            row = campaigns_here.get(name)
+            if row is None:
+                with _told(upload, f"campaign {name}: "):
+                    checked = import_checks.campaign(campaign, name, skins.skins)
+                found.append(_campaign(checked.row, present=False, differs=False))
+                continue
+            with store.reading() as connection:
+                differs = importing.differs(connection, row, campaign)
+            found.append(_campaign(row._mapping, present=True, differs=differs))
+    clashes += [f"Campaign {one.name!r} ({one.id}) is there already and differs" for one in found if one.differs]
+    return Found(overview, skins, diagnosed, found, diagnosed_here, clashes)
+
+
+def bring_in(store: Database, upload: Upload) -> Imported:
+    """Keep what is not there; raises as `look`, and Conflict, with nothing kept, where it contradicts the store."""
+    found = look(store, upload)
+    if found.clashes:
+        more = f", and {len(found.clashes) - 1} more clashes" if len(found.clashes) > 1 else ""
+        raise Conflict(f"{found.clashes[0]}{more}; nothing was imported.")
+    missing = [campaign.id for campaign in found.campaigns if not campaign.present]
+    importing.add_skins(store, found.skins)
+    with upload.path.open("rb") as stream, _told(upload, ""):
+        for name, campaign in _campaigns(stream, upload, missing):
+            importing.add(store, import_checks.campaign(campaign, name, found.skins.skins))
+    diagnosis_export.add(store, found.diagnosed)
+    return Imported(skin_id=found.overview.skin, kept=len(missing), present=len(found.campaigns) - len(missing))
+
+
+def _campaigns(stream: BinaryIO, upload: Upload, names: list[str]) -> Iterator[tuple[str, ExportedCampaign]]:
+    for start in range(0, len(names), _AT_A_TIME):
+        some = names[start : start + _AT_A_TIME]
+        yield from zip(some, read_campaigns(stream, _label(upload), some), strict=True)
+
+
+def _campaign(row: Any, *, present: bool, differs: bool) -> CampaignFound:
+    about = (row["id"], row["name"], row["recorded_at"], row["recordings"], row["excluded"])
+    return CampaignFound(*about, present=present, differs=differs)
+
+
+def _label(upload: Upload) -> str:
+    return upload.label or "the upload"
+
+
+@contextmanager
+def _told(upload: Upload, place: str) -> Iterator[None]:
+    """Turns what is raised about a part of a file into InvalidInput that names the part."""
+    try:
+        yield
+    except InvalidInput as error:
+        raise InvalidInput(f"{place}{error.field}", error.value, error.allowed, error.index) from None
+    except FileError as error:
+        raise InvalidInput("file", upload.label, f"{error.place}: {error.reason}".lstrip(": ")) from None
+    except (ValidationError, KeyError, TypeError) as error:
+        raise InvalidInput("file", upload.label, f"{place}is not as underskin exports it: {_words(error)}") from None
+
+
+def _words(error: Exception) -> str:
+    """What is wrong, where pydantic and look-ups say it in many lines."""
+    if isinstance(error, ValidationError):
+        first = error.errors(include_url=False)[0]
+        return f"{'.'.join(map(str, first['loc']))}: {first['msg'][:1].lower()}{first['msg'][1:]}"[:500]
+    return f"{type(error).__name__}: {error}"[:500]

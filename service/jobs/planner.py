@@ -1,0 +1,120 @@
+"""Next experiments within the limits of a reader's rig: each worked out in a worker process, one after the other.
+
+Nothing of them is kept in the store: a server remembers the latest, and after a restart they are worked out again.
+"""
+
+import tempfile
+import threading
+import time
+from collections import OrderedDict
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from service.jobs.process import Worker
+from service.jobs.runner import Terms, logger
+from service.jobs.worker import Job
+from service.problems import Refusal
+from service.store import diagnoses
+from service.store.engine import Database
+from service.store.tables import AnyRow
+from underskin.recordings.readers import json_file
+
+if TYPE_CHECKING:
+    from underskin.diagnosis.planning.rig_limits import Limits
+
+_REMEMBERED = 50
+_MOST_WAITING = 8
+_JOIN_S = 10.0
+_TOLD_S = 60.0  # so long a failure is told before it is tried again
+
+
+@dataclass
+class Planned:
+    """One plan; `plan` is empty where nothing can be told apart better."""
+
+    state: Literal["queued", "running", "done", "failed"] = "queued"
+    progress: float = 0.0
+    plan: dict[str, Any] | None = None
+    reason: str = ""
+    failed_at: float = 0.0
+
+    def fail(self, reason: str) -> None:
+        """End it without a plan."""
+        self.reason, self.failed_at, self.state = reason, time.monotonic(), "failed"
+
+
+class Planner:
+    """See the module; between the server's start and `stop`."""
+
+    def __init__(self, store: Database, terms: Terms) -> None:
+        self._store = store
+        self._terms = terms
+        self._known: OrderedDict[tuple[str, str], Planned] = OrderedDict()
+        self._lock = threading.Lock()
+        self._turn = threading.Lock()
+        self._ending = threading.Event()
+        self._worker: Worker | None = None
+        self._threads: set[threading.Thread] = set()
+
+    def plan(self, row: AnyRow, limits: "Limits") -> Planned:
+        """That of a diagnosis within these limits: begun where it is not known, or failed a minute ago; raises
+        Refusal 503 where too many wait, or where this server runs no diagnoses."""
+        key = (str(row.id), repr(limits))
+        with self._lock:
+            known = self._known.get(key)
+            if known is not None and (known.state != "failed" or time.monotonic() < known.failed_at + _TOLD_S):
+                self._known.move_to_end(key)
+                return known
+            if not self._terms.workers:
+                raise Refusal(503, "This server runs no diagnoses and plans nothing; use the command below.")
+            if len(self._threads) >= _MOST_WAITING:
+                raise Refusal(503, "Many plans are being worked out: try again in a minute.")
+            planned = self._known[key] = Planned()
+            while len(self._known) > _REMEMBERED:
+                self._known.popitem(last=False)
+            thread = threading.Thread(target=self._job, args=(row, limits, planned), name=f"plan {row.id}", daemon=True)
+            self._threads.add(thread)
+        thread.start()
+        return planned
+
+    def stop(self) -> None:
+        """End what is being worked out."""
+        self._ending.set()
+        with self._lock:
+            threads = list(self._threads)
+            if self._worker is not None:
+                self._worker.news.set()
+        for thread in threads:
+            thread.join(_JOIN_S)
+
+    def _job(self, row: AnyRow, limits: "Limits", planned: Planned) -> None:
+        try:
+            with self._turn:
+                if not self._ending.is_set():
+                    self._run(row, limits, planned)
+        except Exception as error:  # nobody else would hear of it
+            logger.exception("a plan could not be made", extra={"fields": {"diagnosis": row.id}})
+            planned.fail(f"{type(error).__name__}: {error}")
+        finally:
+            with self._lock:
+                self._threads.discard(threading.current_thread())
+
+    def _run(self, row: AnyRow, limits: "Limits", planned: Planned) -> None:
+        planned.state = "running"
+        with self._store.reading() as connection:
+            campaign, _ = diagnoses.campaign_of(connection, row)
+        content = json_file.write(campaign)
+        terms = self._terms
+        job = Job(len(content), str(terms.table), terms.table_sha256, terms.memory_bytes, (), asdict(limits))
+        with tempfile.TemporaryFile() as stderr, Worker(job, content, stderr) as worker:
+            with self._lock:
+                self._worker = worker
+            while not (worker.ended or self._ending.is_set()):
+                worker.news.wait(0.5)
+                planned.progress = worker.progress
+            with self._lock:
+                self._worker = None
+            if worker.plan is not None:
+                planned.plan, planned.state = worker.plan, "done"
+            else:
+                planned.fail(worker.failure if worker.ended else "the server ended")

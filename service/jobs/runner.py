@@ -1,0 +1,166 @@
+"""Claims diagnoses from the store's queue and runs each in a worker process, as many at once as there are cores."""
+
+import logging
+import secrets
+import tempfile
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from service.jobs.process import Worker
+from service.jobs.worker import Job
+from service.lasting_failure import LastingFailure
+from service.store import diagnoses
+from service.store.engine import Database, StorageFull
+from service.store.errors import StoreMoved
+from service.store.tables import AnyRow
+from underskin import __version__
+from underskin.recordings.readers import json_file
+
+logger = logging.getLogger("underskin")
+
+_POLL_S = 2.0  # how often the queue is looked at: another server may have put something in
+_BEAT_S = 2.0  # how often a running one is kept alive and its progress kept
+_JOIN_S = 10.0
+_STORE_FAILED = (SQLAlchemyError, StorageFull, StoreMoved, OSError)
+
+
+@dataclass(frozen=True)
+class Terms:
+    """What a runner works with; memory is a worker's, beyond what its program takes."""
+
+    workers: int
+    memory_bytes: int
+    table: Path
+    table_sha256: str
+
+
+class Runner:
+    """See the module. Threads of the server's process; between `start` and `stop`."""
+
+    def __init__(self, store: Database, terms: Terms) -> None:
+        self._store = store
+        self._terms = terms
+        self._server = secrets.token_hex(8)
+        self._ending = threading.Event()
+        self._stirred = threading.Event()
+        self._jobs: dict[threading.Thread, Worker | None] = {}
+        self._lock = threading.Lock()
+        self._failure = LastingFailure(logger)
+        self._dispatcher = threading.Thread(target=self._dispatch, name="diagnosing", daemon=True)
+
+    def start(self) -> None:
+        """Take up what is in the queue, and what was running when its server ended."""
+        if self._terms.workers:
+            self._dispatcher.start()
+
+    def stir(self) -> None:
+        """Look at once at what has changed: something new in the queue, or cancelled."""
+        self._stirred.set()
+        with self._lock:
+            for worker in self._jobs.values():
+                if worker is not None:
+                    worker.news.set()
+
+    def stop(self) -> None:
+        """End all workers; what they were at goes back into the queue."""
+        self._ending.set()
+        self.stir()
+        for thread in (self._dispatcher, *self._jobs):
+            if thread.ident is not None:
+                thread.join(_JOIN_S)
+
+    def _dispatch(self) -> None:
+        while not self._ending.is_set():
+            self._stirred.clear()
+            try:
+                while len(self._jobs) < self._terms.workers and (row := self._claim()) is not None:
+                    thread = threading.Thread(target=self._job, args=(row,), name=row.id, daemon=True)
+                    with self._lock:
+                        self._jobs[thread] = None
+                    thread.start()
+            except _STORE_FAILED as error:
+                self._failure.log("no diagnosis can be claimed", error)
+            self._stirred.wait(_POLL_S)
+
+    def _claim(self) -> AnyRow | None:
+        with self._store.writing() as connection:
+            row = diagnoses.claim(connection, self._server, self._terms.table_sha256, __version__)
+        self._failure.is_over()
+        return row
+
+    def _job(self, row: AnyRow) -> None:
+        try:
+            self._run(row)
+        except StoreMoved as error:
+            self._failure.log("a diagnosis cannot be run now", error)
+            self._release(row)
+        except Exception as error:  # nobody else would hear of it
+            logger.exception("a diagnosis could not be run", extra={"fields": {"diagnosis": row.id}})
+            self._end(row, None, f"{type(error).__name__}: {error}")
+        finally:
+            with self._lock:
+                del self._jobs[threading.current_thread()]
+            self._stirred.set()
+
+    def _run(self, row: AnyRow) -> None:
+        """One diagnosis, until it has ended, is no longer ours, or the server ends."""
+        with self._store.reading() as connection:
+            campaign, excluded = diagnoses.campaign_of(connection, row)
+        content = json_file.write(campaign)
+        left_out = tuple((left.recording, left.reason) for left in excluded)
+        terms = self._terms
+        job = Job(len(content), str(terms.table), terms.table_sha256, terms.memory_bytes, left_out)
+        with tempfile.TemporaryFile() as stderr, Worker(job, content, stderr) as worker:
+            with self._lock:
+                self._jobs[threading.current_thread()] = worker
+            while not worker.ended and not self._ending.is_set():
+                worker.news.wait(_BEAT_S)
+                worker.news.clear()
+                if not self._is_ours(row, worker):
+                    return
+            if not worker.ended:
+                self._release(row)
+            elif worker.report is not None:
+                self._end(row, worker.report, "", worker.figures)
+            else:
+                logger.error("a diagnosis failed", extra={"fields": {"diagnosis": row.id, "said": worker.last_words}})
+                self._end(row, None, worker.failure)
+
+    def _is_ours(self, row: AnyRow, worker: Worker) -> bool:
+        """Say that it runs; whether it was neither cancelled nor taken by another server. A silent store says yes."""
+        try:
+            with self._store.writing() as connection:
+                ours = diagnoses.keep_alive(connection, row.number, self._server, worker.progress)
+        except _STORE_FAILED as error:
+            self._failure.log("a diagnosis cannot be kept alive", error)
+            return True
+        self._failure.is_over()
+        return ours
+
+    def _end(
+        self, row: AnyRow, report: dict[str, Any] | None, reason: str, figures: dict[str, str] | None = None
+    ) -> None:
+        """Keep what came of it; again and again where the store fails, since it was long work."""
+        while True:
+            try:
+                with self._store.writing() as connection:
+                    if report is not None:
+                        diagnoses.finish(connection, row.number, self._server, report, figures)
+                    else:
+                        diagnoses.fail(connection, row.number, self._server, reason)
+                return
+            except _STORE_FAILED as error:
+                self._failure.log("what came of a diagnosis cannot be kept", error)
+                if self._ending.wait(_POLL_S):
+                    return
+
+    def _release(self, row: AnyRow) -> None:
+        try:
+            with self._store.writing() as connection:
+                diagnoses.release(connection, row.number, self._server)
+        except _STORE_FAILED as error:
+            self._failure.log("a diagnosis cannot be put back into the queue", error)

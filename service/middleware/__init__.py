@@ -1,0 +1,1 @@
+"""Between the socket and the routes: limits, request ids, the log of requests, errors."""

@@ -1,0 +1,187 @@
+"""The outermost layer, plain ASGI: gate, request id, body limit, metrics and log for every request.
+
+It also answers the two requests that clients send one by one in great number, before FastAPI's own layers, which
+would take longer than the answer. Such a hot route treats the plain case only and leaves all else to the route of the
+same path in the API, which is the authority on what is valid and on the errors.
+"""
+
+import itertools
+import logging
+import os
+import re
+import time
+from collections.abc import Callable, Iterable, Mapping
+
+from starlette.requests import ClientDisconnect
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.auth.access_control import Gate
+from service.middleware.request_log import record
+from service.pages.shared.problem import problem_page
+from service.problems import Refusal, is_browsing, unexpected
+
+logger = logging.getLogger("underskin")
+
+_NUMBERS = frozenset({int, float})
+_SANE_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
+
+
+# Answers a query string (GET) or a body (POST) with JSON, or with None to leave it to the API.
+HotRoute = Callable[[bytes], bytes | None]
+
+
+def are_numbers(values: Iterable[object]) -> bool:
+    """Whether all are numbers as JSON knows them: what is not is left to the API."""
+    return _NUMBERS.issuperset(map(type, values))
+
+
+class Front:
+    """See the module."""
+
+    def __init__(self, api: ASGIApp, gate: Gate, hot: Mapping[tuple[str, str], HotRoute]) -> None:
+        """`hot` is by method and path."""
+        self._api = api
+        self._gate = gate
+        self._hot = hot
+        self._prefix = os.urandom(6).hex()
+        self._numbers = itertools.count()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """One request."""
+        if scope["type"] != "http":
+            await self._api(scope, receive, send)
+            return
+        start = time.perf_counter()
+        headers: dict[bytes, bytes] = dict(scope["headers"])
+        request_id = self._request_id(headers.get(b"x-request-id"))
+        scope["request_id"] = request_id
+        scope["key"] = None
+        scope["why"] = None
+        exchange = _Exchange(send, request_id, scope["path"], headers.get(b"accept", b"").decode("latin-1"))
+        try:
+            await self._answer(scope, headers, receive, exchange)
+        except Refusal as refusal:
+            scope["why"] = refusal.in_log()
+            await exchange.refuse(refusal)
+        except ClientDisconnect:
+            exchange.status = 499
+            scope["why"] = "the client left"
+        except Exception:
+            logger.exception("request failed", extra={"fields": {"request_id": request_id}})
+            if not exchange.status:
+                await exchange.refuse(unexpected())
+        seconds = time.perf_counter() - start
+        method, path = scope["method"], scope["path"]
+        route = path if exchange.hot else getattr(scope.get("route"), "path", "none")
+        record(request_id, method, route, path, exchange.status, seconds, scope["key"], scope["why"])
+
+    def _request_id(self, sent: bytes | None) -> str:
+        if sent is not None and _SANE_ID.fullmatch(sent):
+            return sent.decode()
+        return f"{self._prefix}-{next(self._numbers):x}"
+
+    async def _answer(
+        self, scope: Scope, headers: Mapping[bytes, bytes], receive: Receive, exchange: "_Exchange"
+    ) -> None:
+        """Pass the gate, then a hot route or the API."""
+        method, path = scope["method"], scope["path"]
+        scope["key"] = self._gate.check(method, path, headers)
+        hot = self._hot.get((method, path))
+        limited = self._limited(receive, path, headers)
+        if hot is None or not _plain(method, headers):
+            await self._api(scope, limited, exchange.send)
+            return
+        body = b"" if method == "GET" else await _whole_body(limited)
+        content = hot(body or scope["query_string"])
+        if content is None:
+            await self._api(scope, _replay(body, receive), exchange.send)
+        else:
+            await exchange.answer(content)
+
+    def _limited(self, receive: Receive, path: str, headers: Mapping[bytes, bytes]) -> Receive:
+        """`receive`, refusing the body once it exceeds the limit, whatever its Content-Length said."""
+        size = 0
+
+        async def counted() -> Message:
+            nonlocal size
+            message = await receive()
+            size += len(message.get("body", b""))
+            self._gate.check_size(size, path, headers)
+            return message
+
+        return counted
+
+
+class _Exchange:
+    """The answer on its way: puts the request id into it and remembers its status."""
+
+    def __init__(self, send: Send, request_id: str, path: str, accept: str) -> None:
+        self._send = send
+        self._request_id = request_id
+        self._path = path
+        self._accept = accept
+        self.status = 0
+        self.hot = False
+
+    async def send(self, message: Message) -> None:
+        """What the API sends."""
+        if message["type"] == "http.response.start":
+            self.status = message["status"]
+            message["headers"] = [*message.get("headers", ()), (b"x-request-id", self._request_id.encode())]
+        await self._send(message)
+
+    async def answer(self, content: bytes) -> None:
+        """A hot route's JSON."""
+        self.hot = True
+        await self._whole(200, content, [(b"content-type", b"application/json")])
+
+    async def refuse(self, refusal: Refusal) -> None:
+        """A problem."""
+        if is_browsing(self._path, self._accept):
+            page = problem_page(refusal, self._request_id)
+            kept = [header for header in page.raw_headers if header[0] != b"content-length"]
+            await self._whole(page.status_code, bytes(page.body), kept)
+            return
+        headers = [(name.lower().encode(), value.encode()) for name, value in refusal.headers.items()]
+        content_type = (b"content-type", refusal.media_type(self._path).encode())
+        await self._whole(
+            refusal.status_for(self._path), refusal.body(self._path, self._request_id), [content_type, *headers]
+        )
+
+    async def _whole(self, status: int, content: bytes, headers: list[tuple[bytes, bytes]]) -> None:
+        self.status = status
+        headers += (b"content-length", b"%d" % len(content)), (b"x-request-id", self._request_id.encode())
+        await self._send({"type": "http.response.start", "status": status, "headers": headers})
+        await self._send({"type": "http.response.body", "body": content})
+
+
+def _plain(method: str, headers: Mapping[bytes, bytes]) -> bool:
+    """Whether JSON is asked for and, where there is a body, sent."""
+    if b"csv" in headers.get(b"accept", b""):
+        return False
+    return method == "GET" or headers.get(b"content-type", b"").split(b";")[0].strip().lower() == b"application/json"
+
+
+async def _whole_body(receive: Receive) -> bytes:
+    message = await receive()
+    body: bytes = message.get("body", b"")
+    while message.get("more_body", False):
+        message = await receive()
+        body += message.get("body", b"")
+    if message["type"] == "http.disconnect":
+        raise ClientDisconnect
+    return body
+
+
+def _replay(body: bytes, receive: Receive) -> Receive:
+    """A body that was read already, and then what follows."""
+    pending = True
+
+    async def replayed() -> Message:
+        nonlocal pending
+        if pending:
+            pending = False
+            return {"type": "http.request", "body": body, "more_body": False}
+        return await receive()
+
+    return replayed

@@ -1,0 +1,89 @@
+"""Every error that a route raises, as a problem."""
+
+import logging
+
+from fastapi import FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from sqlalchemy.exc import DataError, IntegrityError, OperationalError
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+
+from service.pages.shared.problem import problem_page
+from service.problems import RETRY_LATER, Refusal, from_validation, invalid_input, is_browsing, unexpected
+from service.routes.openapi import methods
+from service.store.answers import OtherRequest
+from service.store.engine import StorageFull
+from service.store.errors import Conflict, Missing, StoreMoved
+from underskin import InvalidInput
+
+logger = logging.getLogger("underskin")
+
+
+def install_handlers(api: FastAPI) -> None:
+    """One shape for what we raise, what FastAPI raises, and what nobody expected."""
+    api.add_exception_handler(Refusal, _handle)
+    api.add_exception_handler(InvalidInput, _handle)
+    api.add_exception_handler(RequestValidationError, _handle)
+    api.add_exception_handler(HTTPException, _handle)
+    for kind in (*_STATUS, StorageFull, StoreMoved, DataError, IntegrityError, OperationalError, Exception):
+        api.add_exception_handler(kind, _handle)
+
+
+async def _handle(request: Request, error: Exception) -> Response:
+    refusal = _as_refusal(request, error)
+    request.scope["why"] = refusal.in_log()
+    path = request.scope["path"]
+    if is_browsing(path, request.headers.get("accept", "")):
+        return problem_page(refusal, request.scope["request_id"])
+    content = refusal.body(path, request.scope["request_id"])
+    return Response(content, refusal.status_for(path), headers=refusal.headers, media_type=refusal.media_type(path))
+
+
+def _as_refusal(request: Request, error: Exception) -> Refusal:
+    match error:
+        case Refusal():
+            return error
+        case HTTPException(__cause__=Refusal() as refusal):  # FastAPI wraps what ends the reading of a body
+            return refusal
+        case HTTPException(__cause__=ClientDisconnect()):
+            return Refusal(499, "The client left before its body was complete.", title="Client closed request")
+        case InvalidInput():
+            return invalid_input([error])
+        case RequestValidationError():
+            return _unreadable(error) or from_validation(error.errors())
+        case HTTPException(status_code=404):
+            return Refusal(404, f"There is nothing at {request.url.path}; /openapi.json lists all routes.")
+        case HTTPException(status_code=405):
+            allowed = {"Allow": ", ".join(methods(request.app, request.scope["route"].path))}
+            return Refusal(405, f"{request.url.path} does not take {request.method}.", headers=allowed)
+        case HTTPException():
+            return Refusal(error.status_code, str(error.detail), headers=error.headers)
+        case _:
+            return _of_the_store(request, error)
+
+
+def _unreadable(error: RequestValidationError) -> Refusal | None:
+    """A body that is not JSON is no question of fields."""
+    found = [entry for entry in error.errors() if entry["type"] == "json_invalid"]
+    return Refusal(400, f"The body is not JSON: {found[0]['ctx']['error']}.") if found else None
+
+
+_STATUS = {Missing: 404, Conflict: 409, OtherRequest: 422}
+
+
+def _of_the_store(request: Request, error: Exception) -> Refusal:
+    """What the store raises, and what nobody expected."""
+    if type(error) in _STATUS:
+        return Refusal(_STATUS[type(error)], str(error))
+    if isinstance(error, StorageFull):
+        return Refusal(507, "The disk is full: nothing of this request was kept. What is kept can be read.")
+    if isinstance(error, StoreMoved):
+        return Refusal(503, str(error), headers=RETRY_LATER)
+    if isinstance(error, DataError):
+        return Refusal(422, "A text has a character that cannot be kept, such as NUL.")
+    if isinstance(error, IntegrityError):
+        return Refusal(409, "Another request kept the same at the same time: look at what is there, and send it again.")
+    if isinstance(error, OperationalError):
+        logger.error("the store failed: %s", error, extra={"fields": {"request_id": request.scope["request_id"]}})
+        return Refusal(503, "The store does not answer; try again in a while.", headers=RETRY_LATER)
+    return unexpected()

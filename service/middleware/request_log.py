@@ -1,0 +1,81 @@
+"""What is kept of each request: a line in the log and a count in the metrics."""
+
+import asyncio
+import os
+import re
+import time
+from contextlib import suppress
+from datetime import UTC, datetime
+from functools import cache
+
+import orjson
+from prometheus_client import Histogram
+
+from service.auth.keys import Key
+
+# Requests are written and counted together: one by one, that would cost as much as to answer them.
+_DELAY_S = 0.2
+_waiting: list[tuple[float, str, str, str, str, int, float, Key | None, str | None]] = []
+_LONGEST_WHY = 300
+_KEY = re.compile(r"us_[\w-]{16,}")  # what looks like one, wherever somebody put it
+
+_seconds = Histogram(
+    "underskin_request_seconds",
+    "Time to answer a request, by route as documented, method and status",
+    ["method", "route", "status"],
+    buckets=(0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0),
+)
+
+
+def record(
+    request_id: str, method: str, route: str, path: str, status: int, seconds: float, key: Key | None, why: str | None
+) -> None:
+    """Keep what is to be said of a request; `route` is its path as documented, `why` the reason of an error."""
+    if not _waiting:
+        asyncio.get_running_loop().call_later(_DELAY_S, flush)
+    _waiting.append((time.time(), request_id, method, route, path, status, seconds, key, why))
+
+
+def flush() -> None:
+    """Count and write the requests that wait."""
+    text = b"".join(_line(*entry) for entry in _waiting)
+    for _, _, method, route, _, status, seconds, *_ in _waiting:
+        _series(method, route, status).observe(seconds)
+    _waiting.clear()
+    with suppress(OSError):  # a log that nobody reads, or a full disk, must not stop the answers
+        while text:
+            text = text[os.write(2, text) :]
+
+
+@cache  # finding the series by its labels takes longer than observing it
+def _series(method: str, route: str, status: int) -> Histogram:
+    return _seconds.labels(method, route, str(status))
+
+
+def _line(
+    ended: float,
+    request_id: str,
+    method: str,
+    route: str,
+    path: str,
+    status: int,
+    seconds: float,
+    key: Key | None,
+    why: str | None,
+) -> bytes:
+    fields = {
+        "time": datetime.fromtimestamp(ended, UTC),
+        "level": "info",
+        "logger": "underskin.request",
+        "message": f"{method} {path[:200]} {status}",
+        "request_id": request_id,
+        "method": method,
+        "path": path[:200],
+        "route": route,
+        "status": status,
+        "milliseconds": round(1e3 * seconds, 3),
+        "key": key.name if key else None,
+    }
+    if why is not None:
+        fields["error"] = _KEY.sub("us_…", why)[:_LONGEST_WHY]
+    return orjson.dumps(fields, option=orjson.OPT_APPEND_NEWLINE)

@@ -1,0 +1,144 @@
+"""An array under loads: the fields of the forms that ask for one, and the request of `POST /v1/stress` in them."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from fastapi import Request
+
+from service.pages.shared.form_errors import said
+from service.pages.shared.skin_values import start
+from service.store import campaigns, skins
+from service.store.engine import Database
+from service.usecases.table_loader import influence_table
+from underskin import InvalidInput, UnderskinError
+from underskin.array_stress.answer import StressAnswer, answer
+from underskin.array_stress.request import read_request
+from underskin.recordings.readers import text
+from underskin.surrogate.sigma_table import SigmaTable
+
+_MOST_SENSORS = 10_000
+_BETWEEN = re.compile(r"[;\s]+|,(?:\s+|$)")  # numbers in a line: a comma without a space may be a decimal one
+# Field, words, unit.
+FIELDS = (
+    ("thickness_mm", "thickness h", "mm"),
+    ("youngs_modulus_mpa", "Young's modulus E", "MPa"),
+    ("sensor_radius_mm", "sensor radius rT", "mm"),
+    ("d33_pc_per_n", "d33", "pC/N"),
+    ("poisson_ratio", "Poisson's ratio ν", ""),
+)
+# Field, words, unit, default.
+GRID = (("columns", "sensors along x", "", 4), ("rows", "sensors along y", "", 4), ("pitch_mm", "pitch", "mm", 8.0))
+GLUE, UNITS = "glue_stiffness", "units_checked"
+_LABELS = {
+    **{name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in (*FIELDS, *GRID)},
+    GLUE: "glue line, κ",
+    "contacts": "loads",
+    "pressure_map": "the map",
+}
+
+
+@dataclass(frozen=True)
+class Described:
+    """What a form says of the array: as it was sent, or else as the skin's latest campaign or the prototype has it."""
+
+    skin_id: str | None
+    values: Mapping[str, str]
+    glue: str
+    units_checked: bool
+    sensors: Sequence[Mapping[str, Any]] | None  # the skin's; None: a grid of the form's
+    taken: Sequence[str]  # in sentences, which values nobody declared
+
+    @property
+    def fields(self) -> Sequence[tuple[str, str, str]]:
+        """Those that the form asks for."""
+        return (
+            FIELDS if self.sensors is not None else (*FIELDS, *[(name, words, unit) for name, words, unit, _ in GRID])
+        )
+
+    def document(self) -> dict[str, Any]:
+        """The request without its loads; raises InvalidInput."""
+        numbers = {name: number(name, self.values[name]) for name, *_ in self.fields}
+        document: dict[str, Any] = {name: numbers[name] for name, *_ in FIELDS}
+        if self.glue.strip():
+            document[GLUE] = number(GLUE, self.glue)
+        if self.units_checked:
+            document[UNITS] = True
+        document["sensors"] = list(_grid(numbers) if self.sensors is None else self.sensors)
+        return document
+
+
+def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin_id: str | None) -> Described:
+    """The array of a form's fields; raises InvalidInput where the skin has no campaign with sensors."""
+    sensors = None if skin_id is None else _latest(store, skin_id)["sensors"]
+    missing = {name: (words, unit) for name, words, unit in FIELDS if not given.get(name)}
+    known, taken = start(store, table, skin_id, missing)
+    defaults = {name: known[name] for name, *_ in FIELDS} | {name: default for name, _, _, default in GRID}
+    values = {name: given.get(name) or f"{default:g}" for name, default in defaults.items()}
+    return Described(skin_id, values, given.get(GLUE, ""), UNITS in given, sensors, taken)
+
+
+def refused(error: UnderskinError, lines: Sequence[int] = ()) -> str:
+    """An error in the words of these forms; `lines`: of the loads in their text."""
+    return said(error, _LABELS, lines, "or tick “Take unlikely magnitudes as they are”")
+
+
+def answered(request: Request, document: Mapping[str, Any]) -> StressAnswer:
+    """What `POST /v1/stress` answers; raises UnderskinError."""
+    table = influence_table(request.app.state.settings.tables)
+    with np.errstate(all="ignore"):  # what overflows is out of reach
+        return answer(table, read_request(document))
+
+
+def charge_columns(found: StressAnswer) -> dict[str, list[Any]]:
+    """Charge and stress on each sensor."""
+    return {"sensor": list(found.sensors), **{name: column.tolist() for name, column in found.columns.items()}}
+
+
+def number(name: str, typed: str) -> float:
+    """A number that somebody typed; raises InvalidInput."""
+    try:
+        return float(typed)
+    except ValueError:
+        raise InvalidInput(name, typed[:80], "must be a number") from None
+
+
+def numbers(name: str, line: str) -> list[float]:
+    """The numbers of a line that somebody typed, with decimal points or with decimal commas; raises InvalidInput.
+
+    Between them are spaces, tabs, semicolons, or commas and a space: `7,06` is one number.
+    """
+    typed = [cell for cell in _BETWEEN.split(line) if cell]
+    decimal = "," if any("," in cell for cell in typed) else "."
+    found = [text.number(cell, decimal) for cell in typed]
+    if decimal == "," and None in found:
+        allowed = "must be numbers with spaces between them, with decimal points or with decimal commas, not both"
+        raise InvalidInput(name, line[:80], allowed)
+    return [number(name, cell) if value is None else value for cell, value in zip(typed, found, strict=True)]
+
+
+def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:
+    columns, rows, pitch = values["columns"], values["rows"], values["pitch_mm"]
+    for name in ("columns", "rows"):
+        if not values[name].is_integer():
+            raise InvalidInput(name, f"{values[name]:g}", "must be a whole number")
+    if not (1 <= columns <= 1000 and 1 <= rows <= 1000 and columns * rows <= _MOST_SENSORS):
+        raise InvalidInput("columns", f"{columns:g} × {rows:g}", f"must be 1 to {_MOST_SENSORS} sensors in all")
+    return [
+        {"id": f"s{1 + row * int(columns) + column:02d}", "x_mm": pitch * column, "y_mm": pitch * row}
+        for row in range(int(rows))
+        for column in range(int(columns))
+    ]
+
+
+def _latest(store: Database, skin_id: str) -> Mapping[str, Any]:
+    """The skin as its latest campaign declares it."""
+    with store.reading() as connection:
+        root = skins.require_root(connection, skin_id)
+        latest = campaigns.listed(connection, campaigns.Filters(skin=root, state="current"), None, 1)
+    found: dict[str, Any] = latest[0].about["skin"] if latest else {"sensors": []}
+    if not found["sensors"]:
+        raise InvalidInput("skin", skin_id, "must have a current campaign that names its sensors")
+    return found

@@ -1,0 +1,85 @@
+"""Several loads on an array, and the charge on each of its sensors."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request, Response
+
+from service.dependencies import Store, Table
+from service.pages.array.description import Described, answered, charge_columns, described, numbers, refused
+from service.pages.shared import same_request
+from service.pages.shared.figures import csv_answer, drawn
+from service.pages.shared.html import page
+from underskin import InvalidInput, UnderskinError
+from underskin.array_stress.answer import StressAnswer
+
+router = APIRouter(prefix="/loads")
+
+_LONGEST = 20_000  # characters of the loads
+_LOADS = "10 8 4 1\n14 16 10 3 0.5 0"
+_ORDER = ("x_mm", "y_mm", "indenter_radius_mm", "normal_force_n")
+
+Loads = Annotated[str, Query(max_length=_LONGEST)]
+Skin = Annotated[str | None, Query()]
+
+
+@router.get("")
+def view(request: Request, store: Store, table: Table, skin: Skin = None, loads: Loads = _LOADS) -> Response:
+    """With the skin and the loads of the address, or else the paper's prototype under two spheres."""
+    array = described(store, table, request.query_params, skin)
+    error: str | None = None
+    document: dict[str, Any] = {}
+    found: StressAnswer | None = None
+    try:
+        document = _document(array, loads)
+        found = answered(request, document)
+    except UnderskinError as found_wrong:
+        error = refused(found_wrong, [place for place, line in enumerate(loads.splitlines(), 1) if line.strip()])
+    return page(
+        request,
+        "loads.html",
+        array=array,
+        loads=loads,
+        error=error,
+        found=found,
+        figures=[] if found is None else [_figure(request, document, found)],
+        same=same_request.post(request, "/v1/stress", document, f"client.stress({document!r})"),
+    )
+
+
+@router.get("/charge.csv")
+def charge_csv(request: Request, store: Store, table: Table, skin: Skin = None, loads: Loads = _LOADS) -> Response:
+    """Charge and stress on each sensor."""
+    found = answered(request, _document(described(store, table, request.query_params, skin), loads))
+    return csv_answer("charge", charge_columns(found))
+
+
+def _figure(request: Request, document: Mapping[str, Any], found: StressAnswer) -> Any:
+    from underskin.figures import loaded_array
+
+    columns = found.columns
+    figure = loaded_array(
+        found.sensors,
+        columns["x_mm"],
+        columns["y_mm"],
+        columns["charge_pc"],
+        columns["charge_error_pc"],
+        [(load["x_mm"], load["y_mm"]) for load in document["contacts"]],
+    )
+    query = f"?{request.url.query}" if request.url.query else ""
+    return drawn("charge", figure, "Each sensor where it lies, coloured by its charge.", f"/loads/charge.csv{query}")
+
+
+def _document(array: Described, loads: str) -> dict[str, Any]:
+    """The request of `POST /v1/stress`; raises InvalidInput."""
+    contacts = [_load(place, line) for place, line in enumerate(loads.splitlines(), 1) if line.strip()]
+    return {**array.document(), "contacts": contacts}
+
+
+def _load(place: int, line: str) -> dict[str, Any]:
+    """A line of numbers: x, y, radius and force, and perhaps the tangential force along x and y."""
+    parts = numbers(f"load in line {place}", line)
+    if len(parts) not in (4, 6):
+        raise InvalidInput(f"load in line {place}", line[:80], "must be x y R F, or x y R F Fx Fy (mm, N)")
+    load: dict[str, Any] = dict(zip(_ORDER, parts, strict=False))
+    return {**load, "tangential_force_n": parts[4:]} if parts[4:] else load

@@ -1,0 +1,130 @@
+"""A measured map of pressure on an array, and the charge on each of its sensors.
+
+Nothing of it is kept: the map stays in the page's form, and what the page saves is in the page.
+"""
+
+import base64
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import orjson
+from fastapi import APIRouter, Query, Request, Response
+from starlette.concurrency import run_in_threadpool
+
+from service.dependencies import Store
+from service.ingest.uploads import Upload, received
+from service.pages.array import description
+from service.pages.shared import same_request
+from service.pages.shared.figures import Drawn, csv_text, drawn
+from service.pages.shared.forms import TOKEN, require_own
+from service.pages.shared.html import page
+from service.routes.campaigns import heavy
+from service.store.engine import Database
+from underskin import InvalidInput, UnderskinError
+from underskin.array_stress import pressure_map
+from underskin.array_stress.answer import StressAnswer
+from underskin.recordings.readers import text
+
+router = APIRouter(prefix="/loads/map")
+
+_EXAMPLE = "map.csv"
+_LARGEST_BYTES = 1_000_000
+_LARGEST_BODY_BYTES = 2 * _LARGEST_BYTES + 100_000  # a file, the text of the last map, and the other fields
+_LONGEST_FIELD = 1000  # bytes of a field beside the map
+_MAP, _FILE, _SKIN = "map", "file", "skin"
+
+
+@router.get("")
+def view(request: Request, store: Store, skin: Annotated[str | None, Query()] = None) -> Response:
+    """With an example map, which presses one finger on the skin, or on the paper's prototype."""
+    example = (Path(__file__).parents[1] / "static" / _EXAMPLE).read_bytes()
+    return _shown(request, store, {} if skin is None else {_SKIN: skin}, example, "the map")
+
+
+@router.post("")
+async def send(request: Request, store: Store) -> Response:
+    """With the map that was sent as a file, or else as text."""
+    async with received(request, request.app.state.uploads, _LARGEST_BODY_BYTES) as sent:
+        fields = {one.field or "": _start(one, _LONGEST_FIELD) for one in sent if one.field not in (_MAP, _FILE)}
+        given = {name: value.decode("utf-8", "replace").strip() for name, value in fields.items()}
+        require_own(request, given.get(TOKEN, ""))
+        file = next((one for one in sent if one.field == _FILE and one.label), None)
+        typed = next((one for one in sent if one.field == _MAP), None)
+        chosen = file or typed
+        content = b"" if chosen is None else _start(chosen, _LARGEST_BYTES + 1)
+    name = "the map" if file is None or not file.label else file.label
+    async with heavy:
+        return await run_in_threadpool(_shown, request, store, given, content, name)
+
+
+def _shown(request: Request, store: Database, given: Mapping[str, str], content: bytes, name: str) -> Response:
+    described = description.described(store, request.app.state.table, given, given.get(_SKIN))
+    error: str | None = None
+    document: dict[str, Any] = {}
+    found: StressAnswer | None = None
+    try:
+        if len(content) > _LARGEST_BYTES:
+            raise InvalidInput("pressure_map", name, f"must have at most {_LARGEST_BYTES / 1e6:g} MB: make it coarser")
+        pressure = pressure_map.parse(content, name)
+        document = {**described.document(), "pressure_map": pressure}
+        found = description.answered(request, document)
+    except UnderskinError as refused:
+        error = description.refused(refused)
+    return page(
+        request,
+        "pressure_map.html",
+        array=described,
+        map=_text(content[:_LARGEST_BYTES]),
+        example=_EXAMPLE,
+        error=error,
+        found=found,
+        figures=[] if found is None else _figures(document, found),
+        body=None if found is None else _inside("application/json", orjson.dumps(document)),
+        same=same_request.from_file(request, "/v1/stress", "request.json", "client.stress({})"),
+    )
+
+
+def _figures(document: Mapping[str, Any], found: StressAnswer) -> list[Drawn]:
+    from underskin.figures import loaded_array, pressure_on_array
+
+    columns, held = found.columns, document["pressure_map"]
+    places = list(zip(columns["x_mm"].tolist(), columns["y_mm"].tolist(), strict=True))
+    pressed = pressure_on_array(held["x_mm"], held["y_mm"], held["pressure_mpa"], places, document["sensor_radius_mm"])
+    charge = loaded_array(
+        found.sensors, columns["x_mm"], columns["y_mm"], columns["charge_pc"], columns["charge_error_pc"], []
+    )
+    as_map = {"y_mm \\ x_mm": held["y_mm"]} | {
+        f"{x!r}": column for x, column in zip(held["x_mm"], zip(*held["pressure_mpa"], strict=True), strict=True)
+    }
+    return [
+        drawn("pressure", pressed, "The map as it was read, and the sensors' outlines.", _csv(as_map)),
+        drawn(
+            "charge",
+            charge,
+            "Each sensor where it lies, coloured by its charge.",
+            _csv(description.charge_columns(found)),
+        ),
+    ]
+
+
+def _csv(columns: Mapping[str, Any]) -> str:
+    return _inside("text/csv", csv_text(columns).encode())
+
+
+def _inside(media_type: str, content: bytes) -> str:
+    """An address that holds what it leads to."""
+    return f"data:{media_type};base64,{base64.b64encode(content).decode()}"
+
+
+def _start(part: Upload, most: int) -> bytes:
+    with part.path.open("rb") as file:
+        return file.read(most)
+
+
+def _text(content: bytes) -> str:
+    """The map as the form has it: what is no text, a spreadsheet's own file for one, is not put there."""
+    try:
+        return text.decode(content, "")
+    except UnderskinError:
+        return ""

@@ -1,0 +1,166 @@
+"""The figures of a campaign's page, and their numbers."""
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from threading import Lock
+from typing import Any
+from urllib.parse import quote
+
+from service.pages.shared.figures import Drawn, drawn
+from service.store import campaigns
+from service.store.engine import Database
+from service.store.tables import AnyRow
+from service.usecases.figure_data import MOST_SINGLE, measured, spreads, spreads_of
+from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
+from underskin.units import to_lab
+
+_D33 = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
+_AGAINST_PRELOAD = (
+    "indenter_radius_mm", "preload_n", "frf_pc_per_n", "frf_uncertainty_pc_per_n", "model_frf_pc_per_n",
+)  # fmt: skip
+_MOST_CURVES = 24
+_MOST_KEPT = 64
+Which = tuple[str, int, str, str, str]  # campaign, revision, table, band, what is shown
+_kept: dict[Which, list[Drawn]] = {}
+_keeping = Lock()
+
+
+def figures(
+    store: Database, row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str, *, curves: bool
+) -> list[Drawn]:
+    """All that can be drawn of a campaign as it is now; `answer`: its d33, as `/d33` has it, with its `numbers`. `show`
+    as `measured` has it; `curves`: whether it has recordings of other kinds. What was drawn lately is kept."""
+    basis = (row.id, row.revision, answer["table_sha256"], _chosen(answer))
+    loaded = cache(lambda: _loaded(store, row))
+    makers: dict[str, Callable[[], list[Drawn]]] = {
+        **({"curves": lambda: _curves(row, loaded())} if curves else {}),
+        f"lines {show}": lambda: _frf(row, loaded, answer, numbers, show),
+        "d33": lambda: _d33(row, answer, numbers),
+    }
+    found = []
+    for name, make in makers.items():
+        before = _kept.get((*basis, name))
+        found += before if before is not None else _keep((*basis, name), make())
+    return found
+
+
+def _keep(which: Which, drawn_now: list[Drawn]) -> list[Drawn]:
+    with _keeping:
+        while len(_kept) >= _MOST_KEPT:
+            del _kept[next(iter(_kept))]
+        _kept[which] = drawn_now
+    return drawn_now
+
+
+def _loaded(store: Database, row: AnyRow) -> Campaign:
+    with store.reading() as connection:
+        return campaigns.load(connection, row, with_excluded=False)
+
+
+def band_query(band_hz: tuple[float, float]) -> str:
+    """A band in an address."""
+    return f"band_low_hz={band_hz[0]!r}&band_high_hz={band_hz[1]!r}"
+
+
+def _chosen(answer: Mapping[str, Any]) -> str:
+    """The band in an address, where the reader chose it."""
+    band = answer["band"]
+    return band_query((band["low_hz"], band["high_hz"])) if band is not None and band["chosen_by_user"] else ""
+
+
+def frf_columns(campaign: Campaign, show: str = "") -> dict[str, list[Any]]:
+    """Every line of the recordings, or of those of `show`."""
+    names = ("recording", "sensor", "frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n", "coherence")
+    columns: dict[str, list[Any]] = {name: [] for name in names}
+    for recording, frf in measured(campaign, show):
+        count = len(frf.values)
+        columns["recording"] += [recording.id] * count
+        columns["sensor"] += [recording.sensor] * count
+        columns["frequency_hz"] += frf.frequency.tolist()
+        columns["frf_re_pc_per_n"] += to_lab("frf_pc_per_n", frf.values.real).tolist()
+        columns["frf_im_pc_per_n"] += to_lab("frf_pc_per_n", frf.values.imag).tolist()
+        columns["coherence"] += [None] * count if frf.coherence is None else frf.coherence.tolist()
+    return columns
+
+
+def _frf(
+    row: AnyRow, loaded: Callable[[], Campaign], answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str
+) -> list[Drawn]:
+    from underskin.figures import frf_overview, frf_recordings
+    from underskin.recordings.frf import summary
+
+    band = answer["band"]
+    zone = None if band is None else (band["low_hz"], band["high_hz"])
+    place = f"/campaigns/{row.id}/frf.csv?show={quote(show, safe='')}"
+    if show or numbers["spreads"] is None:
+        chosen = measured(loaded(), show)
+        if not chosen:
+            return []
+        if len(chosen) <= MOST_SINGLE:
+            lines = [summary.lines_of(_title(recording, show), frf) for recording, frf in chosen]
+            about = "Magnitude, phase and coherence of each recording."
+            return [drawn("frf", frf_recordings(lines, zone), about, place)]
+        found = spreads_of(chosen)
+    else:
+        found = spreads(numbers["spreads"])
+    about = (
+        f"{sum(spread.recordings for spread in found)} recordings: for each sphere and preload the median magnitude "
+        "and phase and the lowest coherence; as a band, the magnitudes of all its recordings."
+    )
+    return [drawn("frf", frf_overview(found, zone), about, place)]
+
+
+def _title(recording: FrfRecording, show: str) -> str:
+    where = "" if show == recording.sensor else f"{recording.sensor}, "
+    return f"{where}{recording.indenter_radius_mm:.3g} mm, {recording.preload_n:.3g} N"
+
+
+def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any]) -> list[Drawn]:
+    from underskin.figures import array_map, frf_versus_preload, response_per_sensor
+
+    if answer["band"] is None:
+        return []
+    places = {sensor["id"]: sensor for sensor in row.about["skin"]["sensors"]}
+    sensors = answer["sensors"]
+    names = [entry["sensor"] for entry in sensors]
+    reasons = ["; ".join(flag["reason"] for flag in entry["flags"]) for entry in sensors]
+    d33, uncertainty, low, high = ([entry[name] for entry in sensors] for name in _D33)
+    x_mm, y_mm = ([places[name][axis] for name in names] for axis in ("x_mm", "y_mm"))
+    array = answer["array"]
+    limits = None if array is None else (array["d33_low_pc_per_n"], array["d33_high_pc_per_n"])
+    rows = numbers["recordings"]
+    titles = [f"{name}, sensor {sensor}" for name, sensor in zip(rows["recording"], rows["sensor"], strict=True)]
+    place, chosen = f"/campaigns/{row.id}", _chosen(answer)
+    chosen = f"?{chosen}" if chosen else ""
+    return [
+        drawn(
+            "preload",
+            frf_versus_preload(titles, *(rows[name] for name in _AGAINST_PRELOAD)),
+            "FRF in the flat zone against preload, for each sphere; lines are the model with the array's d33.",
+            f"{place}/preload.csv{chosen}",
+        ),
+        drawn(
+            "response",
+            response_per_sensor(names, d33, low, high, limits, reasons),
+            "d33 of each sensor with its 95 % interval.",
+            f"{place}/d33.csv{chosen}",
+        ),
+        drawn(
+            "map",
+            array_map(names, x_mm, y_mm, d33, uncertainty, reasons),
+            "Each sensor where it lies, coloured by its d33.",
+            f"{place}/d33.csv{chosen}",
+        ),
+    ]
+
+
+def _curves(row: AnyRow, campaign: Campaign) -> list[Drawn]:
+    from underskin.figures import Curve, force_curves
+
+    kinds = (IndentationRecording, CompressionRecording)
+    chosen = [recording for recording in campaign.recordings if isinstance(recording, kinds)]
+    if not chosen:
+        return []
+    figure = force_curves([Curve(one.id, one.displacement_mm, one.force_n) for one in chosen[:_MOST_CURVES]])
+    about = f"Force against displacement of {min(len(chosen), _MOST_CURVES)} of {len(chosen)} recordings."
+    return [drawn("curves", figure, about, f"/campaigns/{row.id}/curves.csv")]

@@ -1,0 +1,224 @@
+"""The design view: sliders, and at once what the skin would tell."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+from urllib.parse import urlencode
+
+import numpy as np
+import orjson
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import ValidationError
+
+from service.dependencies import Store, Table
+from service.pages.shared import same_request
+from service.pages.shared.figures import Drawn, csv_answer, drawn
+from service.pages.shared.form_errors import said
+from service.pages.shared.formats import short_and_exact
+from service.pages.shared.html import compress, page
+from service.pages.shared.skin_values import PROTOTYPE, start
+from service.problems import from_validation
+from service.routes.design import DesignAnswer, DesignRequest, answer, designed
+from underskin import InvalidInput, UnderskinError
+from underskin.surrogate.sigma_table import SigmaTable
+
+router = APIRouter(prefix="/design")
+
+# Field, words, unit, the slider's ends.
+SLIDERS = (
+    ("thickness_mm", "thickness h", "mm", 0.2, 20),
+    ("sensor_radius_mm", "sensor radius rT", "mm", 0.1, 10),
+    ("indenter_radius_mm", "sphere radius R", "mm", 0.5, 50),
+    ("preload_n", "force F", "N", 0.05, 50),
+    ("youngs_modulus_mpa", "Young's modulus E", "MPa", 0.1, 100),
+    ("d33_pc_per_n", "d33", "pC/N", 1, 100),
+    ("pitch_mm", "pitch of the array", "mm", 0.5, 50),
+    ("dip_percent", "dip that can be told", "%", 1, 50),
+)
+_LABELS = {name: f"{words} [{unit}]" for name, words, unit, *_ in SLIDERS}
+_WORDS = {name: (words, unit) for name, words, unit, *_ in SLIDERS if name != "dip_percent"}
+BLIND_PERCENT = 10.0  # of the response above a sensor: what lies below goes unseen
+
+
+@router.get("")
+def view(request: Request, store: Store, table: Table, skin: Annotated[str | None, Query()] = None) -> Response:
+    """With the values of the address, or else those of the skin, or of the paper's prototype."""
+    given = _given(request)
+    own, taken = _start(store, table, skin, given)
+    values = {**own, **given}
+    error: str | None = None
+    found: DesignAnswer | None = None
+    figures: list[Drawn] = []
+    try:
+        asked = _asked(values)
+        found, figures = _answered(table, asked, own, skin)
+    except UnderskinError as refused:
+        error = said(refused, _LABELS)
+    return page(
+        request,
+        "design.html",
+        skin_id=skin,
+        values=values,
+        sliders=SLIDERS,
+        told=[] if found is None else told(found),
+        figures=figures,
+        error=error,
+        taken=taken,
+        same=same_request.post(request, "/v1/design", values, _call(values)),
+    )
+
+
+@router.get("/answer")
+def at_once(request: Request, store: Store, table: Table, skin: Annotated[str | None, Query()] = None) -> Response:
+    """What changes in the page when a slider moves, as JSON."""
+    given = _given(request)
+    own, _ = _start(store, table, skin, given)
+    values = {**own, **given}
+    try:
+        found, figures = _answered(table, _asked(values), own, skin)
+    except UnderskinError as refused:
+        return _json(request, {"error": said(refused, _LABELS)})
+    same = same_request.post(request, "/v1/design", values, _call(values))
+    return _json(
+        request,
+        {
+            "told": {entry.name: [entry.text, entry.exact, entry.note] for entry in told(found)},
+            "figures": {figure.name: figure.json for figure in figures},
+            "same": [same.curl, same.python],
+        },
+    )
+
+
+@router.get("/sweeps.csv")
+def sweeps_csv(request: Request, table: Table) -> Response:
+    """σ and γ along each axis."""
+    found = _computed(request, table)
+    columns: dict[str, list[Any]] = {name: [] for name in ("axis", "value", "sigma", "gamma")}
+    for sweep in found.sweeps:
+        columns["axis"] += [sweep.axis] * len(sweep.value)
+        columns["value"] += sweep.value
+        columns["sigma"] += sweep.sigma
+        columns["gamma"] += sweep.gamma
+    return csv_answer("design", columns)
+
+
+@router.get("/response.csv")
+def response_csv(request: Request, table: Table) -> Response:
+    """A sensor's response against the place of the load."""
+    return csv_answer("response", _computed(request, table).response.model_dump())
+
+
+@dataclass(frozen=True)
+class Told:
+    """One thing that a design tells: short, exact, and with a remark."""
+
+    name: str
+    words: str
+    value: float | None
+    unit: str
+    digits: int
+    note: str
+
+    @property
+    def text(self) -> str:
+        """The value with its unit."""
+        shown = short_and_exact(self.value, self.unit, self.digits)[0]
+        return shown if self.value is None else f"{shown} {self.unit}".strip()
+
+    @property
+    def exact(self) -> str:
+        """All its digits."""
+        return short_and_exact(self.value, self.unit, self.digits)[1]
+
+
+def told(found: DesignAnswer) -> list[Told]:
+    """What a design tells, in order."""
+    apart = found.two_point_separation_mm
+    blind = found.response_amid_percent is not None and found.response_amid_percent < BLIND_PERCENT
+    point = f"a/h {found.a_over_h:.3g}, rT/h {found.rt_over_h:.3g}, L {found.load_parameter:.2g}"
+    anywhere = "wherever the array lies" if apart is not None else "not told apart everywhere at this pitch"
+    return [
+        Told("sigma", "transmission σ", found.sigma, "", 4, point),
+        Told("frf", "FRF", found.frf_pc_per_n, "pC/N", 4, "what an instrument should show above the sensor"),
+        Told("gamma", "γ of a point load", found.gamma, "", 4, "above the sensor, linear layer"),
+        Told("stress", "mean stress on the sensor", found.mean_stress_mpa, "MPa", 3,
+             f"contact radius {found.contact_radius_mm:.3g} mm"),
+        Told("resolution", "spatial resolution", found.resolution_mm, "mm", 3, "width at half maximum of a response"),
+        Told("apart", "two-point separation", apart, "mm", 3, f"two equal loads, {anywhere}"),
+        Told("best", "two-point separation at best", found.two_point_best_mm, "mm", 3,
+             "where the sensors lie best under them"),
+        Told("amid", "response amid four sensors", found.response_amid_percent, "%", 3,
+             "of that above one" + (": blind spots" if blind else "")),
+    ]  # fmt: skip
+
+
+def _start(
+    store: Store, table: Table, skin: str | None, given: Mapping[str, float]
+) -> tuple[dict[str, float], list[str]]:
+    """Where the sliders start, and what of it, beyond what is given, nobody declared."""
+    own, taken = start(store, table, skin, {name: words for name, words in _WORDS.items() if name not in given})
+    return {name: own[name] for name, *_ in SLIDERS}, taken
+
+
+def _given(request: Request) -> dict[str, float]:
+    """The numbers of the address."""
+    names = {name for name, *_ in SLIDERS}
+    try:
+        return {name: float(value) for name, value in request.query_params.items() if name in names}
+    except ValueError:
+        raise InvalidInput("address", request.url.query[:80], "must have numbers") from None
+
+
+def _asked(values: Mapping[str, float]) -> DesignRequest:
+    try:
+        return DesignRequest.model_validate(dict(values))
+    except ValidationError as error:
+        raise InvalidInput(*_first(error)) from None
+
+
+def _first(error: ValidationError) -> tuple[str, Any, str]:
+    told = from_validation(error).errors[0]
+    return told["field"], told["value"], told["allowed"]
+
+
+def _computed(request: Request, table: SigmaTable) -> DesignAnswer:
+    asked = _asked({**{name: PROTOTYPE[name] for name, *_ in SLIDERS}, **_given(request)})
+    return answer(table, asked, designed(table, asked))
+
+
+def _answered(
+    table: SigmaTable, asked: DesignRequest, own: Mapping[str, float], skin: str | None
+) -> tuple[DesignAnswer, list[Drawn]]:
+    from underskin.figures import Mark, array_response, design_overview
+
+    with np.errstate(all="ignore"):
+        found = designed(table, asked)
+        start = designed(table, _asked(own)).contact
+    name = "the paper's prototype" if skin is None else "the skin as it is"
+    mark = Mark(name, float(start.a_over_h), float(start.rt_over_h), float(start.load_parameter), float(start.sigma))
+    query = urlencode({name: getattr(asked, name) for name, *_ in SLIDERS})
+    return answer(table, asked, found), [
+        drawn(
+            "design",
+            design_overview(found, mark),
+            "σ under the sphere and γ under a point load, above a sensor's centre, against contact radius, sensor "
+            "radius and load; the other two stay as designed.",
+            f"/design/sweeps.csv?{query}",
+        ),
+        drawn(
+            "row",
+            array_response(found, asked.pitch_mm),
+            "The reading of each sensor of a row while the sphere moves along it, over that above a sensor.",
+            f"/design/response.csv?{query}",
+        ),
+    ]
+
+
+def _call(values: Mapping[str, float]) -> str:
+    return f"client.design({', '.join(f'{name}={value:.6g}' for name, value in values.items())})"
+
+
+def _json(request: Request, document: Any) -> Response:
+    answer = Response(orjson.dumps(document), media_type="application/json", headers={"Cache-Control": "no-store"})
+    compress(request, answer)
+    return answer

@@ -1,0 +1,181 @@
+"""A diagnosis: asked for, watched while it runs, read, saved, adopted."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NoReturn
+from urllib.parse import quote
+
+from fastapi import APIRouter, Request, Response
+from markupsafe import Markup
+
+from service.dependencies import CampaignId, Store, Table
+from service.pages.diagnosis.figure_columns import columns
+from service.pages.diagnosis.plan import FIELDS, left_open
+from service.pages.shared import adoption, same_request
+from service.pages.shared.figures import Drawn, csv_answer, drawn, drawn_before
+from service.pages.shared.forms import WRITE, Form, see, sender
+from service.pages.shared.html import page, render
+from service.problems import Refusal
+from service.routes.diagnoses import DiagnosisId, runner_of
+from service.routes.models import adopted
+from service.store import campaigns, diagnoses, models, skins
+from service.store.engine import Database
+from service.store.tables import AnyRow
+from underskin import __version__
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+router = APIRouter()
+
+_ABOUT = {
+    "where": "Each cell is the mean over the recordings in it, empty where there is none; the outlined region holds "
+    "most of the misfit.",
+    "before_after": "Each point a recording, or a part of its lines; the grey band is what noise alone allows.",
+    "explanations": "What the recordings say of each explanation, the stated one on top.",
+    "parameters": "What is known of each parameter: grey before the recordings, blue after them.",
+}
+_ODD = (LookupError, TypeError, ValueError, AttributeError)  # of a report that came with an import
+
+
+@router.post("/campaigns/{campaign_id}/diagnosis", dependencies=WRITE)
+def ask(request: Request, campaign_id: CampaignId, sent: Form, store: Store, table: Table) -> Response:  # noqa: ARG001
+    """Puts it into the queue; one that was diagnosed as it is now is shown."""
+    with store.writing() as connection:
+        row = diagnoses.ask(connection, campaign_id, table.sha256, __version__, sender(request))
+    runner_of(request).stir()
+    return see(f"/diagnoses/{row.id}")
+
+
+@router.get("/diagnoses/{diagnosis_id}")
+def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response:
+    """How far it is, or what it found."""
+    with store.reading() as connection:
+        row = diagnoses.find(connection, diagnosis_id)
+        report = diagnoses.report_of(connection, row.number)
+        figures = diagnoses.figures_of(connection, row.number)
+        of_skin = models.of_skin(connection, skins.require_root(connection, row.skin_id))
+        own = next((model for model in of_skin if model.id == row.id), None)
+        adopted_as = None if own is None else adoption.of_rows(connection, [own])[0]
+        campaign = campaigns.find(connection, row.campaign_id)
+    place = f"/v1/diagnoses/{row.id}"
+    return page(
+        request,
+        "diagnosis.html",
+        row=row,
+        campaign_name=campaign.name,
+        shown=None if report is None else _shown(row, report, figures),
+        lacks_figures=report is not None and report["fit"] is not None and not figures,
+        outdated=diagnoses.outdated(row),
+        adopted_as=adopted_as,
+        in_force=own is not None and own is of_skin[0] and own.model_withdrawn_at is None,
+        may_be_adopted=report is not None and _not_adopted(report) is None,
+        open=report is not None and left_open(report),
+        limit_fields=FIELDS,
+        not_adopted=None if report is None else _not_adopted(report),
+        same=same_request.get(request, place, f"client.diagnoses.get({row.id!r})"),
+    )
+
+
+@router.get("/diagnoses/{diagnosis_id}/report.html")
+def one_file(diagnosis_id: DiagnosisId, store: Store) -> Response:
+    """The whole as one file that needs nothing else, to be kept or sent."""
+    import plotly.io
+
+    from underskin.diagnosis.reporting import html_report as file
+
+    row, report, texts = _done(store, diagnosis_id)
+    try:
+        figures: Mapping[str, go.Figure] | None = {name: plotly.io.from_json(text) for name, text in texts.items()}
+        content = file.page(report, figures or None)
+    except _ODD:
+        _cannot_be_shown(row)
+    headers = {
+        "Content-Disposition": f'attachment; filename="{row.id}.html"',
+        "Content-Security-Policy": "sandbox",  # should anything open it in place
+        "X-Content-Type-Options": "nosniff",
+    }
+    return Response(content, headers=headers, media_type="text/html; charset=utf-8")
+
+
+@router.get("/diagnoses/{diagnosis_id}/{figure}.csv")
+def numbers_csv(diagnosis_id: DiagnosisId, figure: str, store: Store) -> Response:
+    """The numbers of a figure."""
+    row, report, figures = _done(store, diagnosis_id)
+    if figure not in _ABOUT:
+        raise Refusal(404, f"There is no figure {figure!r}.")
+    try:
+        return csv_answer(f"{row.id}-{figure}", columns(figure, report, figures))
+    except _ODD:
+        _cannot_be_shown(row)
+
+
+@router.post("/diagnoses/{diagnosis_id}/cancel", dependencies=WRITE)
+def cancel(request: Request, diagnosis_id: DiagnosisId, sent: Form, store: Store) -> Response:  # noqa: ARG001
+    """Ends it."""
+    with store.writing() as connection:
+        diagnoses.cancel(connection, diagnosis_id)
+    runner_of(request).stir()
+    return see(f"/diagnoses/{quote(diagnosis_id, safe='')}")
+
+
+@router.post("/diagnoses/{diagnosis_id}/adopt", dependencies=WRITE)
+def adopt(request: Request, diagnosis_id: DiagnosisId, sent: Form, store: Store) -> Response:  # noqa: ARG001
+    """Makes it the model of its skin."""
+    with store.writing() as connection:
+        skin = diagnoses.find(connection, diagnosis_id).skin_id
+        model = adopted(connection, skin, diagnosis_id, sender(request))
+    return see(f"/skins/{quote(model.model_skin, safe='')}?model=adopted")
+
+
+def _not_adopted(report: Mapping[str, Any]) -> str | None:
+    """Why a report cannot become a model, and what to do; None where it can."""
+    from underskin.prediction.adopted_model import NOT_ADOPTED, implausible_d33
+
+    if report["verdict"] == "explained":
+        if report["d33"] is None:
+            return "it is of curves, which have no d33: a model of a skin is of FRFs"
+        reason = implausible_d33(report)
+        return None if reason is None else f"its d33 cannot be right: {reason}"
+    return NOT_ADOPTED[report["verdict"]].removeprefix("must be explained: ")
+
+
+def _done(store: Database, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any], dict[str, str]]:
+    with store.reading() as connection:
+        row = diagnoses.find(connection, diagnosis_id)
+        report = diagnoses.report_of(connection, row.number)
+        figures = diagnoses.figures_of(connection, row.number)
+    if report is None:
+        raise Refusal(404, f"Diagnosis {diagnosis_id!r} has no report: its state is {row.state}.")
+    return row, report, figures
+
+
+def _shown(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> tuple[Markup, Markup]:
+    """The report, worded as the file has it, with the figures of a page; and with what it was made."""
+    from underskin.diagnosis.reporting import html_report as file
+
+    try:
+        figures = _drawn(row, report, texts)
+        body = file.body_of(report, {name: render("figure.html", drawn=figure) for name, figure in figures.items()})
+        provenance = file.provenance(report)
+    except _ODD:
+        _cannot_be_shown(row)
+    return Markup(body), Markup(provenance)  # noqa: S704 -- every text in them is escaped where they are made
+
+
+def _drawn(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> dict[str, Drawn]:
+    from underskin.diagnosis.reporting.html_report import of_report
+
+    def numbers(name: str) -> str:
+        return f"/diagnoses/{row.id}/{name}.csv"
+
+    if texts:
+        return {
+            name: drawn_before(name, texts[name], about, numbers(name))
+            for name, about in _ABOUT.items()
+            if name in texts
+        }
+    return {name: drawn(name, figure, _ABOUT[name], numbers(name)) for name, figure in of_report(report).items()}
+
+
+def _cannot_be_shown(row: AnyRow) -> NoReturn:
+    raise Refusal(422, f"The report of diagnosis {row.id!r} came with an import and lacks what a page shows.") from None

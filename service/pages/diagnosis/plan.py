@@ -1,0 +1,159 @@
+"""What to measure next within the limits of the reader's rig; worked out beside the server, and not kept."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import JSONResponse
+from markupsafe import Markup
+
+from service.dependencies import Store
+from service.jobs import Planner
+from service.jobs.planner import Planned
+from service.pages.array.description import number
+from service.pages.shared import same_request
+from service.pages.shared.form_errors import said
+from service.pages.shared.html import page
+from service.problems import Refusal
+from service.routes.diagnoses import DiagnosisId
+from service.store import campaigns, diagnoses
+from service.store.engine import Database
+from service.store.tables import AnyRow
+from underskin import InvalidInput, UnderskinError
+
+if TYPE_CHECKING:
+    from underskin.diagnosis.planning.rig_limits import Limits
+
+router = APIRouter(prefix="/diagnoses/{diagnosis_id}/plan")
+
+_LOWEST, _HIGHEST, _RECORDINGS = "lowest_preload_n", "highest_preload_n", "recordings"
+# Field, words, unit, whether it takes several numbers.
+FIELDS = (
+    (_LOWEST, "lowest preload", "N", False),
+    (_HIGHEST, "highest preload", "N", False),
+    ("indenter_radius_mm", "radii of the spheres at hand", "mm", True),
+    ("offset_mm", "distances beside the sensor", "mm", True),
+    ("dynamic_force_n", "dynamic forces of the shaker", "N", True),
+    ("dwell_s", "times to hold the preload", "s", True),
+    (_RECORDINGS, "recordings at most (empty: 8)", "", False),
+)
+_SEVERAL = tuple(name for name, _, _, many in FIELDS if many)
+_LABELS = {name: f"{words} [{unit}]" if unit else words for name, words, unit, _ in FIELDS} | {
+    "preload_n": "lowest and highest preload [N]",
+    _RECORDINGS: "recordings at most",
+}
+_MOST_VALUES = 8
+_MOST_RECORDINGS = 50
+_SURVIVES = 0.02  # less probable ones are not weighed
+
+
+def left_open(report: Mapping[str, Any]) -> bool:
+    """Whether a report leaves more than one explanation that recordings could tell apart."""
+    others = sum(entry["probability"] > _SURVIVES for entry in report["alternatives"])
+    return bool(report["next_experiment"]) or (report["fit"] is not None and others > 0)
+
+
+@router.get("")
+def plan(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response:
+    """Within the limits of the address."""
+    row, name = _diagnosed(store, diagnosis_id)
+    error: str | None = None
+    planned: Planned | None = None
+    same: same_request.SameRequest | None = None
+    try:
+        told = _limits(request.query_params)
+        same = _same(request, row.campaign_id, told)
+        planned = _planner(request).plan(row, _checked(told))
+    except UnderskinError as wrong:
+        error = said(wrong, _LABELS)
+    except Refusal as busy:
+        error = busy.detail
+    return page(
+        request,
+        "plan.html",
+        row=row,
+        campaign_name=name,
+        outdated=diagnoses.outdated(row),
+        excluded=row.excluded,
+        limit_fields=FIELDS,
+        given=request.query_params,
+        error=error,
+        planned=planned,
+        shown=None if planned is None or not planned.plan else _worded(planned.plan),
+        query=request.url.query,
+        same=same,
+    )
+
+
+@router.get("/progress")
+def progress(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response:
+    """How far it is."""
+    row, _ = _diagnosed(store, diagnosis_id)
+    planned = _planner(request).plan(row, _checked(_limits(request.query_params)))
+    return JSONResponse({"state": planned.state, "progress": planned.progress})
+
+
+def _diagnosed(store: Database, diagnosis_id: str) -> tuple[AnyRow, str]:
+    with store.reading() as connection:
+        row = diagnoses.find(connection, diagnosis_id)
+        name = str(campaigns.find(connection, row.campaign_id).name)
+    if row.state != "done":
+        raise Refusal(404, f"Diagnosis {diagnosis_id!r} has no report: its state is {row.state}.")
+    return row, name
+
+
+def _planner(request: Request) -> Planner:
+    planner: Planner = request.app.state.planner
+    return planner
+
+
+def _limits(given: Mapping[str, str]) -> dict[str, Any]:
+    """Of `Limits`, by name, those that were told; raises InvalidInput."""
+    told: dict[str, Any] = {}
+    ends = [given.get(name, "").strip() for name in (_LOWEST, _HIGHEST)]
+    if all(ends):
+        told["preload_n"] = tuple(number(name, text) for name, text in zip((_LOWEST, _HIGHEST), ends, strict=True))
+    elif any(ends):
+        raise InvalidInput("preload_n", None, "give both, or leave both empty")
+    for name in _SEVERAL:
+        parts = given.get(name, "").replace(",", " ").split()
+        if len(parts) > _MOST_VALUES:
+            raise InvalidInput(name, len(parts), f"must be at most {_MOST_VALUES} numbers")
+        if parts:
+            told[name] = [number(name, part) for part in parts]
+    count = given.get(_RECORDINGS, "").strip()
+    if count:
+        if not (count.isascii() and count.isdigit() and 1 <= int(count[:4]) <= _MOST_RECORDINGS):
+            raise InvalidInput(_RECORDINGS, count[:80], f"must be a whole number from 1 to {_MOST_RECORDINGS}")
+        told[_RECORDINGS] = int(count)
+    return told
+
+
+def _checked(told: Mapping[str, Any]) -> "Limits":
+    from underskin.diagnosis.planning.rig_limits import Limits
+
+    return Limits(**told)
+
+
+def _worded(planned: Mapping[str, Any]) -> Markup:
+    """A plan as the report words it."""
+    from underskin.diagnosis.reporting.html_report import plan_of
+
+    return Markup(plan_of(planned))  # noqa: S704 -- every text in it is escaped where it is made
+
+
+def _same(request: Request, campaign_id: str, told: Mapping[str, Any]) -> same_request.SameRequest:
+    """The command and the library's call with these limits."""
+    options: list[str] = []
+    for name, value in told.items():
+        options += _option("--" + name.replace("_", "-"), name, value)
+    return same_request.planned(
+        request, campaign_id, options, ", ".join(f"{name}={value!r}" for name, value in told.items())
+    )
+
+
+def _option(flag: str, name: str, value: Any) -> Sequence[str]:
+    if name == "preload_n":
+        return [flag, *map(repr, value)]
+    values = value if name in _SEVERAL else [value]
+    return [text for one in values for text in (flag, repr(one))]

@@ -1,0 +1,1 @@
+"""The page of single measured values of the FRF."""

@@ -1,0 +1,77 @@
+"""d33 by a skin's adopted model, beside the paper's, on the page of a few measured values."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from service.pages.array.description import FIELDS, number
+from service.pages.shared.form_errors import said
+from service.problems import Refusal
+from service.routes.d33 import D33Columns, answer
+from service.schemas.columns_answer import Columns
+from service.store.engine import Database
+from service.store.errors import Conflict
+from service.usecases.adopted_models import serving
+from underskin import InvalidInput, UnderskinError
+from underskin.surrogate.sigma_table import SigmaTable
+
+if TYPE_CHECKING:
+    from underskin.prediction.adopted_model import AdoptedModel
+
+# Words and unit of what a model may need beside sphere and preload.
+_NEEDED = {
+    "dynamic_force_n": ("dynamic force", "N"),
+    "dwell_s": ("time the preload was held", "s"),
+    "load_cycles": ("load cycles so far", ""),
+    "sensor": ("sensor", ""),
+}
+_WORDS = {name: (words, unit) for name, words, unit in FIELDS} | _NEEDED
+_LABELS = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in _WORDS.items()}
+
+
+@dataclass(frozen=True)
+class ByModel:
+    """What the model in force says of the same measurements.
+
+    `fields`: what the form asks for besides (name, words, unit, value); `document`: the request of `POST /v1/d33` and
+    `found`: its answer, both None where `not_told` says why.
+    """
+
+    fields: Sequence[tuple[str, str, str, str]] = ()
+    document: Mapping[str, Any] | None = None
+    found: Columns | None = None
+    not_told: str | None = None
+
+    def columns(self) -> dict[str, list[float]]:
+        """d33 by it, a row a measurement; without any where it could not be told."""
+        if self.found is None:
+            return {}
+        names = {"d33_pc_per_n": "d33_adopted_pc_per_n", "d33_uncertainty_pc_per_n": "d33_adopted_uncertainty_pc_per_n"}
+        return {new: self.found.full(name).tolist() for name, new in names.items()}
+
+
+def by_model(
+    store: Database, table: SigmaTable, skin: str | None, given: Mapping[str, str], document: Mapping[str, Any]
+) -> ByModel | None:
+    """The same by the model in force of the skin; None where there is none. `document`: the paper's request."""
+    if skin is None:
+        return None
+    try:
+        model = serving(store, skin).model
+    except Refusal:
+        return None
+    except Conflict as outdated:
+        return ByModel(not_told=str(outdated))
+    fields = [(name, *_NEEDED[name], given.get(name, "").strip()) for name in model.needs]
+    try:
+        asked = {**document, **_needed(model, fields), "model": "adopted", "skin_id": skin}
+        return ByModel(fields, asked, answer(table, store, D33Columns.model_validate(asked)))
+    except UnderskinError as refused:
+        return ByModel(fields, not_told=said(refused, _LABELS))
+
+
+def _needed(model: "AdoptedModel", fields: Sequence[tuple[str, str, str, str]]) -> dict[str, Any]:
+    if model.of_lines:
+        names = " and ".join(name.replace("_", " ") for name in model.of_lines)
+        raise InvalidInput("FRF", None, f"one value is not enough: {names} depends on frequency, so upload recordings")
+    return {name: value if name == "sensor" else number(name, value) for name, _, _, value in fields if value}

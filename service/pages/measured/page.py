@@ -1,0 +1,127 @@
+"""d33 from single measured values of the FRF, for whom a file of recordings would be too much."""
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import ValidationError
+
+from service.dependencies import Store, Table
+from service.pages.array.description import FIELDS as OF_ARRAY
+from service.pages.array.description import UNITS, number, numbers, refused
+from service.pages.measured.adopted_model import ByModel, by_model
+from service.pages.measured.out_of_domain import reasons
+from service.pages.shared import same_request
+from service.pages.shared.figures import csv_answer
+from service.pages.shared.html import page
+from service.pages.shared.skin_values import start
+from service.problems import from_validation
+from service.routes.d33 import D33Columns, answer
+from service.schemas.columns_answer import Columns
+from service.store.engine import Database
+from underskin import InvalidInput, UnderskinError
+from underskin.surrogate.sigma_table import SigmaTable
+
+router = APIRouter(prefix="/d33")
+
+FIELDS = tuple(field for field in OF_ARRAY if field[0] != "d33_pc_per_n")
+_LONGEST = 20_000  # characters of the rows
+_ROWS = "4 1 7.06 0.1\n4 3 7.45 0.1"
+_ORDER = ("indenter_radius_mm", "preload_n", "frf_pc_per_n", "frf_uncertainty_pc_per_n")
+_WORDS = {"frf_pc_per_n": "FRF", "d33_pc_per_n": "d33"}  # that findings are about
+_ANSWERED = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "contact_radius_mm", "sigma", "mean_stress_mpa")
+
+Rows = Annotated[str, Query(max_length=_LONGEST)]
+Skin = Annotated[str | None, Query()]
+
+
+@router.get("")
+def view(request: Request, store: Store, table: Table, skin: Skin = None, rows: Rows = _ROWS) -> Response:
+    """With the skin and the rows of the address, or else the paper's prototype under a sphere."""
+    values, taken = _values(store, table, request.query_params, skin)
+    error: str | None = None
+    document: dict[str, Any] = {}
+    found: Columns | None = None
+    adopted: ByModel | None = None
+    try:
+        document = _document(values, request.query_params, rows)
+        found = _answered(table, store, document)
+        adopted = by_model(store, table, skin, request.query_params, document)
+    except ValidationError as problem:
+        entry = from_validation(problem).errors[0]
+        error = _said(InvalidInput(entry["field"], entry["value"], entry["allowed"], entry["index"]))
+    except UnderskinError as problem:
+        error = _said(problem)
+    shown = document if adopted is None or adopted.document is None else adopted.document
+    return page(
+        request,
+        "measured.html",
+        skin_id=skin,
+        fields=FIELDS,
+        values=values,
+        taken=taken,
+        units_checked=UNITS in request.query_params,
+        rows=rows,
+        error=error,
+        findings=[] if found is None else found.shared["findings"],
+        words=_WORDS,
+        columns=None if found is None else _columns(document, found, adopted),
+        adopted=adopted,
+        outside=[] if found is None else reasons(document, found, table),
+        query=request.url.query,
+        same=same_request.post(request, "/v1/d33", shown, f"client.d33(**{shown!r})"),
+    )
+
+
+@router.get("/rows.csv")
+def rows_csv(request: Request, store: Store, table: Table, skin: Skin = None, rows: Rows = _ROWS) -> Response:
+    """What was measured and what it says, a row a measurement."""
+    values, _ = _values(store, table, request.query_params, skin)
+    document = _document(values, request.query_params, rows)
+    adopted = by_model(store, table, skin, request.query_params, document)
+    return csv_answer("d33", _columns(document, _answered(table, store, document), adopted))
+
+
+def _values(
+    store: Database, table: SigmaTable, given: Mapping[str, str], skin: str | None
+) -> tuple[dict[str, str], list[str]]:
+    """What the form shows: as it was sent, or else the skin's, or the prototype's; and in sentences what is not the
+    skin's own."""
+    missing = {name: (words, unit) for name, words, unit in FIELDS if not given.get(name)}
+    known, taken = start(store, table, skin, missing)
+    return {name: given.get(name) or f"{known[name]:g}" for name, *_ in FIELDS}, taken
+
+
+def _said(error: UnderskinError) -> str:
+    row = "" if not isinstance(error, InvalidInput) or error.index is None else f"row {error.index + 1}, "
+    return row + refused(error)
+
+
+def _answered(table: SigmaTable, store: Database, document: dict[str, Any]) -> Columns:
+    return answer(table, store, D33Columns.model_validate(document))
+
+
+def _columns(document: Mapping[str, Any], found: Columns, adopted: ByModel | None) -> dict[str, list[Any]]:
+    """What was sent and what is answered, a row a measurement."""
+    sent = {name: document.get(name, [math.nan] * found.rows) for name in _ORDER}
+    answered = {name: found.full(name).tolist() for name in _ANSWERED}
+    beside = {} if adopted is None else adopted.columns()
+    return {**sent, **answered, **beside, "status": list(found.status())}
+
+
+def _document(values: Mapping[str, str], given: Mapping[str, str], rows: str) -> dict[str, Any]:
+    """The request of `POST /v1/d33`; raises InvalidInput."""
+    parts = [_row(place, line) for place, line in enumerate(rows.splitlines(), 1) if line.strip()]
+    if len({len(part) for part in parts}) != 1:
+        raise InvalidInput("measurements", len(parts), "must be one or more, all with an uncertainty or none")
+    document: dict[str, Any] = {name: number(name, values[name]) for name, *_ in FIELDS}
+    document |= dict(zip(_ORDER, (list(column) for column in zip(*parts, strict=True)), strict=False))
+    return {**document, UNITS: True} if UNITS in given else document
+
+
+def _row(place: int, line: str) -> list[float]:
+    parts = numbers(f"row {place}", line)
+    if len(parts) not in (3, 4):
+        raise InvalidInput(f"row {place}", line[:80], "must be R F FRF, or R F FRF and its uncertainty (mm, N, pC/N)")
+    return parts

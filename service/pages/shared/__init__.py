@@ -1,0 +1,1 @@
+"""What several pages use: templates, forms, figures, verdicts."""

@@ -1,0 +1,75 @@
+"""The model of a skin, as pages head it: what it adds, since when and until when, and d33 by it beside the paper's."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection
+
+from service.pages.shared.verdicts import in_words, mechanisms_of
+from service.problems import Refusal
+from service.store import diagnoses
+from service.store.engine import Database
+from service.store.errors import Conflict
+from service.store.tables import AnyRow
+from service.usecases import adopted_models, d33_cache
+from underskin import InvalidInput
+from underskin.surrogate.sigma_table import SigmaTable
+
+
+@dataclass(frozen=True)
+class Withdrawal:
+    """When a model was withdrawn, by whom (name of the API key), and why."""
+
+    at: str
+    sender: str | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class Adoption:
+    """A model that was adopted; `outdated`: why it serves no figures, None where it does."""
+
+    diagnosis_id: str
+    version: int
+    at: str
+    mechanisms: str
+    outdated: str | None
+    withdrawn: Withdrawal | None
+
+
+def of_rows(connection: Connection, rows: Sequence[AnyRow]) -> list[Adoption]:
+    """Of rows of models."""
+    reports = diagnoses.reports_of(connection, [row.number for row in rows])
+    return [
+        Adoption(
+            row.id,
+            row.model_version,
+            row.adopted_at,
+            in_words(mechanisms_of(reports[row.number])),
+            diagnoses.outdated(row),
+            _withdrawal(row),
+        )
+        for row in rows
+    ]
+
+
+def _withdrawal(row: AnyRow) -> Withdrawal | None:
+    if row.model_withdrawn_at is None:
+        return None
+    return Withdrawal(row.model_withdrawn_at, row.model_withdrawn_from, row.model_withdraw_reason)
+
+
+def answer_by_it(
+    store: Database, table: SigmaTable, root: str, row: AnyRow
+) -> tuple[Mapping[str, Any] | None, str | None]:
+    """d33 of a campaign by the model in force, or why there is none."""
+    try:
+        return d33_cache.adopted_answer(store, table, row, adopted_models.serving(store, root), None), None
+    except (InvalidInput, Conflict, Refusal) as error:
+        return None, str(error)
+
+
+def change_percent(by_paper: float | None, by_model: float | None) -> float | None:
+    """How far d33 by the adopted model lies above the paper's [%]."""
+    return None if not by_paper or by_model is None else 100 * (by_model / by_paper - 1)

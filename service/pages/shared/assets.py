@@ -1,0 +1,75 @@
+"""What pages load: style, scripts, and plotly's own script from its package. A version in the address lets browsers
+keep them for good.
+"""
+
+import base64
+import hashlib
+import re
+import zlib
+from functools import cache
+from pathlib import Path
+from typing import Annotated
+
+import plotly
+from fastapi import APIRouter, Header, Response
+
+from service.problems import Refusal
+
+router = APIRouter()
+
+LIBRARY = "plotly.min.js"
+_FOLDER = Path(__file__).parents[1] / "static"
+_TYPES = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml", ".csv": "text/csv"}
+_FOR_GOOD = "public, max-age=31536000, immutable"
+
+
+@router.get("/static/{name}")
+def asset(name: str, if_none_match: Annotated[str, Header()] = "") -> Response:
+    """One of the files; gzipped, which every browser reads."""
+    if name not in names():
+        raise Refusal(404, f"There is no file {name!r}.")
+    tag = f'"{version(name)}"'
+    headers = {"ETag": tag, "Cache-Control": _FOR_GOOD, "X-Content-Type-Options": "nosniff"}
+    if tag in if_none_match:
+        return Response(status_code=304, headers=headers)
+    headers["Content-Encoding"] = "gzip"
+    return Response(gzipped(name), headers=headers, media_type=_TYPES[Path(name).suffix])
+
+
+@cache
+def names() -> frozenset[str]:
+    """All files there are."""
+    return frozenset(file.name for file in _FOLDER.iterdir()) | {LIBRARY}
+
+
+def address(name: str) -> str:
+    """Where a page finds a file."""
+    return f"/static/{name}?v={version(name)}"
+
+
+@cache
+def version(name: str) -> str:
+    """Changes with the file's content."""
+    return hashlib.sha256(_content(name)).hexdigest()[:16]
+
+
+@cache
+def library_style_hash() -> str:
+    """How a policy names the one style sheet that plotly carries in its script, for its maps."""
+    script = _content(LIBRARY).decode()
+    found = re.search(r"textContent='([^'\\]*)',document\.head\.appendChild", script)
+    if found is None:
+        return ""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(found[1].encode()).digest()).decode()}'"
+
+
+@cache
+def gzipped(name: str) -> bytes:
+    """A file as it is sent."""
+    packer = zlib.compressobj(6, wbits=31)
+    return packer.compress(_content(name)) + packer.flush()
+
+
+def _content(name: str) -> bytes:
+    folder = Path(plotly.__file__).parent / "package_data" if name == LIBRARY else _FOLDER
+    return (folder / name).read_bytes()

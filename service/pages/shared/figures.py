@@ -1,0 +1,77 @@
+"""A plotly figure in a page: its JSON, its words, and where its numbers are."""
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import orjson
+from fastapi import Response
+from markupsafe import Markup
+
+from service.pages.shared.assets import LIBRARY, gzipped
+from service.pages.shared.formats import json_inside
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure as the template has it."""
+
+    name: str
+    title: str
+    height: int
+    json: Markup
+    numbers: str | None  # address of its numbers as CSV
+    about: str
+
+
+def drawn(name: str, figure: "go.Figure", about: str, numbers: str | None = None) -> Drawn:
+    """For the template's macro `figure`; `about` says what is to be seen."""
+    title, height = figure.layout.title.text, figure.layout.height
+    return Drawn(name, title, height, json_inside(figure.to_json()), numbers, about)
+
+
+@cache
+def prepare() -> None:
+    """Load what draws and what it needs, before somebody asks for the first figure: it takes half a second."""
+    import underskin.figures.campaign_figures
+    from underskin.figures import frf_overview
+
+    assert underskin.figures.campaign_figures
+    frf_overview([], None).to_json()
+    gzipped(LIBRARY)
+
+
+def drawn_before(name: str, text: str, about: str, numbers: str | None = None) -> Drawn:
+    """The same of a figure's JSON."""
+    layout = orjson.loads(text)["layout"]
+    return Drawn(name, layout["title"]["text"], layout["height"], json_inside(text), numbers, about)
+
+
+def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> Response:
+    """Columns as a CSV file to be saved."""
+    headers = {"Content-Disposition": f'attachment; filename="{name}.csv"', "X-Content-Type-Options": "nosniff"}
+    return Response(csv_text(columns), headers=headers, media_type="text/csv; charset=utf-8")
+
+
+def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
+    """Columns as CSV."""
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    writer.writerows([_cell(value) for value in row] for row in zip(*columns.values(), strict=True))
+    return text.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    """A text that a spreadsheet would take for a formula is marked as text."""
+    if value is None:
+        return "NaN"
+    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value

@@ -1,0 +1,103 @@
+"""Templates into answers: every page goes through here, and gets its policy here."""
+
+import gzip
+from functools import cache
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from fastapi import Request, Response
+from fastapi.responses import HTMLResponse
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from service.auth import session
+from service.auth.keys import Key
+from service.pages.shared import formats
+from service.pages.shared.assets import address, library_style_hash
+from service.pages.shared.same_request import scheme
+from service.pages.upload.mapping import field_words, what_to_do
+from underskin import __version__
+
+# Of the empty style element that plotly fills through the object model.
+_EMPTY_STYLE = "'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='"
+
+
+_COMPRESSION = 5  # of 9: the rest takes longer than it saves
+
+
+@cache
+def _policy() -> str:
+    """Nothing from outside, no script or style of a page's own; plotly sets style attributes, reaching no network."""
+    styles = f"'self' {_EMPTY_STYLE} {library_style_hash()}"
+    return (
+        f"default-src 'none'; script-src 'self'; style-src {styles}; style-src-elem {styles}; "
+        "style-src-attr 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self'; form-action 'self'; "
+        "frame-ancestors 'none'; base-uri 'none'"
+    )
+
+
+def headers() -> dict[str, str]:
+    """What every page is sent with."""
+    return {
+        "Content-Security-Policy": _policy(),
+        "X-Content-Type-Options": "nosniff",
+        "Referrer-Policy": "same-origin",  # with no referrer, a form would tell no origin either
+        "Cross-Origin-Opener-Policy": "same-origin",
+        "Cache-Control": "no-store",
+    }
+
+
+@cache
+def _templates() -> Environment:
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parents[1] / "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        auto_reload=False,
+    )
+    environment.filters.update(formats.FILTERS)
+    environment.filters.update(field_words=field_words, what_to_do=what_to_do)
+    environment.globals.update(static=address, version=__version__, segment=lambda text: quote(text, safe=""))
+    return environment
+
+
+def render(template: str, **values: Any) -> str:
+    """A template as text."""
+    return _templates().get_template(template).render(**values)
+
+
+def page(
+    request: Request, template: str, *, status: int = 200, cookie: str | None = None, **values: Any
+) -> HTMLResponse:
+    """A template as the answer to a request; `cookie` replaces the session's."""
+    kept = session.cookie_in(dict(request.scope["headers"]))
+    current = cookie or kept or session.anonymous()
+    key: Key | None = request.scope["key"]
+    viewer = {
+        "key": key,
+        "may_write": key is None or key.scope == "write",
+        "form_token": session.form_token(current),
+        "path": request.url.path,
+    }
+    answer = HTMLResponse(render(template, viewer=viewer, **values), status, headers())
+    compress(request, answer)
+    if current != kept:
+        set_session(request, answer, current)
+    return answer
+
+
+def compress(request: Request, answer: Response) -> None:
+    """Gzip an answer where the browser reads that. What it holds of secrets is the session's own token, and another
+    site's requests carry no session, so that lengths tell nobody anything."""
+    if "gzip" in request.headers.get("accept-encoding", ""):
+        answer.body = gzip.compress(bytes(answer.body), _COMPRESSION)
+        answer.headers.update({"Content-Encoding": "gzip", "Content-Length": str(len(answer.body))})
+
+
+def set_session(request: Request, answer: Any, cookie: str) -> None:
+    """Put the session's cookie into an answer; behind TLS it goes back through TLS only."""
+    secure = scheme(request) == "https"
+    age = session.LASTS_S
+    answer.set_cookie(session.COOKIE, cookie, max_age=age, httponly=True, samesite="strict", secure=secure, path="/")

@@ -1,0 +1,25 @@
+"""Two ids that turned out to mean one skin."""
+
+from urllib.parse import quote
+
+from fastapi import APIRouter, Response
+from pydantic import ValidationError
+
+from service.dependencies import SkinId, Store
+from service.pages.shared.forms import WRITE, Form, see
+from service.problems import from_validation
+from service.routes import skins
+from service.schemas.skins import Join
+
+router = APIRouter()
+
+
+@router.post("/skins/{skin_id}/join", dependencies=WRITE)
+def join(skin_id: SkinId, sent: Form, store: Store) -> Response:
+    """Count the other as this one from now on."""
+    try:
+        asked = Join(skin_id=sent.get("other", "").strip(), reason=sent.get("reason", ""))
+    except ValidationError as error:
+        raise from_validation(error) from None
+    skins.join(skin_id, asked, store)
+    return see(f"/skins/{quote(skin_id, safe='')}")

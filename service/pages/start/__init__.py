@@ -1,0 +1,1 @@
+"""The start page, the example skin, and logging in."""

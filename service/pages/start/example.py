@@ -1,0 +1,51 @@
+"""An example skin with campaigns, kept by one click."""
+
+import hashlib
+from pathlib import Path
+
+from fastapi import APIRouter, Request, Response
+from sqlalchemy import Connection
+from starlette.concurrency import run_in_threadpool
+
+from service.dependencies import Store, Table
+from service.ingest.accept import Terms, accept
+from service.ingest.uploads import Upload
+from service.pages.shared.forms import WRITE, Form, see
+from service.store import campaigns, skins
+from service.usecases import d33_cache
+
+router = APIRouter()
+
+SKIN = "example"
+_FOLDER = Path(__file__).parent / "example"
+_MOST = 1000  # campaigns of it that are looked at
+
+
+@router.post("/example", dependencies=WRITE)
+async def load(request: Request, sent: Form, store: Store, table: Table) -> Response:  # noqa: ARG001 -- checked by it
+    """Keeps the example's campaigns, once however often it is asked for; afresh where all were withdrawn."""
+    with store.reading() as connection:
+        withdrawn = _withdrawn(connection)
+    if withdrawn is None:
+        return see(f"/skins/{SKIN}")
+    uploads = [_upload(file) for file in sorted(_FOLDER.glob("*.json"))]
+    key = request.scope["key"]
+    sender = None if key is None else key.name
+    asked = f"the example skin, {withdrawn} withdrawn" if withdrawn else "the example skin"
+    terms = Terms(SKIN, None, None, False, None, asked, sender, request.app.state.settings.max_body_bytes)
+    answer, _ = await run_in_threadpool(accept, store, uploads, terms)
+    await run_in_threadpool(d33_cache.derive, store, table, [entry["id"] for entry in answer["campaigns"]])
+    return see(f"/skins/{SKIN}")
+
+
+def _withdrawn(connection: Connection) -> int | None:
+    """How many campaigns the skin had, all of which were withdrawn; None where one is in use."""
+    if not skins.is_known(connection, SKIN):
+        return 0
+    filters = campaigns.Filters(skin=skins.require_root(connection, SKIN))
+    found = campaigns.listed(connection, filters, None, _MOST)
+    return None if any(campaigns.state(row) == "current" for row in found) else len(found)
+
+
+def _upload(file: Path) -> Upload:
+    return Upload(file, file.name, "file", hashlib.sha256(file.read_bytes()).hexdigest(), in_form=True)

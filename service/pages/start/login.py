@@ -1,0 +1,50 @@
+"""Logging in with a key, where keys are needed."""
+
+from typing import Annotated
+from urllib.parse import quote
+
+from fastapi import APIRouter, Query, Request, Response
+
+from service.auth import session
+from service.auth.access_control import Gate
+from service.pages.shared.forms import Form, see
+from service.pages.shared.html import page, set_session
+
+router = APIRouter()
+
+
+@router.get("/login")
+def form(request: Request, back: Annotated[str, Query(alias="next")] = "/") -> Response:
+    """Asks for a key, where one is needed."""
+    gate: Gate = request.app.state.gate
+    if not gate.keys_needed():
+        return see("/")
+    return page(request, "login.html", back=back, refused=False, missing=gate.keys_missing())
+
+
+@router.post("/login")
+def login(request: Request, sent: Form) -> Response:
+    """Starts a session."""
+    gate: Gate = request.app.state.gate
+    key = gate.key_of_login(sent.get("key", ""))
+    back = sent.get("next", "/")
+    if key is None:
+        request.scope["why"] = "the key that was typed is not known"
+        return page(request, "login.html", status=401, back=back, refused=True, missing=gate.keys_missing())
+    answer = see(_own(back))
+    set_session(request, answer, session.logged_in(key))
+    return answer
+
+
+@router.post("/logout")
+def logout(request: Request, sent: Form) -> Response:  # noqa: ARG001 -- reading it checks the session
+    """Ends it in this browser."""
+    answer = see("/login")
+    set_session(request, answer, session.anonymous())
+    return answer
+
+
+def _own(path: str) -> str:
+    """A path of this server, whatever the form said."""
+    plain = path.startswith("/") and not path.startswith("//") and "\\" not in path and path.isprintable()
+    return quote(path, safe="/?=&") if plain else "/"

@@ -1,0 +1,56 @@
+"""The start: skins at a glance."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+from starlette.background import BackgroundTask
+
+from service.dependencies import Store, Table
+from service.pages.shared import adoption, same_request, verdicts
+from service.pages.shared.figures import prepare
+from service.pages.shared.html import page
+from service.pages.start.sparkline import sparkline
+from service.routes.campaigns import before as number_of
+from service.store import overview
+
+router = APIRouter()
+
+_ON_A_PAGE = 25
+
+
+@router.get("/")
+def start(
+    request: Request,
+    store: Store,
+    table: Table,
+    find: Annotated[str, Query(max_length=200)] = "",
+    before: Annotated[str | None, Query()] = None,
+) -> Response:
+    """The skins whose campaigns came last, first."""
+    with store.reading() as connection:
+        found = overview.glances(connection, find or None, number_of(before), _ON_A_PAGE + 1, table.sha256)
+        shown = found[:_ON_A_PAGE]
+        told = [glance.diagnosis for glance in shown if glance.diagnosis is not None]
+        models = [glance.model for glance in shown if glance.model is not None]
+        verdict = verdicts.of_rows(connection, told, [row.id for row in models])
+        adoptions = {one.diagnosis_id: one for one in adoption.of_rows(connection, models)}
+    answer = page(
+        request,
+        "start.html",
+        glances=[
+            (
+                glance,
+                sparkline(glance.d33),
+                None if glance.diagnosis is None else verdict[glance.diagnosis.id],
+                None if glance.model is None else adoptions[glance.model.id],
+                adoption.change_percent(glance.paper_d33, glance.adopted_d33),
+            )
+            for glance in shown
+        ],
+        find=find,
+        following=shown[-1].cursor if len(found) > _ON_A_PAGE else None,
+        first=before is None,
+        same=same_request.get(request, "/v1/skins", "list(client.skins.all())"),
+    )
+    answer.background = BackgroundTask(prepare)
+    return answer

@@ -1,0 +1,122 @@
+"""The tables that answers come from: what each holds, over which range, how wrong it may be, and how it was made."""
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any
+
+import h5py
+import numpy as np
+from fastapi import APIRouter, Depends, Request, Response
+
+from service.pages.shared import same_request
+from service.pages.shared.html import page
+from service.pages.shared.skin_values import PROTOTYPE
+from service.routes.tables import TableAxis, TableEntry, Tables, tables
+from underskin.surrogate.contact_table import CONTACT_TABLE
+from underskin.surrogate.influence_table import INFLUENCE_TABLE
+from underskin.surrogate.sigma_table import SIGMA_TABLE
+
+router = APIRouter(prefix="/tables")
+
+# Of each table: its file, a title, what it holds.
+_HELD = {
+    "sigma": (
+        SIGMA_TABLE,
+        "Transmission factor σ",
+        "A sphere above the sensor's centre, its pressure after Hertz: σ, from which FRF and d33 follow.",
+    ),
+    "influence": (
+        INFLUENCE_TABLE,
+        "Influence γ",
+        "A point load anywhere on top, pressing or dragging, on a layer that deforms little: several loads add up.",
+    ),
+    "contact": (
+        CONTACT_TABLE,
+        "Contact of a sphere",
+        "A sphere that sinks deep: how wide it touches, how far it sinks in, and σ with that contact.",
+    ),
+}
+# Words of an axis, and what it is in lab units on the paper's prototype: symbol, factor, unit.
+_H, _RT, _E = (PROTOTYPE[name] for name in ("thickness_mm", "sensor_radius_mm", "youngs_modulus_mpa"))
+_R = PROTOTYPE["indenter_radius_mm"]
+_AXES = {
+    "a_over_h": ("contact radius a over thickness, a/h", "a", _H, "mm"),
+    "rt_over_h": ("sensor radius over thickness, rT/h", "rT", _H, "mm"),
+    "load_parameter": ("load parameter, L = F/(R²E)", "F", _R**2 * _E, "N"),
+    "indenter_radius_over_h": ("radius of the sphere over thickness, R/h", "R", _H, "mm"),
+    "r_over_h": ("distance of the load from the sensor's centre over thickness, r/h", "r", _H, "mm"),
+    "poisson_ratio": ("Poisson's ratio ν", "", 0.0, ""),
+    "slip": ("slip of the glue line: 0 bonded, 1 frictionless", "", 0.0, ""),
+}
+_MADE = {
+    "material": "material",
+    "mesh": "elements",
+    "solver": "solver",
+    "force_balance_error": "the base bears the force, but for a relative",
+    "tablegen_sources_sha256": "SHA-256 of the sources",
+}
+
+
+@dataclass(frozen=True)
+class Told:
+    """One table in words."""
+
+    name: str
+    title: str
+    holds: str
+    sha256: str
+    schema: str
+    domain: list[tuple[str, TableAxis, str]]  # words, the axis, what it is on the prototype
+    errors: list[tuple[str, float, float]]  # of what, median and largest
+    made: list[tuple[str, Any]]
+    versions: str
+
+
+@router.get("")
+def view(request: Request, answered: Annotated[Tables, Depends(tables)]) -> Response:
+    """What `GET /v1/tables` says, and the errors that the files hold."""
+    folder = request.app.state.settings.tables
+    return page(
+        request,
+        "tables.html",
+        tables=[_told(folder, entry) for entry in answered.tables],
+        prototype=f"h {_H:g} mm, E {_E:g} MPa, a sphere of R {_R:g} mm",
+        same=same_request.get(request, "/v1/tables", "client.tables()"),
+    )
+
+
+def _told(folder: Path, entry: TableEntry) -> Told:
+    file, title, holds = _HELD[entry.name]
+    versions = {name.removeprefix("version_"): value for name, value in entry.about.items() if "version_" in name}
+    return Told(
+        entry.name,
+        title,
+        holds,
+        entry.table_sha256,
+        entry.table_schema,
+        [(_AXES[axis.name][0], axis, _in_lab_units(axis)) for axis in entry.axes],
+        _errors(folder / file),
+        [(words, entry.about[name]) for name, words in _MADE.items() if name in entry.about],
+        ", ".join(f"{name} {value}" for name, value in versions.items()),
+    )
+
+
+def _in_lab_units(axis: TableAxis) -> str:
+    """The range on the prototype; empty where the axis has none."""
+    _, symbol, factor, unit = _AXES[axis.name]
+    return f"{symbol} {factor * axis.low:.3g} to {factor * axis.high:.3g} {unit}" if symbol else ""
+
+
+@cache
+def _errors(file: Path) -> list[tuple[str, float, float]]:
+    """Of each estimate of an error that a table's file holds: of what, and its median and largest over the domain."""
+    found = []
+    with h5py.File(file) as table:
+        for group in table.values():
+            for name, values in group.items():
+                if name.endswith("_error"):
+                    sizes = np.abs(values[()])
+                    words = f"{name.removesuffix('_error')}: {values.attrs['long_name']}".replace("_", " ")
+                    found.append((words, float(np.median(sizes)), float(sizes.max())))
+    return found

@@ -1,0 +1,64 @@
+"""Refusals that are alike: told once, with how many there are and which."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from service.pages.upload.file_summary import FileSeen
+
+_FEWEST = 3  # that are told together
+_NUMBER = re.compile(r"\d+(?:[.,]\d+)*")
+
+Errors = Sequence[Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class Alike:
+    """Entries, as (place in the list, name), and the errors of the first: of the others the numbers may differ."""
+
+    entries: Sequence[tuple[int, str]]
+    errors: Errors
+
+    @property
+    def first(self) -> int:
+        """Place of the first."""
+        return self.entries[0][0]
+
+    def holds(self, place: int) -> bool:
+        """Whether the entry of that place is among them."""
+        return any(place == own for own, _ in self.entries)
+
+
+def of_files(files: Sequence[FileSeen]) -> list[Alike]:
+    """Files, those together of which nothing was understood for the same reasons."""
+    return _together([(file.label, [] if file.recordings else _reasons(file)) for file in files])
+
+
+def of_recordings(file: FileSeen) -> list[Alike]:
+    """The refused recordings of a file."""
+    return _together([(entry["id"], entry["errors"]) for entry in file.refused])
+
+
+def _reasons(file: FileSeen) -> Errors:
+    return [*file.errors, *(error for entry in file.refused for error in entry["errors"])]
+
+
+def _together(found: Sequence[tuple[str, Errors]]) -> list[Alike]:
+    """In the order of their first; few that are alike, and those without errors, one by one."""
+    by_reason: dict[Any, list[int]] = {}
+    for place, (name, errors) in enumerate(found):
+        reason = tuple(_what(name, error) for error in errors) or place
+        by_reason.setdefault(reason, []).append(place)
+    groups = [
+        part
+        for places in by_reason.values()
+        for part in ([places] if len(places) >= _FEWEST else [[place] for place in places])
+    ]
+    return [Alike([(place, found[place][0]) for place in places], found[places[0]][1]) for places in sorted(groups)]
+
+
+def _what(name: str, error: Mapping[str, Any]) -> tuple[str, str]:
+    """What is wrong, without the numbers and the name of the one it is wrong with."""
+    field, allowed = (_NUMBER.sub("#", str(error[part]).replace(name, "")) for part in ("field", "allowed"))
+    return field, allowed

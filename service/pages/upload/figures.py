@@ -1,0 +1,94 @@
+"""The figures of an uploaded file: its channels as they came, its FRFs, its curves."""
+
+from typing import Any
+
+import numpy as np
+
+from service.ingest.reading import Look
+from service.pages.campaign.figures import frf_columns
+from service.pages.shared.figures import Drawn, drawn
+from service.usecases.figure_data import measured
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+
+_MOST_TRACES = 8
+_MOST_FRF = 12
+_MOST_CURVES = 12
+
+
+def figures(look: Look, place: str) -> list[Drawn]:
+    """What there is to see; `place`: the address of the upload's file, under which its numbers are."""
+    campaigns = _campaigns(look)
+    return [*_traces(look, place), *_frf(campaigns, place), *_curves(campaigns)]
+
+
+def trace_columns(look: Look) -> dict[str, list[Any]]:
+    """The channels of the file's first part, a row a sample."""
+    if look.contents is None or not look.contents.blocks:
+        return {}
+    block = look.contents.blocks[0]
+    length = max((len(channel.values) for channel in block.channels), default=0)
+    columns = {}
+    for channel in block.channels:
+        values = np.abs(channel.values) if np.iscomplexobj(channel.values) else channel.values
+        filled = [*values.tolist(), *[None] * (length - len(values))]
+        columns[f"{channel.name} [{channel.unit}]" if channel.unit else channel.name] = filled
+    return columns
+
+
+def lines_columns(look: Look) -> dict[str, list[Any]]:
+    """Every line of every FRF in the file."""
+    parts = [frf_columns(campaign) for campaign in _campaigns(look)]
+    return {name: [value for part in parts for value in part[name]] for name in parts[0]} if parts else {}
+
+
+def _campaigns(look: Look) -> list[Campaign]:
+    return [found.reading.campaign for found in look.found if found.reading is not None]
+
+
+def _traces(look: Look, place: str) -> list[Drawn]:
+    from underskin.figures import Trace, raw_traces
+
+    if look.contents is None or not look.contents.blocks:
+        return []
+    block = look.contents.blocks[0]
+    real = [one for one in block.channels if len(one.values) and not np.iscomplexobj(one.values)]
+    if not real:
+        return []
+    traces = [Trace(one.name, one.unit, one.values.astype(float)) for one in real[:_MOST_TRACES]]
+    of = (
+        f" of {block.name[:60]!r}, the first of {len(look.contents.blocks)} parts"
+        if len(look.contents.blocks) > 1
+        else ""
+    )
+    most = f" (the first {_MOST_TRACES} of {len(real)})" if len(real) > _MOST_TRACES else ""
+    about = f"The channels{of}{most}, in the units of the file."
+    return [drawn("traces", raw_traces(traces, block.sample_rate_hz), about, f"{place}traces.csv")]
+
+
+def _frf(campaigns: list[Campaign], place: str) -> list[Drawn]:
+    from underskin.figures import frf_recordings
+    from underskin.recordings.frf import summary
+
+    found = [entry for campaign in campaigns for entry in measured(campaign)]
+    if not found:
+        return []
+    lines = [
+        summary.lines_of(f"{one.id}: {one.sensor}, {one.indenter_radius_mm:g} mm, {one.preload_n:g} N", frf)
+        for one, frf in found[:_MOST_FRF]
+    ]
+    some = f" of the first {_MOST_FRF} of {len(found)} recordings" if len(found) > _MOST_FRF else " of each recording"
+    about = f"Magnitude, phase and coherence{some}."
+    return [drawn("frf", frf_recordings(lines, None), about, f"{place}frf.csv")]
+
+
+def _curves(campaigns: list[Campaign]) -> list[Drawn]:
+    from underskin.figures import Curve, force_curves
+
+    kinds = (IndentationRecording, CompressionRecording)
+    chosen = [one for campaign in campaigns for one in campaign.recordings if isinstance(one, kinds)]
+    if not chosen:
+        return []
+    figure = force_curves([Curve(one.id, one.displacement_mm, one.force_n) for one in chosen[:_MOST_CURVES]])
+    return [
+        drawn("curves", figure, f"Force against displacement of {min(len(chosen), _MOST_CURVES)} of {len(chosen)}.")
+    ]

@@ -1,0 +1,161 @@
+"""What was understood of an uploaded file: its channels, its recordings, what is wrong."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from service.ingest.reading import Arrived, Look, arrived_as
+from service.ingest.uploads import Upload
+from underskin import InvalidInput
+from underskin.recordings.campaign import CompressionRecording, FrfRecording, Recording
+from underskin.recordings.channels import Contents
+from underskin.units import to_lab
+
+MOST_LISTED = 60
+_MOST_CHANNELS = 60
+_MOST_PROPERTIES = 40
+
+
+@dataclass(frozen=True)
+class ChannelSeen:
+    """A channel: over all parts of the file that have it."""
+
+    name: str
+    unit: str
+    samples: int  # of the first part
+    low: float | None
+    high: float | None
+    is_complex: bool = False
+
+
+@dataclass(frozen=True)
+class RecordingSeen:
+    """A recording that can be kept; `frf_pc_per_n` is the median magnitude over its lines."""
+
+    id: str
+    kind: str
+    sensor: str | None
+    pressed_by: str
+    points: int
+    frf_pc_per_n: float | None
+
+
+@dataclass(frozen=True)
+class FileSeen:
+    """One file."""
+
+    label: str
+    kind: str
+    recordings: int
+    listed: Sequence[RecordingSeen]
+    refused: Sequence[dict[str, Any]]  # id and errors of each
+    errors: Sequence[dict[str, Any]]  # of the whole
+    notes: Sequence[str]
+    campaigns: Sequence[str]  # their names
+    skin: str | None
+    known: Sequence[str] = ()  # what to know before it is kept
+    parts: int = 0
+    sample_rate_hz: float | None = None
+    channels: Sequence[ChannelSeen] = ()
+    properties: Mapping[str, str | float] = field(default_factory=dict)
+
+
+def seen(upload: Upload, look: Look, known: Sequence[str]) -> FileSeen:
+    """A summary that is small however large the file; `known`: what to know before it is kept."""
+    arrived = [arrived_as(found) for found in look.found]
+    campaigns = [one.campaign for one in arrived if one.campaign is not None]
+    recordings = [recording for campaign in campaigns for recording in campaign.recordings]
+    skins = {campaign.skin.id for campaign in campaigns if campaign.skin.id is not None}
+    contents = look.contents
+    about: dict[str, Any] = {} if contents is None else _about(contents)
+    return FileSeen(
+        label=upload.label or "the file",
+        kind=look.kind,
+        recordings=len(recordings),
+        listed=[_recording(recording) for recording in recordings[:MOST_LISTED]],
+        refused=[entry for one in arrived for entry in one.refused],
+        errors=[error for one in arrived for error in _own_errors(one)],
+        notes=[note for one in arrived for note in one.notes],
+        campaigns=[campaign.name for campaign in campaigns],
+        skin=next(iter(skins)) if len(skins) == 1 else None,
+        known=known,
+        **about,
+    )
+
+
+def _own_errors(one: Arrived) -> list[dict[str, Any]]:
+    """Those of the file, not that all its recordings were refused, which are listed."""
+    return [] if one.refused else one.errors
+
+
+def _about(contents: Contents) -> dict[str, Any]:
+    by_name: dict[str, ChannelSeen] = {}
+    for block in contents.blocks:
+        for channel in block.channels:
+            if channel.name in by_name or len(by_name) < _MOST_CHANNELS:
+                low, high = _range(channel.values)
+                before = by_name.get(channel.name)
+                if before is not None:
+                    low, high = (
+                        _either(pick, *pair) for pick, pair in ((min, (before.low, low)), (max, (before.high, high)))
+                    )
+                samples = len(channel.values) if before is None else before.samples
+                complex_numbers = bool(np.iscomplexobj(channel.values))
+                by_name[channel.name] = ChannelSeen(channel.name, channel.unit, samples, low, high, complex_numbers)
+    return {
+        "parts": len(contents.blocks),
+        "sample_rate_hz": contents.blocks[0].sample_rate_hz if contents.blocks else None,
+        "channels": list(by_name.values()),
+        "properties": _properties(contents),
+    }
+
+
+def _properties(contents: Contents) -> dict[str, str | float]:
+    """What the file, and its first part, says about itself: a part's own by their own names, as mappings know them."""
+    first = contents.blocks[0].name if contents.blocks else ""
+    others = tuple(f"{block.name}." for block in contents.blocks if block.name)
+    own = f"{first}."
+    found = {
+        name.removeprefix(own) if first else name: value
+        for name, value in contents.properties.items()
+        if not name.startswith(others) or (first and name.startswith(own))
+    }
+    return dict(list(found.items())[:_MOST_PROPERTIES])
+
+
+def _range(values: Any) -> tuple[float | None, float | None]:
+    """Of the finite values; of complex ones their magnitude."""
+    real = np.abs(values) if np.iscomplexobj(values) else values
+    finite = real[np.isfinite(real)]
+    return (float(finite.min()), float(finite.max())) if len(finite) else (None, None)
+
+
+def _either(pick: Any, first: float | None, second: float | None) -> float | None:
+    known = [value for value in (first, second) if value is not None]
+    return pick(known) if known else None
+
+
+def _recording(recording: Recording) -> RecordingSeen:
+    if isinstance(recording, CompressionRecording):
+        size = f"{recording.sample_height_mm:g} mm high, {recording.sample_diameter_mm:g} mm across"
+        return RecordingSeen(recording.id, recording.kind, None, size, len(recording.force_n), None)
+    if not isinstance(recording, FrfRecording):
+        size = f"sphere of {recording.indenter_radius_mm:g} mm"
+        return RecordingSeen(recording.id, recording.kind, recording.sensor, size, len(recording.force_n), None)
+    column = recording.force_n if recording.force_n is not None else recording.frequency_hz
+    pressed = f"{recording.preload_n:g} N, sphere of {recording.indenter_radius_mm:g} mm"
+    points = 0 if column is None else len(column)
+    return RecordingSeen(recording.id, recording.kind, recording.sensor, pressed, points, _level(recording))
+
+
+def _level(recording: FrfRecording) -> float | None:
+    from underskin.recordings.frf.estimation import lines_of
+
+    try:
+        values = lines_of(recording).values
+    except InvalidInput:
+        return None
+    finite = values[np.isfinite(values)]
+    return float(np.median(to_lab("frf_pc_per_n", np.abs(finite)))) if len(finite) else None

@@ -1,0 +1,256 @@
+"""A rig description as a form: what each channel of a file is, and what the file does not say."""
+
+import re
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from typing import Any
+
+from service.pages.shared.form_errors import FOR_REQUESTS
+from service.pages.upload.file_summary import ChannelSeen
+from underskin import InvalidInput
+from underskin.recordings.readers.unit_labels import lab_field, unit
+from underskin.recordings.rig_description import SCHEMA, channel_fields
+
+KINDS = {
+    "frf": "FRF: charge against a shaken force",
+    "indentation": "indentation: force against depth",
+    "compression": "compression of a sample of the elastomer",
+}
+# Field, words, unit, and the kinds that have it.
+SKIN = (
+    ("thickness_mm", "thickness h", "mm"),
+    ("youngs_modulus_mpa", "Young's modulus E", "MPa"),
+    ("poisson_ratio", "Poisson's ratio ν", ""),
+    ("sensor_radius_mm", "sensor radius rT", "mm"),
+)
+RECORDING = (
+    ("sensor", "sensor that was pressed", "", ("frf", "indentation")),
+    ("indenter_radius_mm", "sphere radius R", "mm", ("frf", "indentation")),
+    ("preload_n", "preload F", "N", ("frf",)),
+    ("dynamic_force_n", "dynamic force, peak", "N", ("frf",)),
+    ("sample_rate_hz", "sample rate, if the file does not say", "Hz", ("frf",)),
+    ("sample_height_mm", "sample's height", "mm", ("compression",)),
+    ("sample_diameter_mm", "sample's diameter", "mm", ("compression",)),
+)
+CHANNELS = {
+    "force_n": "force",
+    "charge_pc": "charge",
+    "displacement_mm": "displacement",
+    "time_s": "time",
+    "frequency_hz": "frequency",
+    "frf_re_pc_per_n": "FRF, real part",
+    "frf_im_pc_per_n": "FRF, imaginary part",
+    "frf_pc_per_n": "FRF, complex numbers",
+    "coherence": "coherence γ²",
+}  # what a channel can be, of one kind or another
+_RATE = "sample_rate_hz"
+_RATES = ("fs", "sample_rate", "sampling_rate", "samplerate", "sampling_frequency")  # as files call it
+_WORDS = {
+    **CHANNELS,
+    **{name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in (*SKIN, *RECORDING)},
+    "sensors": "layout",
+    _RATE: "sample rate [Hz]",
+}
+_UNQUOTED_FIELD = re.compile(r"(?<!['\w])[a-z0-9]+(?:_[a-z0-9]+)+(?!['\w])")  # what is quoted is the file's own
+_TEXTS = ("sensor",)
+_SEPARATORS = (";", "\t", ",", None)  # of a line of the layout, as tried; None: blanks
+_PARTS = 3  # of it: name, x, y
+_BY_DIMENSION = {
+    "frf": {
+        "force": "force_n",
+        "charge": "charge_pc",
+        "frequency": "frequency_hz",
+        "charge/force": "frf_re_pc_per_n",
+        "time": "time_s",
+    },
+    "indentation": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
+    "compression": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
+}
+_OF_COMPRESSION = ("compress", "engineering strain", "true strain")  # as testing machines call their columns
+_BY_WORD = {
+    "force": "force_n",
+    "load": "force_n",
+    "charge": "charge_pc",
+    "amplifier": "charge_pc",
+    "coherence": "coherence",
+    "frequency": "frequency_hz",
+}
+
+
+def field_words(field: str) -> str:
+    """A field as the form calls it; others as they are."""
+    return _WORDS.get(field.removeprefix("skin.").removeprefix("recording.").removeprefix("channels."), field)
+
+
+def what_to_do(error: Mapping[str, Any]) -> str:
+    """What is allowed; for what the form asks, where to say it."""
+    if error["allowed"] != "required" or field_words(error["field"]) == error["field"]:
+        allowed = str(error["allowed"]).replace(FOR_REQUESTS, " (or tick “Take unlikely magnitudes as they are”)")
+        return _UNQUOTED_FIELD.sub(lambda found: field_words(found[0]), allowed)
+    if error["field"] == _RATE:
+        return "required: fill it in below, or say which channel is the time"
+    if error["field"] in CHANNELS:
+        return "required: say below which channel it is"
+    return "required: fill it in below"
+
+
+def guessed(channels: Sequence[ChannelSeen], properties: Mapping[str, Any], skin: Mapping[str, Any]) -> dict[str, Any]:
+    """A first rig description by units and names of channels and properties, to be looked over; `skin`: what is known
+    of it."""
+    kind, fields = _likely(channels)
+    found: dict[str, Any] = {}
+    for one, field in zip(channels, fields, strict=True):
+        if field and field not in found:
+            found[field] = {"channel": one.name}
+    known_skin = {name: skin[name] for name in (*[name for name, *_ in SKIN], "sensors") if skin.get(name) is not None}
+    return {
+        "schema": SCHEMA,
+        "kind": kind,
+        "skin": {"poisson_ratio": 0.5, **known_skin},
+        "recording": _stated(properties, kind),
+        "channels": found,
+    }
+
+
+def passed_over(channels: Sequence[ChannelSeen]) -> list[str]:
+    """In words, which channels `guessed` left unused although they may be what another one was taken for."""
+    by_field: dict[str, list[str]] = {}
+    for one, field in zip(channels, _likely(channels)[1], strict=True):
+        by_field.setdefault(field, []).append(one.name)
+    return [
+        f"{', '.join(names[1:])} may be {CHANNELS[field]} as well as {names[0]}, which was taken for it: "
+        "choose the one that is meant"
+        for field, names in by_field.items()
+        if field and len(names) > 1
+    ]
+
+
+def _likely(channels: Sequence[ChannelSeen]) -> tuple[str, list[str]]:
+    """The kind of recording, and of each channel the field that it may be; empty where nothing speaks for one."""
+    dimensions = [known.dimension if (known := unit(one.unit)) else "" for one in channels]
+    kind = "frf"
+    if "length" in dimensions and "charge" not in dimensions:
+        named = any(words in one.name.lower() for one in channels for words in _OF_COMPRESSION)
+        kind = "compression" if named else "indentation"
+    found = []
+    for one, dimension in zip(channels, dimensions, strict=True):
+        word = next((field for word, field in _BY_WORD.items() if word in one.name.lower()), "")
+        field = "frf_pc_per_n" if one.is_complex else _BY_DIMENSION[kind].get(dimension) or word
+        if field == "frf_re_pc_per_n" and "imag" in one.name.lower():
+            field = "frf_im_pc_per_n"
+        found.append(field if field in channel_fields(kind) else "")
+    return kind, found
+
+
+def _stated(properties: Mapping[str, Any], kind: str) -> dict[str, Any]:
+    """The recording's fields that the file itself states under their own names."""
+    wanted = [name for name, _, _, kinds in RECORDING if kind in kinds]
+    named = {field: one for one in properties for field in (one, *(lab_field(one) or ())[:1])}
+    rate = next((one for one in properties if one.lower().replace(" ", "_") in _RATES), None)
+    if rate is not None:
+        named[_RATE] = rate
+    return {name: {"property": named[name]} for name in wanted if name in named}
+
+
+def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[str, Any], list[InvalidInput]]:
+    """The rig description that a form says, and what in it cannot be: a line of the layout, two channels for one field.
+
+    What no field of the form is about stays as in `base`; what was typed and cannot be is kept, to be put right.
+    """
+    kind = form.get("kind", "frf")
+    sensors, strange = _sensors(form.get("sensors", ""))
+    channels, twice = _channels(form, base.get("channels", {}))
+    document: dict[str, Any] = {"schema": SCHEMA, **deepcopy(dict(base)), "kind": kind}
+    document["skin"] = _replaced(base.get("skin", {}), {name: _number(form.get(name, "")) for name, *_ in SKIN})
+    document["skin"] = _replaced(document["skin"], {"sensors": sensors})
+    said = {name: _said(form, name) if kind in kinds else None for name, _, _, kinds in RECORDING}
+    document["recording"] = _replaced(base.get("recording", {}), said)
+    document["channels"] = channels
+    document.pop("units_checked", None)
+    if form.get("units_checked"):
+        document["units_checked"] = True
+    return document, [*strange, *twice]
+
+
+def sensors_text(document: Mapping[str, Any]) -> str:
+    """The layout, a line a sensor."""
+    sensors = document.get("skin", {}).get("sensors") or []
+    told = [[one[name] for name in ("id", "x_mm", "y_mm") if name in one] for one in sensors]
+    return "\n".join(", ".join(f"{part:g}" if isinstance(part, float | int) else part for part in one) for one in told)
+
+
+def _replaced(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    kept = {name: value for name, value in base.items() if name not in values}
+    return kept | {name: value for name, value in values.items() if value is not None}
+
+
+def _said(form: Mapping[str, str], name: str) -> Any:
+    """A value, or the property of the file that holds it."""
+    if form.get(f"{name}-from"):
+        return {"property": form[f"{name}-from"]}
+    text = form.get(name, "").strip()
+    return (text or None) if name in _TEXTS else _number(text)
+
+
+def _number(text: str) -> Any:
+    """A number, with a decimal point or comma; what is none is left to the checks, which name it."""
+    text = text.strip()
+    try:
+        return float(text.replace(",", ".")) if text else None
+    except ValueError:
+        return text
+
+
+def _sensors(layout: str) -> tuple[list[dict[str, Any]] | None, list[InvalidInput]]:
+    """The sensors, and the lines that are none: these are kept as names without a place."""
+    found: list[dict[str, Any]] = []
+    strange = []
+    for number, line in enumerate(layout.splitlines(), start=1):
+        told = line.strip()
+        if not told:
+            continue
+        # A comma separates, or is a decimal comma between semicolons, tabs or blanks: as three parts come out.
+        parts = next((parts for by in _SEPARATORS if len(parts := told.split(by)) == _PARTS), None)
+        if parts is None:
+            must = f"line {number} must be: name, x [mm], y [mm]; such as s{number}, 8, 0"
+            strange.append(InvalidInput("skin.sensors", told[:80], must))
+            found.append({"id": told})
+        else:
+            name, x, y = parts
+            found.append({"id": name.strip(), "x_mm": _number(x), "y_mm": _number(y)})
+    return found or None, strange
+
+
+def _channels(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[str, Any], list[InvalidInput]]:
+    """What each field's channel is, and the channels that a field has beside its first."""
+    found: dict[str, Any] = {}
+    twice = []
+    number = 0
+    while f"channel-{number}" in form:
+        field = form.get(f"is-{number}", "")
+        if field in found:
+            first = found[field]["channel"]
+            allowed = f"{first[:80]} is {CHANNELS.get(field, field)} already: set one of the two to “not used”"
+            twice.append(InvalidInput(f"channels.{field}", form[f"channel-{number}"], allowed))
+        elif field:
+            found[field] = _channel(form, number, base.get(field, {}))
+        number += 1
+    return found, twice
+
+
+def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> dict[str, Any]:
+    """One channel; a unit that differs from the file's label says that the label is wrong."""
+    name, label = form[f"channel-{number}"], form.get(f"label-{number}", "")
+    true_unit = form.get(f"unit-{number}", "").strip()
+    wrong = bool(label and true_unit and unit(true_unit) != unit(label))
+    stiffness = base.get("stiffness_n_per_mm") if base.get("channel") == name else None
+    values = {
+        "channel": name,
+        "unit": true_unit if true_unit and (wrong or not label or "unit" in base) else None,
+        "labelled": label if wrong else None,
+        "sign": {"1": 1, "-1": -1}.get(form.get(f"sign-{number}", "")),
+        "sensitivity": _number(form.get(f"sensitivity-{number}", "")),
+        "sensitivity_unit": form.get(f"sensitivity_unit-{number}", "").strip() or None,
+        "stiffness_n_per_mm": stiffness,
+    }
+    return {key: value for key, value in values.items() if value is not None}

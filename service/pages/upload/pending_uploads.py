@@ -1,0 +1,124 @@
+"""Uploads that were looked at and not kept yet: each in a folder of its own, of one session, for an hour.
+
+They lie in the server's folder of uploads, which ends with the server, and take no more room together than one upload
+may; the oldest make room for the newest.
+"""
+
+import hashlib
+import secrets
+import shutil
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from service.ingest.uploads import Upload
+from service.pages.shared.figures import Drawn
+from service.pages.upload.file_summary import FileSeen
+from service.pages.upload.skin_summary import SkinSeen
+from service.store.errors import Missing
+from underskin.recordings.rig_description import RigDescription
+
+LASTS_S = 3600.0
+_MOST_KEPT = 50
+_MOST_DRAWN = 6  # files whose figures are kept
+
+
+@dataclass
+class Shelved:
+    """One upload, and what was understood of it so far."""
+
+    id: str
+    session: str  # digest of the cookie
+    folder: Path
+    files: Sequence[Upload]
+    size: int
+    used: float
+    skin: str | None = None
+    rig: RigDescription | None = None
+    rig_label: str | None = None  # the file that a request would send it as; None where none need be sent
+    draft: dict[str, Any] | None = None  # the rig description as the form had it, usable or not
+    refused: list[dict[str, Any]] = field(
+        default_factory=list
+    )  # what is wrong with the form, or kept it from being kept
+    seen: list[FileSeen] = field(default_factory=list)
+    drawn: dict[int, list[Drawn]] = field(default_factory=dict)
+    corrects: str | None = None  # the campaign whose place it takes
+    reason: str = ""  # why it does
+    skin_seen: SkinSeen | None = None  # where it is an exported skin
+    kept_at: str | None = None  # the page of what was kept
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def draw(self, number: int, figures: list[Drawn]) -> None:
+        """Keep the figures of a file."""
+        if len(self.drawn) >= _MOST_DRAWN:
+            self.drawn.pop(next(iter(self.drawn)))
+        self.drawn[number] = figures
+
+
+class Shelf:
+    """See the module."""
+
+    def __init__(self, folder: Path, most_bytes: int) -> None:
+        self._folder = folder
+        self._most_bytes = most_bytes
+        self._lock = threading.Lock()
+        self._held: dict[str, Shelved] = {}
+
+    def put(self, cookie: str, sent: Sequence[Upload]) -> Shelved:
+        """Take over the files of an upload; what the session had here before goes."""
+        name = secrets.token_urlsafe(16)
+        folder = self._folder / f"shelf-{name}"
+        folder.mkdir()
+        files = [replace(one, path=one.path.rename(folder / str(number))) for number, one in enumerate(sent)]
+        size = sum(one.path.stat().st_size for one in files)
+        added = Shelved(name, _digest(cookie), folder, files, size, time.monotonic())
+        with self._lock:
+            for old in [held for held in self._held.values() if held.session == added.session]:
+                self._remove(old)
+            self._sweep(size)
+            self._held[name] = added
+        return added
+
+    def find(self, cookie: str, name: str) -> Shelved:
+        """The session's own; raises Missing where it is gone or another's."""
+        with self._lock:
+            self._sweep(0)
+            found = self._held.get(name)
+            if found is None or found.session != _digest(cookie):
+                raise Missing(
+                    "This upload is not here any more: an upload that is not kept goes after an hour, when you send "
+                    "another one, or when the server is restarted. Nothing of it was kept; send it again."
+                )
+            found.used = time.monotonic()
+            return found
+
+    def empty(self, shelved: Shelved) -> None:
+        """Remove the files; the page that says where they went stays for a while."""
+        shutil.rmtree(shelved.folder, ignore_errors=True)
+        shelved.size = 0
+
+    def discard(self, shelved: Shelved) -> None:
+        """Remove it whole."""
+        with self._lock:
+            self._remove(shelved)
+
+    def _sweep(self, coming: int) -> None:
+        """Remove what is too old, and the oldest until there is room."""
+        by_age = sorted(self._held.values(), key=lambda held: held.used)
+        total = coming + sum(held.size for held in by_age)
+        for held in by_age:
+            too_old = time.monotonic() - held.used > LASTS_S
+            if too_old or total > self._most_bytes or len(self._held) >= _MOST_KEPT:
+                total -= held.size
+                self._remove(held)
+
+    def _remove(self, held: Shelved) -> None:
+        self._held.pop(held.id, None)
+        shutil.rmtree(held.folder, ignore_errors=True)
+
+
+def _digest(cookie: str) -> str:
+    return hashlib.sha256(cookie.encode()).hexdigest()

@@ -1,0 +1,1 @@
+"""HTTP: parse the request, call a use case, shape the answer."""

@@ -1,0 +1,290 @@
+"""Campaigns: sent, listed, read, withdrawn, corrected, their recordings excluded, their d33."""
+
+import asyncio
+from collections.abc import Mapping
+from functools import partial
+from typing import Annotated, Any, Literal
+
+import orjson
+from fastapi import APIRouter, Header, Query, Request, Response, Security
+from fastapi.responses import StreamingResponse
+from pydantic import ValidationError
+from sqlalchemy import Connection
+from starlette.concurrency import run_in_threadpool
+
+from service.dependencies import CampaignId, Store, Table, authorised
+from service.ingest.accept import RIG, Terms, accept
+from service.ingest.form_fields import FILE, split
+from service.ingest.uploads import received
+from service.middleware.unique_keys import JsonRoute
+from service.problems import from_validation
+from service.routes.temporary_files import made_file
+from service.schemas import campaigns as models
+from service.schemas.campaign_d33 import D33
+from service.store import campaigns
+from service.store.times import stored
+from service.usecases import campaign_documents, d33_cache
+from service.usecases.adopted_models import serving
+from underskin import InvalidInput
+
+router = APIRouter(prefix="/v1", tags=["campaigns"], route_class=JsonRoute)
+
+WRITE = [Security(authorised, scopes=["write"])]
+# Reading a campaign takes memory many times its size: few at a time, the others wait.
+heavy = asyncio.Semaphore(2)
+
+_FILE: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
+_EXAMPLE: dict[str, Any] = {
+    "schema": "campaign/1",
+    "name": "first day",
+    "skin": {
+        "id": "palm-3",
+        "thickness_mm": 2.5,
+        "youngs_modulus_mpa": 16.0,
+        "poisson_ratio": 0.5,
+        "sensor_radius_mm": 1.5,
+        "sensors": [{"id": "s01", "x_mm": 0.0, "y_mm": 0.0}],
+    },
+    "recordings": [
+        {
+            "id": "r1",
+            "sensor": "s01",
+            "indenter_radius_mm": 4.0,
+            "preload_n": 1.0,
+            "dynamic_force_n": 0.09,
+            "recorded_at": "2017-05-03T09:00:00Z",
+            "frequency_hz": [10.0, 20.0, 40.0],
+            "frf_re_pc_per_n": [7.1, 7.0, 7.0],
+            "frf_im_pc_per_n": [0.1, 0.0, 0.0],
+        }
+    ],
+}
+_BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "description": "One campaign as JSON (`campaign/1`), a JSON list of them, one file as the whole body, or a "
+        "form with any number of files; its part `rig` is a rig description, for files that do not say what their "
+        "channels are. What the query says may be fields of the form instead; what both say must be the same. "
+        "Other fields that are no files are refused.",
+        "content": {
+            "application/json": {"schema": {"type": "object", "description": "campaign/1"}, "example": _EXAMPLE},
+            "application/octet-stream": {**_FILE, "example": orjson.dumps(_EXAMPLE).decode()},
+            "multipart/form-data": {
+                "schema": {
+                    "type": "object",
+                    "description": "Files, what their channels are, and the options of the query.",
+                    "properties": {
+                        FILE: {
+                            "type": "array",
+                            "items": _FILE["schema"],
+                            "description": "Files of campaigns, or as instruments write them.",
+                        },
+                        RIG: {"type": "string", "description": "A rig description, `rig/1`, as YAML or JSON."},
+                        **models.SendOptions.model_json_schema()["properties"],
+                    },
+                    "additionalProperties": {**_FILE["schema"], "description": "More files, by any other names."},
+                }
+            },
+        },
+    }
+}
+
+
+@router.post(
+    "/campaigns",
+    operation_id="post_campaigns",
+    summary="Send campaigns",
+    status_code=201,
+    dependencies=WRITE,
+    openapi_extra=_BODY,
+    responses={201: {"model": models.CampaignResult | models.BatchResult}},
+)
+async def post(
+    request: Request,
+    store: Store,
+    table: Table,
+    query: Annotated[models.SendOptions, Query()],
+    idempotency_key: Annotated[
+        str | None,
+        Header(
+            min_length=1,
+            max_length=255,
+            description="A text of your own: the same request under the same key is answered the same and kept once.",
+        ),
+    ] = None,
+) -> Response:
+    """Keeps the good recordings and says of each of the others what was wrong. What is answered is on the disk.
+
+    One campaign is answered with its own entry, a form or a list with one entry a campaign: one in all where they go
+    `together`.
+    """
+    settings = request.app.state.settings
+    key = request.scope["key"]
+    sender = None if key is None else key.name
+    async with received(request, request.app.state.uploads) as parts, heavy:
+        fields, uploads = split(parts, list(models.SendOptions.model_fields), [RIG])
+        terms = Terms(
+            **_options(query, fields),
+            idempotency_key=idempotency_key,
+            sender=sender,
+            most_json_bytes=settings.max_body_bytes,
+        )
+        answer, repeats = await run_in_threadpool(accept, store, uploads, terms)
+        await run_in_threadpool(d33_cache.derive, store, table, _ids(answer))
+    headers = {"Idempotency-Replayed": "true"} if repeats else {}
+    return Response(orjson.dumps(answer), status_code=201, headers=headers, media_type="application/json")
+
+
+def _options(query: models.SendOptions, fields: Mapping[str, str]) -> dict[str, Any]:
+    """Those of the query and of the form; raises Refusal, InvalidInput."""
+    try:
+        return query.with_form(fields).model_dump()
+    except ValidationError as error:
+        raise from_validation(error) from None
+
+
+def _ids(answer: dict[str, Any]) -> list[str]:
+    """Of the campaigns that were kept."""
+    return [result["id"] for result in answer.get("campaigns", [answer]) if result["id"] is not None]
+
+
+@router.get("/campaigns", operation_id="campaigns", summary="Campaigns, the latest first")
+def listed(
+    store: Store,
+    skin: Annotated[str | None, Query(description="Of this skin and of those joined with it.")] = None,
+    state: Annotated[models.State | Literal["all"], Query(description="Only those of this state.")] = "current",
+    name_contains: Annotated[str | None, Query(description="Only those whose name contains this.")] = None,
+    recorded_from: Annotated[str | None, Query(description="Only those recorded at this time or later.")] = None,
+    recorded_to: Annotated[str | None, Query(description="Only those recorded before this time.")] = None,
+    limit: Annotated[int, Query(ge=1, le=200, description="How many on a page.")] = 50,
+    cursor: Annotated[str | None, Query(description="`next` of the page before.")] = None,
+) -> models.CampaignList:
+    """Without their recordings; a page holds `limit` of them."""
+    filters = campaigns.Filters(
+        skin=skin,
+        state=None if state == "all" else state,
+        name_contains=name_contains,
+        recorded_from=_time("recorded_from", recorded_from),
+        recorded_to=_time("recorded_to", recorded_to),
+    )
+    with store.reading() as connection:
+        rows = campaigns.listed(connection, filters, before(cursor), limit + 1)
+    page = [models.CampaignEntry(**models.entry(row, campaigns.state(row))) for row in rows[:limit]]
+    return models.CampaignList(campaigns=page, next=str(rows[limit - 1].number) if len(rows) > limit else None)
+
+
+@router.get("/campaigns/{campaign_id}", operation_id="campaign", summary="One campaign")
+def one(campaign_id: CampaignId, store: Store) -> models.CampaignDetail:
+    """With its recordings, without their arrays."""
+    with store.reading() as connection:
+        return _detail(connection, campaign_id)
+
+
+@router.get(
+    "/campaigns/{campaign_id}/document",
+    operation_id="campaign_document",
+    summary="One campaign as campaign/1",
+    response_class=Response,
+    responses={
+        200: {
+            "content": {
+                "application/json": {"schema": {"type": "object", "description": "campaign/1"}},
+                "application/x-hdf5": _FILE,
+            }
+        }
+    },
+)
+def document(
+    campaign_id: CampaignId,
+    request: Request,
+    store: Store,
+    file_format: Annotated[Literal["json", "hdf5"], Query(alias="format", description="JSON or HDF5.")] = "json",
+) -> Response:
+    """All recordings that were kept, arrays and all, those excluded later included."""
+    with store.reading() as connection:
+        row = campaigns.find(connection, campaign_id)
+    if file_format == "json":
+        return StreamingResponse(campaign_documents.json_parts(store, row), media_type="application/json")
+    return made_file(
+        request.app.state.uploads,
+        f"{row.id}.h5",
+        "application/x-hdf5",
+        partial(campaign_documents.write_hdf5, store, row),
+    )
+
+
+@router.get("/campaigns/{campaign_id}/d33", operation_id="campaign_d33", summary="d33 of each sensor")
+def d33(
+    campaign_id: CampaignId,
+    store: Store,
+    table: Table,
+    band_low_hz: Annotated[
+        float | None, Query(gt=0, description="Average from here [Hz], not over the flat zone.")
+    ] = None,
+    band_high_hz: Annotated[float | None, Query(gt=0, description="Average up to here [Hz].")] = None,
+    model: Annotated[
+        Literal["paper", "adopted"], Query(description="`adopted`: the model in force of the campaign's skin.")
+    ] = "paper",
+) -> D33:
+    """By sensor, indenter and preload, with uncertainty, and what it leaves out."""
+    if (band_low_hz is None) != (band_high_hz is None):
+        raise InvalidInput("band_low_hz", band_low_hz, "band_low_hz and band_high_hz go together")
+    band = None if band_low_hz is None or band_high_hz is None else (band_low_hz, band_high_hz)
+    with store.reading() as connection:
+        row = campaigns.find(connection, campaign_id)
+    if model == "adopted":
+        return D33(**d33_cache.adopted_answer(store, table, row, serving(store, row.skin_id), band))
+    return D33(**d33_cache.answer(store, table, row, band))
+
+
+@router.post(
+    "/campaigns/{campaign_id}/withdraw", operation_id="withdraw_campaign", summary="Withdraw it", dependencies=WRITE
+)
+def withdraw(campaign_id: CampaignId, withdrawal: models.Withdrawal, store: Store) -> models.CampaignDetail:
+    """Figures no longer use it; it can still be read."""
+    with store.writing() as connection:
+        campaigns.withdraw(connection, campaign_id, withdrawal.reason)
+        return _detail(connection, campaign_id)
+
+
+@router.post(
+    "/campaigns/{campaign_id}/exclusions",
+    operation_id="exclude_recording",
+    summary="Exclude a recording",
+    dependencies=WRITE,
+)
+def exclude(campaign_id: CampaignId, exclusion: models.Exclusion, store: Store, table: Table) -> models.CampaignDetail:
+    """Figures no longer use it; it can still be read. A correction is the way back."""
+    with store.writing() as connection:
+        campaigns.exclude(connection, campaign_id, exclusion.recording, exclusion.reason)
+        detail = _detail(connection, campaign_id)
+    d33_cache.derive(store, table, [campaign_id])
+    return detail
+
+
+def _detail(connection: Connection, campaign_id: str) -> models.CampaignDetail:
+    row = campaigns.find(connection, campaign_id)
+    kept = campaigns.recordings_of(connection, row.number)
+    return models.CampaignDetail(
+        **models.entry(row, campaigns.state(row)),
+        skin=row.about["skin"],
+        entries=[models.RecordingEntry(**recording._mapping) for recording in kept],
+        refused=[models.RecordingResult(**refused) for refused in row.refused],
+        notes=row.notes,
+    )
+
+
+def _time(name: str, text: str | None) -> str | None:
+    try:
+        return None if text is None else stored(text)
+    except ValueError:
+        raise InvalidInput(name, text, "must be a date and time like 2017-05-03T09:00:00Z") from None
+
+
+def before(cursor: str | None) -> int | None:
+    """The number that a page of a list ended with; raises InvalidInput."""
+    if cursor is None:
+        return None
+    if not cursor.isascii() or not cursor.isdigit() or len(cursor) > 18:
+        raise InvalidInput("cursor", cursor, "must be the `next` of the page before")
+    return int(cursor)

@@ -1,0 +1,87 @@
+"""Diagnoses: asked for, listed, read, cancelled. They run in service/jobs."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query, Request, Security
+from fastapi.responses import JSONResponse
+
+from service.dependencies import CampaignId, Store, Table, authorised
+from service.jobs import Runner
+from service.middleware.unique_keys import JsonRoute
+from service.routes.campaigns import before
+from service.routes.idempotency import IdempotentOnce
+from service.schemas import diagnoses as models
+from service.store import diagnoses
+from underskin import __version__
+
+router = APIRouter(prefix="/v1", tags=["diagnoses"], route_class=JsonRoute)
+
+WRITE = [Security(authorised, scopes=["write"])]
+DiagnosisId = Annotated[str, Path(description="Id of a diagnosis, as it was answered when it was asked for.")]
+
+
+@router.post(
+    "/campaigns/{campaign_id}/diagnosis",
+    operation_id="diagnose_campaign",
+    summary="Ask for its diagnosis",
+    status_code=202,
+    dependencies=WRITE,
+    responses={202: {"model": models.Asked}},
+)
+def ask(campaign_id: CampaignId, request: Request, once: IdempotentOnce, store: Store, table: Table) -> JSONResponse:
+    """Puts it into the queue; excluded recordings are left out. A campaign that was diagnosed as it is now, with this
+    table and version, is answered with that diagnosis.
+    """
+    answer = once.answer(
+        store,
+        None,
+        lambda connection: models.Asked.model_validate(
+            diagnoses.ask(connection, campaign_id, table.sha256, __version__, once.sender), from_attributes=True
+        ).model_dump(),
+    )
+    runner_of(request).stir()
+    return JSONResponse(answer, status_code=202)
+
+
+@router.get("/diagnoses", operation_id="diagnoses", summary="Diagnoses, the latest first")
+def listed(
+    store: Store,
+    campaign: Annotated[str | None, Query(description="Of this campaign.")] = None,
+    skin: Annotated[str | None, Query(description="Of campaigns of this skin and of those joined with it.")] = None,
+    state: Annotated[models.State | None, Query(description="Only those in this state.")] = None,
+    limit: Annotated[int, Query(ge=1, le=200, description="How many on a page.")] = 50,
+    cursor: Annotated[str | None, Query(description="`next` of the page before.")] = None,
+) -> models.DiagnosisList:
+    """Without their reports; a page holds `limit` of them."""
+    filters = diagnoses.Filters(campaign, skin, state)
+    with store.reading() as connection:
+        rows = diagnoses.listed(connection, filters, before(cursor), limit + 1)
+    page = [models.DiagnosisEntry(**models.entry(row)) for row in rows[:limit]]
+    return models.DiagnosisList(diagnoses=page, next=str(rows[limit - 1].number) if len(rows) > limit else None)
+
+
+@router.get("/diagnoses/{diagnosis_id}", operation_id="diagnosis", summary="One diagnosis")
+def one(diagnosis_id: DiagnosisId, store: Store) -> models.Diagnosis:
+    """How far it is and, once it is done, its report."""
+    with store.reading() as connection:
+        row = diagnoses.find(connection, diagnosis_id)
+        report = diagnoses.report_of(connection, row.number)
+    return models.Diagnosis(**models.entry(row), report=report)
+
+
+@router.delete(
+    "/diagnoses/{diagnosis_id}", operation_id="cancel_diagnosis", summary="Cancel a diagnosis", dependencies=WRITE
+)
+def cancel(diagnosis_id: DiagnosisId, request: Request, store: Store) -> models.DiagnosisEntry:
+    """Ends its process, or takes it out of the queue. One that is done or has failed stays: 409."""
+    with store.writing() as connection:
+        diagnoses.cancel(connection, diagnosis_id)
+        row = diagnoses.find(connection, diagnosis_id)
+    runner_of(request).stir()
+    return models.DiagnosisEntry(**models.entry(row))
+
+
+def runner_of(request: Request) -> Runner:
+    """What runs them in this server."""
+    runner: Runner = request.app.state.runner
+    return runner

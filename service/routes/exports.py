@@ -1,0 +1,58 @@
+"""All that is kept of a skin as one file, and back."""
+
+from functools import partial
+from typing import Any
+
+from fastapi import APIRouter, Request, Security
+from fastapi.responses import FileResponse
+from starlette.concurrency import run_in_threadpool
+
+from service.dependencies import SkinId, Store, authorised
+from service.ingest import skin_imports
+from service.ingest.form_fields import split
+from service.ingest.skin_imports import Imported
+from service.ingest.uploads import received
+from service.problems import Refusal
+from service.routes.temporary_files import made_file
+from service.store import skins
+from service.store.export import export
+
+router = APIRouter(prefix="/v1", tags=["skins"])
+
+_MEDIA_TYPE = "application/x-hdf5"
+_FILE: dict[str, Any] = {"content": {_MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}}}
+
+
+@router.get(
+    "/skins/{skin_id}/export",
+    operation_id="export_skin",
+    summary="All that is kept of a skin",
+    response_class=FileResponse,
+    responses={200: _FILE},
+)
+def export_skin(skin_id: SkinId, request: Request, store: Store) -> FileResponse:
+    """One HDF5 file (`skin-export/1`) with its campaigns in every state, those of skins joined to it, its rigs,
+    diagnoses that have ended and models.
+    """
+    with store.reading() as connection:
+        root = skins.require_root(connection, skin_id)
+        return made_file(request.app.state.uploads, f"{root}.h5", _MEDIA_TYPE, partial(export, connection, root))
+
+
+@router.post(
+    "/skins/import",
+    operation_id="import_skin",
+    summary="Bring in a skin that was exported",
+    dependencies=[Security(authorised, scopes=["write"])],
+    openapi_extra={
+        "requestBody": {"required": True, "content": {"application/octet-stream": _FILE["content"][_MEDIA_TYPE]}}
+    },
+)
+async def import_skin(request: Request, store: Store) -> Imported:
+    """To the same state; what is here already must be the same, and is left. After a failure, send the file again."""
+    async with received(request, request.app.state.uploads) as parts:
+        _, uploads = split(parts)
+        if len(uploads) != 1:
+            raise Refusal(422, f"One file is imported at a time, not {len(uploads)}.")
+        async with skin_imports.one:
+            return await run_in_threadpool(skin_imports.bring_in, store, uploads[0])

@@ -1,0 +1,92 @@
+"""The OpenAPI document: FastAPI's own, with the errors and the keys as they are here."""
+
+from typing import Any
+
+from fastapi import APIRouter, FastAPI, Request
+from fastapi.openapi.utils import get_openapi
+from pydantic import BaseModel, Field
+
+from service import pages
+from service.auth.access_control import OPEN
+from service.problems import MEDIA_TYPE, Problem
+from service.schemas.stress import StressRequest
+
+router = APIRouter(tags=["openapi"])
+
+DESCRIPTION = """\
+What is happening under the skin: σ, FRF and d33 of a piezoelectric electronic skin pressed by a sphere.
+
+Units are spelled in the names (`_mm`, `_mpa`, `_n`, `_pc_per_n`, `_hz`). Requests to `/v1/sigma`, `/v1/frf` and
+`/v1/d33` are in columns: a single number holds for all rows. A row outside the table is answered `out_of_domain` with
+null, never extrapolated. `Accept: text/csv` returns columns as CSV, with NaN. Errors are RFC 9457 problems; under
+`/umbridge` they have the shape of that protocol.
+"""
+
+
+class UmbridgeError(BaseModel):
+    """What is wrong."""
+
+    type: str = Field(description="Kind of error.", examples=["InvalidInput"])
+    message: str = Field(description="What happened and what to do.")
+
+
+class UmbridgeProblem(BaseModel):
+    """An error as UM-Bridge says it."""
+
+    error: UmbridgeError
+
+
+@router.get("/openapi.json", operation_id="openapi", summary="This document")
+async def openapi(request: Request) -> dict[str, Any]:
+    """OpenAPI 3.1; says that a key is needed where one is."""
+    document = dict(_document(request.app))
+    if request.app.state.gate.keys_needed():
+        document["security"] = [{"key": []}]
+    return document
+
+
+def methods(api: FastAPI, path: str) -> list[str]:
+    """All that `path` takes, as it stands in the document; the router knows those of one of its routes only."""
+    known = _document(api)["paths"].get(path)
+    return pages.methods(path) if known is None else [method.upper() for method in known]
+
+
+def query_parameters(api: FastAPI, path: str, method: str) -> list[str]:
+    """The query parameters of a route of the API, as they stand in the document."""
+    operation = _document(api)["paths"][path][method.lower()]
+    return [parameter["name"] for parameter in operation.get("parameters", []) if parameter["in"] == "query"]
+
+
+def _document(api: FastAPI) -> dict[str, Any]:
+    return api.openapi_schema or _describe(api)
+
+
+def _describe(api: FastAPI) -> dict[str, Any]:
+    """The document without what depends on the keys; kept for the next time."""
+    document = get_openapi(title=api.title, version=api.version, description=api.description, routes=api.routes)
+    components = document["components"]
+    for model in (Problem, UmbridgeProblem, StressRequest):
+        schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
+        components["schemas"].update(schema.pop("$defs"))
+        components["schemas"][model.__name__] = schema
+    for unused in ("HTTPValidationError", "ValidationError"):
+        components["schemas"].pop(unused, None)
+    components["securitySchemes"] = {
+        "key": {"type": "http", "scheme": "bearer", "description": "`underskin key create NAME` makes one."}
+    }
+    for path, operations in document["paths"].items():
+        for operation in operations.values():
+            _describe_errors(path, operation)
+    api.openapi_schema = document
+    return document
+
+
+def _describe_errors(path: str, operation: dict[str, Any]) -> None:
+    operation["responses"].pop("422", None)
+    umbridge = path.startswith("/umbridge/")
+    name, media_type = ("UmbridgeProblem", "application/json") if umbridge else ("Problem", MEDIA_TYPE)
+    content = {media_type: {"schema": {"$ref": f"#/components/schemas/{name}"}}}
+    for status, meaning in (("4XX", "The request is refused."), ("5XX", "The server failed.")):
+        operation["responses"][status] = {"description": meaning, "content": content}
+    if path in OPEN:
+        operation["security"] = []

@@ -1,0 +1,30 @@
+"""The query string: parameters that a route does not have are refused, and so are those that are given twice."""
+
+from collections.abc import Collection, Iterable, Iterator
+
+from fastapi import Request
+
+from service.problems import invalid_input
+from service.routes.openapi import query_parameters
+from service.spelling import unknown
+from underskin import InvalidInput
+
+
+async def known_query(request: Request) -> None:
+    """For every route under /v1: raises Refusal (422) that names each parameter that is unknown or repeated."""
+    if not request.scope["query_string"]:
+        return
+    known = query_parameters(request.app, request.scope["route"].path, request.method)
+    errors = list(_errors(request.query_params.multi_items(), known))
+    if errors:
+        raise invalid_input(errors)
+
+
+def _errors(given: Iterable[tuple[str, str]], known: Collection[str]) -> Iterator[InvalidInput]:
+    seen: set[str] = set()
+    for name, value in given:
+        if name not in known:
+            yield unknown(name, value, known, "query parameter")
+        elif name in seen:
+            yield InvalidInput(name, value, "must be given once")
+        seen.add(name)

@@ -1,0 +1,124 @@
+"""What the routes of skins answer and take."""
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.schemas.campaigns import Reason
+
+
+class JoinedSkin(BaseModel):
+    """A skin that counts as another."""
+
+    id: str = Field(description="Its own id; campaigns sent for it keep it.")
+    joined_to: str = Field(description="The skin it was joined to.")
+    joined_at: str = Field(description="When, UTC.")
+    reason: str = Field(description="Why.")
+
+
+class SkinEntry(BaseModel):
+    """A skin."""
+
+    id: str = Field(description="Its id.")
+    created_at: str = Field(description="When its first campaign arrived, UTC.")
+    campaigns: int = Field(description="How many campaigns it and the skins joined to it have, in any state.")
+
+
+class SkinList(BaseModel):
+    """A page of skins, by id."""
+
+    skins: list[SkinEntry] = Field(description="At most `limit` of them; those joined to another are under that one.")
+    next: str | None = Field(description="Send it as `cursor` for the next page; null on the last.")
+
+
+class SkinDetail(BaseModel):
+    """A skin and what was joined to it."""
+
+    id: str = Field(description="Its id.")
+    created_at: str = Field(description="When its first campaign arrived, UTC.")
+    joined: list[JoinedSkin] = Field(description="Skins that count as this one.")
+    rig: dict[str, Any] | None = Field(description="The rig description in use for its files (`rig/1`).")
+
+
+class Join(BaseModel):
+    """Says that two ids mean one skin."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    skin_id: str = Field(description="The skin that counts as this one from now on.", examples=["palm-3b"])
+    reason: Reason = Field(description="Why.")
+
+
+class Point(BaseModel):
+    """One campaign's d33 of a sensor."""
+
+    campaign_id: str = Field(description="The campaign.")
+    time: str = Field(description="When it was recorded, or else received, UTC.")
+    time_is: Literal["recorded", "received"] = Field(description="Which of the two.")
+    model: Literal["paper", "adopted"] = Field(description="The model that d33 rests on.")
+    model_id: str | None = Field(description="Which adopted model; null with `paper`.")
+    d33_pc_per_n: float = Field(description="d33 [pC/N].")
+    d33_uncertainty_pc_per_n: float = Field(description="Its standard uncertainty [pC/N].")
+
+
+class TrendAnswer(BaseModel):
+    """A straight line through the points: weighted least squares, its scatter counted where it exceeds the weights."""
+
+    slope_pc_per_n_per_year: float = Field(description="Slope [pC/N a year].")
+    slope_uncertainty_pc_per_n_per_year: float = Field(description="Its standard uncertainty.")
+    p_value: float = Field(description="Of a slope this far from 0 where there is none (Student's t, two-sided).")
+    p_value_adjusted: float = Field(description="The same, adjusted for the number of sensors looked at (Holm).")
+    significant: bool = Field(description="Whether p_value_adjusted is below 0.05.")
+
+
+class SensorHistory(BaseModel):
+    """d33 of one sensor over time."""
+
+    sensor: str = Field(description="Its id.")
+    points: list[Point] = Field(description="By time.")
+    trend: TrendAnswer | None = Field(description="Null where `no_trend` says why.")
+    no_trend: str | None = Field(
+        description="Why there is none: fewer than three points, one timed by its arrival, or less than a day in all."
+    )
+
+
+class LeftOutCampaign(BaseModel):
+    """A campaign that figures do not use."""
+
+    campaign_id: str = Field(description="The campaign.")
+    reason: str = Field(description="Why.")
+    repeats: str | None = Field(
+        default=None, description="The campaign that counts in its place, where it has recordings of that one."
+    )
+
+
+class LeftOutPoint(BaseModel):
+    """A campaign's d33 of a sensor that does not count, since recordings that it rests on count elsewhere."""
+
+    campaign_id: str = Field(description="The campaign, of which other sensors count.")
+    sensor: str = Field(description="The sensor.")
+    repeats: str = Field(description="The campaign in which they count.")
+    reason: str = Field(description="Why, in words.")
+
+
+class LeftOutRecording(BaseModel):
+    """A recording that figures do not use."""
+
+    campaign_id: str = Field(description="Its campaign.")
+    recording: str = Field(description="Its id there.")
+    reason: str = Field(description="Why.")
+
+
+class History(BaseModel):
+    """d33 of each sensor over time, and what that leaves out."""
+
+    skin_id: str = Field(description="The skin; the one it was joined to, where it was.")
+    joined: list[JoinedSkin] = Field(description="Skins that are counted in.")
+    sensors: list[SensorHistory] = Field(description="By id.")
+    left_out_campaigns: list[LeftOutCampaign] = Field(
+        description="Withdrawn, corrected, without d33, or only with recordings that count in another campaign."
+    )
+    left_out_points: list[LeftOutPoint] = Field(
+        description="Those with recordings that count in another campaign, of campaigns that are used."
+    )
+    left_out_recordings: list[LeftOutRecording] = Field(description="Excluded from campaigns that are used.")

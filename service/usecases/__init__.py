@@ -1,0 +1,1 @@
+"""What a request means: called by routes and pages alike."""

@@ -1,0 +1,158 @@
+"""A skin's adopted model: from the store to rows of a request."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import Connection
+
+from service.problems import Refusal
+from service.schemas.pressed_skin import FIELDS, PressedSkinColumns
+from service.store import diagnoses, models, skins
+from service.store.engine import Database
+from service.store.errors import Conflict
+from service.store.tables import AnyRow
+from underskin import InvalidInput
+from underskin.physics.charge_response import gain
+from underskin.prediction.answers import pressed
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Complexes, Floats, finite, non_negative
+
+# Imported where it is needed: signal processing takes a second to load, which a start need not wait for.
+if TYPE_CHECKING:
+    from underskin.prediction.adopted_model import AdoptedModel
+
+_LARGEST_LINES = 100_000  # distinct rows times frequencies: some seconds
+_MOST_KNOWN = 100
+_known: "dict[str, AdoptedModel]" = {}  # by diagnosis, which do not change once done
+_ANY_LINE = np.array([1.0])
+
+
+@dataclass(frozen=True)
+class Serving:
+    """The model in force of a skin, and its id."""
+
+    model: "AdoptedModel"
+    model_id: str
+
+
+def serving(store: Database, skin_id: str) -> Serving:
+    """The model in force; raises Refusal 404 where there is none, Conflict where it is outdated."""
+    with store.reading() as connection:
+        skin = skins.find(connection, skin_id)
+        row = None if skin is None else models.in_force(connection, skin.root_id)
+        if row is None:
+            raise Refusal(404, f"Skin {skin_id!r} has no adopted model; use model paper.")
+        why = diagnoses.outdated(row)
+        if why is not None:
+            raise Conflict(
+                f"Model {row.model_id!r} of skin {skin_id!r} serves no figures: its campaign {row.campaign_id!r} was "
+                f"{why}. Diagnose it again and adopt that, or use model paper."
+            )
+        return Serving(of_row(connection, row), row.model_id)
+
+
+def of_row(connection: Connection, row: AnyRow) -> "AdoptedModel":
+    """The model of a diagnosis that is done; raises InvalidInput where it cannot serve."""
+    from underskin.prediction.adopted_model import adopted
+
+    if row.id not in _known:
+        report = diagnoses.report_of(connection, row.number)
+        assert report is not None
+        campaign, _ = diagnoses.campaign_of(connection, row)
+        if len(_known) >= _MOST_KNOWN:
+            _known.clear()
+        _known[row.id] = adopted(report, campaign)
+    return _known[row.id]
+
+
+def serving_of(store: Database, request: PressedSkinColumns) -> Serving:
+    """The model that a request asks for."""
+    if request.skin_id is None:
+        raise InvalidInput("skin_id", None, "is required with model adopted")
+    return serving(store, request.skin_id)
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """The rows of a request under an adopted model."""
+
+    serving: Serving
+    columns: Mapping[str, Floats]  # as in the answer, those that an adopted model can tell
+    level: Floats  # (rows,) FRF over d33 on the plateau [-]
+    inside: NDArray[np.bool_]  # (rows,)
+    _request: PressedSkinColumns
+    _table: SigmaTable
+    _rows: Mapping[str, Floats]  # the distinct ones
+    _which: NDArray[np.intp]  # of each row
+
+    def response(self, frequency_hz: Floats) -> Complexes:
+        """FRF over d33 (rows, lines) [-]."""
+        return _response(self.serving.model, self._request, self._table, self._rows, frequency_hz)[0][self._which]
+
+    def require_lines(self, field: str) -> None:
+        """Raises InvalidInput that names `field` where the model depends on frequency and it was not given."""
+        if self.serving.model.of_lines and getattr(self._request, field) is None:
+            names = " and ".join(self.serving.model.of_lines)
+            raise InvalidInput(field, None, f"is required: the adopted model depends on frequency ({names})")
+
+
+def press(serving: Serving, table: SigmaTable, request: PressedSkinColumns, count: int) -> Pressed:
+    """The rows of a request, so many, under an adopted model; raises InvalidInput."""
+    given = {name: request.column(name) for name in FIELDS}
+    felt = pressed(table, given, request.units_checked)  # which checks them
+    serving.model.require_skin(given)
+    for name, mechanism in serving.model.needs.items():
+        if getattr(request, name) is None:
+            raise InvalidInput(name, None, f"is required: the adopted model has {mechanism}")
+    rows = _distinct_columns(request, given)
+    stacked = np.column_stack([np.broadcast_to(column, (count,)) for column in rows.values()])
+    distinct, which = np.unique(stacked, axis=0, return_inverse=True)
+    each = dict(zip(rows, distinct.T, strict=True))
+    level, inside = _response(serving.model, request, table, each, None)
+    which = which.reshape(-1)
+    on_plateau = level[:, 0].real[which]
+    on_plateau = np.where(inside[which], on_plateau, np.nan)
+    none = np.full((), np.nan)
+    columns = {
+        "contact_radius_mm": none,
+        "a_over_h": none,
+        "rt_over_h": felt.rt_over_h,
+        "load_parameter": none,
+        "sigma": on_plateau / gain(1.0, felt.rt_over_h),
+        "rel_error": np.hypot(felt.rel_error, serving.model.unsure),
+        "mean_stress_mpa": none,
+    }
+    return Pressed(serving, columns, on_plateau, inside[which], request, table, each, which)
+
+
+def _distinct_columns(request: PressedSkinColumns, given: Mapping[str, Floats]) -> dict[str, Floats]:
+    columns = {name: given[name] for name in ("indenter_radius_mm", "preload_n")}
+    for name in ("offset_x_mm", "offset_y_mm"):
+        columns[name] = np.zeros(()) if getattr(request, name) is None else finite(name, request.column(name))
+    for name in ("dynamic_force_n", "dwell_s", "load_cycles"):
+        if getattr(request, name) is not None:
+            columns[name] = non_negative(name, request.column(name))
+    return columns
+
+
+def _response(
+    model: "AdoptedModel",
+    request: PressedSkinColumns,
+    table: SigmaTable,
+    rows: Mapping[str, Floats],
+    frequency_hz: Floats | None,
+) -> tuple[Complexes, NDArray[np.bool_]]:
+    """FRF over d33 (rows, lines), on the plateau where there are no frequencies, and which rows are inside."""
+    from underskin.prediction.adopted_model import pressed_campaign
+
+    lines = _ANY_LINE if frequency_hz is None else frequency_hz
+    count = len(rows["preload_n"])
+    if count * len(lines) > _LARGEST_LINES:
+        allowed = f"different rows times frequencies must be at most {_LARGEST_LINES} with an adopted model"
+        raise InvalidInput("frequency_hz", f"{count} rows, {len(lines)} frequencies", allowed)
+    campaign = pressed_campaign(model.skin, request.sensor, rows, lines)
+    found = model.response(campaign, table, level=frequency_hz is None)
+    return found.value.reshape(count, -1), np.logical_and.reduce(found.inside.reshape(count, -1), axis=1)
