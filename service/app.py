@@ -1,4 +1,4 @@
-"""The application: routes by noun on FastAPI, behind the front."""
+"""The application: routes by noun on FastAPI, behind the ASGI middleware."""
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -8,13 +8,14 @@ from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp
 
 from service import pages
-from service.auth.access_control import Gate
+from service.auth.access_control import AccessControl
 from service.dependencies import authorised
 from service.ingest.uploads import UploadFolder
 from service.jobs import Planner, Runner, Terms
 from service.middleware import request_log
-from service.middleware.asgi_middleware import Front
+from service.middleware.asgi_middleware import AsgiMiddleware
 from service.middleware.error_handlers import install_handlers
+from service.pages.shared.problem import problem_page
 from service.pages.upload.pending_uploads import Shelf
 from service.routes import (
     campaigns,
@@ -45,10 +46,10 @@ async def _lifespan(api: FastAPI) -> AsyncIterator[None]:
     state = api.state
     state.uploads = UploadFolder(state.settings.data)
     state.shelf = Shelf(state.uploads.path, state.settings.max_upload_bytes)
-    state.gate.requirement.start()
+    state.access.requirement.start()
     state.runner.start()
     yield
-    await run_in_threadpool(state.gate.requirement.stop)
+    await run_in_threadpool(state.access.requirement.stop)
     await run_in_threadpool(state.runner.stop)
     await run_in_threadpool(state.planner.stop)
     state.uploads.close()
@@ -56,7 +57,7 @@ async def _lifespan(api: FastAPI) -> AsyncIterator[None]:
     request_log.flush()
 
 
-def create_api(settings: Settings, table: SigmaTable, gate: Gate, store: Database) -> FastAPI:
+def create_api(settings: Settings, table: SigmaTable, access: AccessControl, store: Database) -> FastAPI:
     """All routes, with the table they answer from and the store."""
     api = FastAPI(
         title="underskin",
@@ -69,12 +70,12 @@ def create_api(settings: Settings, table: SigmaTable, gate: Gate, store: Databas
     )
     api.state.settings = settings
     api.state.table = table
-    api.state.gate = gate
+    api.state.access = access
     api.state.store = store
     terms = diagnosing_terms(settings, table)
     api.state.runner = Runner(store, terms)
     api.state.planner = Planner(store, terms)
-    install_handlers(api)
+    install_handlers(api, problem_page)
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"]), Depends(known_query)])
     for noun in (sigma, frf, d33, stress, design, tables, campaigns, diagnoses, exports, skins, models):
         v1.include_router(noun.router)
@@ -89,10 +90,10 @@ def diagnosing_terms(settings: Settings, table: SigmaTable) -> Terms:
     return Terms(settings.diagnosis_workers, memory_bytes, settings.tables / SIGMA_TABLE, table.sha256)
 
 
-def create_app(settings: Settings, table: SigmaTable, gate: Gate, store: Database) -> ASGIApp:
+def create_app(settings: Settings, table: SigmaTable, access: AccessControl, store: Database) -> ASGIApp:
     """What the server runs."""
     hot = {
         ("GET", "/v1/sigma"): sigma.hot_route(table),
         ("POST", "/umbridge/Evaluate"): umbridge.hot_route(table),
     }
-    return Front(create_api(settings, table, gate, store), gate, hot)
+    return AsgiMiddleware(create_api(settings, table, access, store), access, hot, problem_page)

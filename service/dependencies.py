@@ -1,19 +1,16 @@
-"""What routes are given, as annotated types."""
+"""What routes and pages are given, as annotated types."""
 
-import asyncio
-from collections.abc import Awaitable, Callable
-from typing import Annotated, Any, TypeVar
+from typing import Annotated
 
-import numpy as np
-from fastapi import Depends, Path, Request, Response
+from fastapi import Depends, Path, Request, Security
 from fastapi.security import SecurityScopes
 
 from service.auth.access_control import SAFE
 from service.auth.keys import Key
+from service.jobs import Planner, Runner
 from service.problems import Refusal
-from service.schemas.columns import ColumnsRequest, parse
-from service.schemas.columns_answer import Accept, Columns, respond
 from service.store import Database
+from underskin import InvalidInput
 from underskin.surrogate.sigma_table import SigmaTable
 
 
@@ -44,6 +41,7 @@ def _store(request: Request, store: StoreToRead) -> Database:
 Store = Annotated[Database, Depends(_store)]
 
 CampaignId = Annotated[str, Path(description="Id of a campaign, as it was answered when it was sent.")]
+DiagnosisId = Annotated[str, Path(description="Id of a diagnosis, as it was answered when it was asked for.")]
 SkinId = Annotated[str, Path(description="Id of a skin.")]
 
 
@@ -57,57 +55,33 @@ def authorised(scopes: SecurityScopes, request: Request) -> None:
         )
 
 
-# A body up to this size is answered on the event loop (a few ms at most); a larger one in a thread, a few at a time.
-_INLINE_BYTES = 1024
-_threads = asyncio.Semaphore(4)
-
-_Kind = TypeVar("_Kind", bound=ColumnsRequest)
+WRITE = [Security(authorised, scopes=["write"])]
 
 
-def columns_route(
-    kind: type[_Kind], answer: Callable[[SigmaTable, _Kind], Columns]
-) -> Callable[..., Awaitable[Response]]:
-    """An endpoint that reads a request in columns, answers it and writes it as the client accepts it."""
-
-    async def endpoint(request: Request, table: Table, accept: Accept = "application/json") -> Response:
-        """In columns: a list has an entry a row, a single number holds for all rows. Accept: text/csv gives CSV."""
-        body = await request.body()
-        content_type = request.headers.get("content-type", "")
-
-        def work() -> Response:
-            with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
-                return respond(answer(table, parse(kind, body, content_type)), accept)
-
-        if len(body) <= _INLINE_BYTES and b"adopted" not in body:  # that model is in the store
-            return work()
-        return await in_thread(work)
-
-    return endpoint
+def sender(request: Request) -> str | None:
+    """Name of the API key that a request came with."""
+    key: Key | None = request.scope["key"]
+    return None if key is None else key.name
 
 
-async def in_thread(work: Callable[[], Response]) -> Response:
-    """What `work` answers, which may take long: a few at a time, beside the event loop."""
-    async with _threads:
-        return await asyncio.to_thread(work)
+def _runner(request: Request) -> Runner:
+    runner: Runner = request.app.state.runner
+    return runner
 
 
-def columns_body(kind: type[ColumnsRequest], examples: dict[str, Any]) -> dict[str, Any]:
-    """OpenAPI's description of a body in columns."""
-    schema = kind.model_json_schema()
-    return {
-        "requestBody": {
-            "required": True,
-            "content": {
-                "application/json": {"schema": schema, "example": examples},
-                "text/csv": {"schema": {"type": "string"}, "example": _as_csv(examples)},
-            },
-        }
-    }
+def _planner(request: Request) -> Planner:
+    planner: Planner = request.app.state.planner
+    return planner
 
 
-def _as_csv(examples: dict[str, Any]) -> str:
-    """The same columns as CSV, single numbers repeated in every row."""
-    count = max((len(value) for value in examples.values() if isinstance(value, list)), default=1)
-    columns = [value if isinstance(value, list) else [value] * count for value in examples.values()]
-    lines = [examples, *zip(*columns, strict=True)]
-    return "".join(",".join(map(str, line)) + "\r\n" for line in lines)
+RunnerInUse = Annotated[Runner, Depends(_runner)]
+PlannerInUse = Annotated[Planner, Depends(_planner)]
+
+
+def number_of_cursor(cursor: str | None) -> int | None:
+    """The number that a page of a list ended with; raises InvalidInput."""
+    if cursor is None:
+        return None
+    if not cursor.isascii() or not cursor.isdigit() or len(cursor) > 18:
+        raise InvalidInput("cursor", cursor, "must be the `next` of the page before")
+    return int(cursor)

@@ -2,7 +2,8 @@
 
 import math
 import reprlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from http import HTTPStatus
 from typing import Any
 
@@ -181,3 +182,12 @@ def _writable(text: str) -> str:
 
 def _in_json(value: Any) -> Any:
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def unknown_name(name: str, value: str, known: Collection[str], noun: str) -> InvalidInput:
+    """The error of a name that is none of those `known`; `noun`: what such a name is, such as a query parameter."""
+    if not known:
+        return InvalidInput(name, value, f"is not a {noun} of this request, which has none")
+    close = get_close_matches(name.lower(), known, n=1)
+    guess = f"; did you mean {close[0]}?" if close else "."
+    return InvalidInput(name, value, f"is not a {noun} of this request{guess} Known: {', '.join(known)}")

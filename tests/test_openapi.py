@@ -13,7 +13,7 @@ import jsonschema_rs
 import pytest
 
 from service.app import create_api
-from service.auth.access_control import Gate
+from service.auth.access_control import AccessControl
 from service.auth.key_requirement import KeyRequirement
 from service.auth.keys import KeyStore
 from service.settings import Settings
@@ -99,7 +99,7 @@ def test_operation_ids_are_stable(document: dict[str, Any]) -> None:
 def test_every_route_of_the_application_is_in_the_document(document: dict[str, Any], tmp_path: Path) -> None:
     store = open_store("", tmp_path)
     keys = KeyStore(tmp_path)
-    gate = Gate(
+    gate = AccessControl(
         host_names=frozenset(),
         keys=keys,
         requirement=KeyRequirement(keys, store),

@@ -10,10 +10,11 @@ import httpx
 import pytest
 
 from service.app import create_api
-from service.auth.access_control import Gate
+from service.auth.access_control import AccessControl
 from service.auth.key_requirement import KeyRequirement
 from service.auth.keys import KeyStore
-from service.middleware.asgi_middleware import Front
+from service.middleware.asgi_middleware import AsgiMiddleware
+from service.pages.shared.problem import problem_page
 from service.problems import Problem
 from service.settings import Settings
 from service.store import open_store
@@ -219,7 +220,7 @@ def test_what_nobody_expected_is_a_problem_with_the_traceback_in_the_log(
 ) -> None:
     store = open_store("", tmp_path)
     keys = KeyStore(tmp_path)
-    gate = Gate(
+    gate = AccessControl(
         host_names=frozenset(),
         keys=keys,
         requirement=KeyRequirement(keys, store),
@@ -234,7 +235,7 @@ def test_what_nobody_expected_is_a_problem_with_the_traceback_in_the_log(
         raise ZeroDivisionError("a bug")
 
     async def ask() -> httpx.Response:
-        transport = httpx.ASGITransport(Front(api, gate, {}))
+        transport = httpx.ASGITransport(AsgiMiddleware(api, gate, {}, problem_page))
         async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
             return await client.get("/fails")
 

@@ -20,7 +20,7 @@ _MOST_OPEN_BYTES = 8000  # of a body that anybody may send: a key and a path fit
 SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
-class Gate:
+class AccessControl:
     """Refuses what must not reach a route."""
 
     def __init__(

@@ -6,7 +6,7 @@ import threading
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.auth.keys import KeyStore
-from service.lasting_failure import LastingFailure
+from service.log import LastingFailure
 from service.store import key_requirement
 from service.store.engine import Database, StorageFull
 from service.store.errors import StoreMoved

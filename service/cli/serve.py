@@ -11,7 +11,7 @@ import typer
 import uvicorn
 
 from service.app import create_app
-from service.auth.access_control import LOOPBACK_NAMES, Gate
+from service.auth.access_control import LOOPBACK_NAMES, AccessControl
 from service.auth.key_requirement import KeyRequirement
 from service.auth.keys import KeyStore
 from service.cli.shared import STORE_ERRORS, fail, read_settings
@@ -46,7 +46,7 @@ def serve(
         fail(str(error))
     configure_logging()
     typer.echo(f"underskin serves on http://{_host_name(host)}:{listener.getsockname()[1]} (Ctrl+C ends it)")
-    gate = Gate(
+    access = AccessControl(
         host_names=settings.host_names | {_host_name(host)},
         keys=keys,
         requirement=requirement,
@@ -55,7 +55,7 @@ def serve(
         max_upload_bytes=settings.max_upload_bytes,
     )
     config = uvicorn.Config(
-        create_app(settings, table, gate, store),
+        create_app(settings, table, access, store),
         access_log=False,
         log_config=None,
         server_header=False,

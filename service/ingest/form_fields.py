@@ -4,8 +4,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 
 from service.ingest.uploads import Upload
-from service.problems import invalid_input
-from service.spelling import unknown
+from service.problems import invalid_input, unknown_name
 from underskin import InvalidInput
 
 FILE = "file"  # a part of this name is a file, also where its sender gives no file name
@@ -36,7 +35,7 @@ def _errors(upload: Upload, texts: Collection[str], single_files: Collection[str
     name = upload.field or ""
     known = (*texts, FILE, *single_files)
     if upload.label is None and name not in known:
-        yield unknown(name, _start(upload), known, "form field")
+        yield unknown_name(name, _start(upload), known, "form field")
     elif name in texts and upload.label is not None:
         yield InvalidInput(name, upload.label, "must be a text, not a file")
     elif name in texts and not _is_short_text(upload):

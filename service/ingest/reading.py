@@ -1,5 +1,6 @@
 """From uploaded files to campaigns, with what is wrong in each."""
 
+import asyncio
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -21,6 +22,9 @@ from underskin.recordings.rig_description import RigDescription
 
 _BOM = b"\xef\xbb\xbf"
 _UNNAMED = "the upload"
+
+# Reading a campaign takes memory many times its size: few at a time, the others wait.
+READING_SLOTS = asyncio.Semaphore(2)
 
 MOST_CAMPAIGNS = 1000  # a request
 MOST_RECORDINGS = 50_000  # a request, good or not

@@ -12,7 +12,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from service.jobs.process import Worker
 from service.jobs.worker import Job
-from service.lasting_failure import LastingFailure
+from service.log import LastingFailure
 from service.store import diagnoses
 from service.store.engine import Database, StorageFull
 from service.store.errors import StoreMoved

@@ -7,7 +7,6 @@ its figures, or one with the plan where the rig's limits are told, or one with t
 """
 
 import os
-import resource
 import sys
 import threading
 from collections.abc import Callable
@@ -69,13 +68,14 @@ def _work(job: Job, campaign: bytes, say: Callable[[dict[str, Any]], None]) -> N
     from underskin.diagnosis.reporting.figures import figures
     from underskin.diagnosis.reporting.report import report
     from underskin.errors import TableError
+    from underskin.process_limits import limit_process
     from underskin.recordings.campaign import parse
     from underskin.surrogate.sigma_table import load_table
 
     table = load_table(Path(job.table))
     if table.sha256 != job.table_sha256:
         raise TableError(f"{job.table} changed since the server started: restart it")
-    _limit(job.memory_bytes)
+    limit_process(job.memory_bytes)
     limits = Limits(**job.limits or {})
     found = diagnose(parse(orjson.loads(campaign)), table, lambda share: say({"progress": share}), limits)
     if job.limits is not None:
@@ -88,13 +88,6 @@ def _work(job: Job, campaign: bytes, say: Callable[[dict[str, Any]], None]) -> N
     ]
     say({"report": {**document, "findings": left_out + list(document["findings"])}})
     say({"figures": {name: figure.to_json() for name, figure in figures(found, document).items()}})
-
-
-def _limit(memory_bytes: int) -> None:
-    """So much beyond what has been loaded."""
-    own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (own + memory_bytes, own + memory_bytes))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def _end_with_the_runner(stdin: BinaryIO) -> None:

@@ -1,4 +1,4 @@
-"""The outermost layer, plain ASGI: gate, request id, body limit, metrics and log for every request.
+"""The outermost layer, plain ASGI: access control, request id, body limit, metrics and log for every request.
 
 It also answers the two requests that clients send one by one in great number, before FastAPI's own layers, which
 would take longer than the answer. Such a hot route treats the plain case only and leaves all else to the route of the
@@ -15,9 +15,9 @@ from collections.abc import Callable, Iterable, Mapping
 from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.auth.access_control import Gate
+from service.auth.access_control import AccessControl
+from service.middleware.error_handlers import ProblemPage
 from service.middleware.request_log import record
-from service.pages.shared.problem import problem_page
 from service.problems import Refusal, is_browsing, unexpected
 
 logger = logging.getLogger("underskin")
@@ -35,13 +35,16 @@ def are_numbers(values: Iterable[object]) -> bool:
     return _NUMBERS.issuperset(map(type, values))
 
 
-class Front:
-    """See the module."""
+class AsgiMiddleware:
+    """The layer in front of the API; one for the process."""
 
-    def __init__(self, api: ASGIApp, gate: Gate, hot: Mapping[tuple[str, str], HotRoute]) -> None:
-        """`hot` is by method and path."""
+    def __init__(
+        self, api: ASGIApp, access: AccessControl, hot: Mapping[tuple[str, str], HotRoute], problem_page: ProblemPage
+    ) -> None:
+        """`hot` is by method and path; `problem_page` shows an error to who looks at pages."""
         self._api = api
-        self._gate = gate
+        self._access = access
+        self._problem_page = problem_page
         self._hot = hot
         self._prefix = os.urandom(6).hex()
         self._numbers = itertools.count()
@@ -57,7 +60,8 @@ class Front:
         scope["request_id"] = request_id
         scope["key"] = None
         scope["why"] = None
-        exchange = _Exchange(send, request_id, scope["path"], headers.get(b"accept", b"").decode("latin-1"))
+        accept = headers.get(b"accept", b"").decode("latin-1")
+        exchange = _Exchange(send, request_id, scope["path"], accept, self._problem_page)
         try:
             await self._answer(scope, headers, receive, exchange)
         except Refusal as refusal:
@@ -83,9 +87,9 @@ class Front:
     async def _answer(
         self, scope: Scope, headers: Mapping[bytes, bytes], receive: Receive, exchange: "_Exchange"
     ) -> None:
-        """Pass the gate, then a hot route or the API."""
+        """Check access, then a hot route or the API."""
         method, path = scope["method"], scope["path"]
-        scope["key"] = self._gate.check(method, path, headers)
+        scope["key"] = self._access.check(method, path, headers)
         hot = self._hot.get((method, path))
         limited = self._limited(receive, path, headers)
         if hot is None or not _plain(method, headers):
@@ -106,7 +110,7 @@ class Front:
             nonlocal size
             message = await receive()
             size += len(message.get("body", b""))
-            self._gate.check_size(size, path, headers)
+            self._access.check_size(size, path, headers)
             return message
 
         return counted
@@ -115,11 +119,12 @@ class Front:
 class _Exchange:
     """The answer on its way: puts the request id into it and remembers its status."""
 
-    def __init__(self, send: Send, request_id: str, path: str, accept: str) -> None:
+    def __init__(self, send: Send, request_id: str, path: str, accept: str, problem_page: ProblemPage) -> None:
         self._send = send
         self._request_id = request_id
         self._path = path
         self._accept = accept
+        self._problem_page = problem_page
         self.status = 0
         self.hot = False
 
@@ -138,7 +143,7 @@ class _Exchange:
     async def refuse(self, refusal: Refusal) -> None:
         """A problem."""
         if is_browsing(self._path, self._accept):
-            page = problem_page(refusal, self._request_id)
+            page = self._problem_page(refusal, self._request_id)
             kept = [header for header in page.raw_headers if header[0] != b"content-length"]
             await self._whole(page.status_code, bytes(page.body), kept)
             return

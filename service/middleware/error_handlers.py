@@ -1,16 +1,16 @@
 """Every error that a route raises, as a problem."""
 
 import logging
+from collections.abc import Callable
 
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
+from fastapi.routing import APIRoute
 from sqlalchemy.exc import DataError, IntegrityError, OperationalError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
-from service.pages.shared.problem import problem_page
 from service.problems import RETRY_LATER, Refusal, from_validation, invalid_input, is_browsing, unexpected
-from service.routes.openapi import methods
 from service.store.answers import OtherRequest
 from service.store.engine import StorageFull
 from service.store.errors import Conflict, Missing, StoreMoved
@@ -19,24 +19,25 @@ from underskin import InvalidInput
 logger = logging.getLogger("underskin")
 
 
-def install_handlers(api: FastAPI) -> None:
-    """One shape for what we raise, what FastAPI raises, and what nobody expected."""
-    api.add_exception_handler(Refusal, _handle)
-    api.add_exception_handler(InvalidInput, _handle)
-    api.add_exception_handler(RequestValidationError, _handle)
-    api.add_exception_handler(HTTPException, _handle)
-    for kind in (*_STATUS, StorageFull, StoreMoved, DataError, IntegrityError, OperationalError, Exception):
-        api.add_exception_handler(kind, _handle)
+ProblemPage = Callable[[Refusal, str], Response]  # of a refusal and the request's id
 
 
-async def _handle(request: Request, error: Exception) -> Response:
-    refusal = _as_refusal(request, error)
-    request.scope["why"] = refusal.in_log()
-    path = request.scope["path"]
-    if is_browsing(path, request.headers.get("accept", "")):
-        return problem_page(refusal, request.scope["request_id"])
-    content = refusal.body(path, request.scope["request_id"])
-    return Response(content, refusal.status_for(path), headers=refusal.headers, media_type=refusal.media_type(path))
+def install_handlers(api: FastAPI, problem_page: ProblemPage) -> None:
+    """One shape for what we raise, what FastAPI raises, and what nobody expected; a page for who looks at pages."""
+
+    async def handle(request: Request, error: Exception) -> Response:
+        refusal = _as_refusal(request, error)
+        request.scope["why"] = refusal.in_log()
+        path, request_id = request.scope["path"], request.scope["request_id"]
+        if is_browsing(path, request.headers.get("accept", "")):
+            return problem_page(refusal, request_id)
+        media_type = refusal.media_type(path)
+        status = refusal.status_for(path)
+        return Response(refusal.body(path, request_id), status, headers=refusal.headers, media_type=media_type)
+
+    ours = (Refusal, InvalidInput, RequestValidationError, HTTPException)
+    for kind in (*ours, *_STATUS, StorageFull, StoreMoved, DataError, IntegrityError, OperationalError, Exception):
+        api.add_exception_handler(kind, handle)
 
 
 def _as_refusal(request: Request, error: Exception) -> Refusal:
@@ -54,7 +55,7 @@ def _as_refusal(request: Request, error: Exception) -> Refusal:
         case HTTPException(status_code=404):
             return Refusal(404, f"There is nothing at {request.url.path}; /openapi.json lists all routes.")
         case HTTPException(status_code=405):
-            allowed = {"Allow": ", ".join(methods(request.app, request.scope["route"].path))}
+            allowed = {"Allow": ", ".join(_methods(request.app, request.scope["route"].path))}
             return Refusal(405, f"{request.url.path} does not take {request.method}.", headers=allowed)
         case HTTPException():
             return Refusal(error.status_code, str(error.detail), headers=error.headers)
@@ -62,10 +63,16 @@ def _as_refusal(request: Request, error: Exception) -> Refusal:
             return _of_the_store(request, error)
 
 
+def _methods(api: FastAPI, path: str) -> list[str]:
+    """All methods of a path, in the order of its routes; the router knows those of one of them only."""
+    routes = [route for route in api.routes if isinstance(route, APIRoute) and route.path == path]
+    return list(dict.fromkeys(method for route in routes for method in sorted(route.methods or ())))
+
+
 def _unreadable(error: RequestValidationError) -> Refusal | None:
     """A body that is not JSON is no question of fields."""
-    found = [entry for entry in error.errors() if entry["type"] == "json_invalid"]
-    return Refusal(400, f"The body is not JSON: {found[0]['ctx']['error']}.") if found else None
+    reasons = [entry["ctx"]["error"] for entry in error.errors() if entry["type"] == "json_invalid"]
+    return Refusal(400, f"The body is not JSON: {reasons[0]}.") if reasons else None
 
 
 _STATUS = {Missing: 404, Conflict: 409, OtherRequest: 422}

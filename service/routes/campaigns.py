@@ -1,20 +1,19 @@
 """Campaigns: sent, listed, read, withdrawn, corrected, their recordings excluded, their d33."""
 
-import asyncio
 from collections.abc import Mapping
 from functools import partial
 from typing import Annotated, Any, Literal
 
 import orjson
-from fastapi import APIRouter, Header, Query, Request, Response, Security
+from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import StreamingResponse
 from pydantic import ValidationError
-from sqlalchemy import Connection
 from starlette.concurrency import run_in_threadpool
 
-from service.dependencies import CampaignId, Store, Table, authorised
+from service.dependencies import WRITE, CampaignId, Store, Table, number_of_cursor, sender
 from service.ingest.accept import RIG, Terms, accept
 from service.ingest.form_fields import FILE, split
+from service.ingest.reading import READING_SLOTS
 from service.ingest.uploads import received
 from service.middleware.unique_keys import JsonRoute
 from service.problems import from_validation
@@ -24,14 +23,12 @@ from service.schemas.campaign_d33 import D33
 from service.store import campaigns
 from service.store.times import stored
 from service.usecases import campaign_documents, d33_cache
+from service.usecases import campaigns as usecase
 from service.usecases.adopted_models import serving
 from underskin import InvalidInput
 
 router = APIRouter(prefix="/v1", tags=["campaigns"], route_class=JsonRoute)
 
-WRITE = [Security(authorised, scopes=["write"])]
-# Reading a campaign takes memory many times its size: few at a time, the others wait.
-heavy = asyncio.Semaphore(2)
 
 _FILE: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
 _EXAMPLE: dict[str, Any] = {
@@ -119,14 +116,12 @@ async def post(
     `together`.
     """
     settings = request.app.state.settings
-    key = request.scope["key"]
-    sender = None if key is None else key.name
-    async with received(request, request.app.state.uploads) as parts, heavy:
+    async with received(request, request.app.state.uploads) as parts, READING_SLOTS:
         fields, uploads = split(parts, list(models.SendOptions.model_fields), [RIG])
         terms = Terms(
             **_options(query, fields),
             idempotency_key=idempotency_key,
-            sender=sender,
+            sender=sender(request),
             most_json_bytes=settings.max_body_bytes,
         )
         answer, repeats = await run_in_threadpool(accept, store, uploads, terms)
@@ -168,8 +163,8 @@ def listed(
         recorded_to=_time("recorded_to", recorded_to),
     )
     with store.reading() as connection:
-        rows = campaigns.listed(connection, filters, before(cursor), limit + 1)
-    page = [models.CampaignEntry(**models.entry(row, campaigns.state(row))) for row in rows[:limit]]
+        rows = campaigns.listed(connection, filters, number_of_cursor(cursor), limit + 1)
+    page = [models.CampaignEntry(**usecase.entry(row)) for row in rows[:limit]]
     return models.CampaignList(campaigns=page, next=str(rows[limit - 1].number) if len(rows) > limit else None)
 
 
@@ -177,7 +172,7 @@ def listed(
 def one(campaign_id: CampaignId, store: Store) -> models.CampaignDetail:
     """With its recordings, without their arrays."""
     with store.reading() as connection:
-        return _detail(connection, campaign_id)
+        return usecase.detail(connection, campaign_id)
 
 
 @router.get(
@@ -244,7 +239,7 @@ def withdraw(campaign_id: CampaignId, withdrawal: models.Withdrawal, store: Stor
     """Figures no longer use it; it can still be read."""
     with store.writing() as connection:
         campaigns.withdraw(connection, campaign_id, withdrawal.reason)
-        return _detail(connection, campaign_id)
+        return usecase.detail(connection, campaign_id)
 
 
 @router.post(
@@ -255,23 +250,9 @@ def withdraw(campaign_id: CampaignId, withdrawal: models.Withdrawal, store: Stor
 )
 def exclude(campaign_id: CampaignId, exclusion: models.Exclusion, store: Store, table: Table) -> models.CampaignDetail:
     """Figures no longer use it; it can still be read. A correction is the way back."""
-    with store.writing() as connection:
-        campaigns.exclude(connection, campaign_id, exclusion.recording, exclusion.reason)
-        detail = _detail(connection, campaign_id)
-    d33_cache.derive(store, table, [campaign_id])
-    return detail
-
-
-def _detail(connection: Connection, campaign_id: str) -> models.CampaignDetail:
-    row = campaigns.find(connection, campaign_id)
-    kept = campaigns.recordings_of(connection, row.number)
-    return models.CampaignDetail(
-        **models.entry(row, campaigns.state(row)),
-        skin=row.about["skin"],
-        entries=[models.RecordingEntry(**recording._mapping) for recording in kept],
-        refused=[models.RecordingResult(**refused) for refused in row.refused],
-        notes=row.notes,
-    )
+    usecase.exclude(store, table, campaign_id, exclusion.recording, exclusion.reason)
+    with store.reading() as connection:
+        return usecase.detail(connection, campaign_id)
 
 
 def _time(name: str, text: str | None) -> str | None:
@@ -279,12 +260,3 @@ def _time(name: str, text: str | None) -> str | None:
         return None if text is None else stored(text)
     except ValueError:
         raise InvalidInput(name, text, "must be a date and time like 2017-05-03T09:00:00Z") from None
-
-
-def before(cursor: str | None) -> int | None:
-    """The number that a page of a list ended with; raises InvalidInput."""
-    if cursor is None:
-        return None
-    if not cursor.isascii() or not cursor.isdigit() or len(cursor) > 18:
-        raise InvalidInput("cursor", cursor, "must be the `next` of the page before")
-    return int(cursor)

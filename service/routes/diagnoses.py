@@ -2,22 +2,17 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Query, Request, Security
+from fastapi import APIRouter, Query
 from fastapi.responses import JSONResponse
 
-from service.dependencies import CampaignId, Store, Table, authorised
-from service.jobs import Runner
+from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, Store, Table, number_of_cursor
 from service.middleware.unique_keys import JsonRoute
-from service.routes.campaigns import before
 from service.routes.idempotency import IdempotentOnce
 from service.schemas import diagnoses as models
 from service.store import diagnoses
-from underskin import __version__
+from service.usecases import diagnoses as usecase
 
 router = APIRouter(prefix="/v1", tags=["diagnoses"], route_class=JsonRoute)
-
-WRITE = [Security(authorised, scopes=["write"])]
-DiagnosisId = Annotated[str, Path(description="Id of a diagnosis, as it was answered when it was asked for.")]
 
 
 @router.post(
@@ -28,7 +23,7 @@ DiagnosisId = Annotated[str, Path(description="Id of a diagnosis, as it was answ
     dependencies=WRITE,
     responses={202: {"model": models.Asked}},
 )
-def ask(campaign_id: CampaignId, request: Request, once: IdempotentOnce, store: Store, table: Table) -> JSONResponse:
+def ask(campaign_id: CampaignId, runner: RunnerInUse, once: IdempotentOnce, store: Store, table: Table) -> JSONResponse:
     """Puts it into the queue; excluded recordings are left out. A campaign that was diagnosed as it is now, with this
     table and version, is answered with that diagnosis.
     """
@@ -36,10 +31,10 @@ def ask(campaign_id: CampaignId, request: Request, once: IdempotentOnce, store: 
         store,
         None,
         lambda connection: models.Asked.model_validate(
-            diagnoses.ask(connection, campaign_id, table.sha256, __version__, once.sender), from_attributes=True
+            usecase.ask(connection, campaign_id, table, once.sender), from_attributes=True
         ).model_dump(),
     )
-    runner_of(request).stir()
+    runner.stir()
     return JSONResponse(answer, status_code=202)
 
 
@@ -55,8 +50,8 @@ def listed(
     """Without their reports; a page holds `limit` of them."""
     filters = diagnoses.Filters(campaign, skin, state)
     with store.reading() as connection:
-        rows = diagnoses.listed(connection, filters, before(cursor), limit + 1)
-    page = [models.DiagnosisEntry(**models.entry(row)) for row in rows[:limit]]
+        rows = diagnoses.listed(connection, filters, number_of_cursor(cursor), limit + 1)
+    page = [models.DiagnosisEntry(**usecase.entry(row)) for row in rows[:limit]]
     return models.DiagnosisList(diagnoses=page, next=str(rows[limit - 1].number) if len(rows) > limit else None)
 
 
@@ -66,22 +61,16 @@ def one(diagnosis_id: DiagnosisId, store: Store) -> models.Diagnosis:
     with store.reading() as connection:
         row = diagnoses.find(connection, diagnosis_id)
         report = diagnoses.report_of(connection, row.number)
-    return models.Diagnosis(**models.entry(row), report=report)
+    return models.Diagnosis(**usecase.entry(row), report=report)
 
 
 @router.delete(
     "/diagnoses/{diagnosis_id}", operation_id="cancel_diagnosis", summary="Cancel a diagnosis", dependencies=WRITE
 )
-def cancel(diagnosis_id: DiagnosisId, request: Request, store: Store) -> models.DiagnosisEntry:
+def cancel(diagnosis_id: DiagnosisId, runner: RunnerInUse, store: Store) -> models.DiagnosisEntry:
     """Ends its process, or takes it out of the queue. One that is done or has failed stays: 409."""
     with store.writing() as connection:
         diagnoses.cancel(connection, diagnosis_id)
         row = diagnoses.find(connection, diagnosis_id)
-    runner_of(request).stir()
-    return models.DiagnosisEntry(**models.entry(row))
-
-
-def runner_of(request: Request) -> Runner:
-    """What runs them in this server."""
-    runner: Runner = request.app.state.runner
-    return runner
+    runner.stir()
+    return models.DiagnosisEntry(**usecase.entry(row))

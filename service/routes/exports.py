@@ -3,11 +3,11 @@
 from functools import partial
 from typing import Any
 
-from fastapi import APIRouter, Request, Security
+from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
-from service.dependencies import SkinId, Store, authorised
+from service.dependencies import WRITE, SkinId, Store
 from service.ingest import skin_imports
 from service.ingest.form_fields import split
 from service.ingest.skin_imports import Imported
@@ -43,7 +43,7 @@ def export_skin(skin_id: SkinId, request: Request, store: Store) -> FileResponse
     "/skins/import",
     operation_id="import_skin",
     summary="Bring in a skin that was exported",
-    dependencies=[Security(authorised, scopes=["write"])],
+    dependencies=WRITE,
     openapi_extra={
         "requestBody": {"required": True, "content": {"application/octet-stream": _FILE["content"][_MEDIA_TYPE]}}
     },

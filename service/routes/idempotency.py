@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from fastapi import Depends, Header, Request
 from sqlalchemy import Connection
 
+from service.dependencies import sender
 from service.store import answers
 from service.store.engine import Database
 
@@ -27,8 +28,7 @@ class Once:
             ),
         ] = None,
     ) -> None:
-        key = request.scope["key"]
-        self.sender: str | None = None if key is None else key.name
+        self.sender = sender(request)
         self._path = request.url.path
         self._key = idempotency_key
 

@@ -2,24 +2,20 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Security
+from fastapi import APIRouter, Query
 from fastapi.responses import JSONResponse
 from sqlalchemy import Connection
 
-from service.dependencies import SkinId, Store, authorised
+from service.dependencies import WRITE, SkinId, Store
 from service.middleware.unique_keys import JsonRoute
 from service.problems import Refusal
 from service.routes.idempotency import IdempotentOnce
 from service.schemas import diagnoses as answers
 from service.schemas.campaigns import Reason
-from service.store import diagnoses, models, skins
-from service.store.errors import Conflict
-from service.store.tables import AnyRow
-from service.usecases.adopted_models import of_row
+from service.store import models, skins
+from service.usecases import models as usecase
 
 router = APIRouter(prefix="/v1", tags=["skins"], route_class=JsonRoute)
-
-WRITE = [Security(authorised, scopes=["write"])]
 
 
 @router.post(
@@ -35,19 +31,11 @@ def adopt(skin_id: SkinId, adoption: answers.Adoption, once: IdempotentOnce, sto
     it on request from now on. Adopted already, it is answered as it is."""
 
     def act(connection: Connection) -> dict[str, object]:
-        return _entry(connection, adopted(connection, skin_id, adoption.diagnosis_id, once.sender)).model_dump()
+        return usecase.entry(
+            connection, usecase.adopt(connection, skin_id, adoption.diagnosis_id, once.sender)
+        ).model_dump()
 
     return JSONResponse(once.answer(store, adoption.diagnosis_id, act), status_code=201)
-
-
-def adopted(connection: Connection, skin_id: str, diagnosis_id: str, sender: str | None) -> AnyRow:
-    """The model that a diagnosis has become; raises Conflict, Missing, and InvalidInput where it cannot serve."""
-    root = skins.require_root(connection, skin_id)
-    diagnosis = diagnoses.find(connection, diagnosis_id)
-    if diagnosis.state != "done":
-        raise Conflict(f"Diagnosis {diagnosis.id!r} has no report: its state is {diagnosis.state}.")
-    of_row(connection, diagnosis)  # which refuses what cannot serve
-    return models.adopt(connection, root, diagnosis, sender)
 
 
 @router.delete(
@@ -64,7 +52,7 @@ def withdraw(
 
     def act(connection: Connection) -> dict[str, object]:
         root = skins.require_root(connection, skin_id)
-        return _version(models.withdraw(connection, root, reason, once.sender)).model_dump()
+        return usecase.version(models.withdraw(connection, root, reason, once.sender)).model_dump()
 
     return answers.ModelVersion(**once.answer(store, {"withdraw": reason}, act))
 
@@ -77,7 +65,7 @@ def in_force(skin_id: SkinId, store: Store) -> answers.ModelEntry:
         row = models.in_force(connection, root)
         if row is None:
             raise Refusal(404, f"Skin {skin_id!r} has no adopted model.")
-        return _entry(connection, row)
+        return usecase.entry(connection, row)
 
 
 @router.get("/skins/{skin_id}/model/versions", operation_id="skin_model_versions", summary="All models it ever had")
@@ -85,33 +73,5 @@ def versions(skin_id: SkinId, store: Store) -> answers.ModelVersions:
     """Nothing is deleted: of the skin and of those joined to it."""
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
-        found = [_entry(connection, row) for row in models.of_skin(connection, root)]
-    return answers.ModelVersions(skin_id=root, models=found)
-
-
-def _version(row: AnyRow) -> answers.ModelVersion:
-    return answers.ModelVersion(
-        id=row.model_id,
-        version=row.model_version,
-        skin_id=row.model_skin,
-        adopted_at=row.adopted_at,
-        adopted_from=row.adopted_from,
-        diagnosis_id=row.id,
-        campaign_id=row.campaign_id,
-        withdrawn_at=row.model_withdrawn_at,
-        withdrawn_from=row.model_withdrawn_from,
-        withdraw_reason=row.model_withdraw_reason,
-    )
-
-
-def _entry(connection: Connection, row: AnyRow) -> answers.ModelEntry:
-    report = diagnoses.report_of(connection, row.number)
-    assert report is not None
-    model = of_row(connection, row)
-    return answers.ModelEntry(
-        **_version(row).model_dump(),
-        outdated=diagnoses.outdated(row),
-        **{name: report[name] for name in ("mechanisms", "probability", "statement", "fit", "provenance")},
-        needs=list(model.needs),
-        depends_on_frequency=bool(model.of_lines),
-    )
+        entries = [usecase.entry(connection, row) for row in models.of_skin(connection, root)]
+    return answers.ModelVersions(skin_id=root, models=entries)

@@ -6,7 +6,6 @@ from fastapi import APIRouter, FastAPI, Request
 from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel, Field
 
-from service import pages
 from service.auth.access_control import OPEN
 from service.problems import MEDIA_TYPE, Problem
 from service.schemas.stress import StressRequest
@@ -40,15 +39,9 @@ class UmbridgeProblem(BaseModel):
 async def openapi(request: Request) -> dict[str, Any]:
     """OpenAPI 3.1; says that a key is needed where one is."""
     document = dict(_document(request.app))
-    if request.app.state.gate.keys_needed():
+    if request.app.state.access.keys_needed():
         document["security"] = [{"key": []}]
     return document
-
-
-def methods(api: FastAPI, path: str) -> list[str]:
-    """All that `path` takes, as it stands in the document; the router knows those of one of its routes only."""
-    known = _document(api)["paths"].get(path)
-    return pages.methods(path) if known is None else [method.upper() for method in known]
 
 
 def query_parameters(api: FastAPI, path: str, method: str) -> list[str]:

@@ -4,9 +4,8 @@ from collections.abc import Collection, Iterable, Iterator
 
 from fastapi import Request
 
-from service.problems import invalid_input
+from service.problems import invalid_input, unknown_name
 from service.routes.openapi import query_parameters
-from service.spelling import unknown
 from underskin import InvalidInput
 
 
@@ -24,7 +23,7 @@ def _errors(given: Iterable[tuple[str, str]], known: Collection[str]) -> Iterato
     seen: set[str] = set()
     for name, value in given:
         if name not in known:
-            yield unknown(name, value, known, "query parameter")
+            yield unknown_name(name, value, known, "query parameter")
         elif name in seen:
             yield InvalidInput(name, value, "must be given once")
         seen.add(name)

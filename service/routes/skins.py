@@ -2,22 +2,16 @@
 
 from typing import Annotated, Literal
 
-import orjson
-from fastapi import APIRouter, Query, Security
-from sqlalchemy import Connection
+from fastapi import APIRouter, Query
 
-from service.dependencies import SkinId, Store, Table, authorised
+from service.dependencies import WRITE, SkinId, Store, Table
 from service.middleware.unique_keys import JsonRoute
-from service.problems import Refusal
 from service.schemas import skins as models
 from service.store import skins
-from service.store.errors import Missing
 from service.usecases import d33_cache, histories
-from underskin import InvalidInput
+from service.usecases import skins as usecase
 
 router = APIRouter(prefix="/v1", tags=["skins"], route_class=JsonRoute)
-
-WRITE = [Security(authorised, scopes=["write"])]
 
 
 @router.get("/skins", operation_id="skins", summary="Skins, by id")
@@ -38,25 +32,15 @@ def listed(
 def one(skin_id: SkinId, store: Store) -> models.SkinDetail:
     """With what was joined to it; of a joined skin, the one that it counts as."""
     with store.reading() as connection:
-        return _detail(connection, skin_id)
+        return usecase.detail(connection, skin_id)
 
 
 @router.post("/skins/{skin_id}/join", operation_id="join_skins", summary="Join another skin to it", dependencies=WRITE)
 def join(skin_id: SkinId, join: models.Join, store: Store) -> models.SkinDetail:
     """Two ids turned out to mean one skin: from now on figures of this one use the campaigns of both."""
-    if skin_id == join.skin_id:
-        raise InvalidInput("skin_id", join.skin_id, "must be another skin")
-    with store.writing() as connection:
-        found = skins.lock(connection, [skin_id, join.skin_id])
-        for name in (skin_id, join.skin_id):
-            if name not in found:
-                raise Missing(f"There is no skin {name!r}.")
-            if found[name].root_id != name:
-                raise Refusal(
-                    409, f"Skin {name!r} was joined to {found[name].joined_to!r}: use {found[name].root_id!r}."
-                )
-        skins.join(connection, skin_id, join.skin_id, join.reason)
-        return _detail(connection, skin_id)
+    usecase.join(store, skin_id, join.skin_id, join.reason)
+    with store.reading() as connection:
+        return usecase.detail(connection, skin_id)
 
 
 @router.get("/skins/{skin_id}/history", operation_id="skin_history", summary="d33 over time")
@@ -79,15 +63,3 @@ def history(
     d33_cache.complete(store, table, root)
     with store.reading() as connection:
         return histories.history(connection, root, table.sha256)
-
-
-def _detail(connection: Connection, skin_id: str) -> models.SkinDetail:
-    row = skins.find(connection, skins.require_root(connection, skin_id))
-    assert row is not None
-    rig = skins.rig_of(connection, row.id)
-    return models.SkinDetail(
-        id=row.id,
-        created_at=row.created_at,
-        joined=[histories.joined(other) for other in skins.joined_to(connection, row.id)],
-        rig=None if rig is None else orjson.loads(rig),
-    )

@@ -1,39 +1,18 @@
 """Charge on every sensor of an array under several contacts or a pressure map."""
 
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from fastapi import APIRouter, Request, Response
 
-from service.dependencies import in_thread
-from service.schemas.columns import json_document
-from service.schemas.columns_answer import Accept, Columns, respond
+from service.routes.columns_body import json_document
+from service.routes.columns_endpoint import Accept, in_thread, respond
 from service.schemas.stress import StressAnswer
+from service.usecases import stress as usecase
 from service.usecases.table_loader import influence_table
-from underskin.array_stress.answer import answer
-from underskin.array_stress.request import StressRequest, read_request
-from underskin.surrogate.influence_table import InfluenceTable
+from underskin.array_stress.request import read_request
 
 router = APIRouter(prefix="/v1", tags=["stress"])
-
-
-def columns(table: InfluenceTable, request: StressRequest) -> Columns:
-    """Charge and stress on each sensor."""
-    found = answer(table, request)
-    return Columns(
-        rows=len(found.sensors),
-        model="linear_layer",
-        table_sha256=table.sha256,
-        inside=found.inside,
-        shared={
-            "reach_mm": found.reach_mm,
-            "contact_radius_mm": found.contact_radius_mm,
-            "findings": [asdict(finding) for finding in found.findings],
-        },
-        names={"sensor": found.sensors},
-        columns=found.columns,
-    )
 
 
 EXAMPLE = {
@@ -72,6 +51,6 @@ async def stress(request: Request, accept: Accept = "application/json") -> Respo
     def work() -> Response:
         asked = read_request(json_document(body, content_type))
         with np.errstate(all="ignore"):  # what overflows is out of reach
-            return respond(columns(influence_table(request.app.state.settings.tables), asked), accept)
+            return respond(usecase.stress(influence_table(request.app.state.settings.tables), asked), accept)
 
     return await in_thread(work)

@@ -1,4 +1,4 @@
-"""What the routes of campaigns answer and take."""
+"""Campaigns: requests and answers."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -144,9 +144,3 @@ class Exclusion(_Request):
 
     recording: str = Field(description="Its id in the campaign.", examples=["r1"])
     reason: Reason = Field(description="Why; shown with every figure that leaves it out.")
-
-
-def entry(row: Any, state: State) -> dict[str, Any]:
-    """The fields of CampaignEntry from a row of the store."""
-    names = set(CampaignEntry.model_fields) - {"state", "file"}
-    return {name: getattr(row, name) for name in names} | {"state": state, "file": row.source}

@@ -1,19 +1,17 @@
-"""Columns out: one answer as JSON (null where there is no value) or as CSV (NaN there)."""
+"""Answers in columns: as JSON, null where there is no value, or as CSV, NaN there."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import orjson
-from fastapi import Header, Response
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from service.schemas.columns import Status
+from underskin.columns import statuses, to_csv
 from underskin.units import Floats
-
-Accept = Annotated[str, Header(description="`text/csv` returns the columns as CSV with NaN; otherwise JSON with null.")]
 
 
 class AnswerInColumns(BaseModel):
@@ -57,12 +55,9 @@ class Columns:
         shape = (self.rows, *values.shape[1:]) if values.ndim > 1 else (self.rows,)
         return np.ascontiguousarray(np.broadcast_to(values, shape))
 
-    def status(self) -> list[Status]:
+    def status(self) -> list[str]:
         """`ok` or `out_of_domain`, row by row."""
-        if self.inside.all():
-            return ["ok"] * self.rows
-        inside = np.broadcast_to(self.inside, (self.rows,)).tolist()
-        return ["ok" if row else "out_of_domain" for row in inside]
+        return statuses(self.inside, self.rows)
 
     def json(self) -> bytes:
         """The answer as a JSON object."""
@@ -88,45 +83,12 @@ class Columns:
 
     def csv(self) -> bytes:
         """The columns as CSV; a column of spectra becomes one CSV column a frequency, `name[10.0 Hz]`."""
-        header: list[str] = list(self.names)
-        cells: list[list[str]] = [list(map(_quoted, texts)) for texts in self.names.values()]
+        columns: dict[str, Floats | Sequence[str]] = dict(self.names)
         for name in self.columns:
             values = self.full(name)
             if values.ndim == 1:
-                header.append(name)
-                cells.append(_texts(values))
+                columns[name] = values
             elif self.line_hz is not None:
-                header += [f"{name}[{frequency!r} Hz]" for frequency in self.line_hz.tolist()]
-                cells += [_texts(line) for line in values.T]
-        cells.append(list(self.status()))
-        lines = [",".join([*header, "status"]), *map(",".join, zip(*cells, strict=True)), ""]
-        return "\r\n".join(lines).encode()
-
-
-def _texts(values: Floats) -> list[str]:
-    return ["NaN" if value != value else repr(value) for value in values.tolist()]
-
-
-def _quoted(text: str) -> str:
-    """A text as a cell, quoted where it must be (RFC 4180)."""
-    return '"' + text.replace('"', '""') + '"' if set(text) & set(',"\r\n') else text
-
-
-def wants_csv(accept: str) -> bool:
-    """Whether an Accept header prefers text/csv to JSON."""
-    weights = {"text/csv": 0.0, "application/json": 0.0, "application/*": 0.0, "*/*": 0.0}
-    for part in accept.split(","):
-        media_type, *parameters = (piece.strip() for piece in part.lower().split(";"))
-        weight = next((value[2:] for value in parameters if value.startswith("q=")), "1")
-        if media_type in weights:
-            weights[media_type] = float(weight) if weight.replace(".", "", 1).isdecimal() else 0.0
-    csv_weight = weights.pop("text/csv")
-    return csv_weight > 0 and csv_weight >= max(weights.values())
-
-
-def respond(answer: Columns, accept: str, *, one: bool = False) -> Response:
-    """The answer in the form that the client asked for; beside CSV, model and table travel as headers."""
-    if not wants_csv(accept):
-        return Response(answer.json_of_one() if one else answer.json(), media_type="application/json")
-    table = {} if answer.table_sha256 is None else {"Underskin-Table-SHA256": answer.table_sha256}
-    return Response(answer.csv(), media_type="text/csv", headers={"Underskin-Model": answer.model, **table})
+                frequencies = self.line_hz.tolist()
+                columns |= {f"{name}[{one!r} Hz]": line for one, line in zip(frequencies, values.T, strict=True)}
+        return to_csv({**columns, "status": self.status()}, "\r\n").encode()

@@ -1,11 +1,8 @@
-"""What the routes of diagnoses and adopted models answer and take."""
+"""Diagnoses and adopted models: requests and answers."""
 
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
-
-from service.store import diagnoses
-from service.store.tables import AnyRow
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]
 Verdict = Literal["no_mismatch", "explained", "ambiguous", "unexplained", "insufficient_data"]
@@ -95,9 +92,3 @@ class ModelVersions(BaseModel):
     models: list[ModelEntry] = Field(
         description="The latest adoption first; the first one is in force unless withdrawn."
     )
-
-
-def entry(row: AnyRow) -> dict[str, Any]:
-    """The fields of DiagnosisEntry from a row of the store."""
-    told = {name: getattr(row, name) for name in DiagnosisEntry.model_fields if name != "outdated"}
-    return told | {"outdated": diagnoses.outdated(row)}

@@ -1,4 +1,4 @@
-"""What /frf and /d33 share: the skin and what presses it, in columns, and what reaches the sensor."""
+"""A skin pressed by a sphere, in columns, and what reaches its sensor: common to `/v1/frf` and `/v1/d33`."""
 
 from typing import ClassVar, Literal
 
@@ -6,7 +6,6 @@ from pydantic import Field
 
 from service.schemas.columns import ColumnsRequest, NonNegative, Positive, Signed
 from service.schemas.columns_answer import AnswerInColumns
-from underskin import InvalidInput
 
 FIELDS = (
     "thickness_mm",
@@ -82,10 +81,3 @@ class PressedSkinAnswer(AnswerInColumns):
         description="Static mean stress on the sensor, 3Fσ/(2πh²), positive in compression; null with an adopted "
         "model [MPa]."
     )
-
-
-def require_paper(request: PressedSkinColumns) -> None:
-    """Refuses what goes with an adopted model only."""
-    for name in ("skin_id", "sensor", *ADOPTED_COLUMNS):
-        if getattr(request, name) is not None:
-            raise InvalidInput(name, getattr(request, name), "is used only with model adopted")

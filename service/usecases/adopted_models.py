@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from service.problems import Refusal
-from service.schemas.pressed_skin import FIELDS, PressedSkinColumns
+from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS, PressedSkinColumns
 from service.store import diagnoses, models, skins
 from service.store.engine import Database
 from service.store.errors import Conflict
@@ -156,3 +156,10 @@ def _response(
     campaign = pressed_campaign(model.skin, request.sensor, rows, lines)
     found = model.response(campaign, table, level=frequency_hz is None)
     return found.value.reshape(count, -1), np.logical_and.reduce(found.inside.reshape(count, -1), axis=1)
+
+
+def require_paper(request: PressedSkinColumns) -> None:
+    """Raises InvalidInput for a field that only an adopted model uses."""
+    for name in ("skin_id", "sensor", *ADOPTED_COLUMNS):
+        if getattr(request, name) is not None:
+            raise InvalidInput(name, getattr(request, name), "is used only with model adopted")

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import orjson
 
 from service.problems import Refusal
-from service.schemas.campaign_d33 import D33, of_inversion, of_moduli
+from service.schemas.campaign_d33 import D33
 from service.store import campaigns, inversions
 from service.store.engine import Database, StorageFull
 from service.store.errors import Conflict, StoreMoved
 from service.store.tables import AnyRow
 from service.usecases import figure_data
 from service.usecases.adopted_models import Serving, serving
+from service.usecases.campaign_d33 import of_inversion, of_moduli
 from underskin import InvalidInput
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable

@@ -44,6 +44,21 @@ def measured(campaign: Campaign, show: str = "") -> list[tuple[FrfRecording, "Fr
     return found
 
 
+def frf_columns(campaign: Campaign, show: str = "") -> dict[str, list[Any]]:
+    """Every line of the recordings, or of those of `show`."""
+    names = ("recording", "sensor", "frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n", "coherence")
+    columns: dict[str, list[Any]] = {name: [] for name in names}
+    for recording, frf in measured(campaign, show):
+        count = len(frf.values)
+        columns["recording"] += [recording.id] * count
+        columns["sensor"] += [recording.sensor] * count
+        columns["frequency_hz"] += frf.frequency.tolist()
+        columns["frf_re_pc_per_n"] += to_lab("frf_pc_per_n", frf.values.real).tolist()
+        columns["frf_im_pc_per_n"] += to_lab("frf_pc_per_n", frf.values.imag).tolist()
+        columns["coherence"] += [None] * count if frf.coherence is None else frf.coherence.tolist()
+    return columns
+
+
 def spreads(kept: Sequence[Mapping[str, Any]]) -> "list[FrfSpread]":
     """Those of `numbers` again."""
     from underskin.recordings.frf.summary import FrfSpread

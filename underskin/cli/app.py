@@ -6,7 +6,6 @@ The other packages (the server, the table generator) hand in theirs through the 
 
 import ast
 import importlib.util
-import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
@@ -167,7 +166,7 @@ def d33(
     for_files = [name for name, used in only_files if used is not None]
     invert_files.refuse(for_files, "goes with FILE, and none is given")
 
-    defaults = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": math.nan}
+    defaults: dict[str, float | None] = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": None}
     from underskin.prediction import answers
 
     _answer(given, defaults, input_file, csv, lambda table, columns: answers.d33(table, columns, units_checked))
@@ -175,17 +174,18 @@ def d33(
 
 def _answer(
     given: Mapping[str, _Given],
-    defaults: Mapping[str, float],
+    defaults: Mapping[str, float | None],
     input_file: str | None,
     as_csv: bool,
     compute: "Callable[[SigmaTable, Mapping[str, Floats]], Answer]",
 ) -> None:
     """Gather the columns, compute, and write inputs and results."""
     from underskin.cli import columns
+    from underskin.columns import rows
     from underskin.surrogate.sigma_table import load_table
 
     gathered = columns.gather(given, defaults, input_file)
-    count = columns.rows(gathered)
+    count = rows(gathered)
     table = load_table()
     answer = compute(table, gathered)
     everything = {**gathered, **answer.columns}

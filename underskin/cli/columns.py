@@ -1,6 +1,5 @@
 """Columns at the command line: from options and a CSV file into arrays, and back as CSV or as a table to read."""
 
-import csv
 import sys
 from collections.abc import Mapping, Sequence
 
@@ -11,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from underskin.columns import CsvError, from_csv, statuses, to_csv
 from underskin.errors import InvalidInput, UnderskinError
 from underskin.formatting import significant
 from underskin.units import LAB, Finding, Floats
@@ -46,9 +46,10 @@ PIPED_WIDTH = 200  # of a table that goes into a file or a pipe
 
 
 def gather(
-    options: Mapping[str, Sequence[str] | None], defaults: Mapping[str, float], path: str | None
+    options: Mapping[str, Sequence[str] | None], defaults: Mapping[str, float | None], path: str | None
 ) -> dict[str, Floats]:
-    """Every field of `options`, from its option, the CSV file at `path` (`-` is standard input) or its default.
+    """Every field of `options`, from its option, the CSV file at `path` (`-` is standard input) or its default;
+    one whose default is None may be left out.
 
     An option such as ["0.5,1", "2"] is a column of three; a single number has shape () and holds for all rows. Raises
     InvalidInput, or UnderskinError for a field that has no value.
@@ -63,7 +64,8 @@ def gather(
         elif name in in_file:
             columns[name] = in_file[name]
         elif name in defaults:
-            columns[name] = np.array(defaults[name])
+            if defaults[name] is not None:
+                columns[name] = np.array(defaults[name])
         else:
             option = "--" + name.replace("_", "-")
             raise UnderskinError(f"{name} is missing: give {option}, or a column {name} in the CSV file of --input")
@@ -79,33 +81,16 @@ def _from_csv(path: str, allowed: Sequence[str]) -> dict[str, Floats]:
     try:
         source = sys.stdin.fileno() if path == STANDARD_INPUT else path
         with open(source, encoding="utf-8-sig", newline="", closefd=path != STANDARD_INPUT) as file:
-            lines = [line for line in csv.reader(file, strict=True) if line]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+            columns = from_csv(file.read())
+    except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise InvalidInput("input", path, f"must be a readable CSV file ({reason})") from error
-    if len(lines) < 2:
-        raise InvalidInput("input", path, "must have a header of field names and at least one row")
-    header = [name.strip() for name in lines[0]]
-    if len(header) == 1 and any(separator in header[0] for separator in ";\t"):
-        raise InvalidInput("input", path, "must separate cells by commas and write numbers with a point")
-    for name in header:
-        if name not in allowed or header.count(name) > 1:
+    except CsvError as error:
+        raise InvalidInput("input", path, str(error)) from error
+    for name in columns:
+        if name not in allowed:
             raise InvalidInput("input", path, f"has the column {name!r}; allowed, once each: {', '.join(allowed)}")
-    for number, line in enumerate(lines[1:]):
-        if len(line) != len(header):
-            raise InvalidInput("input", path, f"has {len(line)} cells in row {number}, but {len(header)} in the header")
-    return {name: _numbers(name, cells) for name, cells in zip(header, zip(*lines[1:], strict=True), strict=True)}
-
-
-def rows(columns: Mapping[str, Floats]) -> int:
-    """How many rows the columns have; raises InvalidInput that names two of different length."""
-    long = {name: len(values) for name, values in columns.items() if values.ndim}
-    first = next(iter(long), None)
-    for name, count in long.items():
-        if first is not None and count != long[first]:
-            allowed = f"must have as many rows as {first} ({long[first]}), or be a single number"
-            raise InvalidInput(name, f"{count} rows", allowed)
-    return 1 if first is None else long[first]
+    return {name: _numbers(name, cells) for name, cells in columns.items()}
 
 
 def write_csv(
@@ -115,11 +100,8 @@ def write_csv(
 
     `names`: columns of text, one a row, that go first.
     """
-    full = [np.broadcast_to(values, (count,)).tolist() for values in columns.values()]
-    cells = [["NaN" if number != number else repr(number) for number in numbers] for numbers in full]
-    writer = csv.writer(sys.stdout, lineterminator="\n")
-    writer.writerow([*names, *columns, "status"])
-    writer.writerows(zip(*names.values(), *cells, map(status, np.broadcast_to(inside, (count,)).tolist()), strict=True))
+    full = {name: np.broadcast_to(values, (count,)) for name, values in columns.items()}
+    sys.stdout.write(to_csv({**names, **full, "status": statuses(inside, count)}, "\n"))
 
 
 def write_table(
@@ -136,7 +118,7 @@ def write_table(
         if name not in varying:
             listed.add_row(_NAMES[name][0], _rounded(name, float(values.flat[0])), _unit(name))
     if count == 1:
-        listed.add_row("status", status(bool(inside.flat[0])))
+        listed.add_row("status", *statuses(inside.flat[:1], 1))
     console.print(listed)
     if count > 1:
         console.print(_rows_table(varying, np.broadcast_to(inside, (count,)), names))
@@ -149,10 +131,10 @@ def _rows_table(columns: Mapping[str, Floats], inside: NDArray[np.bool_], names:
     for name in columns:
         table.add_column(Text(f"{_NAMES[name][1]}\n{_unit(name)}"), justify="right", overflow="fold")
     table.add_column("status", overflow="fold")
-    for number, row_inside in enumerate(inside.tolist()):
+    for number, row_status in enumerate(statuses(inside, len(inside))):
         texts = (Text(each[number]) for each in names.values())
         rounded = (_rounded(name, values[number]) for name, values in columns.items())
-        table.add_row(*texts, *rounded, status(row_inside))
+        table.add_row(*texts, *rounded, row_status)
     return table
 
 
@@ -160,11 +142,6 @@ def say(findings: Sequence[Finding]) -> None:
     """What looks wrong and is used all the same, a line each on standard error."""
     for finding in findings:
         sys.stderr.write(f"underskin: look at {finding.field}: {finding.statement}\n")
-
-
-def status(inside: bool) -> str:
-    """The word for a row."""
-    return "ok" if inside else "out_of_domain"
 
 
 def _numbers(name: str, cells: Sequence[str]) -> Floats:

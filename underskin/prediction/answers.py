@@ -1,4 +1,4 @@
-"""What the commands answer: columns in lab units in and out; a single number holds for all rows."""
+"""What server and command line answer: columns in lab units in and out; a single number holds for all rows."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +15,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Finding, Floats, checked, finite, non_negative, to_lab, to_si
 
 Model = Literal["layer", "half_space"]
+_FRF_UNCERTAINTY = "frf_uncertainty_pc_per_n"
 
 
 @dataclass(frozen=True)
@@ -38,23 +39,62 @@ def sigma(table: SigmaTable, given: Mapping[str, Floats], model: Model) -> Answe
 
 
 def frf(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Answer:
-    """What the sensor should answer to the preload, and what leads to it; raises InvalidInput."""
+    """FRF of a sensor under a preloaded sphere, FRF = d33 (3/2) (rT/h)² σ, and what leads to it.
+
+    Parameters
+    ----------
+    table : the table of σ.
+    given : columns in lab units by field name: the skin's, the sphere's and `d33_pc_per_n`, of equal length or single.
+    units_checked : accept magnitudes that look like a slip of units.
+
+    Returns
+    -------
+    Answer
+        A row is inside where the table holds it and its FRF is finite.
+
+    Raises
+    ------
+    InvalidInput
+        Names the field and the row of a value that cannot be used.
+    """
     reached = pressed(table, given, units_checked)
     d33 = checked("d33_pc_per_n", given["d33_pc_per_n"], units_checked=units_checked)
-    return _skin_answer(table, reached, {"frf_pc_per_n": reached.frf(d33)})
+    frf = to_lab("frf_pc_per_n", reached.frf(d33))
+    return _skin_answer(table, reached, {**lab_columns(reached), "frf_pc_per_n": frf}, frf)
 
 
 def d33(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Answer:
-    """d33 and its standard uncertainty from a measured FRF, and what leads to them; raises InvalidInput."""
+    """d33 of a sensor from the measured plateau of its FRF, d33 = FRF / ((3/2) (rT/h)² σ), and what leads to it.
+
+    Parameters
+    ----------
+    table : the table of σ.
+    given : columns in lab units by field name: the skin's, the sphere's, `frf_pc_per_n` and perhaps
+        `frf_uncertainty_pc_per_n`, the standard uncertainty; without it that of d33 is NaN.
+    units_checked : accept magnitudes that look like a slip of units.
+
+    Returns
+    -------
+    Answer
+        With the FRF and its uncertainty. A row is inside where the table holds it and its d33 is finite. Findings name
+        magnitudes that look wrong.
+
+    Raises
+    ------
+    InvalidInput
+        Names the field and the row of a value that cannot be used.
+    """
     reached = pressed(table, given, units_checked)
-    finite("frf_pc_per_n", given["frf_pc_per_n"])
-    if not np.isnan(given["frf_uncertainty_pc_per_n"]).all():  # unknown: then d33's is NaN
-        non_negative("frf_uncertainty_pc_per_n", given["frf_uncertainty_pc_per_n"])
-    measured = (to_si(name, given[name]) for name in ("frf_pc_per_n", "frf_uncertainty_pc_per_n"))
-    value, uncertainty = reached.d33(*measured)
-    answer = _skin_answer(table, reached, {"d33_pc_per_n": value, "d33_uncertainty_pc_per_n": uncertainty})
-    looked_at = plausibility.of_rows(given["frf_pc_per_n"], answer.columns["d33_pc_per_n"])
-    return replace(answer, findings=looked_at)
+    measured = {"frf_pc_per_n": finite("frf_pc_per_n", given["frf_pc_per_n"]), _FRF_UNCERTAINTY: np.full((), np.nan)}
+    if _FRF_UNCERTAINTY in given:
+        measured[_FRF_UNCERTAINTY] = non_negative(_FRF_UNCERTAINTY, given[_FRF_UNCERTAINTY])
+    value, uncertainty = reached.d33(*(to_si(name, values) for name, values in measured.items()))
+    results = {
+        "d33_pc_per_n": to_lab("d33_pc_per_n", value),
+        "d33_uncertainty_pc_per_n": to_lab("d33_uncertainty_pc_per_n", uncertainty),
+    }
+    answer = _skin_answer(table, reached, {**measured, **lab_columns(reached), **results}, results["d33_pc_per_n"])
+    return replace(answer, findings=plausibility.of_rows(measured["frf_pc_per_n"], results["d33_pc_per_n"]))
 
 
 def pressed(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Transmission:
@@ -83,9 +123,10 @@ def lab_columns(reached: Transmission) -> dict[str, Floats]:
     }
 
 
-def _skin_answer(table: SigmaTable, reached: Transmission, results: Mapping[str, Floats]) -> Answer:
-    in_lab_units = {name: to_lab(name, values) for name, values in results.items()}
-    return Answer(lab_columns(reached) | in_lab_units, reached.inside, f"{_table_domain(table)}, Poisson's ratio 0.5")
+def _skin_answer(table: SigmaTable, reached: Transmission, columns: Mapping[str, Floats], result: Floats) -> Answer:
+    """A row whose result is not finite is outside, as one that the table does not hold."""
+    domain = f"{_table_domain(table)}, Poisson's ratio 0.5"
+    return Answer(columns, reached.inside & np.isfinite(result), domain)
 
 
 def _table_domain(table: SigmaTable) -> str:

@@ -1,6 +1,5 @@
 """An array under loads: the fields of the forms that ask for one, and the request of `POST /v1/stress` in them."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,29 +8,21 @@ import numpy as np
 from fastapi import Request
 
 from service.pages.shared.form_errors import said
+from service.pages.shared.skin_fields import FIELDS, UNITS
 from service.pages.shared.skin_values import start
+from service.pages.shared.typed_numbers import number
 from service.store import campaigns, skins
 from service.store.engine import Database
 from service.usecases.table_loader import influence_table
 from underskin import InvalidInput, UnderskinError
 from underskin.array_stress.answer import StressAnswer, answer
 from underskin.array_stress.request import read_request
-from underskin.recordings.readers import text
 from underskin.surrogate.sigma_table import SigmaTable
 
 _MOST_SENSORS = 10_000
-_BETWEEN = re.compile(r"[;\s]+|,(?:\s+|$)")  # numbers in a line: a comma without a space may be a decimal one
-# Field, words, unit.
-FIELDS = (
-    ("thickness_mm", "thickness h", "mm"),
-    ("youngs_modulus_mpa", "Young's modulus E", "MPa"),
-    ("sensor_radius_mm", "sensor radius rT", "mm"),
-    ("d33_pc_per_n", "d33", "pC/N"),
-    ("poisson_ratio", "Poisson's ratio ν", ""),
-)
 # Field, words, unit, default.
 GRID = (("columns", "sensors along x", "", 4), ("rows", "sensors along y", "", 4), ("pitch_mm", "pitch", "mm", 8.0))
-GLUE, UNITS = "glue_stiffness", "units_checked"
+GLUE = "glue_stiffness"
 _LABELS = {
     **{name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in (*FIELDS, *GRID)},
     GLUE: "glue line, κ",
@@ -95,28 +86,6 @@ def answered(request: Request, document: Mapping[str, Any]) -> StressAnswer:
 def charge_columns(found: StressAnswer) -> dict[str, list[Any]]:
     """Charge and stress on each sensor."""
     return {"sensor": list(found.sensors), **{name: column.tolist() for name, column in found.columns.items()}}
-
-
-def number(name: str, typed: str) -> float:
-    """A number that somebody typed; raises InvalidInput."""
-    try:
-        return float(typed)
-    except ValueError:
-        raise InvalidInput(name, typed[:80], "must be a number") from None
-
-
-def numbers(name: str, line: str) -> list[float]:
-    """The numbers of a line that somebody typed, with decimal points or with decimal commas; raises InvalidInput.
-
-    Between them are spaces, tabs, semicolons, or commas and a space: `7,06` is one number.
-    """
-    typed = [cell for cell in _BETWEEN.split(line) if cell]
-    decimal = "," if any("," in cell for cell in typed) else "."
-    found = [text.number(cell, decimal) for cell in typed]
-    if decimal == "," and None in found:
-        allowed = "must be numbers with spaces between them, with decimal points or with decimal commas, not both"
-        raise InvalidInput(name, line[:80], allowed)
-    return [number(name, cell) if value is None else value for cell, value in zip(typed, found, strict=True)]
 
 
 def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:

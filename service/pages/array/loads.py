@@ -6,10 +6,11 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request, Response
 
 from service.dependencies import Store, Table
-from service.pages.array.description import Described, answered, charge_columns, described, numbers, refused
+from service.pages.array.description import Described, answered, charge_columns, described, refused
 from service.pages.shared import same_request
 from service.pages.shared.figures import csv_answer, drawn
 from service.pages.shared.html import page
+from service.pages.shared.typed_numbers import numbers
 from underskin import InvalidInput, UnderskinError
 from underskin.array_stress.answer import StressAnswer
 

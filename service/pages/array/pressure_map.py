@@ -13,13 +13,13 @@ from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import Store
+from service.ingest.reading import READING_SLOTS
 from service.ingest.uploads import Upload, received
 from service.pages.array import description
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_text, drawn
 from service.pages.shared.forms import TOKEN, require_own
 from service.pages.shared.html import page
-from service.routes.campaigns import heavy
 from service.store.engine import Database
 from underskin import InvalidInput, UnderskinError
 from underskin.array_stress import pressure_map
@@ -54,7 +54,7 @@ async def send(request: Request, store: Store) -> Response:
         chosen = file or typed
         content = b"" if chosen is None else _start(chosen, _LARGEST_BYTES + 1)
     name = "the map" if file is None or not file.label else file.label
-    async with heavy:
+    async with READING_SLOTS:
         return await run_in_threadpool(_shown, request, store, given, content, name)
 
 

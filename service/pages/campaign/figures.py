@@ -12,7 +12,6 @@ from service.store.engine import Database
 from service.store.tables import AnyRow
 from service.usecases.figure_data import MOST_SINGLE, measured, spreads, spreads_of
 from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
-from underskin.units import to_lab
 
 _D33 = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
 _AGAINST_PRELOAD = (
@@ -66,21 +65,6 @@ def _chosen(answer: Mapping[str, Any]) -> str:
     """The band in an address, where the reader chose it."""
     band = answer["band"]
     return band_query((band["low_hz"], band["high_hz"])) if band is not None and band["chosen_by_user"] else ""
-
-
-def frf_columns(campaign: Campaign, show: str = "") -> dict[str, list[Any]]:
-    """Every line of the recordings, or of those of `show`."""
-    names = ("recording", "sensor", "frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n", "coherence")
-    columns: dict[str, list[Any]] = {name: [] for name in names}
-    for recording, frf in measured(campaign, show):
-        count = len(frf.values)
-        columns["recording"] += [recording.id] * count
-        columns["sensor"] += [recording.sensor] * count
-        columns["frequency_hz"] += frf.frequency.tolist()
-        columns["frf_re_pc_per_n"] += to_lab("frf_pc_per_n", frf.values.real).tolist()
-        columns["frf_im_pc_per_n"] += to_lab("frf_pc_per_n", frf.values.imag).tolist()
-        columns["coherence"] += [None] * count if frf.coherence is None else frf.coherence.tolist()
-    return columns
 
 
 def _frf(

@@ -5,16 +5,18 @@ from urllib.parse import quote
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 
-from service.dependencies import CampaignId, Store, Table
-from service.pages.campaign.figures import band_query, figures, frf_columns
+from service.dependencies import WRITE, CampaignId, Store, Table
+from service.pages.campaign.figures import band_query, figures
 from service.pages.shared import same_request, verdicts
 from service.pages.shared.figures import csv_answer
-from service.pages.shared.forms import WRITE, Form, reason, see
+from service.pages.shared.forms import Form, reason, see
 from service.pages.shared.html import page
 from service.store import campaigns, diagnoses
 from service.store.engine import Database
 from service.store.tables import AnyRow
 from service.usecases import d33_cache
+from service.usecases.campaigns import exclude as exclude_recording
+from service.usecases.figure_data import frf_columns
 from underskin import InvalidInput
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
 
@@ -118,9 +120,7 @@ def curves_csv(campaign_id: CampaignId, store: Store) -> Response:
 @router.post("/exclude", dependencies=WRITE)
 def exclude(campaign_id: CampaignId, sent: Form, store: Store, table: Table) -> Response:
     """Leave a recording out of all figures."""
-    with store.writing() as connection:
-        campaigns.exclude(connection, campaign_id, sent.get("recording", ""), reason(sent))
-    d33_cache.derive(store, table, [campaign_id])
+    exclude_recording(store, table, campaign_id, sent.get("recording", ""), reason(sent))
     return see(f"/campaigns/{quote(campaign_id, safe='')}")
 
 

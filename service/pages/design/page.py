@@ -18,7 +18,8 @@ from service.pages.shared.formats import short_and_exact
 from service.pages.shared.html import compress, page
 from service.pages.shared.skin_values import PROTOTYPE, start
 from service.problems import from_validation
-from service.routes.design import DesignAnswer, DesignRequest, answer, designed
+from service.schemas.design import DesignAnswer, DesignRequest
+from service.usecases.design import design_answer, design_of
 from underskin import InvalidInput, UnderskinError
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -183,7 +184,7 @@ def _first(error: ValidationError) -> tuple[str, Any, str]:
 
 def _computed(request: Request, table: SigmaTable) -> DesignAnswer:
     asked = _asked({**{name: PROTOTYPE[name] for name, *_ in SLIDERS}, **_given(request)})
-    return answer(table, asked, designed(table, asked))
+    return design_answer(table, asked, design_of(table, asked))
 
 
 def _answered(
@@ -192,12 +193,12 @@ def _answered(
     from underskin.figures import Mark, array_response, design_overview
 
     with np.errstate(all="ignore"):
-        found = designed(table, asked)
-        start = designed(table, _asked(own)).contact
+        found = design_of(table, asked)
+        start = design_of(table, _asked(own)).contact
     name = "the paper's prototype" if skin is None else "the skin as it is"
     mark = Mark(name, float(start.a_over_h), float(start.rt_over_h), float(start.load_parameter), float(start.sigma))
     query = urlencode({name: getattr(asked, name) for name, *_ in SLIDERS})
-    return answer(table, asked, found), [
+    return design_answer(table, asked, found), [
         drawn(
             "design",
             design_overview(found, mark),

@@ -7,20 +7,19 @@ from urllib.parse import quote
 from fastapi import APIRouter, Request, Response
 from markupsafe import Markup
 
-from service.dependencies import CampaignId, Store, Table
+from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, Store, Table, sender
 from service.pages.diagnosis.figure_columns import columns
 from service.pages.diagnosis.plan import FIELDS, left_open
 from service.pages.shared import adoption, same_request
 from service.pages.shared.figures import Drawn, csv_answer, drawn, drawn_before
-from service.pages.shared.forms import WRITE, Form, see, sender
+from service.pages.shared.forms import OWN_FORM, see
 from service.pages.shared.html import page, render
 from service.problems import Refusal
-from service.routes.diagnoses import DiagnosisId, runner_of
-from service.routes.models import adopted
 from service.store import campaigns, diagnoses, models, skins
 from service.store.engine import Database
 from service.store.tables import AnyRow
-from underskin import __version__
+from service.usecases import diagnoses as usecase
+from service.usecases.models import adopt as adopt_model
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -37,12 +36,12 @@ _ABOUT = {
 _ODD = (LookupError, TypeError, ValueError, AttributeError)  # of a report that came with an import
 
 
-@router.post("/campaigns/{campaign_id}/diagnosis", dependencies=WRITE)
-def ask(request: Request, campaign_id: CampaignId, sent: Form, store: Store, table: Table) -> Response:  # noqa: ARG001
+@router.post("/campaigns/{campaign_id}/diagnosis", dependencies=[*WRITE, OWN_FORM])
+def ask(request: Request, campaign_id: CampaignId, runner: RunnerInUse, store: Store, table: Table) -> Response:
     """Puts it into the queue; one that was diagnosed as it is now is shown."""
     with store.writing() as connection:
-        row = diagnoses.ask(connection, campaign_id, table.sha256, __version__, sender(request))
-    runner_of(request).stir()
+        row = usecase.ask(connection, campaign_id, table, sender(request))
+    runner.stir()
     return see(f"/diagnoses/{row.id}")
 
 
@@ -109,21 +108,21 @@ def numbers_csv(diagnosis_id: DiagnosisId, figure: str, store: Store) -> Respons
         _cannot_be_shown(row)
 
 
-@router.post("/diagnoses/{diagnosis_id}/cancel", dependencies=WRITE)
-def cancel(request: Request, diagnosis_id: DiagnosisId, sent: Form, store: Store) -> Response:  # noqa: ARG001
+@router.post("/diagnoses/{diagnosis_id}/cancel", dependencies=[*WRITE, OWN_FORM])
+def cancel(diagnosis_id: DiagnosisId, runner: RunnerInUse, store: Store) -> Response:
     """Ends it."""
     with store.writing() as connection:
         diagnoses.cancel(connection, diagnosis_id)
-    runner_of(request).stir()
+    runner.stir()
     return see(f"/diagnoses/{quote(diagnosis_id, safe='')}")
 
 
-@router.post("/diagnoses/{diagnosis_id}/adopt", dependencies=WRITE)
-def adopt(request: Request, diagnosis_id: DiagnosisId, sent: Form, store: Store) -> Response:  # noqa: ARG001
+@router.post("/diagnoses/{diagnosis_id}/adopt", dependencies=[*WRITE, OWN_FORM])
+def adopt(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response:
     """Makes it the model of its skin."""
     with store.writing() as connection:
         skin = diagnoses.find(connection, diagnosis_id).skin_id
-        model = adopted(connection, skin, diagnosis_id, sender(request))
+        model = adopt_model(connection, skin, diagnosis_id, sender(request))
     return see(f"/skins/{quote(model.model_skin, safe='')}?model=adopted")
 
 

@@ -7,15 +7,13 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import JSONResponse
 from markupsafe import Markup
 
-from service.dependencies import Store
-from service.jobs import Planner
+from service.dependencies import DiagnosisId, PlannerInUse, Store
 from service.jobs.planner import Planned
-from service.pages.array.description import number
 from service.pages.shared import same_request
 from service.pages.shared.form_errors import said
 from service.pages.shared.html import page
+from service.pages.shared.typed_numbers import number
 from service.problems import Refusal
-from service.routes.diagnoses import DiagnosisId
 from service.store import campaigns, diagnoses
 from service.store.engine import Database
 from service.store.tables import AnyRow
@@ -54,7 +52,7 @@ def left_open(report: Mapping[str, Any]) -> bool:
 
 
 @router.get("")
-def plan(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response:
+def plan(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, store: Store) -> Response:
     """Within the limits of the address."""
     row, name = _diagnosed(store, diagnosis_id)
     error: str | None = None
@@ -63,7 +61,7 @@ def plan(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response:
     try:
         told = _limits(request.query_params)
         same = _same(request, row.campaign_id, told)
-        planned = _planner(request).plan(row, _checked(told))
+        planned = planner.plan(row, _checked(told))
     except UnderskinError as wrong:
         error = said(wrong, _LABELS)
     except Refusal as busy:
@@ -86,10 +84,10 @@ def plan(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response:
 
 
 @router.get("/progress")
-def progress(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response:
+def progress(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, store: Store) -> Response:
     """How far it is."""
     row, _ = _diagnosed(store, diagnosis_id)
-    planned = _planner(request).plan(row, _checked(_limits(request.query_params)))
+    planned = planner.plan(row, _checked(_limits(request.query_params)))
     return JSONResponse({"state": planned.state, "progress": planned.progress})
 
 
@@ -100,11 +98,6 @@ def _diagnosed(store: Database, diagnosis_id: str) -> tuple[AnyRow, str]:
     if row.state != "done":
         raise Refusal(404, f"Diagnosis {diagnosis_id!r} has no report: its state is {row.state}.")
     return row, name
-
-
-def _planner(request: Request) -> Planner:
-    planner: Planner = request.app.state.planner
-    return planner
 
 
 def _limits(given: Mapping[str, str]) -> dict[str, Any]:

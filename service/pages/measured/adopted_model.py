@@ -4,14 +4,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from service.pages.array.description import FIELDS, number
 from service.pages.shared.form_errors import said
+from service.pages.shared.skin_fields import FIELDS
+from service.pages.shared.typed_numbers import number
 from service.problems import Refusal
-from service.routes.d33 import D33Columns, answer
 from service.schemas.columns_answer import Columns
+from service.schemas.d33 import D33Columns
 from service.store.engine import Database
 from service.store.errors import Conflict
 from service.usecases.adopted_models import serving
+from service.usecases.d33 import d33
 from underskin import InvalidInput, UnderskinError
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -65,7 +67,7 @@ def by_model(
     fields = [(name, *_NEEDED[name], given.get(name, "").strip()) for name in model.needs]
     try:
         asked = {**document, **_needed(model, fields), "model": "adopted", "skin_id": skin}
-        return ByModel(fields, asked, answer(table, store, D33Columns.model_validate(asked)))
+        return ByModel(fields, asked, d33(table, store, D33Columns.model_validate(asked)))
     except UnderskinError as refused:
         return ByModel(fields, not_told=said(refused, _LABELS))
 

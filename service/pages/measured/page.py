@@ -8,24 +8,27 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import ValidationError
 
 from service.dependencies import Store, Table
-from service.pages.array.description import FIELDS as OF_ARRAY
-from service.pages.array.description import UNITS, number, numbers, refused
+from service.pages.array.description import refused
 from service.pages.measured.adopted_model import ByModel, by_model
 from service.pages.measured.out_of_domain import reasons
 from service.pages.shared import same_request
 from service.pages.shared.figures import csv_answer
 from service.pages.shared.html import page
+from service.pages.shared.skin_fields import FIELDS as SKIN_FIELDS
+from service.pages.shared.skin_fields import UNITS
 from service.pages.shared.skin_values import start
+from service.pages.shared.typed_numbers import number, numbers
 from service.problems import from_validation
-from service.routes.d33 import D33Columns, answer
 from service.schemas.columns_answer import Columns
+from service.schemas.d33 import D33Columns
 from service.store.engine import Database
+from service.usecases.d33 import d33
 from underskin import InvalidInput, UnderskinError
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/d33")
 
-FIELDS = tuple(field for field in OF_ARRAY if field[0] != "d33_pc_per_n")
+FIELDS = tuple(field for field in SKIN_FIELDS if field[0] != "d33_pc_per_n")
 _LONGEST = 20_000  # characters of the rows
 _ROWS = "4 1 7.06 0.1\n4 3 7.45 0.1"
 _ORDER = ("indenter_radius_mm", "preload_n", "frf_pc_per_n", "frf_uncertainty_pc_per_n")
@@ -99,7 +102,7 @@ def _said(error: UnderskinError) -> str:
 
 
 def _answered(table: SigmaTable, store: Database, document: dict[str, Any]) -> Columns:
-    return answer(table, store, D33Columns.model_validate(document))
+    return d33(table, store, D33Columns.model_validate(document))
 
 
 def _columns(document: Mapping[str, Any], found: Columns, adopted: ByModel | None) -> dict[str, list[Any]]:

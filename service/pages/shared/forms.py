@@ -3,16 +3,14 @@
 from typing import Annotated
 from urllib.parse import parse_qs
 
-from fastapi import Depends, Request, Security
+from fastapi import Depends, Request
 from fastapi.responses import RedirectResponse
 
 from service.auth import session
-from service.dependencies import authorised
 from service.problems import Refusal
 from underskin import InvalidInput
 
 TOKEN = "form_token"  # noqa: S105 -- the name of the field
-WRITE = [Security(authorised, scopes=["write"])]
 _LARGEST_BYTES = 100_000
 _MOST_FIELDS = 500  # a file of many channels has a row of fields for each
 
@@ -40,6 +38,7 @@ def require_own(request: Request, token: str) -> None:
 
 
 Form = Annotated[dict[str, str], Depends(_fields)]
+OWN_FORM = Depends(_fields)  # of a route that needs no field, only that the form is of this session
 
 
 def reason(sent: dict[str, str]) -> str:
@@ -48,12 +47,6 @@ def reason(sent: dict[str, str]) -> str:
     if not 0 < len(why) <= 1000:
         raise InvalidInput("reason", why[:80], "must say why in 1 to 1000 characters")
     return why
-
-
-def sender(request: Request) -> str | None:
-    """Name of the API key that the session was begun with."""
-    key = request.scope["key"]
-    return None if key is None else str(key.name)
 
 
 def see(path: str) -> RedirectResponse:

@@ -5,11 +5,11 @@ from urllib.parse import quote
 from fastapi import APIRouter, Response
 from pydantic import ValidationError
 
-from service.dependencies import SkinId, Store
-from service.pages.shared.forms import WRITE, Form, see
+from service.dependencies import WRITE, SkinId, Store
+from service.pages.shared.forms import Form, see
 from service.problems import from_validation
-from service.routes import skins
 from service.schemas.skins import Join
+from service.usecases import skins
 
 router = APIRouter()
 
@@ -21,5 +21,5 @@ def join(skin_id: SkinId, sent: Form, store: Store) -> Response:
         asked = Join(skin_id=sent.get("other", "").strip(), reason=sent.get("reason", ""))
     except ValidationError as error:
         raise from_validation(error) from None
-    skins.join(skin_id, asked, store)
+    skins.join(store, skin_id, asked.skin_id, asked.reason)
     return see(f"/skins/{quote(skin_id, safe='')}")

@@ -9,13 +9,12 @@ from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy import Connection
 from starlette.background import BackgroundTask
 
-from service.dependencies import SkinId, Store, Table
+from service.dependencies import WRITE, SkinId, Store, Table, number_of_cursor, sender
 from service.pages.shared import same_request, verdicts
 from service.pages.shared.adoption import Adoption, answer_by_it, change_percent, of_rows
 from service.pages.shared.figures import Drawn, csv_answer, drawn
-from service.pages.shared.forms import WRITE, Form, reason, see, sender
+from service.pages.shared.forms import Form, reason, see
 from service.pages.shared.html import page
-from service.routes.campaigns import before as number_of
 from service.schemas.skins import History, SensorHistory
 from service.store import campaigns, inversions, models, overview, skins
 from service.store.engine import Database
@@ -50,7 +49,7 @@ def skin(
     root, waiting = _completed(store, table, skin_id)
     with store.reading() as connection:
         filters = campaigns.Filters(skin=root, state=None)
-        rows = campaigns.listed(connection, filters, number_of(before), _ON_A_PAGE + 1)
+        rows = campaigns.listed(connection, filters, number_of_cursor(before), _ON_A_PAGE + 1)
         latest = campaigns.listed(connection, campaigns.Filters(skin=root, state="current"), None, 1)
         numbers = [row.number for row in rows]
         medians = overview.medians(connection, numbers, table.sha256)

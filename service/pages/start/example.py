@@ -7,10 +7,10 @@ from fastapi import APIRouter, Request, Response
 from sqlalchemy import Connection
 from starlette.concurrency import run_in_threadpool
 
-from service.dependencies import Store, Table
+from service.dependencies import WRITE, Store, Table, sender
 from service.ingest.accept import Terms, accept
 from service.ingest.uploads import Upload
-from service.pages.shared.forms import WRITE, Form, see
+from service.pages.shared.forms import OWN_FORM, see
 from service.store import campaigns, skins
 from service.usecases import d33_cache
 
@@ -21,18 +21,16 @@ _FOLDER = Path(__file__).parent / "example"
 _MOST = 1000  # campaigns of it that are looked at
 
 
-@router.post("/example", dependencies=WRITE)
-async def load(request: Request, sent: Form, store: Store, table: Table) -> Response:  # noqa: ARG001 -- checked by it
+@router.post("/example", dependencies=[*WRITE, OWN_FORM])
+async def load(request: Request, store: Store, table: Table) -> Response:
     """Keeps the example's campaigns, once however often it is asked for; afresh where all were withdrawn."""
     with store.reading() as connection:
         withdrawn = _withdrawn(connection)
     if withdrawn is None:
         return see(f"/skins/{SKIN}")
     uploads = [_upload(file) for file in sorted(_FOLDER.glob("*.json"))]
-    key = request.scope["key"]
-    sender = None if key is None else key.name
     asked = f"the example skin, {withdrawn} withdrawn" if withdrawn else "the example skin"
-    terms = Terms(SKIN, None, None, False, None, asked, sender, request.app.state.settings.max_body_bytes)
+    terms = Terms(SKIN, None, None, False, None, asked, sender(request), request.app.state.settings.max_body_bytes)
     answer, _ = await run_in_threadpool(accept, store, uploads, terms)
     await run_in_threadpool(d33_cache.derive, store, table, [entry["id"] for entry in answer["campaigns"]])
     return see(f"/skins/{SKIN}")

@@ -6,8 +6,8 @@ from urllib.parse import quote
 from fastapi import APIRouter, Query, Request, Response
 
 from service.auth import session
-from service.auth.access_control import Gate
-from service.pages.shared.forms import Form, see
+from service.auth.access_control import AccessControl
+from service.pages.shared.forms import OWN_FORM, Form, see
 from service.pages.shared.html import page, set_session
 
 router = APIRouter()
@@ -16,28 +16,28 @@ router = APIRouter()
 @router.get("/login")
 def form(request: Request, back: Annotated[str, Query(alias="next")] = "/") -> Response:
     """Asks for a key, where one is needed."""
-    gate: Gate = request.app.state.gate
-    if not gate.keys_needed():
+    access: AccessControl = request.app.state.access
+    if not access.keys_needed():
         return see("/")
-    return page(request, "login.html", back=back, refused=False, missing=gate.keys_missing())
+    return page(request, "login.html", back=back, refused=False, missing=access.keys_missing())
 
 
 @router.post("/login")
 def login(request: Request, sent: Form) -> Response:
     """Starts a session."""
-    gate: Gate = request.app.state.gate
-    key = gate.key_of_login(sent.get("key", ""))
+    access: AccessControl = request.app.state.access
+    key = access.key_of_login(sent.get("key", ""))
     back = sent.get("next", "/")
     if key is None:
         request.scope["why"] = "the key that was typed is not known"
-        return page(request, "login.html", status=401, back=back, refused=True, missing=gate.keys_missing())
+        return page(request, "login.html", status=401, back=back, refused=True, missing=access.keys_missing())
     answer = see(_own(back))
     set_session(request, answer, session.logged_in(key))
     return answer
 
 
-@router.post("/logout")
-def logout(request: Request, sent: Form) -> Response:  # noqa: ARG001 -- reading it checks the session
+@router.post("/logout", dependencies=[OWN_FORM])
+def logout(request: Request) -> Response:
     """Ends it in this browser."""
     answer = see("/login")
     set_session(request, answer, session.anonymous())

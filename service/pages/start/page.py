@@ -5,12 +5,11 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 from starlette.background import BackgroundTask
 
-from service.dependencies import Store, Table
+from service.dependencies import Store, Table, number_of_cursor
 from service.pages.shared import adoption, same_request, verdicts
 from service.pages.shared.figures import prepare
 from service.pages.shared.html import page
 from service.pages.start.sparkline import sparkline
-from service.routes.campaigns import before as number_of
 from service.store import overview
 
 router = APIRouter()
@@ -28,7 +27,7 @@ def start(
 ) -> Response:
     """The skins whose campaigns came last, first."""
     with store.reading() as connection:
-        found = overview.glances(connection, find or None, number_of(before), _ON_A_PAGE + 1, table.sha256)
+        found = overview.glances(connection, find or None, number_of_cursor(before), _ON_A_PAGE + 1, table.sha256)
         shown = found[:_ON_A_PAGE]
         told = [glance.diagnosis for glance in shown if glance.diagnosis is not None]
         models = [glance.model for glance in shown if glance.model is not None]

@@ -3,16 +3,18 @@
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import h5py
 import numpy as np
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Request, Response
 
+from service.dependencies import Table
 from service.pages.shared import same_request
 from service.pages.shared.html import page
 from service.pages.shared.skin_values import PROTOTYPE
-from service.routes.tables import TableAxis, TableEntry, Tables, tables
+from service.schemas.tables import TableAxis, TableEntry
+from service.usecases.tables import tables
 from underskin.surrogate.contact_table import CONTACT_TABLE
 from underskin.surrogate.influence_table import INFLUENCE_TABLE
 from underskin.surrogate.sigma_table import SIGMA_TABLE
@@ -59,7 +61,7 @@ _MADE = {
 
 
 @dataclass(frozen=True)
-class Told:
+class DescribedTable:
     """One table in words."""
 
     name: str
@@ -74,22 +76,22 @@ class Told:
 
 
 @router.get("")
-def view(request: Request, answered: Annotated[Tables, Depends(tables)]) -> Response:
+def view(request: Request, table: Table) -> Response:
     """What `GET /v1/tables` says, and the errors that the files hold."""
     folder = request.app.state.settings.tables
     return page(
         request,
         "tables.html",
-        tables=[_told(folder, entry) for entry in answered.tables],
+        tables=[_described(folder, entry) for entry in tables(table, folder).tables],
         prototype=f"h {_H:g} mm, E {_E:g} MPa, a sphere of R {_R:g} mm",
         same=same_request.get(request, "/v1/tables", "client.tables()"),
     )
 
 
-def _told(folder: Path, entry: TableEntry) -> Told:
+def _described(folder: Path, entry: TableEntry) -> DescribedTable:
     file, title, holds = _HELD[entry.name]
     versions = {name.removeprefix("version_"): value for name, value in entry.about.items() if "version_" in name}
-    return Told(
+    return DescribedTable(
         entry.name,
         title,
         holds,
@@ -111,12 +113,12 @@ def _in_lab_units(axis: TableAxis) -> str:
 @cache
 def _errors(file: Path) -> list[tuple[str, float, float]]:
     """Of each estimate of an error that a table's file holds: of what, and its median and largest over the domain."""
-    found = []
+    errors = []
     with h5py.File(file) as table:
         for group in table.values():
             for name, values in group.items():
                 if name.endswith("_error"):
                     sizes = np.abs(values[()])
                     words = f"{name.removesuffix('_error')}: {values.attrs['long_name']}".replace("_", " ")
-                    found.append((words, float(np.median(sizes)), float(sizes.max())))
-    return found
+                    errors.append((words, float(np.median(sizes)), float(sizes.max())))
+    return errors

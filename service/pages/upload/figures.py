@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 
 from service.ingest.reading import Look
-from service.pages.campaign.figures import frf_columns
 from service.pages.shared.figures import Drawn, drawn
-from service.usecases.figure_data import measured
+from service.usecases.figure_data import frf_columns, measured
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
 
 _MOST_TRACES = 8

@@ -7,6 +7,7 @@ from urllib.parse import quote
 import orjson
 from fastapi import Request
 
+from service.dependencies import sender
 from service.ingest.accept import RIG, Terms, accept
 from service.ingest.uploads import Upload
 from service.pages.upload.pending_uploads import Shelved
@@ -24,15 +25,13 @@ def keep_good(request: Request, shelved: Shelved, sent: Mapping[str, str], store
     with shelved.lock:
         if shelved.kept_at is not None:
             return []
-        key = request.scope["key"]
-        sender = None if key is None else key.name
         together = sent.get("together", "").strip() if sent.get("as") == "one" else None
         shelved.skin = sent.get(SKIN_FIELD, "").strip() or None
         shelved.reason = sent.get("reason", "").strip()
         reason = shelved.reason or None if shelved.corrects is not None else None
         most = request.app.state.settings.max_body_bytes
         try:
-            terms = Terms(shelved.skin, shelved.corrects, reason, False, together, None, sender, most)
+            terms = Terms(shelved.skin, shelved.corrects, reason, False, together, None, sender(request), most)
             answer, _ = accept(store, [*shelved.files, *_rig_upload(shelved)], terms)
         except (InvalidInput, Conflict, Missing, Refusal) as error:
             shelved.refused = all_told(error)

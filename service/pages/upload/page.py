@@ -9,15 +9,15 @@ from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.auth import session
-from service.dependencies import Store, Table
+from service.dependencies import WRITE, Store, Table
 from service.ingest.accept import RIG
-from service.ingest.reading import Look, look, require_few
+from service.ingest.reading import READING_SLOTS, Look, look, require_few
 from service.ingest.uploads import Upload, received
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer
-from service.pages.shared.forms import TOKEN, WRITE, Form, require_own, see
+from service.pages.shared.forms import OWN_FORM, TOKEN, Form, require_own, see
 from service.pages.shared.html import page
-from service.pages.upload import alike, before_keeping, exported_skin
+from service.pages.upload import alike, before_keeping, exported_skin, rig_in_use
 from service.pages.upload.figures import figures, lines_columns, trace_columns
 from service.pages.upload.file_summary import MOST_LISTED, ChannelSeen, FileSeen, seen
 from service.pages.upload.keep import CORRECTS, SKIN_FIELD, all_told, keep_good
@@ -33,7 +33,6 @@ from service.pages.upload.mapping import (
 )
 from service.pages.upload.pending_uploads import Shelf, Shelved
 from service.problems import Refusal
-from service.routes.campaigns import heavy
 from service.store import campaigns, skins
 from service.store.engine import Database
 from service.store.errors import Missing
@@ -82,17 +81,17 @@ async def send(request: Request, store: Store) -> Response:
         if not given:
             raise Refusal(422, "No file came. Choose one, or drop it on the page.", title="No file")
         corrects = fields.get(CORRECTS) or None
-        skin = fields.get(SKIN_FIELD) or await run_in_threadpool(rig.skin_of, store, corrects)
-        found = await run_in_threadpool(rig.rig, store, rig, skin)
+        skin = fields.get(SKIN_FIELD) or await run_in_threadpool(rig_in_use.skin_of, store, corrects)
+        rig_and_errors = await run_in_threadpool(rig_in_use.rig, store, rig, skin)
         shelved = shelf.put(cookie, given)
     shelved.skin, shelved.corrects = skin, corrects
-    shelved.rig, shelved.refused = found
+    shelved.rig, shelved.refused = rig_and_errors
     shelved.rig_label = None if rig is None or shelved.rig is None else rig.label
     try:
         if await run_in_threadpool(exported_skin.holds_skin, shelved):
             await exported_skin.look(store, shelved)
         else:
-            async with heavy:
+            async with READING_SLOTS:
                 await run_in_threadpool(_look, request, shelved)
     except BaseException:
         shelf.discard(shelved)
@@ -165,7 +164,7 @@ async def mapping(request: Request, upload_id: str, sent: Form) -> Response:
     if wrong:
         return see(f"/upload/{upload_id}")
     shelved.rig, shelved.draft, shelved.rig_label = rig, None, "rig.json"  # as the page saves it
-    async with heavy:
+    async with READING_SLOTS:
         await run_in_threadpool(_look, request, shelved)
     return see(f"/upload/{upload_id}")
 
@@ -174,14 +173,14 @@ async def mapping(request: Request, upload_id: str, sent: Form) -> Response:
 async def keep(request: Request, upload_id: str, sent: Form, store: Store, table: Table) -> Response:
     """Keeps what is good of it."""
     shelved = _find(request, upload_id)
-    async with heavy:
+    async with READING_SLOTS:
         kept = await run_in_threadpool(keep_good, request, shelved, sent, store)
         await run_in_threadpool(d33_cache.derive, store, table, kept)
     return see(shelved.kept_at or f"/upload/{upload_id}")
 
 
-@router.post("/{upload_id}/skin", dependencies=WRITE)
-async def bring_in(request: Request, upload_id: str, sent: Form, store: Store) -> Response:  # noqa: ARG001 -- see discard
+@router.post("/{upload_id}/skin", dependencies=[*WRITE, OWN_FORM])
+async def bring_in(request: Request, upload_id: str, store: Store) -> Response:
     """Brings in an exported skin."""
     shelved = _find(request, upload_id)
     if shelved.skin_seen is None:
@@ -190,8 +189,8 @@ async def bring_in(request: Request, upload_id: str, sent: Form, store: Store) -
     return see(shelved.kept_at or f"/upload/{upload_id}")
 
 
-@router.post("/{upload_id}/discard", dependencies=WRITE)
-def discard(request: Request, upload_id: str, sent: Form) -> Response:  # noqa: ARG001 -- reading it checks the session
+@router.post("/{upload_id}/discard", dependencies=[*WRITE, OWN_FORM])
+def discard(request: Request, upload_id: str) -> Response:
     """Removes it."""
     request.app.state.shelf.discard(_find(request, upload_id))
     return see("/upload")

@@ -12,13 +12,13 @@ import subprocess
 import sys
 import tempfile
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 import orjson
 
 from underskin.errors import FileError
+from underskin.process_limits import limit_process
 from underskin.recordings.channels import Block, Channel, Contents
 from underskin.recordings.readers.formats import parse
 from underskin.recordings.validation import shown
@@ -127,7 +127,7 @@ def _parsed(stream: BinaryIO, name: str) -> dict[str, Any]:
 def _main() -> None:
     """The child: file on standard input, answer on standard output."""
     function, memory_bytes, seconds, longest, *given = sys.argv[1:]
-    _limit(int(memory_bytes), float(seconds))
+    limit_process(int(memory_bytes), file_bytes=int(memory_bytes), cpu_seconds=int(float(seconds)) + 1)
     module, _, name = function.partition(":")
     try:
         with os.fdopen(0, "rb") as stream:
@@ -142,16 +142,6 @@ def _main() -> None:
     with os.fdopen(1, "wb") as out:
         for part in answer:
             out.write(part)
-
-
-def _limit(memory_bytes: int, seconds: float) -> None:
-    import resource  # not on Windows, where no server runs
-
-    own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (own + memory_bytes, own + memory_bytes))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (memory_bytes, memory_bytes))
-    resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 1))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def _encoded(answer: dict[str, Any]) -> list[Any]:

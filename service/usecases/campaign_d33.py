@@ -1,0 +1,99 @@
+"""An inversion as the answer on the d33 of a campaign."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from underskin import InvalidInput
+from underskin.units import to_lab
+
+if TYPE_CHECKING:
+    from underskin.inversion.invert import Inversion
+    from underskin.inversion.mixed_model import Estimate
+    from underskin.recordings.elastomer import RecordingModulus
+
+
+def of_inversion(inversion: "Inversion") -> dict[str, Any]:
+    """The fields of `D33` that come from an inversion."""
+    zone, cells, array = inversion.zone, inversion.cells, inversion.campaign_d33
+    names = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
+    flags = _flags(inversion)
+    radii = to_lab("indenter_radius_mm", cells.indenter_radius).tolist()
+    return {
+        "status": "ok",
+        "reason": None,
+        "band": {
+            "low_hz": float(zone.low_hz),
+            "high_hz": float(zone.high_hz),
+            "reason": zone.reason,
+            "chosen_by_user": zone.chosen_by_user,
+            "left_out_hz": [float(line) for line in zone.left_out_hz],
+        },
+        "array": None if array is None else dict(zip(names, _columns(array)[0], strict=True)),
+        "sensor_spread_percent": _scatter(inversion.spread, 100.0),
+        "gain_scatter_percent": _scatter(inversion.gain, 100.0),
+        "position_scatter_mm": _scatter(inversion.position, 1e3),
+        "declared_percent": _finite(inversion.declared_percent),
+        "sensors": [
+            {"sensor": name, "flags": flags.get(name, []), **dict(zip(names, row, strict=True))}
+            for name, row in zip(inversion.sensor_ids, _columns(inversion.sensors), strict=True)
+        ],
+        "cells": [
+            {
+                "sensor": inversion.sensor_ids[sensor],
+                "indenter_radius_mm": round(radius, 9),
+                "preload_n": preload,
+                "recordings": count,
+                **dict(zip(names, row, strict=True)),
+            }
+            for sensor, radius, preload, count, row in zip(
+                cells.sensor.tolist(), radii, cells.preload.tolist(), cells.recordings.tolist(), _columns(cells.d33),
+                strict=True,
+            )
+        ],
+        "findings": list(inversion.findings),
+    }  # fmt: skip
+
+
+def of_moduli(recordings: Sequence["RecordingModulus"]) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
+    """The entries of `moduli`, and those of `left_out` for recordings that tell none."""
+    moduli, left_out = [], []
+    for one in recordings:
+        if isinstance(one.found, InvalidInput):
+            left_out.append({"recording": one.recording, "reason": str(one.found)})
+            continue
+        moduli.append(
+            {
+                "recording": one.recording,
+                "kind": one.kind,
+                "youngs_modulus_mpa": float(to_lab("youngs_modulus_mpa", one.found.modulus)),
+                "youngs_modulus_uncertainty_mpa": float(to_lab("youngs_modulus_mpa", one.found.uncertainty)),
+                "statement": one.found.statement,
+            }
+        )
+    return moduli, left_out
+
+
+def _columns(estimate: "Estimate") -> list[list[float | None]]:
+    """Value, uncertainty, low and high [pC/N] of each entry."""
+    parts = (estimate.value, estimate.uncertainty, estimate.low, estimate.high)
+    columns = np.stack([np.atleast_1d(to_lab("d33_pc_per_n", part)) for part in parts], axis=-1)
+    return [[_finite(value) for value in row] for row in columns.tolist()]
+
+
+def _scatter(estimate: "Estimate | None", factor: float) -> dict[str, float] | None:
+    if estimate is None:
+        return None
+    return {name: factor * float(getattr(estimate, name)) for name in ("value", "low", "high")}
+
+
+def _flags(inversion: "Inversion") -> dict[str, list[dict[str, str]]]:
+    by_sensor: dict[str, list[dict[str, str]]] = {}
+    for flag in inversion.flags:
+        by_sensor.setdefault(flag.sensor, []).append({"code": flag.code, "reason": flag.reason})
+    return by_sensor
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

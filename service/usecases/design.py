@@ -1,0 +1,80 @@
+"""A skin before it is built: transmission, spatial resolution, two-point separation."""
+
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from service.problems import from_validation
+from service.schemas.design import DesignAnswer, DesignRequest, ResponseAnswer, SweepAnswer
+from underskin import Indenter, InvalidInput, Skin
+from underskin.prediction.skin_design import Design, design
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import checked, to_lab
+
+
+def read_design(document: Any) -> DesignRequest:
+    """The request that a document makes; raises Refusal with all that is wrong."""
+    try:
+        return DesignRequest.model_validate(document)
+    except ValidationError as error:
+        raise from_validation(error) from None
+
+
+def design_of(table: SigmaTable, asked: DesignRequest) -> Design:
+    """The design that is asked for; raises InvalidInput."""
+    given = {name: getattr(asked, name) for name in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm")}
+    skin = Skin.from_lab(**given, units_checked=asked.units_checked)
+    indenter = Indenter.from_lab(indenter_radius_mm=asked.indenter_radius_mm, units_checked=asked.units_checked)
+    preload = float(checked("preload_n", asked.preload_n, units_checked=asked.units_checked))
+    pitch = asked.pitch_mm * 1e-3
+    if pitch < 2 * float(skin.sensor_radius):
+        allowed = f"must be at least {2 * asked.sensor_radius_mm:g} mm, the diameter of a sensor: they cannot overlap"
+        raise InvalidInput("pitch_mm", asked.pitch_mm, allowed)
+    return design(table, skin, indenter, preload, pitch, asked.dip_percent / 100)
+
+
+def design_answer(table: SigmaTable, asked: DesignRequest, designed: Design) -> DesignAnswer:
+    """A design in lab units."""
+    contact, resolution = designed.contact, designed.resolution
+    frf = None
+    if asked.d33_pc_per_n is not None:
+        d33 = checked("d33_pc_per_n", asked.d33_pc_per_n, units_checked=asked.units_checked)
+        frf = _number(to_lab("frf_pc_per_n", contact.frf(d33)))
+    return DesignAnswer(
+        table_sha256=table.sha256,
+        status="ok" if bool(contact.inside) else "out_of_domain",
+        contact_radius_mm=float(to_lab("contact_radius_mm", contact.contact_radius)),
+        a_over_h=float(contact.a_over_h),
+        rt_over_h=float(contact.rt_over_h),
+        load_parameter=float(contact.load_parameter),
+        sigma=_number(contact.sigma),
+        rel_error=_number(contact.rel_error),
+        gamma=_number(designed.gamma),
+        mean_stress_mpa=_number(to_lab("mean_stress_mpa", contact.mean_stress)),
+        frf_pc_per_n=frf,
+        resolution_mm=_number(to_lab("x_mm", resolution.width)),
+        response_between_percent=_number(100 * resolution.between),
+        response_amid_percent=_number(100 * resolution.amid),
+        two_point_separation_mm=_number(to_lab("x_mm", resolution.separation)),
+        two_point_best_mm=_number(to_lab("x_mm", resolution.best_separation)),
+        response=ResponseAnswer(
+            offset_mm=to_lab("x_mm", designed.offset).tolist(),
+            sigma=_numbers(designed.response),
+            gamma=_numbers(designed.point_response),
+        ),
+        sweeps=[
+            SweepAnswer(
+                axis=sweep.axis, value=sweep.values.tolist(), sigma=_numbers(sweep.sigma), gamma=_numbers(sweep.gamma)
+            )
+            for sweep in designed.sweeps
+        ],
+    )
+
+
+def _number(value: Any) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _numbers(values: Any) -> list[float | None]:
+    return [_number(value) for value in values.tolist()]

@@ -1,0 +1,26 @@
+"""Charge on every sensor of an array under several contacts or a pressure map."""
+
+from dataclasses import asdict
+
+from service.schemas.columns_answer import Columns
+from underskin.array_stress.answer import answer
+from underskin.array_stress.request import StressRequest
+from underskin.surrogate.influence_table import InfluenceTable
+
+
+def stress(table: InfluenceTable, request: StressRequest) -> Columns:
+    """Charge and stress on each sensor."""
+    result = answer(table, request)
+    return Columns(
+        rows=len(result.sensors),
+        model="linear_layer",
+        table_sha256=table.sha256,
+        inside=result.inside,
+        shared={
+            "reach_mm": result.reach_mm,
+            "contact_radius_mm": result.contact_radius_mm,
+            "findings": [asdict(finding) for finding in result.findings],
+        },
+        names={"sensor": result.sensors},
+        columns=result.columns,
+    )

@@ -1,0 +1,75 @@
+"""Columns in lab units between a client and the library: their common length, and CSV in and out."""
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.errors import InvalidInput
+from underskin.units import Floats
+
+
+class CsvError(ValueError):
+    """A text is not columns in CSV; the message says what it must be."""
+
+
+def rows(columns: Mapping[str, Floats]) -> int:
+    """Number of rows that columns have together; a single number (shape `()`) holds for all of them.
+
+    Raises:
+        InvalidInput: names the first column that is not as long as the others, and one of these.
+    """
+    long = {name: len(values) for name, values in columns.items() if values.ndim}
+    first = next(iter(long), None)
+    for name, count in long.items():
+        if first is not None and count != long[first]:
+            allowed = f"must have as many rows as {first} ({long[first]}), or be a single number"
+            raise InvalidInput(name, f"{count} rows", allowed)
+    return 1 if first is None else long[first]
+
+
+def statuses(inside: NDArray[np.bool_], count: int) -> list[str]:
+    """`ok` or `out_of_domain` for each of `count` rows."""
+    return ["ok" if row else "out_of_domain" for row in np.broadcast_to(inside, (count,)).tolist()]
+
+
+def from_csv(text: str) -> dict[str, list[str]]:
+    """The cells of each column, by the names in the header; lines without a cell are skipped.
+
+    Raises:
+        CsvError: cells are not separated by commas, a name comes twice, or a row has too many or too few cells.
+    """
+    try:
+        lines = [line for line in csv.reader(io.StringIO(text, newline=""), strict=True) if line]
+    except csv.Error as error:
+        raise CsvError(f"must be readable as CSV ({error})") from error
+    if len(lines) < 2:
+        raise CsvError("must have a header of field names and at least one row")
+    header = [name.strip() for name in lines[0]]
+    if len(header) == 1 and any(separator in header[0] for separator in ";\t"):
+        raise CsvError("must separate cells by commas and write numbers with a point")
+    for name in header:
+        if header.count(name) > 1:
+            raise CsvError(f"must name each field once; its header has {name!r} twice")
+    for number, line in enumerate(lines[1:]):
+        if len(line) != len(header):
+            raise CsvError(f"must have as many cells in each row as in the header: {len(line)} in row {number}, "
+                           f"{len(header)} in the header")  # fmt: skip
+    return {name: list(cells) for name, cells in zip(header, zip(*lines[1:], strict=True), strict=True)}
+
+
+def to_csv(columns: Mapping[str, Floats | Sequence[str]], line_end: str) -> str:
+    """Columns of equal length as CSV (RFC 4180): numbers in full, `NaN` where there is no value."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator=line_end)
+    writer.writerow(columns)
+    writer.writerows(zip(*map(_cells, columns.values()), strict=True))
+    return text.getvalue()
+
+
+def _cells(column: Floats | Sequence[str]) -> Sequence[str]:
+    if not isinstance(column, np.ndarray):
+        return column
+    return ["NaN" if value != value else repr(value) for value in column.tolist()]
