@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.errors import InvalidInput
+from underskin.requirement import Mention, Requirement
 from underskin.units import Floats
 
 
@@ -25,7 +26,8 @@ def rows(columns: Mapping[str, Floats]) -> int:
     first = next(iter(long), None)
     for name, count in long.items():
         if first is not None and count != long[first]:
-            allowed = f"must have as many rows as {first} ({long[first]}), or be a single number"
+            length = f" ({long[first]}), or be a single number"
+            allowed = Requirement("must have as many rows as ", Mention(first), length)
             raise InvalidInput(name, f"{count} rows", allowed)
     return 1 if first is None else long[first]
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from underskin.errors import InvalidInput
+from underskin.requirement import UNITS_CHECKED, Requirement
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -154,12 +155,12 @@ def _refuse(name: str, values: Floats, bad: NDArray[np.bool_], allowed: str) -> 
         raise InvalidInput(name, float(values.flat[first]), allowed, index=first if values.ndim else None)
 
 
-def _slip(field: LabField, size: float) -> str:
+def _slip(field: LabField, size: float) -> Requirement:
     """What is allowed, and the unit that was probably meant."""
     assert field.likely is not None
     low, high = field.likely
-    text = f"must be {low:g} to {high:g} {field.unit} in magnitude (or set units_checked to true)"
-    return f"{text}; {_guess(field, size)}"
+    text = f"must be {low:g} to {high:g} {field.unit} in magnitude"
+    return Requirement(text, UNITS_CHECKED, f"; {_guess(field, size)}")
 
 
 def _guess(field: LabField, size: float) -> str:

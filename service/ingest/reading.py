@@ -19,6 +19,7 @@ from underskin.recordings.channels import Contents
 from underskin.recordings.readers import formats
 from underskin.recordings.reading import Reading, read_contents, understood
 from underskin.recordings.rig_description import RigDescription
+from underskin.requirement import Mention, Requirement
 
 _BOM = b"\xef\xbb\xbf"
 _UNNAMED = "the upload"
@@ -92,7 +93,7 @@ def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> Lo
         found = understood(held, label, rig)
         _require_usable(found.campaign)
     except FileError as error:
-        allowed = ": ".join(part for part in (error.place, error.reason) if part)
+        allowed = Requirement(Mention(error.place), ": ", error.reason) if error.place else error.reason
         return Look(kind, contents, [Found(upload.label, errors=[_error("file", upload.label, allowed)])])
     except InvalidInput as error:
         return Look(kind, contents, [Found(upload.label, errors=[_invalid(error)])])

@@ -20,6 +20,7 @@ from underskin.array_stress.validation import findings, refuse_beside_skin, refu
 from underskin.errors import InvalidInput
 from underskin.physics.contact_pressure import MOST_A_OVER_H, SpherePressure, sphere_pressures
 from underskin.physics.elastic_layer import Layer, slip
+from underskin.requirement import Mention, Requirement
 from underskin.surrogate.influence_table import Influence, InfluenceTable
 from underskin.units import Finding, Floats, checked, to_lab, to_si
 
@@ -83,7 +84,8 @@ def _influence(table: InfluenceTable, request: StressRequest, rt_over_h: float) 
     glue = np.inf if request.glue_stiffness is None else request.glue_stiffness
     influence = table.at(rt_over_h, request.poisson_ratio, slip(glue))
     if influence is None:
-        allowed = f"must be {low:g} to {high:g} times thickness_mm ({request.thickness_mm:g}): the table's range"
+        thickness = f" ({request.thickness_mm:g}): the table's range"
+        allowed = Requirement(f"must be {low:g} to {high:g} times ", Mention("thickness_mm"), thickness)
         raise InvalidInput("sensor_radius_mm", request.sensor_radius_mm, allowed)
     return influence
 

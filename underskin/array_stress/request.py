@@ -16,6 +16,7 @@ from underskin.recordings import validation as field
 from underskin.recordings.campaign import Sensors
 from underskin.recordings.readers import json_file
 from underskin.recordings.validation import shown
+from underskin.requirement import Mention, Requirement
 from underskin.units import Floats
 
 MOST_CONTACTS = 1000
@@ -131,8 +132,9 @@ def read_request(document: Any) -> StressRequest:
     if not request.sensors:
         raise InvalidInput("sensors", shown(request.sensors), "must hold at least one sensor")
     if bool(request.contacts) == (request.pressure_map is not None):
-        allowed = "must be given, or pressure_map, but not both"
+        allowed = Requirement("must be given, or ", Mention("pressure_map"), ", but not both")
         raise InvalidInput("contacts", shown(request.contacts) if request.contacts else None, allowed)
     if request.contacts and request.youngs_modulus_mpa is None:
-        raise InvalidInput("youngs_modulus_mpa", None, "is required with contacts, whose radii depend on it")
+        allowed = Requirement("is required with ", Mention("contacts"), ", whose radii depend on it")
+        raise InvalidInput("youngs_modulus_mpa", None, allowed)
     return request

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from underskin.array_stress.request import LabContact, PressureMap, StressRequest
 from underskin.errors import InvalidInput
 from underskin.physics import hertz
+from underskin.requirement import Mention, Requirement
 from underskin.units import Finding, Floats, to_lab, to_si
 from underskin.units import findings as unusual
 
@@ -76,7 +77,8 @@ def refuse_overlap(places: Floats, radii: Floats) -> None:
     if first.size:
         i, j = int(first[0]), int(second[0])
         gap, least = to_lab("x_mm", distance[i, j]), to_lab("x_mm", apart[i, j])
-        allowed = f"must not overlap contacts[{i}]: the centres are {gap:.4g} mm apart, the radii add to {least:.4g} mm"
+        gaps = f": the centres are {gap:.4g} mm apart, the radii add to {least:.4g} mm"
+        allowed = Requirement("must not overlap ", Mention(f"contacts[{i}]"), gaps)
         x, y = to_lab("x_mm", places[j])
         raise InvalidInput(f"contacts[{j}]", f"at x {x:g}, y {y:g} mm", allowed)
 

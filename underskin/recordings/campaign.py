@@ -13,6 +13,7 @@ import numpy as np
 from underskin.errors import InvalidInput
 from underskin.recordings import validation as field
 from underskin.recordings.validation import named, shown
+from underskin.requirement import REQUIRED, Mention, Requirement
 
 SCHEMA = "campaign/1"
 
@@ -270,7 +271,7 @@ def _not_one_of_two_forms(recording: FrfRecording) -> list[InvalidInput]:
     if series and lines:
         return [InvalidInput(series[0], "given", "must be absent where the FRF itself is given")]
     needed = _TIME_SERIES if series else _LINES
-    return [InvalidInput(name, None, "required") for name in needed if getattr(recording, name) is None]
+    return [InvalidInput(name, None, REQUIRED) for name in needed if getattr(recording, name) is None]
 
 
 def _unequal_lengths(recording: Recording) -> list[InvalidInput]:
@@ -283,7 +284,7 @@ def _unequal_lengths(recording: Recording) -> list[InvalidInput]:
         return []
     first, length = next(iter(columns.items()))
     return [
-        InvalidInput(name, f"{size} entries", f"must have {length} entries, as many as {first}")
+        InvalidInput(name, f"{size} entries", Requirement(f"must have {length} entries, as many as ", Mention(first)))
         for name, size in columns.items()
         if size != length
     ]

@@ -12,6 +12,7 @@ from scipy.optimize import minimize_scalar
 
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
+from underskin.requirement import Mention, Requirement
 from underskin.units import Floats, to_lab, to_si
 
 _STRAIGHT = 0.02  # largest departure from a straight line, of the stress it spans
@@ -188,7 +189,8 @@ def _amplification(jacobian: Floats) -> float:
 def _loading(along: Floats, load: Floats) -> tuple[Floats, Floats]:
     """The branch up to the largest load."""
     if len(along) != len(load):
-        raise InvalidInput("force_n", f"{len(load)} entries", f"must have {len(along)}, as many as displacement_mm")
+        allowed = Requirement(f"must have {len(along)}, as many as ", Mention("displacement_mm"))
+        raise InvalidInput("force_n", f"{len(load)} entries", allowed)
     top = int(np.argmax(np.abs(load - load[0])))
     if top + 1 < _FEWEST:
         raise InvalidInput("force_n", f"largest at entry {top}", f"must load over at least {_FEWEST} entries")

@@ -24,6 +24,7 @@ from underskin.recordings import validation as field
 from underskin.recordings.campaign import COLUMNS, KINDS, SkinDescription
 from underskin.recordings.readers import json_file, text
 from underskin.recordings.validation import mapping, named, shown
+from underskin.requirement import Mention, Requirement
 
 SCHEMA = "rig/1"
 LARGEST_BYTES = 1_000_000
@@ -140,7 +141,9 @@ def _channels(kind: str, document: Any) -> dict[str, ChannelMapping]:
             raise InvalidInput(f"channels.{name}.unit", None, "required where labelled says that the label is wrong")
         if entry.stiffness_n_per_mm is not None and (name != "displacement_mm" or "force_n" not in channels):
             raise InvalidInput(
-                f"channels.{name}.stiffness_n_per_mm", entry.stiffness_n_per_mm, "is for displacement_mm"
+                f"channels.{name}.stiffness_n_per_mm",
+                entry.stiffness_n_per_mm,
+                Requirement("is for ", Mention("displacement_mm")),
             )
     if not channels:
         raise InvalidInput("channels", "none", "must name at least one channel")

@@ -13,6 +13,7 @@ from underskin.recordings.readers import text
 from underskin.recordings.readers.unit_labels import field_unit, labelled_unit, unit
 from underskin.recordings.rig_description import BLOCK_NAME, COMPLEX_FRF, ChannelMapping, Property, RigDescription
 from underskin.recordings.validation import LONGEST_NAME, shown
+from underskin.requirement import Mention, Requirement
 from underskin.units import LAB, Floats
 
 _TEXTS = ("id", "sensor", "recorded_at")
@@ -89,8 +90,8 @@ def _factor(label: str, field: str, file: str, place: str, hint: str = "") -> fl
     known, wanted = unit(label), field_unit(field)
     if known is None or known.dimension != wanted.dimension:
         what = "is not known here" if known is None else f"is one of {known.dimension}"
-        needs = f"{field} needs one of {wanted.dimension}, such as {LAB[field].unit}"
-        raise FileError(file, place, f"its unit {label!r} {what}; {needs}{hint}")
+        needs = f" needs one of {wanted.dimension}, such as {LAB[field].unit}{hint}"
+        raise FileError(file, place, Requirement(f"its unit {label!r} {what}; ", Mention(field), needs))
     return known.to_si / LAB[field].to_si
 
 
@@ -109,7 +110,8 @@ class _Mapped:
             frf = values.pop(COMPLEX_FRF)
             values |= {"frf_re_pc_per_n": frf.real, "frf_im_pc_per_n": frf.imag}
         if any(np.iscomplexobj(column) for column in values.values()):
-            raise FileError(self.file, "", f"a channel of complex numbers can only be {COMPLEX_FRF}")
+            only = Requirement("a channel of complex numbers can only be ", Mention(COMPLEX_FRF))
+            raise FileError(self.file, "", only)
         columns: dict[str, Any] = {field: np.asarray(column, dtype=float) for field, column in values.items()}
         self._subtract_instrument(columns)
         self._require_known_sign(columns)
@@ -172,7 +174,9 @@ class _Mapped:
         if stiffness is None:
             return
         if len(columns["displacement_mm"]) != len(columns["force_n"]):
-            raise FileError(self.file, "", "displacement_mm and force_n differ in length: no stiffness can be applied")
+            both = (Mention("displacement_mm"), " and ", Mention("force_n"))
+            reason = Requirement(*both, " differ in length: no stiffness can be applied")
+            raise FileError(self.file, "", reason)
         columns["displacement_mm"] = columns["displacement_mm"] - columns["force_n"] / stiffness
 
     def _require_known_sign(self, columns: Mapping[str, Any]) -> None:
@@ -184,7 +188,8 @@ class _Mapped:
             together = np.mean(_centred(columns["displacement_mm"]) * _centred(columns["force_n"]))
         if together < 0:
             reason = "force falls as the displacement grows, and compression is positive here"
-            raise FileError(self.file, "channels", f"{reason}: say sign: 1 or sign: -1 for displacement_mm and force_n")
+            how = (Mention("displacement_mm"), " and ", Mention("force_n"))
+            raise FileError(self.file, "channels", Requirement(f"{reason}: say sign: 1 or sign: -1 for ", *how))
 
     def _frf(self, columns: dict[str, Any]) -> dict[str, Any]:
         """Without the line at 0 Hz; time series with their sample rate."""

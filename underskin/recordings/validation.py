@@ -16,6 +16,7 @@ import numpy as np
 
 from underskin.errors import InvalidInput
 from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.requirement import REQUIRED
 from underskin.units import Floats, checked
 
 Model = TypeVar("Model")
@@ -46,7 +47,7 @@ def check_fields(
         value = document.get(name)
         try:
             if value is None and default is MISSING:
-                raise InvalidInput(name, None, "required")
+                raise InvalidInput(name, None, REQUIRED)
             values[name] = default if value is None else field_check(name, value, units_checked)
         except InvalidInput as refusal:
             refused.append(refusal)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from fastapi import Request
 
-from service.pages.shared.form_errors import said
+from service.pages.shared.form_errors import in_form_words
 from service.pages.shared.skin_fields import FIELDS, UNITS
 from service.pages.shared.skin_values import start
 from service.pages.shared.typed_numbers import number
@@ -73,7 +73,7 @@ def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin
 
 def refused(error: UnderskinError, lines: Sequence[int] = ()) -> str:
     """An error in the words of these forms; `lines`: of the loads in their text."""
-    return said(error, _LABELS, lines, "or tick “Take unlikely magnitudes as they are”")
+    return in_form_words(error, _LABELS, lines, "or tick “Take unlikely magnitudes as they are”")
 
 
 def answered(request: Request, document: Mapping[str, Any]) -> StressAnswer:

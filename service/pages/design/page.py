@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from service.dependencies import Store, Table
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer, drawn
-from service.pages.shared.form_errors import said
+from service.pages.shared.form_errors import in_form_words
 from service.pages.shared.formats import short_and_exact
 from service.pages.shared.html import compress, page
 from service.pages.shared.skin_values import PROTOTYPE, start
@@ -54,7 +54,7 @@ def view(request: Request, store: Store, table: Table, skin: Annotated[str | Non
         asked = _asked(values)
         found, figures = _answered(table, asked, own, skin)
     except UnderskinError as refused:
-        error = said(refused, _LABELS)
+        error = in_form_words(refused, _LABELS)
     return page(
         request,
         "design.html",
@@ -78,7 +78,7 @@ def at_once(request: Request, store: Store, table: Table, skin: Annotated[str | 
     try:
         found, figures = _answered(table, _asked(values), own, skin)
     except UnderskinError as refused:
-        return _json(request, {"error": said(refused, _LABELS)})
+        return _json(request, {"error": in_form_words(refused, _LABELS)})
     same = same_request.post(request, "/v1/design", values, _call(values))
     return _json(
         request,

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from service.dependencies import DiagnosisId, PlannerInUse, Store
 from service.jobs.planner import Planned
 from service.pages.shared import same_request
-from service.pages.shared.form_errors import said
+from service.pages.shared.form_errors import in_form_words
 from service.pages.shared.html import page
 from service.pages.shared.typed_numbers import number
 from service.problems import Refusal
@@ -63,7 +63,7 @@ def plan(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, sto
         same = _same(request, row.campaign_id, told)
         planned = planner.plan(row, _checked(told))
     except UnderskinError as wrong:
-        error = said(wrong, _LABELS)
+        error = in_form_words(wrong, _LABELS)
     except Refusal as busy:
         error = busy.detail
     return page(

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from service.pages.shared.form_errors import said
+from service.pages.shared.form_errors import in_form_words
 from service.pages.shared.skin_fields import FIELDS
 from service.pages.shared.typed_numbers import number
 from service.problems import Refusal
@@ -69,7 +69,7 @@ def by_model(
         asked = {**document, **_needed(model, fields), "model": "adopted", "skin_id": skin}
         return ByModel(fields, asked, d33(table, store, D33Columns.model_validate(asked)))
     except UnderskinError as refused:
-        return ByModel(fields, not_told=said(refused, _LABELS))
+        return ByModel(fields, not_told=in_form_words(refused, _LABELS))
 
 
 def _needed(model: "AdoptedModel", fields: Sequence[tuple[str, str, str, str]]) -> dict[str, Any]:

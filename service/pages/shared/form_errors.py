@@ -4,34 +4,40 @@ import re
 from collections.abc import Mapping, Sequence
 
 from underskin import InvalidInput, UnderskinError
+from underskin.requirement import UNITS_CHECKED, Mention, Requirement
 
-_CONTACT = re.compile(r"contacts\[(\d+)\](?:\.(\w+))?(?:\[(\d)\])?")
+_LOAD_PATH = re.compile(r"contacts\[(\d+)\](?:\.(\w+))?(?:\[(\d)\])?")  # of `POST /v1/stress`
 _OF_LOAD = {"x_mm": "x", "y_mm": "y", "indenter_radius_mm": "R", "normal_force_n": "F"}
 _TANGENTIAL = ("Fx", "Fy")
-_EVERYDAY = ("rows", "columns")  # names that mean what they say, within a sentence
-FOR_REQUESTS = " (or set units_checked to true)"  # which is for requests
 
 
-def said(error: UnderskinError, labels: Mapping[str, str], lines: Sequence[int] = (), unlikely: str = "") -> str:
+def in_form_words(
+    error: UnderskinError, labels: Mapping[str, str], lines: Sequence[int] = (), unlikely: str = ""
+) -> str:
     """An error; `labels`: of fields as the form has them, `lines`: of the loads in its text, from 1; `unlikely`: how
     the form takes an unlikely magnitude, where it does."""
     if not isinstance(error, InvalidInput):
         return str(error)
-    names = {name: label for name, label in labels.items() if name not in _EVERYDAY}
-    allowed = _in_words(error.allowed.replace(FOR_REQUESTS, f" ({unlikely})" if unlikely else ""), names, lines)
-    field = _in_words(error.field, labels, lines)
-    came = "" if error.value is None else f": {error.value}"
-    return f"{field}{came} – {allowed}"
+
+    def word(mention: Mention) -> str:
+        if mention == UNITS_CHECKED:
+            return f" ({unlikely})" if unlikely else ""
+        return _label(mention.field, labels, lines)
+
+    allowed = error.allowed.worded(word) if isinstance(error.allowed, Requirement) else error.allowed
+    value = "" if error.value is None else f": {error.value}"
+    return f"{_label(error.field, labels, lines)}{value} – {allowed}"
 
 
-def _in_words(text: str, labels: Mapping[str, str], lines: Sequence[int]) -> str:
-    text = _CONTACT.sub(lambda found: _load(found, lines), text)
-    return re.sub(r"\b\w+\b", lambda found: labels.get(found[0], found[0]), text)
+def _label(field: str, labels: Mapping[str, str], lines: Sequence[int]) -> str:
+    """A field as the form calls it; of a path its known parts."""
+    load = _LOAD_PATH.fullmatch(field)
+    return _load(load, lines) if load else ".".join(labels.get(part, part) for part in field.split("."))
 
 
-def _load(found: re.Match[str], lines: Sequence[int]) -> str:
+def _load(path: re.Match[str], lines: Sequence[int]) -> str:
     """`contacts[0].normal_force_n` as `load in line 1, F`."""
-    number, field, part = int(found[1]), found[2], found[3]
+    number, field, part = int(path[1]), path[2], path[3]
     place = f"load in line {lines[number] if number < len(lines) else number + 1}"
     if field is None:
         return place

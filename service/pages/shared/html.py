@@ -2,19 +2,19 @@
 
 import gzip
 from functools import cache
-from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 from fastapi import Request, Response
 from fastapi.responses import HTMLResponse
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment
 
 from service.auth import session
 from service.auth.keys import Key
 from service.pages.shared import formats
 from service.pages.shared.assets import address, library_style_hash
 from service.pages.shared.same_request import scheme
+from service.pages.shared.templates import environment
 from service.pages.upload.mapping import field_words, what_to_do
 from underskin import __version__
 
@@ -49,18 +49,11 @@ def headers() -> dict[str, str]:
 
 @cache
 def _templates() -> Environment:
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parents[1] / "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        auto_reload=False,
-    )
-    environment.filters.update(formats.FILTERS)
-    environment.filters.update(field_words=field_words, what_to_do=what_to_do)
-    environment.globals.update(static=address, version=__version__, segment=lambda text: quote(text, safe=""))
-    return environment
+    templates = environment()
+    templates.filters.update(formats.FILTERS)
+    templates.filters.update(field_words=field_words, what_to_do=what_to_do)
+    templates.globals.update(static=address, version=__version__, segment=lambda text: quote(text, safe=""))
+    return templates
 
 
 def render(template: str, **values: Any) -> str:

@@ -11,6 +11,7 @@ from service.ingest.uploads import Upload
 from underskin import InvalidInput
 from underskin.recordings.campaign import CompressionRecording, FrfRecording, Recording
 from underskin.recordings.channels import Contents
+from underskin.recordings.skin_export import is_export
 from underskin.units import to_lab
 
 MOST_LISTED = 60
@@ -60,6 +61,7 @@ class FileSeen:
     sample_rate_hz: float | None = None
     channels: Sequence[ChannelSeen] = ()
     properties: Mapping[str, str | float] = field(default_factory=dict)
+    is_exported_skin: bool = False  # which is read alone, not among other files
 
 
 def seen(upload: Upload, look: Look, known: Sequence[str]) -> FileSeen:
@@ -81,8 +83,16 @@ def seen(upload: Upload, look: Look, known: Sequence[str]) -> FileSeen:
         campaigns=[campaign.name for campaign in campaigns],
         skin=next(iter(skins)) if len(skins) == 1 else None,
         known=known,
+        is_exported_skin=_is_exported_skin(upload, arrived),
         **about,
     )
+
+
+def _is_exported_skin(upload: Upload, arrived: Sequence[Arrived]) -> bool:
+    if any(one.campaign is not None for one in arrived):
+        return False
+    with upload.path.open("rb") as stream:
+        return is_export(stream, upload.label or "the file")
 
 
 def _own_errors(one: Arrived) -> list[dict[str, Any]]:

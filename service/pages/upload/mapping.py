@@ -1,15 +1,14 @@
 """A rig description as a form: what each channel of a file is, and what the file does not say."""
 
-import re
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
-from service.pages.shared.form_errors import FOR_REQUESTS
 from service.pages.upload.file_summary import ChannelSeen
 from underskin import InvalidInput
 from underskin.recordings.readers.unit_labels import lab_field, unit
 from underskin.recordings.rig_description import SCHEMA, channel_fields
+from underskin.requirement import REQUIRED, UNITS_CHECKED, Mention, Requirement
 
 KINDS = {
     "frf": "FRF: charge against a shaken force",
@@ -51,7 +50,6 @@ _WORDS = {
     "sensors": "layout",
     _RATE: "sample rate [Hz]",
 }
-_UNQUOTED_FIELD = re.compile(r"(?<!['\w])[a-z0-9]+(?:_[a-z0-9]+)+(?!['\w])")  # what is quoted is the file's own
 _TEXTS = ("sensor",)
 _SEPARATORS = (";", "\t", ",", None)  # of a line of the layout, as tried; None: blanks
 _PARTS = 3  # of it: name, x, y
@@ -84,14 +82,20 @@ def field_words(field: str) -> str:
 
 def what_to_do(error: Mapping[str, Any]) -> str:
     """What is allowed; for what the form asks, where to say it."""
-    if error["allowed"] != "required" or field_words(error["field"]) == error["field"]:
-        allowed = str(error["allowed"]).replace(FOR_REQUESTS, " (or tick “Take unlikely magnitudes as they are”)")
-        return _UNQUOTED_FIELD.sub(lambda found: field_words(found[0]), allowed)
+    allowed = error["allowed"]
+    if allowed != REQUIRED or field_words(error["field"]) == error["field"]:
+        return allowed.worded(_mention_words) if isinstance(allowed, Requirement) else str(allowed)
     if error["field"] == _RATE:
         return "required: fill it in below, or say which channel is the time"
     if error["field"] in CHANNELS:
         return "required: say below which channel it is"
     return "required: fill it in below"
+
+
+def _mention_words(mention: Mention) -> str:
+    if mention == UNITS_CHECKED:
+        return " (or tick “Take unlikely magnitudes as they are”)"
+    return field_words(mention.field)
 
 
 def guessed(channels: Sequence[ChannelSeen], properties: Mapping[str, Any], skin: Mapping[str, Any]) -> dict[str, Any]:
