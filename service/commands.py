@@ -27,7 +27,9 @@ from service.store import StoreError, database, key_requirement, open_store
 from service.store.engine import StorageFull
 from service.store.errors import StoreMoved
 from service.store.restore import keys_needed
-from underskin import TableError, UnderskinError
+from underskin import ExtensionError, TableError, UnderskinError
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.recordings.readers.formats import formats_of_other_packages
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
 
 _STORE_FAILED = (StoreError, StoreMoved, StorageFull, DBAPIError)
@@ -51,11 +53,13 @@ def serve(
             where = f"as {settings.hosts}" if _is_loopback(host) else f"on {host}"
             _fail(f"refusing to serve {where} without API keys: make one with `underskin key create NAME`")
         table = load_table(settings.tables / SIGMA_TABLE)
+        CATALOGUE.load()  # what other packages add is refused here, not at the first file or diagnosis
+        formats_of_other_packages()
         store = open_store(settings.database_url, settings.data)
         requirement = KeyRequirement(keys, store)
         requirement.look()
         listener = _listen(host, port)
-    except (TableError, *_STORE_FAILED, OSError, ValueError) as error:
+    except (TableError, ExtensionError, *_STORE_FAILED, OSError, ValueError) as error:
         _fail(str(error))
     configure_logging()
     typer.echo(f"underskin serves on http://{_host_name(host)}:{listener.getsockname()[1]} (Ctrl+C ends it)")

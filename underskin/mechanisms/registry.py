@@ -22,7 +22,8 @@ GROUP = "underskin.mechanisms"
 class Catalogue(Mapping[str, Mechanism]):
     """The mechanisms by name, in order of composition. Those of other packages are loaded at the first access.
 
-    Every access raises ExtensionError where a mechanism of another package cannot be used.
+    Every access raises ExtensionError where a mechanism of another package cannot be used: a diagnosis without it would
+    be another diagnosis.
     """
 
     def __getitem__(self, name: str) -> Mechanism:
@@ -33,6 +34,10 @@ class Catalogue(Mapping[str, Mechanism]):
 
     def __len__(self) -> int:
         return len(_loaded().mechanisms)
+
+    def load(self) -> None:
+        """Load the mechanisms of other packages now; raises ExtensionError where one cannot be used."""
+        _loaded()
 
     @property
     def packages(self) -> Mapping[str, str]:
