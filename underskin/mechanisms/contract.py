@@ -73,7 +73,8 @@ def check(mechanism: Mechanism, others: Sequence[Mechanism] = ()) -> None:
     taken |= dict.fromkeys(_NUISANCES, "the base model")
     spreads = [other.name for other in others for entry in _parameters(other, "frf") if entry.acts_on == "gain_spread"]
     for kind in mechanism.kinds:
-        parameters = _parameters(mechanism, kind)
+        parameters: Any = _parameters(mechanism, kind)
+        _require("parameters", parameters, isinstance(parameters, tuple), "must be a tuple of Parameter")
         for entry in parameters:
             _check_parameter(mechanism, entry)
             if entry.name in taken:
@@ -136,7 +137,8 @@ def _check_parameter(mechanism: Mechanism, entry: Any) -> None:
     require("prior", isinstance(entry.prior, Normal | Uniform), "must be Normal(mean, sd) or Uniform()")
     if isinstance(entry.prior, Normal):
         good = _is_finite(entry.prior.mean) and _is_finite(entry.prior.sd) and entry.prior.sd > 0
-        require("prior", good and np.isfinite(entry.log_prior(entry.start)), "must have mass within the bounds")
+        with np.errstate(divide="ignore"):
+            require("prior", good and np.isfinite(entry.log_prior(entry.start)), "must have mass within the bounds")
     allowed = ("line_variance",) if mechanism.stage is Stage.ADDED_CHARGE else ("mean", "gain_spread")
     require("acts_on", entry.acts_on in allowed, f"must be {' or '.join(allowed)}")
     require("acts_on", entry.moves_covariance != mechanism.moves_predictions, "must fit moves_predictions")

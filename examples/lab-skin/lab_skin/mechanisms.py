@@ -36,5 +36,5 @@ class AmplifierLowPass(Mechanism):
         )
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
-        """Return the factor on each distinct line."""
+        """The complex factor on each distinct line."""
         return 1.0 / (1.0 + 1j * design.line_frequency / values["upper_corner"])
