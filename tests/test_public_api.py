@@ -13,6 +13,7 @@ import underskin
 PUBLIC = {
     "Campaign",
     "Client",
+    "ExtensionError",
     "FileError",
     "Indenter",
     "InvalidInput",

@@ -4,6 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from underskin.errors import (
+    ExtensionError,
     FileError,
     InvalidInput,
     ServiceError,
@@ -28,6 +29,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Campaign",
     "Client",
+    "ExtensionError",
     "FileError",
     "Indenter",
     "InvalidInput",

@@ -4,6 +4,7 @@ UnderskinError
 ├── InvalidInput      a value that cannot be used: names the field, the value and what is allowed
 ├── FileError         a file that cannot be read: names the file and the place in it
 ├── TableError        a table that is missing, damaged, altered or of another schema
+├── ExtensionError    a mechanism or file format of another package that cannot be used: names package and field
 ├── SolverError       a finite-element solve that did not converge: names the point
 ├── ServiceError      an answer of the server that is not a success (raised by the client)
 └── Unreachable       no answer from the server: nothing listens there, or time ran out (raised by the client)
@@ -48,6 +49,24 @@ class FileError(UnderskinError):
 
 class TableError(UnderskinError):
     """A table that cannot be trusted or read; the message says why and what to do."""
+
+
+class ExtensionError(UnderskinError):
+    """Something that another package adds and that cannot be used.
+
+    Attributes: `package` (with its version), `name` (of the mechanism or file format), `field`, `reason`.
+    """
+
+    def __init__(self, package: str, name: str, field: str, reason: str) -> None:
+        self.package = package
+        self.name = name
+        self.field = field
+        self.reason = reason
+        super().__init__(f"{name!r} of the package {package} cannot be used: {field}: {reason}")
+
+    def __reduce__(self) -> tuple[type["ExtensionError"], tuple[str, str, str, str]]:
+        """It crosses from worker processes."""
+        return type(self), (self.package, self.name, self.field, self.reason)
 
 
 class SolverError(UnderskinError):

@@ -8,14 +8,13 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from docs.mechanisms.signatures import panels
-from underskin.mechanisms import CATALOGUE
 from underskin.surrogate.sigma_table import SigmaTable
 
 _STYLE = Path(__file__).parents[1] / "figures.mplstyle"
 _SMALL = {"font.size": 8, "legend.fontsize": "medium", "path.simplify_threshold": 0.5}
 
 
-def draw(table: SigmaTable, folder: Path, names: Iterable[str] = tuple(CATALOGUE)) -> list[Path]:
+def draw(table: SigmaTable, folder: Path, names: Iterable[str]) -> list[Path]:
     """Write mechanism-NAME.svg for each name into `folder`; returns their paths."""
     paths = []
     with mpl.rc_context(cast(Any, _SMALL), fname=_STYLE):  # its type lists every known setting

@@ -1,6 +1,7 @@
 """What each mechanism does to the recordings, over the axes on which it shows: the panels of its figure.
 
-A soft skin (h 2.5 mm, rT 1.5 mm, E 2 MPa) under spheres of 4 and 10 mm; values of the parameters as in `SHOWN`.
+A soft skin (h 2.5 mm, rT 1.5 mm, E 2 MPa) under spheres of 4 and 10 mm; each parameter at the value that it says is
+shown, or at a typical strength. The mechanism says over which axes its figure is drawn.
 """
 
 from collections.abc import Callable, Sequence
@@ -8,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.mechanisms import CATALOGUE, Model, compose
+from underskin.mechanisms import CATALOGUE, Kind, Mechanism, Model, Parameter, compose
 from underskin.recordings.campaign import (
     Campaign,
     CompressionRecording,
@@ -20,30 +21,6 @@ from underskin.recordings.campaign import (
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
-SHOWN: dict[str, dict[str, float]] = {
-    "modulus_error": {"modulus_factor": 0.7},
-    "thickness_error": {"thickness_factor": 0.9},
-    "compressible_layer": {"poisson_ratio": 0.4},
-    "interface_slip": {"glue_stiffness": 0.3},
-    "contact_creep": {"relaxed_fraction": 0.4, "relaxation_time": 40.0},
-    "strain_stiffening": {"stiffening": 5.0, "second_over_first": 0.1, "third_over_first": 0.02},
-    "misalignment": {"offset": 0.7, "offset_x": 0.6, "offset_y": 0.3},
-    "layered_contact": {},
-    "adhesion": {"work_of_adhesion": 0.5},
-    "moving_contact_edge": {"mobile_fraction": 1.0},
-    "amplitude_nonlinearity": {"edge_mobility": 1.0},
-    "preload_dependent_d33": {"stress_coefficient": 2.0, "saturation_stress": 1.0},
-    "sensor_spread": {"spread": 0.12},
-    "crosstalk": {"fraction": 0.1},
-    "ageing": {"loss": 0.15, "onset": 1000.0, "saturation": 0.0},
-    "contact_resonance": {"tip_mass": 2.0, "damping_ratio": 0.05},
-    "sensor_relaxation": {"exponent": 0.03, "step": 0.1, "step_frequency": 20.0},
-    "amplifier_high_pass": {"corner": 1.0},
-    "timing_delay": {"delay": 300.0},
-    "mains_pickup": {"pickup_charge": 0.05, "pickup_width": 1.5, "pickup_harmonics": 1.0},
-    "instrument_compliance": {"stage_stiffness": 20.0},
-    "platen_friction": {"friction": 0.5},
-}
 SPHERES_MM = (4.0, 10.0)
 PRELOADS_N = (0.5, 3.0)
 _SKIN = SkinDescription(
@@ -67,7 +44,18 @@ class Panel:
 
 def panels(name: str, table: SigmaTable) -> list[Panel]:
     """The panels of one mechanism."""
-    return [make(name, table) for make in _PANELS[name]]
+    return [PANELS[axis][1](name, table) for axis in axes(CATALOGUE[name])]
+
+
+def axes(mechanism: Mechanism) -> tuple[str, ...]:
+    """The axes of its figure: those that it names, else the first two on which it shows and that have a panel."""
+    usual = [axis for axis in mechanism.axes if axis in PANELS and PANELS[axis][0] in mechanism.kinds]
+    return mechanism.figure or tuple(usual[:2])
+
+
+def shown(parameter: Parameter) -> float:
+    """The value at which a figure has it, in its unit."""
+    return parameter.from_fit(parameter.typical) if parameter.shown is None else parameter.shown
 
 
 def _recording(number: int, **changes: object) -> FrfRecording:
@@ -87,20 +75,17 @@ def _recording(number: int, **changes: object) -> FrfRecording:
     return replace(plain, **changes)  # type: ignore[arg-type]
 
 
-def _fit(name: str, model: Model) -> Floats:
-    shown = SHOWN.get(name, {})
-    return np.array(
-        [
-            parameter.to_fit(shown[parameter.name]) if parameter.name in shown else parameter.start
-            for parameter in model.parameters
-        ]
-    )
+def _fit(model: Model, base: Model) -> Floats:
+    """The mechanism's own parameters, which come first, as shown; those of the base model at their priors' centres."""
+    own = len(model.parameters) - len(base.parameters)
+    values = [entry.to_fit(shown(entry)) for entry in model.parameters[:own]]
+    return np.array([*values, *(entry.start for entry in base.parameters)])
 
 
 def _ratio(name: str, recordings: Sequence[FrfRecording], table: SigmaTable) -> Floats:
     campaign = Campaign("signature", _SKIN, tuple(recordings))
     with_it, base = compose([name], campaign, table), compose([], campaign, table)
-    value = with_it.predict(_fit(name, with_it)).value / base.predict(_fit("", base)).value
+    value = with_it.predict(_fit(with_it, base)).value / base.predict(_fit(base, base)).value
     return np.asarray(value)
 
 
@@ -123,8 +108,8 @@ def _over_position(name: str, table: SigmaTable) -> Panel:
     rows = [_recording(i, position_mm=(float(x), 0.0)) for i, x in enumerate(offset)]
     campaign = Campaign("signature", _SKIN, tuple(rows))
     with_it, base = compose([name], campaign, table), compose([], campaign, table)
-    found = with_it.predict(_fit(name, with_it)).value.real * 1e12
-    usual = base.predict(_fit("", base)).value.real * 1e12
+    found = with_it.predict(_fit(with_it, base)).value.real * 1e12
+    usual = base.predict(_fit(base, base)).value.real * 1e12
     return Panel("position of the sphere, mm", "FRF, pC/N", {"base": (offset, usual), name: (offset, found)})
 
 
@@ -156,7 +141,7 @@ def _over_sensors(name: str, table: SigmaTable) -> Panel:
     rows = [_recording(i, sensor=sensor.id) for i, sensor in enumerate(_SKIN.sensors)]
     campaign = Campaign("signature", _SKIN, tuple(rows))
     model = compose([name], campaign, table)
-    spread, _ = model.sensor_spread_of(_fit(name, model))
+    spread, _ = model.sensor_spread_of(_fit(model, compose([], campaign, table)))
     number = np.arange(1.0, len(rows) + 1)
     gains = np.random.default_rng(5).normal(0, spread, len(rows))
     band = 100 * np.expm1(np.full(len(rows), spread))
@@ -190,7 +175,7 @@ def _pickup(name: str, table: SigmaTable) -> Panel:
         line = _recording(0, dynamic_force_n=force, frequency_hz=frequency, frf_re_pc_per_n=np.ones(600))
         campaign = Campaign("signature", _SKIN, (replace(line, frf_im_pc_per_n=np.zeros(600)),))
         model = compose([name], campaign, table)
-        variance = model.predict(_fit(name, model)).pickup_variance
+        variance = model.predict(_fit(model, compose([], campaign, table))).pickup_variance
         curves[f"Fd = {force:g} N"] = frequency, 1e12 * np.sqrt(variance)
     return Panel("frequency, Hz", "sd of pick-up, pC/N", curves)
 
@@ -212,35 +197,24 @@ def _over_strain(name: str, table: SigmaTable) -> Panel:
 def _curve(name: str, campaign: Campaign, table: SigmaTable, axis: str, way: Floats) -> Panel:
     with_it, base = compose([name], campaign, table), compose([], campaign, table)
     curves = {
-        "base": (way, base.predict(_fit("", base)).value),
-        name: (way, with_it.predict(_fit(name, with_it)).value),
+        "base": (way, base.predict(_fit(base, base)).value),
+        name: (way, with_it.predict(_fit(with_it, base)).value),
     }
     return Panel(axis, "force, N", curves)
 
 
 Make = Callable[[str, SigmaTable], Panel]
-_PANELS: dict[str, tuple[Make, ...]] = {
-    "modulus_error": (_over_preload, _over_position),
-    "thickness_error": (_over_preload, _over_position),
-    "compressible_layer": (_over_preload, _over_position),
-    "interface_slip": (_over_preload, _over_position),
-    "contact_creep": (_over_dwell, _over_depth),
-    "strain_stiffening": (_over_preload, _over_strain),
-    "misalignment": (_over_preload, _over_position),
-    "layered_contact": (_over_preload, _over_depth),
-    "adhesion": (_over_preload, _over_position),
-    "moving_contact_edge": (_over_preload, _over_position),
-    "amplitude_nonlinearity": (_over_amplitude, _over_preload),
-    "preload_dependent_d33": (_over_preload, _over_position),
-    "sensor_spread": (_over_sensors,),
-    "crosstalk": (_over_position,),
-    "ageing": (_over_cycles,),
-    "contact_resonance": (_over_frequency, _over_phase),
-    "sensor_relaxation": (_over_frequency, _over_phase),
-    "amplifier_high_pass": (_over_frequency, _over_phase),
-    "timing_delay": (_over_phase,),
-    "mains_pickup": (_pickup,),
-    "instrument_compliance": (_over_depth,),
-    "platen_friction": (_over_strain,),
+PANELS: dict[str, tuple[Kind, Make]] = {  # by axis
+    "preload_n": ("frf", _over_preload),
+    "position_mm": ("frf", _over_position),
+    "dwell_s": ("frf", _over_dwell),
+    "load_cycles": ("frf", _over_cycles),
+    "dynamic_force_n": ("frf", _over_amplitude),
+    "sensor": ("frf", _over_sensors),
+    "frequency_hz": ("frf", _over_frequency),
+    "phase": ("frf", _over_phase),
+    "mains": ("frf", _pickup),
+    "force_n": ("indentation", _over_depth),
+    "time_s": ("indentation", _over_depth),
+    "displacement_mm": ("compression", _over_strain),
 }
-assert tuple(_PANELS) == tuple(CATALOGUE)

@@ -5,19 +5,20 @@ from typing import Any
 
 import numpy as np
 
-from docs.mechanisms.signatures import SHOWN
+from docs.mechanisms.signatures import shown
 from docs.mechanisms.silicones import RESULTS
 from docs.paper.markdown import table
-from underskin.mechanisms import CATALOGUE, Mechanism, Normal, Parameter
+from underskin.mechanisms import Mechanism, Normal, Parameter
 from underskin.mechanisms.models.nuisances import FRF_NUISANCES
+from underskin.mechanisms.registry import built_in
 from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription
 
 _INTRODUCTION = """\
 # What may have been left out
 
-The mechanisms that a diagnosis can name, written by `make mechanisms` (`docs/mechanisms/`) from the catalogue itself
-(`underskin/mechanisms/`, one file each). A figure shows what one does to recordings on a soft skin (h 2.5 mm, rT
-1.5 mm, E 2 MPa) with its parameters at the value in the column *shown*.
+The mechanisms that a diagnosis can name, written by `make mechanisms` (`docs/mechanisms/`) from what their files say
+(`underskin/mechanisms/laws/`, one file each; [how to add one](extending.md)). A figure shows what one does to
+recordings on a soft skin (h 2.5 mm, rT 1.5 mm, E 2 MPa) with its parameters at the value in the column *shown*.
 
 *Needs* is what a campaign must hold beyond what every recording tells; FRFs also need the skin's thickness_mm,
 youngs_modulus_mpa and sensor_radius_mm. *Shows on* names along what the effect shows: a campaign that varies little
@@ -27,15 +28,10 @@ there can support the mechanism and still not tell it from others, which a diagn
 
 `compose(names, campaign, table)` puts any set of them on the base model: Hertz' radius on a half space, the contact
 edge still, σ of the bonded finite-strain layer from the table, averaged over the sensor's disc at its offset. Whatever
-order they are named in, they act in this one: declared values (modulus_error, thickness_error) → material
-(compressible_layer, interface_slip, contact_creep, strain_stiffening) → contact radius and pressure (Hertz,
-layered_contact, adhesion, or both) → position (misalignment) → σ → increment with the load (moving_contact_edge, then
-amplitude_nonlinearity: both differentiate F σ at fixed R with everything before inside) → d33 under its own stress
-(preload_dependent_d33) → charge of the neighbours (crosstalk) → ageing → dynamics, line by line (contact_resonance,
-sensor_relaxation, amplifier_high_pass, timing_delay). mains_pickup stands beside, as a covariance, and sensor_spread as
-the variance of the sensors' gains. Curves: material → force at a given contact (layered_contact, adhesion,
-strain_stiffening, platen_friction) → its history (contact_creep) → the stage's give by that force
-(instrument_compliance), all solved together for the displacement that was measured.
+order they are named in, they act in the order of the table below, which lists them by stage. Those of the increment
+with the load differentiate F σ at fixed R, with everything before them inside. sensor_spread acts on the variance of
+the sensors' gains. In curves, the material gives the force at a given contact, then its history, then the stage's give
+by that force, all solved together for the displacement that was measured.
 
 Where a mechanism leaves the table's ground (ν < 0.5, a yielding glue line, a pressure that is not Hertz') σ is the
 exact linear layer's plus what finite strain adds in the table at the mechanism's own a and L. Contacts beyond the
@@ -67,17 +63,17 @@ _CAMPAIGN = Campaign(
 
 def document() -> str:
     """The whole page."""
-    parts = [_INTRODUCTION, _parameters(FRF_NUISANCES, {}), _overview()]
-    parts += [_section(mechanism) for mechanism in CATALOGUE.values()]
+    parts = [_INTRODUCTION, _parameters(FRF_NUISANCES, with_shown=False), _overview()]
+    parts += [_section(mechanism) for mechanism in built_in()]
     return "\n".join([*parts, _SILICONES + _silicones()])
 
 
 def _overview() -> str:
     rows = [
-        (f"[{name}](#{name})", ", ".join(mechanism.kinds), ", ".join(mechanism.axes))
-        for name, mechanism in CATALOGUE.items()
+        (mechanism.stage.value, f"[{name}](#{name})", ", ".join(mechanism.kinds), ", ".join(mechanism.axes))
+        for name, mechanism in ((entry.name, entry) for entry in built_in())
     ]
-    return "## All of them\n\n" + table(("name", "recordings", "shows on"), rows)
+    return "## All of them\n\n" + table(("stage", "name", "recordings", "shows on"), rows)
 
 
 def _section(mechanism: Mechanism) -> str:
@@ -94,17 +90,25 @@ def _section(mechanism: Mechanism) -> str:
         parameter.name: parameter for kind in mechanism.kinds for parameter in mechanism.parameters(_CAMPAIGN, kind)
     }
     if found:
-        lines.append(_parameters(tuple(found.values()), SHOWN[mechanism.name]))
+        lines.append(_parameters(tuple(found.values()), with_shown=True))
     lines.append(f"![What {mechanism.name} does](figures/mechanism-{mechanism.name}.svg)\n")
     return "\n".join(lines)
 
 
-def _parameters(parameters: tuple[Parameter, ...], shown: dict[str, float]) -> str:
-    header = ("parameter", "unit", "bounds", "prior", "base model at", *(("shown",) if shown else ()), "why this prior")
+def _parameters(parameters: tuple[Parameter, ...], *, with_shown: bool) -> str:
+    header = (
+        "parameter",
+        "unit",
+        "bounds",
+        "prior",
+        "base model at",
+        *(("shown",) if with_shown else ()),
+        "why this prior",
+    )
     rows = []
     for entry in parameters:
         limit = "" if entry.limit is None else f"{entry.limit:g}".replace("inf", "∞")
-        value = (f"{shown[entry.name]:g}",) if shown else ()
+        value = (f"{shown(entry):g}",) if with_shown else ()
         rows.append(
             (entry.name, entry.unit, f"{entry.low:g} to {entry.high:g}", _prior(entry), limit, *value, entry.reason)
         )

@@ -18,7 +18,9 @@ from service.cli.shared import STORE_ERRORS, fail, read_settings
 from service.log import configure_logging
 from service.middleware.http_protocol import LimitedHttpProtocol
 from service.store import data_folder, open_store
-from underskin import TableError
+from underskin import ExtensionError, TableError
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.recordings.readers.formats import formats_of_other_packages
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
 
 
@@ -38,11 +40,13 @@ def serve(
             where = f"as {settings.hosts}" if _is_loopback(host) else f"on {host}"
             fail(f"refusing to serve {where} without API keys: make one with `underskin key create NAME`")
         table = load_table(settings.tables / SIGMA_TABLE)
+        CATALOGUE.load()  # what other packages add is refused here, not at the first file or diagnosis
+        formats_of_other_packages()
         store = open_store(settings.database_url, settings.data)
         requirement = KeyRequirement(keys, store)
         requirement.look()
         listener = _listen(host, port)
-    except (TableError, *STORE_ERRORS, OSError, ValueError) as error:
+    except (TableError, ExtensionError, *STORE_ERRORS, OSError, ValueError) as error:
         fail(str(error))
     configure_logging()
     typer.echo(f"underskin serves on http://{_host_name(host)}:{listener.getsockname()[1]} (Ctrl+C ends it)")

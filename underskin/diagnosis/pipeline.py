@@ -33,6 +33,7 @@ from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import confounding, left_open
 from underskin.diagnosis.validation.platen_seating import without_seating
 from underskin.mechanisms.base import Kind
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
 from underskin.recordings.finding import Finding
 from underskin.recordings.plausibility import implausible
@@ -175,4 +176,5 @@ def _provenance(table: SigmaTable) -> dict[str, Any]:
         "scipy": scipy.__version__,
         "tables": {"sigma": table.sha256},
         "seed": SEED,
+        **({"mechanisms": dict(CATALOGUE.packages)} if CATALOGUE.packages else {}),
     }

@@ -4,18 +4,21 @@ model = compose(["moving_contact_edge", "contact_resonance"], campaign, table)
 prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
 """
 
-from underskin.mechanisms.base import Mechanism, Normal, Parameter, Uniform, Unsupported
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Uniform, Unsupported, Values
 from underskin.mechanisms.models.composed import Model, Prediction, compose
 from underskin.mechanisms.registry import CATALOGUE
 
 __all__ = [
     "CATALOGUE",
+    "Kind",
     "Mechanism",
     "Model",
     "Normal",
     "Parameter",
     "Prediction",
+    "Stage",
     "Uniform",
     "Unsupported",
+    "Values",
     "compose",
 ]

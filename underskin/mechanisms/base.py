@@ -1,23 +1,21 @@
 """What a mechanism is: a law that the base model leaves out, its parameters, and where in the model it acts.
 
-A mechanism is one file: its docstring states what happens in one plain sentence, then the law, the assumptions and the
-source; its class says what it asks of a campaign and overrides the hooks of the stages at which it acts. Values inside
-are SI, parameters are in their units.
+A mechanism is one file: a class that states its texts and traits as attributes and overrides the hooks of the stages at
+which it acts. It keeps no state. Values inside hooks are SI, parameters are in their units.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property
-from inspect import getmodule
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from underskin.errors import InvalidInput, UnderskinError
+from underskin.errors import UnderskinError
 from underskin.mechanisms.autodiff import Array, Differentiated
 from underskin.recordings.campaign import Campaign
 from underskin.units import Floats
@@ -29,7 +27,38 @@ if TYPE_CHECKING:
     from underskin.mechanisms.models.pickup import Pickup
 
 Kind = Literal["frf", "indentation", "compression"]
-UNITS = ("-", "mm", "MPa", "1/MPa", "GPa", "N/mm", "N", "g", "J/m²", "Hz", "s", "µs", "pC", "pC/N", "cycles")
+# What a parameter changes: the predicted mean; the spread of the sensors' gains; the variance of single lines.
+ActsOn = Literal["mean", "gain_spread", "line_variance"]
+UNITS = (
+    *("-", "mm", "MPa", "1/MPa", "GPa", "N/mm", "N", "1/N", "g", "J/m²", "Hz", "s", "1/s", "ms", "µs", "°"),
+    *("pC", "pC/N", "pF", "MΩ", "cycles"),
+)
+AXES = (  # fields of a campaign along which an effect can show
+    *("preload_n", "indenter_radius_mm", "position_mm", "sensor", "dwell_s", "load_cycles", "dynamic_force_n"),
+    *("frequency_hz", "phase", "displacement_mm", "force_n", "time_s", "sample_height_mm", "sample_diameter_mm"),
+)
+NEEDED_FIELDS = ("dwell_s", "dynamic_force_n", "load_cycles", "sensor")  # of a recording, that a mechanism may require
+
+
+class Stage(Enum):
+    """Where in a model a mechanism acts, in the order of composition; the value is its name in a sentence."""
+
+    DECLARED = "declared values"  # on_declared, on_curve
+    MATERIAL = "material"  # on_material, on_curve
+    POSITION = "position"  # offset
+    CONTACT = "contact radius and pressure"  # on_material, on_curve
+    LOAD_INCREMENT = "increment with the load"  # force_nodes and mobility
+    SENSOR = "d33 of each sensor"  # on_d33, or a parameter that acts on gain_spread
+    NEIGHBOURS = "charge of the neighbours"  # neighbour_fraction
+    RECORDING = "factor on each recording"  # on_recordings
+    LINES = "dynamics, line by line"  # on_lines
+    ADDED_CHARGE = "charge from elsewhere, as a covariance"  # pickup
+    CURVE = "curves"  # on_curve
+
+    @property
+    def place(self) -> int:
+        """Its place in the order of composition."""
+        return list(Stage).index(self)
 
 
 class Unsupported(UnderskinError):
@@ -63,7 +92,9 @@ class Parameter:
 
     `low`, `high` and `limit` are values in `unit`; the prior lives on the fit coordinate, truncated to the bounds and
     normalised there. `limit` is the value at which the base model is recovered (it may lie outside the bounds: 0 or ∞
-    of a logarithm), None where no finite or infinite value does that.
+    of a logarithm), None where no finite or infinite value does that. `shown` is the value at which the mechanism's
+    figure has it, None for a typical strength. The response is `proportional` to a parameter such as d33. A parameter
+    that does not act on the mean is positive and has the scale `log`.
     """
 
     name: str
@@ -74,6 +105,14 @@ class Parameter:
     scale: Literal["linear", "log"]
     limit: float | None
     reason: str
+    acts_on: ActsOn = "mean"
+    shown: float | None = None
+    proportional: bool = False
+
+    @property
+    def moves_covariance(self) -> bool:
+        """Whether it changes the covariance of the rows and not their mean."""
+        return self.acts_on != "mean"
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
@@ -85,6 +124,17 @@ class Parameter:
         """The prior's centre on the fit coordinate."""
         low, high = self.bounds
         return float(np.clip(self.prior.mean, low, high)) if isinstance(self.prior, Normal) else (low + high) / 2
+
+    @property
+    def typical(self) -> float:
+        """The fit coordinate of a typical strength: the quartile of the prior that is farther from the limit."""
+        if self.limit is None or not isinstance(self.prior, Normal):
+            return self.quantile(0.5)
+        with np.errstate(divide="ignore"):
+            limit = self.limit if self.scale == "linear" else float(np.log(self.limit))
+        if not np.isfinite(limit):
+            return self.quantile(0.5)
+        return max(self.quantile(0.25), self.quantile(0.75), key=lambda end: abs(end - limit))
 
     def to_fit(self, value: float) -> float:
         """The fit coordinate of a value."""
@@ -105,7 +155,7 @@ class Parameter:
 
     @cached_property
     def _log_area(self) -> float:
-        """The logarithm of what a normal prior's bell holds between the bounds."""
+        """The logarithm of the integral of a normal prior's unnormalised density between the bounds."""
         assert isinstance(self.prior, Normal)
         mean, sd = self.prior.mean, self.prior.sd
         inside = ndtr((self.bounds[1] - mean) / sd) - ndtr((self.bounds[0] - mean) / sd)
@@ -127,50 +177,41 @@ Values = Mapping[str, Differentiated]  # of one mechanism's parameters, by name,
 class Mechanism:
     """A law that the base model leaves out. Subclasses override what they need; every hook's default does nothing.
 
-    `axes` are names of the campaign's axes on which the effect shows, `needs` says what the campaign must hold.
+    Texts: `plain` (what happens and how it shows, one sentence without a formula), `law` (the equation),
+    `assumptions`, `source` (a publication), `needs` (what the campaign must hold).
+    Traits: `stage` and `order` (its place among the mechanisms of that stage, smallest first) give the order of
+    composition; `kinds` of recordings that it acts on; `axes` of the campaign on which the effect shows.
     """
 
     name: ClassVar[str]
+    plain: ClassVar[str]
+    law: ClassVar[str]
+    assumptions: ClassVar[str]
+    source: ClassVar[str]
+    stage: ClassVar[Stage]
+    order: ClassVar[int] = 100
     kinds: ClassVar[tuple[Kind, ...]] = ("frf",)
     axes: ClassVar[tuple[str, ...]]
     needs: ClassVar[str] = "nothing beyond the recordings themselves"
-    # What a model must prepare for it: further fields that tell contacts apart, the contacts' stiffness, neighbours,
-    # room for an offset [m] and for a layer that much thicker or thinner.
-    contact_axes: ClassVar[tuple[str, ...]] = ()
+    # Fields of a recording without which it cannot be predicted, of NEEDED_FIELDS; they tell contacts apart.
+    needs_fields: ClassVar[tuple[str, ...]] = ()
+    # What a model prepares for it: the contacts' stiffness, the neighbours' charge, room for an offset [m] and for a
+    # layer that much thicker or thinner.
     needs_stiffness: ClassVar[bool] = False
     needs_neighbours: ClassVar[bool] = False
     largest_offset: ClassVar[float] = 0.0
     largest_stretch: ClassVar[float] = 1.0
+    moves_predictions: ClassVar[bool] = True  # False: it acts on the covariance alone
+    needs_history: ClassVar[bool] = False  # a curve without its beginning cannot be predicted
+    imitated_by_seating: ClassVar[bool] = False  # a platen that seats bends the beginning of a compression alike
+    # Axes over which its figure is drawn, keys of PANELS in docs/mechanisms/signatures.py; empty: the first two of
+    # `axes` that have a panel.
+    figure: ClassVar[tuple[str, ...]] = ()
 
     @property
-    def plain(self) -> str:
-        """What happens and how it shows, in one sentence without a formula."""
-        return " ".join(self._documentation.split("\n\n")[0].split())
-
-    @property
-    def law(self) -> str:
-        """The equation, in words and symbols."""
-        return self._section("Law")
-
-    @property
-    def assumptions(self) -> str:
-        """What is taken for granted."""
-        return self._section("Assumptions")
-
-    @property
-    def source(self) -> str:
-        """Where the law comes from."""
-        return self._section("Source")
-
-    @property
-    def _documentation(self) -> str:
-        return getattr(getmodule(type(self)), "__doc__", None) or ""
-
-    def _section(self, title: str) -> str:
-        found = re.search(rf"^{title}: (.*?)(?=\n\n|\Z)", self._documentation, re.MULTILINE | re.DOTALL)
-        if found is None:
-            raise InvalidInput("docstring", type(self).__module__, f"must have a paragraph '{title}: …'")
-        return " ".join(found.group(1).split())
+    def needs_lines(self) -> bool:
+        """Whether it acts on single lines, so that a recording's lines cannot be replaced by their mean."""
+        return self.stage in (Stage.LINES, Stage.ADDED_CHARGE)
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """Its parameters for recordings of one kind; bounds may depend on the campaign."""
@@ -179,6 +220,13 @@ class Mechanism:
     def parameters_beside(self, others: Collection[str], campaign: Campaign, kind: Kind) -> tuple[Parameter, ...]:
         """Its parameters in a model that these other mechanisms are in too, which may show more of it."""
         return self.parameters(campaign, kind)
+
+    def values_on(self, values: Mapping[str, float], campaign: Campaign) -> Mapping[str, float]:
+        """Values of its parameters found on one campaign, as those that it has on another.
+
+        Raises InvalidInput where they say too little for that campaign.
+        """
+        return values
 
     def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
         """What the campaign lacks to support it, in words; None where nothing is lacking."""
@@ -226,7 +274,3 @@ class Mechanism:
 
     def on_curve(self, curve: Curve, values: Values) -> None:
         """Change what governs an indentation or compression."""
-
-    def spread(self, values: Values) -> Differentiated | None:
-        """The standard deviation of the logarithms of the sensors' gains."""
-        return None

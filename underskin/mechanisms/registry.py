@@ -1,53 +1,101 @@
-"""All mechanisms by name, in the order in which a model composes them."""
+"""All mechanisms by name, in the order in which a model composes them: those of this package, then those of others.
 
+A mechanism of this package is a module of `underskin.mechanisms.laws`; one of another package is named by an entry
+point of the group `underskin.mechanisms`, as a subclass of `Mechanism` or an instance of one.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from inspect import isclass
+from pkgutil import iter_modules
+
+from underskin import extensions
+from underskin.errors import InvalidInput
+from underskin.mechanisms import laws
 from underskin.mechanisms.base import Mechanism
-from underskin.mechanisms.laws.adhesion import Adhesion
-from underskin.mechanisms.laws.ageing import Ageing
-from underskin.mechanisms.laws.amplifier_high_pass import AmplifierHighPass
-from underskin.mechanisms.laws.amplitude_nonlinearity import AmplitudeNonlinearity
-from underskin.mechanisms.laws.compressible_layer import CompressibleLayer
-from underskin.mechanisms.laws.contact_creep import ContactCreep
-from underskin.mechanisms.laws.contact_resonance import ContactResonance
-from underskin.mechanisms.laws.crosstalk import Crosstalk
-from underskin.mechanisms.laws.instrument_compliance import InstrumentCompliance
-from underskin.mechanisms.laws.interface_slip import InterfaceSlip
-from underskin.mechanisms.laws.layered_contact import LayeredContact
-from underskin.mechanisms.laws.mains_pickup import MainsPickup
-from underskin.mechanisms.laws.misalignment import Misalignment
-from underskin.mechanisms.laws.modulus_error import ModulusError
-from underskin.mechanisms.laws.moving_contact_edge import MovingContactEdge
-from underskin.mechanisms.laws.platen_friction import PlatenFriction
-from underskin.mechanisms.laws.preload_dependent_d33 import PreloadDependentD33
-from underskin.mechanisms.laws.sensor_relaxation import SensorRelaxation
-from underskin.mechanisms.laws.sensor_spread import SensorSpread
-from underskin.mechanisms.laws.strain_stiffening import StrainStiffening
-from underskin.mechanisms.laws.thickness_error import ThicknessError
-from underskin.mechanisms.laws.timing_delay import TimingDelay
 
-CATALOGUE: dict[str, Mechanism] = {
-    mechanism.name: mechanism
-    for mechanism in (
-        ModulusError(),
-        ThicknessError(),
-        CompressibleLayer(),
-        InterfaceSlip(),
-        ContactCreep(),
-        StrainStiffening(),
-        Misalignment(),
-        LayeredContact(),
-        Adhesion(),
-        MovingContactEdge(),
-        AmplitudeNonlinearity(),
-        PreloadDependentD33(),
-        SensorSpread(),
-        Crosstalk(),
-        Ageing(),
-        ContactResonance(),
-        SensorRelaxation(),
-        AmplifierHighPass(),
-        TimingDelay(),
-        MainsPickup(),
-        InstrumentCompliance(),
-        PlatenFriction(),
+GROUP = "underskin.mechanisms"
+
+
+class Catalogue(Mapping[str, Mechanism]):
+    """The mechanisms by name, in order of composition. Those of other packages are loaded at the first access.
+
+    Every access raises ExtensionError where a mechanism of another package cannot be used: a diagnosis without it would
+    be another diagnosis.
+    """
+
+    def __getitem__(self, name: str) -> Mechanism:
+        return _loaded().mechanisms[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_loaded().mechanisms)
+
+    def __len__(self) -> int:
+        return len(_loaded().mechanisms)
+
+    def load(self) -> None:
+        """Load the mechanisms of other packages now; raises ExtensionError where one cannot be used."""
+        _loaded()
+
+    @property
+    def packages(self) -> Mapping[str, str]:
+        """Package and version of each mechanism that comes from another package, by its name."""
+        return _loaded().packages
+
+
+CATALOGUE = Catalogue()
+
+
+@cache
+def built_in() -> tuple[Mechanism, ...]:
+    """The mechanisms of this package in order of composition."""
+    modules = [import_module(f"{laws.__name__}.{module.name}") for module in iter_modules(laws.__path__)]
+    return _in_order(
+        value()
+        for module in modules
+        for value in vars(module).values()
+        if isclass(value) and issubclass(value, Mechanism) and value.__module__ == module.__name__
     )
-}
+
+
+@dataclass(frozen=True)
+class _Loaded:
+    mechanisms: Mapping[str, Mechanism]
+    packages: Mapping[str, str]
+
+
+@cache
+def _loaded() -> _Loaded:
+    mechanisms = list(built_in())
+    packages: dict[str, str] = {}
+    for extension in extensions.load(GROUP):
+        mechanism = _checked(extension, mechanisms)
+        packages[mechanism.name] = extension.package
+        mechanisms.append(mechanism)
+    return _Loaded({mechanism.name: mechanism for mechanism in _in_order(mechanisms)}, packages)
+
+
+def _checked(extension: extensions.Extension, others: list[Mechanism]) -> Mechanism:
+    """The mechanism that an entry point names; raises ExtensionError where it breaks the contract."""
+    from underskin.mechanisms.contract import check  # the models, which few callers need
+
+    value = extension.value
+    if not (isinstance(value, Mechanism) or (isclass(value) and issubclass(value, Mechanism))):
+        raise extension.refused("the entry point", "must name a subclass of underskin.mechanisms.Mechanism")
+    try:
+        mechanism = value() if isclass(value) else value
+    except TypeError as error:
+        raise extension.refused("the class", f"must be made without arguments ({error})") from error
+    name = getattr(mechanism, "name", None)
+    try:
+        check(mechanism, others)
+    except InvalidInput as refusal:
+        reason = f"{refusal.value!r}: {refusal.allowed}" if refusal.value is not None else refusal.allowed
+        raise extension.refused(refusal.field, reason, str(name or extension.name)) from refusal
+    return mechanism
+
+
+def _in_order(mechanisms: Iterator[Mechanism] | list[Mechanism]) -> tuple[Mechanism, ...]:
+    return tuple(sorted(mechanisms, key=lambda entry: (entry.stage.place, entry.order, entry.name)))

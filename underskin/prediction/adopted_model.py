@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from underskin.errors import InvalidInput
-from underskin.mechanisms.base import Mechanism, Parameter
+from underskin.mechanisms.base import Mechanism, Parameter, Stage
 from underskin.mechanisms.models.composition import chosen, parameters_together
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.mechanisms.models.frf_design import frf_recordings, offsets
+from underskin.mechanisms.models.frf_design import frf_recordings
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.prediction import plausibility
 from underskin.recordings.campaign import Campaign, FrfRecording, SkinDescription
@@ -36,8 +36,6 @@ NOT_ADOPTED = {
     "plans (next_experiment), send it together with these recordings, and diagnose that",
 }  # by verdict: why it is refused, and what to do
 _SAME = 1e-9  # relative
-# These widen what is expected of recordings, and move no prediction; parameters of older reports may be others.
-_WIDENING = frozenset({"sensor_spread", "mains_pickup"})
 _REPORTED_SDS = 2 * float(ndtri(0.975))  # width of a report's interval
 
 
@@ -65,22 +63,19 @@ class AdoptedModel:
     @property
     def mechanisms(self) -> list[Mechanism]:
         """Those that move predictions, in order of composition."""
-        return [mechanism for mechanism in chosen(list(self.parameters), CATALOGUE) if mechanism.name not in _WIDENING]
+        return [mechanism for mechanism in chosen(list(self.parameters), CATALOGUE) if mechanism.moves_predictions]
 
     @property
     def of_lines(self) -> list[str]:
         """Names of the mechanisms that act line by line."""
-        return [mechanism.name for mechanism in self.mechanisms if _acts_on_lines(mechanism)]
+        return [mechanism.name for mechanism in self.mechanisms if mechanism.stage is Stage.LINES]
 
     @property
     def needs(self) -> dict[str, str]:
         """Fields of a recording that its predictions need beside sphere, preload and lines; each with who needs it."""
         found: dict[str, str] = {}
         for mechanism in self.mechanisms:
-            fields: list[str] = [name for name in ("dwell_s", "dynamic_force_n") if name in mechanism.contact_axes]
-            fields += ["load_cycles"] if "load_cycles" in mechanism.axes else []
-            fields += ["sensor"] if mechanism.needs_neighbours else []
-            found |= {name: mechanism.name for name in fields if name not in found}
+            found |= {name: mechanism.name for name in mechanism.needs_fields if name not in found}
         return found
 
     def require_skin(self, declared: Mapping[str, Any]) -> None:
@@ -104,14 +99,12 @@ class AdoptedModel:
         """
         mechanisms = self.mechanisms
         if level:
-            mechanisms = [mechanism for mechanism in mechanisms if not _acts_on_lines(mechanism)]
+            mechanisms = [mechanism for mechanism in mechanisms if mechanism.stage is not Stage.LINES]
             campaign = _with_one_line(campaign)
         self._require_fields(campaign)
-        known = {name: value for mechanism in mechanisms for name, value in self.parameters[mechanism.name].items()}
-        if "offset" in known:
-            _require_centred(campaign)
-        elif "offset_x" in known:  # of which centred presses need the length alone
-            known["offset"] = float(np.hypot(known["offset_x"], known["offset_y"]))
+        known: dict[str, float] = {}
+        for mechanism in mechanisms:
+            known |= mechanism.values_on(self.parameters[mechanism.name], campaign)
         model = FrfModel(mechanisms, campaign, table)
         fit = [_on_fit(parameter, known.get(parameter.name, 1.0)) for parameter in model.parameters]
         predicted = model.predict(np.array(fit))
@@ -166,7 +159,10 @@ def adopted(report: Mapping[str, Any], campaign: Campaign) -> AdoptedModel:
     frf = [mechanism for name, mechanism in CATALOGUE.items() if name in parameters and "frf" in mechanism.kinds]
     known = parameters_together(frf, campaign, "frf")
     for name, values in parameters.items():
-        as_known = name in known and (name in _WIDENING or set(values) == {entry.name for entry in known[name]})
+        # Parameters that move no prediction are not used; those of older reports may be others.
+        as_known = name in known and (
+            not CATALOGUE[name].moves_predictions or set(values) == {entry.name for entry in known[name]}
+        )
         if not as_known:
             allowed = "must be of mechanisms that this version knows, with the parameters that it knows"
             raise InvalidInput("diagnosis_id", name, allowed)
@@ -217,21 +213,8 @@ def pressed_campaign(
     return Campaign("rows", skin, tuple(recordings))
 
 
-def _require_centred(campaign: Campaign) -> None:
-    """Of a misalignment in an unknown direction, only presses at the sensors' centres show the same."""
-    beside = offsets(campaign).any(axis=1)
-    if beside.any():
-        entry = frf_recordings(campaign)[int(np.argmax(beside))]
-        allowed = "must be the sensor's centre: the adopted model knows how far presses miss it, not in which direction"
-        raise InvalidInput(f"recordings[{entry.id}].position_mm", entry.position_mm, allowed)
-
-
 def _needed(mechanism: str) -> str:
     return f"is required: the adopted model has {mechanism}"
-
-
-def _acts_on_lines(mechanism: Mechanism) -> bool:
-    return type(mechanism).on_lines is not Mechanism.on_lines
 
 
 def _on_fit(parameter: Parameter, value: float) -> float:

@@ -31,8 +31,9 @@ class Reading:
 def read_file(source: Path | str | bytes, name: str, rig: RigDescription | None = None) -> Reading:
     """The campaign in a file, of which `source` is the place on this machine or the bytes, and `name` what to call it.
 
-    The format is told by the content. Files that hold channels, not campaigns, need a rig description. Raises FileError
-    that names the file and the place, InvalidInput where the campaign itself or its skin cannot be used.
+    The format is told by the content, that of another package by the name. Files that hold channels, not campaigns,
+    need a rig description. Raises FileError that names the file and the place, InvalidInput where the campaign itself
+    or its skin cannot be used.
     """
     return understood(read_contents(source, name), name, rig)
 
@@ -53,7 +54,7 @@ def read_contents(source: Path | str | bytes, name: str) -> Contents | dict[str,
     with _opened(source, name) as stream:
         kind = formats.detect(stream, name)
         size = stream.seek(0, io.SEEK_END)
-        if kind in formats.BINARY or (kind != "JSON" and size > _LARGEST_TEXT):
+        if formats.is_parsed_apart(kind) or (kind != "JSON" and size > _LARGEST_TEXT):
             return parse_apart(kind, stream, name)
         return formats.parse(kind, stream, name)
 

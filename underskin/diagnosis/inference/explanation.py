@@ -99,7 +99,7 @@ class Workbench:
 
     def hypothesis(self, names: Sequence[str], placed: bool, *, whole: bool = False) -> Hypothesis:
         """The set's model on the lines that it needs; raises Unsupported."""
-        lines = self.lines if whole or any(needs_lines(name) for name in names) else self.collapsed
+        lines = self.lines if whole or any(CATALOGUE[name].needs_lines for name in names) else self.collapsed
         return Hypothesis(compose(names, lines.campaign, self.table, self.kind), lines, self.curvature, placed)
 
     def explain(self, names: Sequence[str], parent: Explanation | None = None) -> Explanation | None:
@@ -193,11 +193,6 @@ def _is_lowest(index: tuple[int, ...], tried: dict[tuple[int, ...], Evaluated]) 
 def at_recording(bench: Workbench, at: Evaluated) -> np.ndarray:
     """The recording of each row of an evaluated prediction."""
     return bench.lines.recording if len(at.prediction.value) == len(bench.lines.value) else bench.collapsed.recording
-
-
-def needs_lines(name: str) -> bool:
-    """Whether a mechanism acts on lines apart, so that a recording's lines cannot be replaced by their mean."""
-    return bool({"frequency_hz", "phase"} & set(CATALOGUE[name].axes))
 
 
 def _placed_start(fitter: Fitter, at: Evaluated) -> Point:

@@ -12,14 +12,11 @@ from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR, P
 from underskin.mechanisms.base import Normal, Parameter
 from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.models.composition import parameters_together
-from underskin.mechanisms.models.pickup import PICKUP_NAMES
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Floats
 
-COVARIANCE_NAMES = ("spread", *PICKUP_NAMES)
 _LEVELS = (0.1, 100.0)  # bounds of the lines' level
 _CURVE_LEVELS = (0.5, 3.0)  # no cell is more accurate, however smooth; rougher than its neighbours differ is no noise
-_UNDECLARED = 0.2  # sd of the logarithm of a modulus beyond which it is as good as unknown
 
 
 @dataclass(frozen=True)
@@ -47,7 +44,7 @@ class Hypothesis:
     @property
     def mean_places(self) -> list[int]:
         """The places of the model's parameters that move the mean."""
-        return [index for index, entry in enumerate(self.model.parameters) if not moves_covariance(entry)]
+        return [index for index, entry in enumerate(self.model.parameters) if not entry.moves_covariance]
 
     @property
     def covariance(self) -> tuple[CovarianceParameter, ...]:
@@ -66,7 +63,7 @@ class Hypothesis:
         own = [
             CovarianceParameter(entry.name, *entry.bounds, entry.log_prior)
             for entry in self.model.parameters
-            if moves_covariance(entry)
+            if entry.moves_covariance
         ]
         return (*common, *own)
 
@@ -84,18 +81,6 @@ def own_parameters(hypothesis: Hypothesis) -> int:
     """How many of the model's parameters are its mechanisms' own; they come first."""
     mechanisms = [CATALOGUE[name] for name in hypothesis.model.names]
     return sum(map(len, parameters_together(mechanisms, hypothesis.lines.campaign, hypothesis.lines.kind).values()))
-
-
-def moves_covariance(entry: Parameter) -> bool:
-    """Whether a parameter of the model moves the covariance and not the mean."""
-    return entry.name in COVARIANCE_NAMES
-
-
-def is_scale(entry: Parameter) -> bool:
-    """Whether the response is proportional to it, and little is known of it: d33, or a modulus that nobody declared."""
-    return entry.name == "d33" or (
-        entry.name == "youngs_modulus" and isinstance(entry.prior, Normal) and entry.prior.sd > _UNDECLARED
-    )
 
 
 def curvature_of_prior(entry: Parameter) -> tuple[float, float]:

@@ -12,7 +12,6 @@ from underskin.diagnosis.inference.hypothesis import (
     Hypothesis,
     Point,
     curvature_of_prior,
-    moves_covariance,
     own_parameters,
 )
 from underskin.diagnosis.inference.likelihood import LogLikelihoods, Marginal, Moments
@@ -66,11 +65,11 @@ class Evaluator:
         at_start = np.array([entry.start for entry in own]) - self._priors[self.places, 1]
         densities = sum(entry.log_prior(entry.start) for entry in own)
         self._log_prior_height = densities + 0.5 * float(self._priors[self.places, 0] @ at_start**2)
-        self._own = [index for index, entry in enumerate(self.parameters) if moves_covariance(entry)]
+        self._own = [index for index, entry in enumerate(self.parameters) if entry.moves_covariance]
         self._common = len(self.covariance) - len(self._own)
-        names = [entry.name for entry in self.parameters]
-        self._spread = names.index("spread") if "spread" in names else None
-        self.nuisances = len(names) - own_parameters(hypothesis)
+        acts_on = [entry.acts_on for entry in self.parameters]
+        self._spread = acts_on.index("gain_spread") if "gain_spread" in acts_on else None
+        self.nuisances = len(self.parameters) - own_parameters(hypothesis)
         sensors = int(hypothesis.lines.sensor.max()) + 1
         self.no_bend = np.zeros(sensors)
 

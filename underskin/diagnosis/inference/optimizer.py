@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from underskin.diagnosis.inference.hypothesis import Point, is_scale
+from underskin.diagnosis.inference.hypothesis import Point
 from underskin.diagnosis.inference.objective import Evaluated, Evaluator
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
 from underskin.mechanisms.models.composed import Prediction
@@ -50,7 +50,7 @@ class Fitter(Evaluator):
         """A point with these coordinates of the mechanisms, E and h of a parent or their centre, d33 as data say."""
         point = self._uncentred(own, parent)
         fit = point.fit
-        place = next((index for index, entry in enumerate(self.parameters) if is_scale(entry)), None)
+        place = next((index for index, entry in enumerate(self.parameters) if entry.proportional), None)
         if place is not None:
             lines = self.hypothesis.lines
             value = (prediction or self.hypothesis.model.predict(fit)).value

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.data.axes import recording_axes
-from underskin.diagnosis.inference.explanation import Explanation, Workbench, needs_lines
+from underskin.diagnosis.inference.explanation import Explanation, Workbench
 from underskin.diagnosis.inference.residuals import whole_prediction
 from underskin.diagnosis.localisation.permutation_test import axis_values
 from underskin.diagnosis.reporting.report import Diagnosis
 from underskin.mechanisms.autodiff import Array
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Complexes, Floats
 
 _MOST_POINTS = 600
@@ -59,7 +60,7 @@ class Thinned:
         self.lines = lines = bench.lines
         self.bench = bench
         along = any(axis in diagnosis.region for axis in lines.row_axes)
-        by_line = lines.curves or along or any(needs_lines(name) for name in shown.names)
+        by_line = lines.curves or along or any(CATALOGUE[name].needs_lines for name in shown.names)
         distinct, line = np.unique(np.round(lines.frequency, 6), return_inverse=True)
         bins = min(len(distinct), max(_MOST_POINTS // lines.recordings, _LEAST_BINS)) if by_line else 1
         key = lines.recording * bins + line.reshape(-1) * bins // len(distinct)

@@ -10,7 +10,6 @@ from underskin.diagnosis.inference.explanation import Explanation, Workbench
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation import cross_validation
-from underskin.mechanisms.models.pickup import PICKUP_NAMES
 from underskin.mechanisms.registry import CATALOGUE
 
 
@@ -23,7 +22,8 @@ def explains_percent(
     effect that only many recordings together tell. A mechanism that adds variance takes nothing away (see
     `_share_of_variance`).
     """
-    if any(entry.name in PICKUP_NAMES for entry in CATALOGUE[name].parameters(bench.lines.campaign, bench.kind)):
+    own = CATALOGUE[name].parameters(bench.lines.campaign, bench.kind)
+    if any(entry.acts_on == "line_variance" for entry in own):
         return round(100 * _share_of_variance(explanation), 1)
     rest = tuple(entry for entry in explanation.names if entry != name)
     without = next((entry for entry in search.explanations if entry.names == rest), None)

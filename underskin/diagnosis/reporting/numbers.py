@@ -6,7 +6,6 @@ import numpy as np
 from scipy.special import ndtri
 
 from underskin.diagnosis.inference.explanation import Explanation
-from underskin.diagnosis.inference.hypothesis import COVARIANCE_NAMES
 from underskin.diagnosis.inference.laplace import levels_covariance
 
 _QUANTILE = float(ndtri(0.975))
@@ -31,7 +30,7 @@ def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
     """A parameter's most probable value and 95 % interval, within its bounds."""
     fitter, point = explanation.best.fitter, explanation.point
     entry = fitter.parameters[place]
-    if entry.name in COVARIANCE_NAMES:
+    if entry.moves_covariance:
         names = [parameter.name for parameter in fitter.covariance]
         own = names.index(entry.name)
         variance = float(levels_covariance(fitter.covariance_equations(explanation.best.at)[1])[own, own])

@@ -3,19 +3,25 @@
 import math
 import re
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.reporting.figures import AXES
 from underskin.mechanisms.registry import CATALOGUE
 
-_NAMES = {name: name.replace("_", " ") for name in CATALOGUE} | {name: words for name, (words, _) in WORDS.items()}
-_NAMED = re.compile(rf"\b({'|'.join(sorted(_NAMES, key=len, reverse=True))})\b")
-
 
 def readable(text: str) -> str:
     """A statement with the names of mechanisms and axes as words: contact resonance for contact_resonance."""
-    return _NAMED.sub(lambda found: _NAMES[found[0]], text)
+    pattern, names = _names()
+    return pattern.sub(lambda match: names[match[0]], text)
+
+
+@cache
+def _names() -> tuple[re.Pattern[str], dict[str, str]]:
+    """What each name of the code is in words, and what matches any of them, the longest first."""
+    names = {name: name.replace("_", " ") for name in CATALOGUE} | {name: words for name, (words, _) in WORDS.items()}
+    return re.compile(rf"\b({'|'.join(sorted(names, key=len, reverse=True))})\b"), names
 
 
 def words(name: str) -> str:

@@ -13,9 +13,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from underskin.diagnosis.data.dataset import lines
-from underskin.diagnosis.inference.explanation import Explanation, Workbench, needs_lines
+from underskin.diagnosis.inference.explanation import Explanation, Workbench
 from underskin.mechanisms.base import Unsupported
-from underskin.mechanisms.models.pickup import PICKUP_NAMES
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
@@ -42,13 +41,13 @@ def _best_along_frequency(bench: Workbench) -> Explanation | None:
     assert nothing is not None
     singles = []
     for name, mechanism in CATALOGUE.items():
-        if "frf" not in mechanism.kinds or not needs_lines(name):
+        if "frf" not in mechanism.kinds or not mechanism.needs_lines:
             continue
         try:
             found = bench.explain((name,))
         except Unsupported:
             continue
-        if found is not None and not any(entry.name in PICKUP_NAMES for entry in found.model.parameters):
+        if found is not None and not any(entry.acts_on == "line_variance" for entry in found.model.parameters):
             singles.append(found)
     best = max(singles, key=lambda entry: entry.log_evidence, default=nothing)
     return best if best.log_evidence > nothing.log_evidence + _SPEAKS else None

@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from underskin.diagnosis.inference.explanation import Workbench
-from underskin.diagnosis.inference.hypothesis import COVARIANCE_NAMES
 from underskin.diagnosis.inference.likelihood import Marginal, Moments
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.noise.correlated_error import TYPICAL
@@ -50,7 +49,7 @@ def confounding(bench: Workbench) -> list[Confounding]:
         if bench.kind not in mechanism.kinds:
             continue
         parameters = mechanism.parameters(bench.lines.campaign, bench.kind)
-        if any(entry.name in COVARIANCE_NAMES for entry in parameters):
+        if any(entry.moves_covariance for entry in parameters):
             continue
         try:
             hypothesis = bench.hypothesis((name,), placed=False, whole=True)
@@ -70,20 +69,9 @@ def confounding(bench: Workbench) -> list[Confounding]:
     return _told(owners, information, fitter.parameters)
 
 
-def typical(entry: Parameter) -> float:
-    """The fit coordinate of a typical strength."""
-    if entry.limit is None or not isinstance(entry.prior, Normal):
-        return entry.quantile(0.5)
-    with np.errstate(divide="ignore"):
-        limit = entry.limit if entry.scale == "linear" else float(np.log(entry.limit))
-    if not np.isfinite(limit):
-        return entry.quantile(0.5)
-    return max(entry.quantile(0.25), entry.quantile(0.75), key=lambda end: abs(end - limit))
-
-
 def _shapes(parameters: Sequence[Parameter]) -> list[Floats]:
     """The fit coordinates of a typical strength, then of the same with one other parameter at the ends of its range."""
-    middle = np.array([typical(entry) for entry in parameters])
+    middle = np.array([entry.typical for entry in parameters])
     shapes = [middle]
     for place, entry in enumerate(parameters):
         if entry.limit is not None and np.isfinite(entry.to_fit(entry.limit) if entry.limit > 0 else entry.limit):

@@ -13,20 +13,21 @@ import numpy as np
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference.explanation import Workbench
 from underskin.diagnosis.selection.search import SHOWS
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, CompressionRecording, Recording
 from underskin.recordings.finding import Finding
 from underskin.surrogate.sigma_table import SigmaTable
 
 _BEGINNING = 0.1  # of each curve's displacement
-_STIFFENING = "strain_stiffening"
 
 
 def without_seating(campaign: Campaign, names: Sequence[str], table: SigmaTable) -> tuple[Workbench, Finding] | None:
     """The rest of the curves and the finding, where the rest speaks no more for the stiffening among `names`.
 
-    Relaxation needs a curve's whole history: with contact_creep nothing is tried.
+    A law that needs a curve's whole history, such as relaxation, cannot be fitted to the rest: nothing is tried.
     """
-    if _STIFFENING not in names or "contact_creep" in names:
+    imitated = [name for name in names if CATALOGUE[name].imitated_by_seating]
+    if not imitated or any(CATALOGUE[name].needs_history for name in names):
         return None
     if not all(_is_pressed(entry) for entry in campaign.recordings):
         return None
@@ -34,14 +35,14 @@ def without_seating(campaign: Campaign, names: Sequence[str], table: SigmaTable)
     if rows.recordings < len(campaign.recordings):
         return None
     bench = Workbench(rows, table)
-    stiffer, plain = bench.explain(tuple(names)), bench.explain(tuple(name for name in names if name != _STIFFENING))
+    stiffer, plain = bench.explain(tuple(names)), bench.explain(tuple(name for name in names if name not in imitated))
     assert stiffer is not None
     assert plain is not None
     if stiffer.log_evidence - plain.log_evidence > SHOWS:
         return None
     text = (
-        f"only the first {100 * _BEGINNING:.0f} % of the displacement speaks for strain_stiffening: a platen that is "
-        "tilted, or an uneven end, seats like that. It was left out; a small preload before zeroing avoids it"
+        f"only the first {100 * _BEGINNING:.0f} % of the displacement speaks for {' and '.join(imitated)}: a platen "
+        "that is tilted, or an uneven end, seats like that. It was left out; a small preload before zeroing avoids it"
     )
     return bench, Finding("seating", "", "displacement_mm", text)
 

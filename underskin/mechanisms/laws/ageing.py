@@ -1,20 +1,9 @@
-"""The sensors lose strength as the skin is pressed again and again, so recordings after many load cycles are lower than
-those after few.
-
-Law: FRF · f(1 − loss · g), g = [1 − (1 + N/(n (1 + p)))^(−p)]/(1 − 10^(−p)), p = s/(1 − s), n the onset, s the
-saturation. At s = 0 it is 1 − loss · log10(1 + N/n), a loss by the decade; for s → 1 it is 1 − loss · (1 − e^(−N/n)), a
-loss that ends. f(x) = x down to 0.05, below it 0.05 e^(20x − 1): a response dies out, it does not change its sign.
-
-Assumptions: all sensors age alike, by the campaign's own count of cycles.
-
-Source: Jaffe, Cook & Jaffe, Piezoelectric Ceramics (1971), for a loss by the decade; one family holds it and the
-saturating law, so that a fit is well posed.
-"""
+"""The mechanism `ageing`."""
 
 import numpy as np
 
 from underskin.mechanisms.autodiff import Differentiated, chain, log
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Uniform, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.frf_design import FrfDesign, frf_recordings
 from underskin.recordings.campaign import Campaign
 
@@ -23,11 +12,29 @@ _LEAST = 0.05  # what is left of a response before its fall slows down
 
 
 class Ageing(Mechanism):
-    """See the module."""
+    """A d33 that falls with the number of load cycles."""
 
     name = "ageing"
+    plain = (
+        "The sensors lose strength as the skin is pressed again and again, so recordings after many load cycles are "
+        "lower than those after few."
+    )
+    law = (
+        "FRF · f(1 − loss · g), g = [1 − (1 + N/(n (1 + p)))^(−p)]/(1 − 10^(−p)), p = s/(1 − s), n the onset, s the "
+        "saturation. At s = 0 it is 1 − loss · log10(1 + N/n), a loss by the decade; for s → 1 it is 1 − loss · (1 − "
+        "e^(−N/n)), a loss that ends. f(x) = x down to 0.05, below it 0.05 e^(20x − 1): a response dies out, it does "
+        "not change its sign."
+    )
+    assumptions = "all sensors age alike, by the campaign's own count of cycles."
+    source = (
+        "Jaffe, Cook & Jaffe, Piezoelectric Ceramics (1971), for a loss by the decade; one family holds it and the "
+        "saturating law, so that a fit is well posed."
+    )
+    stage = Stage.RECORDING
+    order = 10
     axes = ("load_cycles",)
     needs = "load_cycles of every recording, not all the same"
+    needs_fields = ("load_cycles",)
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The loss, by the decade or in the end, the cycles at which it sets in, and the shape."""
@@ -40,6 +47,7 @@ class Ageing(Mechanism):
                 prior=Normal(0.0, 0.3),
                 scale="linear",
                 limit=0.0,
+                shown=0.15,
                 reason="poled polymers lose some to tens of percent, a decade or in the end",
             ),
             Parameter(
@@ -50,6 +58,7 @@ class Ageing(Mechanism):
                 prior=Normal(6.9, 2.0),
                 scale="log",
                 limit=None,
+                shown=1000.0,
                 reason="run-in takes tens to ten thousands of cycles; 1000 within a factor of 7",
             ),
             Parameter(
@@ -60,6 +69,7 @@ class Ageing(Mechanism):
                 prior=Uniform(),
                 scale="linear",
                 limit=None,
+                shown=0.0,
                 reason="from a loss that goes on by the decade to one that ends: nothing is known beforehand",
             ),
         )

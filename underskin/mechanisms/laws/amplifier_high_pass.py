@@ -1,25 +1,28 @@
-"""The charge amplifier cannot hold a charge for long, so at the lowest frequencies the response drops and runs ahead of
-the force, alike in all recordings.
-
-Law: FRF · iωτ/(1 + iωτ), τ = 1/(2π corner).
-
-Assumptions: one pole, the same for all recordings and sensors.
-
-Source: a charge amplifier's feedback capacitor with its resistor in parallel (Gautschi, Piezoelectric Sensorics, 2002,
-chapter 11).
-"""
+"""The mechanism `amplifier_high_pass`."""
 
 from underskin.mechanisms.autodiff import Differentiated
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.recordings.campaign import Campaign
 
 
 class AmplifierHighPass(Mechanism):
-    """See the module."""
+    """The charge amplifier's lower cut-off frequency."""
 
     name = "amplifier_high_pass"
+    plain = (
+        "The charge amplifier cannot hold a charge for long, so at the lowest frequencies the response drops and runs "
+        "ahead of the force, alike in all recordings."
+    )
+    law = "FRF · iωτ/(1 + iωτ), τ = 1/(2π corner)."
+    assumptions = "one pole, the same for all recordings and sensors."
+    source = (
+        "a charge amplifier's feedback capacitor with its resistor in parallel (Gautschi, Piezoelectric Sensorics, "
+        "2002, chapter 11)."
+    )
+    stage = Stage.LINES
+    order = 30
     axes = ("frequency_hz", "phase")
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
@@ -33,6 +36,7 @@ class AmplifierHighPass(Mechanism):
                 prior=Normal(-0.7, 1.5),
                 scale="log",
                 limit=0.0,
+                shown=1.0,
                 reason="charge amplifiers have corners of 0.01 to some Hz; 0.5 Hz within a factor of 4.5",
             ),
         )

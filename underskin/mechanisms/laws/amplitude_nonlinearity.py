@@ -1,21 +1,9 @@
-"""The dynamic force is not small beside the preload, so the contact grows and shrinks markedly within a cycle and
-charge over force depends on how hard the shaker drives.
-
-Law: σ → (1 − m) σ + m · (first harmonic of (F + Fd sin ωt) σ(F + Fd sin ωt))/Fd, with the edge moving and every other
-mechanism of contact and stress inside; tends to moving_contact_edge as Fd/F → 0. d33 is that at the preload: where it
-changes with stress (preload_dependent_d33) it multiplies the harmonic and does not vary within the cycle.
-
-Assumptions: quasi-static over the cycle; the sphere never leaves the skin (Fd < F); m, the edge's mobility, is the same
-for all recordings.
-
-Source: Gelb & Vander Velde, Multiple-Input Describing Functions (1968), for the first harmonic of a nonlinear answer.
-It is (2/π) ∫₋₁¹ Q(F + Fd s) s/√(1 − s²) ds, by Gauss–Chebyshev quadrature.
-"""
+"""The mechanism `amplitude_nonlinearity`."""
 
 import numpy as np
 
 from underskin.mechanisms.autodiff import Array, Differentiated
-from underskin.mechanisms.base import Kind, Mechanism, Parameter, Uniform, Values
+from underskin.mechanisms.base import Kind, Mechanism, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.frf_design import frf_recordings
 from underskin.recordings.campaign import Campaign
 from underskin.units import Floats
@@ -24,12 +12,32 @@ _NODES = 6
 
 
 class AmplitudeNonlinearity(Mechanism):
-    """See the module."""
+    """A contact that changes markedly within a cycle of the dynamic force."""
 
     name = "amplitude_nonlinearity"
+    plain = (
+        "The dynamic force is not small beside the preload, so the contact grows and shrinks markedly within a cycle "
+        "and charge over force depends on how hard the shaker drives."
+    )
+    law = (
+        "σ → (1 − m) σ + m · (first harmonic of (F + Fd sin ωt) σ(F + Fd sin ωt))/Fd, with the edge moving and every "
+        "other mechanism of contact and stress inside; tends to moving_contact_edge as Fd/F → 0. d33 is that at the "
+        "preload: where it changes with stress (preload_dependent_d33) it multiplies the harmonic and does not vary "
+        "within the cycle."
+    )
+    assumptions = (
+        "quasi-static over the cycle; the sphere never leaves the skin (Fd < F); m, the edge's mobility, is the same "
+        "for all recordings."
+    )
+    source = (
+        "Gelb & Vander Velde, Multiple-Input Describing Functions (1968), for the first harmonic of a nonlinear "
+        "answer. It is (2/π) ∫₋₁¹ Q(F + Fd s) s/√(1 − s²) ds, by Gauss–Chebyshev quadrature."
+    )
+    stage = Stage.LOAD_INCREMENT
+    order = 20
     axes = ("dynamic_force_n", "preload_n", "indenter_radius_mm")
     needs = "dynamic_force_n below preload_n in every recording"
-    contact_axes = ("dynamic_force_n",)
+    needs_fields = ("dynamic_force_n",)
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The edge's mobility."""
@@ -42,6 +50,7 @@ class AmplitudeNonlinearity(Mechanism):
                 prior=Uniform(),
                 scale="linear",
                 limit=0.0,
+                shown=1.0,
                 reason="from an edge pinned by adhesion to one that moves freely: nothing is known beforehand",
             ),
         )

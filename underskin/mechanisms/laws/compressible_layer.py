@@ -1,16 +1,6 @@
-"""The skin's material can be squeezed together a little in volume, so it passes the pressure on in another shape, which
-shows beside the sensors and with centred presses looks like another d33.
+"""The mechanism `compressible_layer`."""
 
-Law: ν < 0.5 in Hertz' E' = E/(1 − ν²), in the layer's transmission M and in its compliance K.
-
-Assumptions: isotropic linear elasticity; what finite strain adds is the incompressible table's, entered with
-L (0.75/(1 − ν²))², which keeps q0/E. For a centred contact nearly a pure gain, not to be told from d33.
-
-Source: Sneddon, Fourier Transforms (1951), chapter 10; the closed forms of M and K stand in
-underskin/physics/elastic_layer.py.
-"""
-
-from underskin.mechanisms.base import Kind, Mechanism, Parameter, Uniform, Values
+from underskin.mechanisms.base import Kind, Mechanism, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.physics.skin import INCOMPRESSIBLE
@@ -18,12 +8,28 @@ from underskin.recordings.campaign import Campaign
 
 
 class CompressibleLayer(Mechanism):
-    """See the module."""
+    """A skin with a Poisson ratio below 0.5."""
 
     name = "compressible_layer"
+    plain = (
+        "The skin's material can be squeezed together a little in volume, so it passes the pressure on in another "
+        "shape, which shows beside the sensors and with centred presses looks like another d33."
+    )
+    law = "ν < 0.5 in Hertz' E' = E/(1 − ν²), in the layer's transmission M and in its compliance K."
+    assumptions = (
+        "isotropic linear elasticity; what finite strain adds is the incompressible table's, entered with L (0.75/(1 "
+        "− ν²))², which keeps q0/E. For a centred contact nearly a pure gain, not to be told from d33."
+    )
+    source = (
+        "Sneddon, Fourier Transforms (1951), chapter 10; the closed forms of M and K stand in "
+        "underskin/physics/elastic_layer.py."
+    )
+    stage = Stage.MATERIAL
+    order = 10
     kinds = ("frf", "indentation")
     axes = ("position_mm", "preload_n", "indenter_radius_mm")
     needs = "a skin declared with poisson_ratio 0.5"
+    figure = ("preload_n", "position_mm")
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The Poisson ratio."""
@@ -36,6 +42,7 @@ class CompressibleLayer(Mechanism):
                 prior=Uniform(),
                 scale="linear",
                 limit=0.5,
+                shown=0.4,
                 reason="solid elastomers 0.48 to 0.5, filled and slightly porous ones 0.4, foams 0.3",
             ),
         )

@@ -1,27 +1,9 @@
-"""The skin slowly gives way under the preload, so the contact grows and the response changes with the time for which
-the preload has been held.
-
-Law: E(t) = E (1 − g (1 − e^(−t/τ))), with t the time held; a³ ∝ 1/E(t), L ∝ 1/E(t).
-
-Assumptions: quasi-elastic: each instant as an elastic layer of modulus E(t), one Prony pair, the declared E is the
-instantaneous one. (Exact creep under a constant force uses J(t), whose time is τ/(1 − g): fitted to FRFs of a solid
-that creeps so, τ comes out 7 % too long at g 0.2, 15 % at 0.4, 24 % at 0.6.) A held oscillation is felt through the
-contact radius alone, since transmission through a linear layer under force control has no modulus in it, and a
-contact's stiffness against an oscillation much faster than τ is the instantaneous modulus' at that radius.
-Curves: an indentation F(t) = ∫₀^{t1} e(t−s) du(s), with u the elastic force, e = E(t)/E, and t1 = t while the contact
-grows; while it shrinks t1 is when it last was as large, ∫_{t1}^{t} e(t−s) dδ(s) = 0 (Ting's theory, exact for one
-growing and one shrinking of the contact, with holds between). With adhesion the edge lets go where it carries the
-stretch ℓ of JKR's contact at the instantaneous modulus. A stage gives by the relaxed force. A sphere that presses again
-after it was drawn back meets a surface that has not recovered: refused. A cylinder: F(t) = ∫₀^t e(t−s) du(s).
-
-Source: Lee & Radok, J. Appl. Mech. 27 (1960) 438; Ting, J. Appl. Mech. 33 (1966) 845; Greenwood & Johnson, Phil. Mag. A
-43 (1981) 697 (the modulus that a moving edge sees).
-"""
+"""The mechanism `contact_creep`."""
 
 import numpy as np
 
 from underskin.mechanisms.autodiff import exp
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Uniform, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.models.curve_timing import time_runs_with_displacement
@@ -32,16 +14,42 @@ _RETURN = 0.05  # of the range of displacement: smaller returns are noise
 
 
 class ContactCreep(Mechanism):
-    """See the module."""
+    """Viscoelastic relaxation of the skin, one Prony pair."""
 
     name = "contact_creep"
+    plain = (
+        "The skin slowly gives way under the preload, so the contact grows and the response changes with the time for "
+        "which the preload has been held."
+    )
+    law = "E(t) = E (1 − g (1 − e^(−t/τ))), with t the time held; a³ ∝ 1/E(t), L ∝ 1/E(t)."
+    assumptions = (
+        "quasi-elastic: each instant as an elastic layer of modulus E(t), one Prony pair, the declared E is the "
+        "instantaneous one. (Exact creep under a constant force uses J(t), whose time is τ/(1 − g): fitted to FRFs of "
+        "a solid that creeps so, τ comes out 7 % too long at g 0.2, 15 % at 0.4, 24 % at 0.6.) A held oscillation is "
+        "felt through the contact radius alone, since transmission through a linear layer under force control has no "
+        "modulus in it, and a contact's stiffness against an oscillation much faster than τ is the instantaneous "
+        "modulus' at that radius. Curves: an indentation F(t) = ∫₀^{t1} e(t−s) du(s), with u the elastic force, e = "
+        "E(t)/E, and t1 = t while the contact grows; while it shrinks t1 is when it last was as large, ∫_{t1}^{t} "
+        "e(t−s) dδ(s) = 0 (Ting's theory, exact for one growing and one shrinking of the contact, with holds "
+        "between). With adhesion the edge lets go where it carries the stretch ℓ of JKR's contact at the "
+        "instantaneous modulus. A stage gives by the relaxed force. A sphere that presses again after it was drawn "
+        "back meets a surface that has not recovered: refused. A cylinder: F(t) = ∫₀^t e(t−s) du(s)."
+    )
+    source = (
+        "Lee & Radok, J. Appl. Mech. 27 (1960) 438; Ting, J. Appl. Mech. 33 (1966) 845; Greenwood & Johnson, Phil. "
+        "Mag. A 43 (1981) 697 (the modulus that a moving edge sees)."
+    )
+    stage = Stage.MATERIAL
+    order = 30
     kinds = ("frf", "indentation", "compression")
     axes = ("dwell_s", "preload_n", "indenter_radius_mm", "time_s")
     needs = (
         "frf: dwell_s of every recording, not all the same; curves: time_s, and two speeds, a hold or a way back; "
         "indentations: one way in and one back"
     )
-    contact_axes = ("dwell_s",)
+    needs_fields = ("dwell_s",)
+    needs_history = True
+    figure = ("dwell_s", "time_s")
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """One Prony pair."""
@@ -54,6 +62,7 @@ class ContactCreep(Mechanism):
                 prior=Uniform(),
                 scale="linear",
                 limit=0.0,
+                shown=0.4,
                 reason="from a few percent in a well cured silicone to most of the modulus in a gel",
             ),
             Parameter(
@@ -64,6 +73,7 @@ class ContactCreep(Mechanism):
                 prior=Normal(3.7, 1.5),
                 scale="log",
                 limit=None,
+                shown=40.0,
                 reason="what a bench can see lies between seconds and an hour; 40 s within a factor of 4.5",
             ),
         )

@@ -1,30 +1,38 @@
-"""The tip between force cell and skin bounces on the contact as a mass on a spring, so the response swells towards a
-resonance and falls beyond it, at a frequency that moves with preload and sphere.
-
-Law: FRF/(1 − (ω/ω0)² + 2iζω/ω0), ω0² = k/m, k = dF/dδ = 2E'a S(a/h) of the layer at the contact radius in force: the
-resonance moves with preload and indenter as the contact does; where the contact creeps it rises, for the contact grows.
-
-Assumptions: one mass, one damping ratio; damping acts on the tip and is not sensed (a dashpot inside the contact would
-add a numerator 1 + 2iζω/ω0); the edge is held over a cycle, which is short beside the times of creep, so that E' is the
-unrelaxed one; the layer itself has no inertia.
-
-Source: Rabe, Janser & Arnold, Rev. Sci. Instrum. 67 (1996) 3281 (contact resonances); Lebedev & Ufliand, J. Appl. Math.
-Mech. 22 (1958) 442, for the layer's S.
-"""
+"""The mechanism `contact_resonance`."""
 
 import numpy as np
 
 from underskin.mechanisms.autodiff import Differentiated
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.recordings.campaign import Campaign
 
 
 class ContactResonance(Mechanism):
-    """See the module."""
+    """The tip's mass on the stiffness of the contact, a resonance."""
 
     name = "contact_resonance"
+    plain = (
+        "The tip between force cell and skin bounces on the contact as a mass on a spring, so the response swells "
+        "towards a resonance and falls beyond it, at a frequency that moves with preload and sphere."
+    )
+    law = (
+        "FRF/(1 − (ω/ω0)² + 2iζω/ω0), ω0² = k/m, k = dF/dδ = 2E'a S(a/h) of the layer at the contact radius in force: "
+        "the resonance moves with preload and indenter as the contact does; where the contact creeps it rises, for "
+        "the contact grows."
+    )
+    assumptions = (
+        "one mass, one damping ratio; damping acts on the tip and is not sensed (a dashpot inside the contact would "
+        "add a numerator 1 + 2iζω/ω0); the edge is held over a cycle, which is short beside the times of creep, so "
+        "that E' is the unrelaxed one; the layer itself has no inertia."
+    )
+    source = (
+        "Rabe, Janser & Arnold, Rev. Sci. Instrum. 67 (1996) 3281 (contact resonances); Lebedev & Ufliand, J. Appl. "
+        "Math. Mech. 22 (1958) 442, for the layer's S."
+    )
+    stage = Stage.LINES
+    order = 10
     axes = ("frequency_hz", "phase", "preload_n", "indenter_radius_mm")
     needs_stiffness = True
 
@@ -39,6 +47,7 @@ class ContactResonance(Mechanism):
                 prior=Normal(0.7, 1.8),
                 scale="log",
                 limit=0.0,
+                shown=2.0,
                 reason="what sits in front of a force cell, from a bead to a shaker's table: 2 g within a factor of 6",
             ),
             Parameter(
@@ -49,6 +58,7 @@ class ContactResonance(Mechanism):
                 prior=Normal(-3.0, 1.0),
                 scale="log",
                 limit=None,
+                shown=0.05,
                 reason="silicones lose little, tan δ 0.02 to 0.3, ζ half of it: 0.05 within a factor of 2.7",
             ),
         )

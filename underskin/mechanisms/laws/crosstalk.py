@@ -1,19 +1,9 @@
-"""Part of the charge of the neighbouring sensors gets into a sensor's own channel, so a press that they feel as well
-reads too high.
-
-Law: charge of a sensor = its own + fraction · Σ own charge of each sensor within 1.2 pitch, pitch being the smallest
-distance between two sensors.
-
-Assumptions: the same fraction for all pairs; a neighbour's own charge follows from the same contact at its own offset,
-with the same d33 law (its own gain is taken as 1).
-
-Source: Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling between leads).
-"""
+"""The mechanism `crosstalk`."""
 
 import numpy as np
 
 from underskin.mechanisms.autodiff import Differentiated
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.recordings.campaign import Campaign
 from underskin.units import to_si
@@ -22,12 +12,29 @@ _FELT_WITHIN = 3.0  # thicknesses; further off a bonded layer passes on less tha
 
 
 class Crosstalk(Mechanism):
-    """See the module."""
+    """A fraction of the neighbouring sensors' charge in a sensor's channel."""
 
     name = "crosstalk"
+    plain = (
+        "Part of the charge of the neighbouring sensors gets into a sensor's own channel, so a press that they feel "
+        "as well reads too high."
+    )
+    law = (
+        "charge of a sensor = its own + fraction · Σ own charge of each sensor within 1.2 pitch, pitch being the "
+        "smallest distance between two sensors."
+    )
+    assumptions = (
+        "the same fraction for all pairs; a neighbour's own charge follows from the same contact at its own offset, "
+        "with the same d33 law (its own gain is taken as 1)."
+    )
+    source = "Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling between leads)."
+    stage = Stage.NEIGHBOURS
+    order = 10
     axes = ("position_mm", "sensor")
     needs = "at least two sensors, and presses within three thicknesses of a neighbour"
     needs_neighbours = True
+    needs_fields = ("sensor",)
+    figure = ("position_mm",)
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The fraction."""
@@ -40,6 +47,7 @@ class Crosstalk(Mechanism):
                 prior=Normal(0.0, 0.15),
                 scale="linear",
                 limit=0.0,
+                shown=0.1,
                 reason="coupling of unshielded leads is some to 20 percent",
             ),
         )

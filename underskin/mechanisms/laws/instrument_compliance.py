@@ -1,22 +1,23 @@
-"""The stage gives way under the force, so the displacement read off it is larger than the indentation and the sample
-looks too soft, most of all at high force.
+"""The mechanism `instrument_compliance`."""
 
-Law: measured displacement = indentation + F/k, with the F that is measured: relaxed, and adhesive.
-
-Assumptions: a linear stage, the same in all recordings; without friction or backlash.
-
-Source: Oliver & Pharr, J. Mater. Res. 7 (1992) 1564 (frame compliance).
-"""
-
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.recordings.campaign import Campaign
 
 
 class InstrumentCompliance(Mechanism):
-    """See the module."""
+    """A stage that gives way under the force."""
 
     name = "instrument_compliance"
+    plain = (
+        "The stage gives way under the force, so the displacement read off it is larger than the indentation and the "
+        "sample looks too soft, most of all at high force."
+    )
+    law = "measured displacement = indentation + F/k, with the F that is measured: relaxed, and adhesive."
+    assumptions = "a linear stage, the same in all recordings; without friction or backlash."
+    source = "Oliver & Pharr, J. Mater. Res. 7 (1992) 1564 (frame compliance)."
+    stage = Stage.CURVE
+    order = 10
     kinds = ("indentation",)
     axes = ("force_n",)
 
@@ -31,6 +32,7 @@ class InstrumentCompliance(Mechanism):
                 prior=Normal(5.0, 2.0),
                 scale="log",
                 limit=float("inf"),
+                shown=20.0,
                 reason="robot stages 10 to 100 N/mm, testing machines 1000 to 50000; 150 within a factor of 7",
             ),
         )

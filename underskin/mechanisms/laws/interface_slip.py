@@ -1,25 +1,34 @@
-"""The glue under the skin gives way sideways, so the pressure reaches the sensors in another shape, which shows beside
-them and with centred presses looks much like another d33.
+"""The mechanism `interface_slip`."""
 
-Law: τ = κ (G/h) u_r at the base, in place of u_r = 0; it changes the layer's transmission M and its compliance K.
-
-Assumptions: a linear glue line of one stiffness everywhere; κ = ∞ is bonded, κ = 0 frictionless. The layer is the
-linear one; what finite strain adds is taken from the bonded table.
-
-Source: Goodman, Taylor & Brekke, J. Soil Mech. Found. Div. 94 (1968) 637 (joint stiffness); Sneddon, Fourier Transforms
-(1951), chapter 10, for the layer: the closed forms of M and K stand in underskin/physics/elastic_layer.py.
-"""
-
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.recordings.campaign import Campaign
 
 
 class InterfaceSlip(Mechanism):
-    """See the module."""
+    """A glue line under the skin with a finite shear stiffness."""
 
     name = "interface_slip"
+    plain = (
+        "The glue under the skin gives way sideways, so the pressure reaches the sensors in another shape, which "
+        "shows beside them and with centred presses looks much like another d33."
+    )
+    law = (
+        "τ = κ (G/h) u_r at the base, in place of u_r = 0; it changes the layer's transmission M and its compliance K."
+    )
+    assumptions = (
+        "a linear glue line of one stiffness everywhere; κ = ∞ is bonded, κ = 0 frictionless. The layer is the linear "
+        "one; what finite strain adds is taken from the bonded table."
+    )
+    source = (
+        "Goodman, Taylor & Brekke, J. Soil Mech. Found. Div. 94 (1968) 637 (joint stiffness); Sneddon, Fourier "
+        "Transforms (1951), chapter 10, for the layer: the closed forms of M and K stand in "
+        "underskin/physics/elastic_layer.py."
+    )
+    stage = Stage.MATERIAL
+    order = 20
     axes = ("position_mm", "preload_n", "indenter_radius_mm")
+    figure = ("preload_n", "position_mm")
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The glue line's stiffness in units of the layer's own."""
@@ -32,6 +41,7 @@ class InterfaceSlip(Mechanism):
                 prior=Normal(-0.3, 1.5),
                 scale="log",
                 limit=float("inf"),
+                shown=0.3,
                 reason="(G_glue/G) (h/t): a tape 0.1 mm thick, 1000 times softer, has 0.02; above 50 no effect",
             ),
         )

@@ -1,24 +1,12 @@
-"""The mains put charge on the sensors' leads, so lines at the mains' frequency and its multiples are off, the more the
-weaker the dynamic force.
-
-Law: a charge q at the mains' frequency and a share of q/n at its n-th harmonic, each a line of some width, whatever the
-dynamic force: an FRF error of q/Fd, complex, its phase independent in each recording and on each line. It adds its
-square to the lines' variance.
-
-Assumptions: q is the standard deviation of each component over recordings; 50 or 60 Hz, whichever stands out in the
-campaign's lines; harmonics up to the fifth, all with the same share; lines are bells exp(−½ (f/width)²), f from the
-multiple. How phases of neighbouring lines hang together, and the lines' shape in detail, depend on the analyser's
-window and on how the mains drift: neither is relied on.
-
-Source: Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling to leads).
-"""
+"""The mechanism `mains_pickup`."""
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage
 from underskin.mechanisms.models.frf_design import FrfDesign, frf_recordings
 from underskin.mechanisms.models.pickup import Pickup
 from underskin.recordings.campaign import Campaign
@@ -37,12 +25,31 @@ _LEAST_STRAY = 1e-6  # relative; of recordings without noise
 
 
 class MainsPickup(Mechanism):
-    """See the module."""
+    """Charge from the mains on the sensors' leads."""
 
     name = "mains_pickup"
+    plain = (
+        "The mains put charge on the sensors' leads, so lines at the mains' frequency and its multiples are off, the "
+        "more the weaker the dynamic force."
+    )
+    law = (
+        "a charge q at the mains' frequency and a share of q/n at its n-th harmonic, each a line of some width, "
+        "whatever the dynamic force: an FRF error of q/Fd, complex, its phase independent in each recording and on "
+        "each line. It adds its square to the lines' variance."
+    )
+    assumptions = (
+        "q is the standard deviation of each component over recordings; 50 or 60 Hz, whichever stands out in the "
+        "campaign's lines; harmonics up to the fifth, all with the same share; lines are bells exp(−½ (f/width)²), f "
+        "from the multiple. How phases of neighbouring lines hang together, and the lines' shape in detail, depend on "
+        "the analyser's window and on how the mains drift: neither is relied on."
+    )
+    source = "Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling to leads)."
+    stage = Stage.ADDED_CHARGE
+    order = 10
     axes = ("frequency_hz", "dynamic_force_n")
     needs = "a line within 3 Hz of 50 or 60 Hz"
-    _last: tuple[Campaign, float] | None = None
+    moves_predictions = False
+    figure = ("mains",)
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The charge, and what its lines look like."""
@@ -55,6 +62,8 @@ class MainsPickup(Mechanism):
                 prior=Normal(-3.0, 1.5),
                 scale="log",
                 limit=0.0,
+                shown=0.05,
+                acts_on="line_variance",
                 reason="unshielded leads of some pF to mains at 230 V collect hundredths to tenths of a pC",
             ),
             Parameter(
@@ -65,6 +74,8 @@ class MainsPickup(Mechanism):
                 prior=Normal(0.4, 0.6),
                 scale="log",
                 limit=None,
+                shown=1.5,
+                acts_on="line_variance",
                 reason="the analyser's window and the mains' drift make lines a few Hz wide",
             ),
             Parameter(
@@ -75,6 +86,8 @@ class MainsPickup(Mechanism):
                 prior=Normal(0.0, 1.5),
                 scale="log",
                 limit=None,
+                shown=1.0,
+                acts_on="line_variance",
                 reason="the n-th harmonic has about 1/n of the charge; a sine has none, rectifiers have more",
             ),
         )
@@ -89,7 +102,7 @@ class MainsPickup(Mechanism):
 
     def pickup(self, campaign: Campaign, design: FrfDesign) -> Pickup:
         """Of the lines within the reach of the mains that stand out, each by the nearest multiple."""
-        away = np.abs(design.row_frequency[:, None] - self._outstanding(campaign) * _HARMONICS)
+        away = np.abs(design.row_frequency[:, None] - _outstanding_mains(campaign) * _HARMONICS)
         rows = np.flatnonzero(away.min(axis=1) < _FURTHEST_HZ)
         harmonic = _HARMONICS[away[rows].argmin(axis=1)]
         half_square, force = 0.5 * away[rows].min(axis=1) ** 2, design.row_dynamic_force[rows]
@@ -101,16 +114,13 @@ class MainsPickup(Mechanism):
 
         return Pickup(rows, deviation)
 
-    def _outstanding(self, campaign: Campaign) -> float:
-        """The mains' frequency, where none stands out the one that has a line nearest; that of the last campaign is
-        kept."""
-        last = self._last
-        if last is None or last[0] is not campaign:
-            lines = [lines_of(entry) for entry in frf_recordings(campaign)]
-            nearest = {mains: min(float(np.abs(one.frequency - mains).min()) for one in lines) for mains in _MAINS_HZ}
-            last = campaign, max(_MAINS_HZ, key=lambda mains: (_excess(lines, mains), -nearest[mains]))
-            self._last = last
-        return last[1]
+
+@lru_cache(maxsize=4)  # by the campaign's identity: a diagnosis composes dozens of models of one campaign
+def _outstanding_mains(campaign: Campaign) -> float:
+    """The mains frequency [Hz] whose lines stand out; where none does, the one that has a line nearest."""
+    lines = [lines_of(entry) for entry in frf_recordings(campaign)]
+    nearest = {mains: min(float(np.abs(one.frequency - mains).min()) for one in lines) for mains in _MAINS_HZ}
+    return max(_MAINS_HZ, key=lambda mains: (_excess(lines, mains), -nearest[mains]))
 
 
 def _excess(recordings: Sequence[Frf], mains: float) -> float:

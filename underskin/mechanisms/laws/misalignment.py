@@ -1,34 +1,41 @@
-"""The sphere does not come down where the stage says but always a little to the same side, so each sensor shows what a
-press at that other place gives.
+"""The mechanism `misalignment`."""
 
-Law: true position = commanded + a constant offset, for all recordings.
-
-Assumptions: stage and array are shifted against each other, not turned or stretched. Where every press is commanded at
-a sensor's centre and no charge of its neighbours shows (crosstalk), the direction cannot be told, and the offset's
-length alone is a parameter.
-
-Source: Sneddon, Fourier Transforms (1951), chapter 10: in the layer's Hankel integral the offset enters as J0(k e/h).
-"""
-
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
+from underskin.errors import InvalidInput
 from underskin.mechanisms.autodiff import Differentiated
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
-from underskin.mechanisms.models.frf_design import offsets
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.models.frf_design import frf_recordings, offsets
 from underskin.recordings.campaign import Campaign
 
 _LARGEST_MM = 2.0
 
 
 class Misalignment(Mechanism):
-    """See the module."""
+    """A constant offset between commanded and true position."""
 
     name = "misalignment"
+    plain = (
+        "The sphere does not come down where the stage says but always a little to the same side, so each sensor "
+        "shows what a press at that other place gives."
+    )
+    law = "true position = commanded + a constant offset, for all recordings."
+    assumptions = (
+        "stage and array are shifted against each other, not turned or stretched. Where every press is commanded at a "
+        "sensor's centre and no charge of its neighbours shows (crosstalk), the direction cannot be told, and the "
+        "offset's length alone is a parameter."
+    )
+    source = (
+        "Sneddon, Fourier Transforms (1951), chapter 10: in the layer's Hankel integral the offset enters as J0(k e/h)."
+    )
+    stage = Stage.POSITION
+    order = 10
     axes = ("position_mm", "sensor", "preload_n", "indenter_radius_mm")
     needs = "nothing; where every press is centred and nothing tells its direction, its length alone is a parameter"
     largest_offset = 1e-3 * _LARGEST_MM * np.sqrt(2)
+    figure = ("preload_n", "position_mm")
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The offset's two components, or its length where its direction cannot be told."""
@@ -36,8 +43,8 @@ class Misalignment(Mechanism):
 
     def parameters_beside(self, others: Collection[str], campaign: Campaign, kind: Kind) -> tuple[Parameter, ...]:
         """The same; the charge of neighbours, which lie in known directions, tells the direction too."""
-        told = offsets(campaign).any() or "crosstalk" in others
-        names, low = (("offset_x", "offset_y"), -_LARGEST_MM) if told else (("offset",), 0.0)
+        directed = offsets(campaign).any() or "crosstalk" in others
+        shown, low = ({"offset_x": 0.6, "offset_y": 0.3}, -_LARGEST_MM) if directed else ({"offset": 0.7}, 0.0)
         return tuple(
             Parameter(
                 name=name,
@@ -47,10 +54,24 @@ class Misalignment(Mechanism):
                 prior=Normal(0.0, 0.7),
                 scale="linear",
                 limit=0.0,
+                shown=value,
                 reason="a tip centred by eye is off by some tenths of a millimetre to a millimetre",
             )
-            for name in names
+            for name, value in shown.items()
         )
+
+    def values_on(self, values: Mapping[str, float], campaign: Campaign) -> Mapping[str, float]:
+        """Centred presses need the offset's length alone; a length without its direction serves no others."""
+        if "offset" not in values:
+            return {**values, "offset": float(np.hypot(values["offset_x"], values["offset_y"]))}
+        beside = offsets(campaign).any(axis=1)
+        if beside.any():
+            entry = frf_recordings(campaign)[int(np.argmax(beside))]
+            allowed = (
+                "must be the sensor's centre: the adopted model knows how far presses miss it, not in which direction"
+            )
+            raise InvalidInput(f"recordings[{entry.id}].position_mm", entry.position_mm, allowed)
+        return values
 
     def offset(self, values: Values) -> tuple[Differentiated, Differentiated]:
         """The offset [m]."""

@@ -1,24 +1,29 @@
-"""The Young's modulus that was declared is not the skin's, a wrong number rather than missing physics, so every contact
-is wider or narrower than computed, which shows the more the wider it is.
+"""The mechanism `modulus_error`."""
 
-Law: E = declared E · factor; it acts through a³ ∝ 1/E and L ∝ 1/E, and on an indentation's or compression's force.
-
-Assumptions: one factor for the whole skin, in all recordings.
-
-Source: Seminara 2018, equations 7 to 10 and 16: E enters through a and L; under force control a linear layer transmits
-a given pressure alike whatever its modulus.
-"""
-
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.recordings.campaign import Campaign
 
 
 class ModulusError(Mechanism):
-    """See the module."""
+    """A declared Young's modulus that is wrong by a factor."""
 
     name = "modulus_error"
+    plain = (
+        "The Young's modulus that was declared is not the skin's, a wrong number rather than missing physics, so "
+        "every contact is wider or narrower than computed, which shows the more the wider it is."
+    )
+    law = (
+        "E = declared E · factor; it acts through a³ ∝ 1/E and L ∝ 1/E, and on an indentation's or compression's force."
+    )
+    assumptions = "one factor for the whole skin, in all recordings."
+    source = (
+        "Seminara 2018, equations 7 to 10 and 16: E enters through a and L; under force control a linear layer "
+        "transmits a given pressure alike whatever its modulus."
+    )
+    stage = Stage.DECLARED
+    order = 10
     kinds = ("frf", "indentation", "compression")
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     needs = "a declared youngs_modulus_mpa"
@@ -34,6 +39,7 @@ class ModulusError(Mechanism):
                 prior=Normal(0.0, 0.35),
                 scale="log",
                 limit=1.0,
+                shown=0.7,
                 reason="E from a durometer, a data sheet or another cure is off by tens of percent",
             ),
         )

@@ -1,20 +1,9 @@
-"""The edge of the contact moves with the dynamic force, so the oscillating part of the pressure sits towards the rim,
-and a wide contact gives less charge than the steady pressure's shape says.
-
-Law: σ → (1 − m) σ + m d(Fσ)/dF at fixed R, with every other mechanism of contact and stress inside the derivative (d33
-multiplies it: preload_dependent_d33's is the tangent coefficient already); for the linear Hertz case
-d(Fσ)/dF = σ + (a/3) ∂σ/∂a, the flat punch's σ. FRF = charge over oscillating force.
-
-Assumptions: m, the mobile fraction, is the same for all recordings; oscillations small against the preload.
-
-Source: Johnson, Contact Mechanics (1985), section 3.4 (an increment of Hertz' pressure is the flat punch's); Seminara
-2018, equations 12 to 16, holds the edge still.
-"""
+"""The mechanism `moving_contact_edge`."""
 
 import numpy as np
 
 from underskin.mechanisms.autodiff import Array, Differentiated
-from underskin.mechanisms.base import Kind, Mechanism, Parameter, Uniform, Values
+from underskin.mechanisms.base import Kind, Mechanism, Parameter, Stage, Uniform, Values
 from underskin.recordings.campaign import Campaign
 from underskin.units import Floats
 
@@ -22,9 +11,25 @@ _STEP = 1e-3  # of the central difference over F, relative; its error is of the 
 
 
 class MovingContactEdge(Mechanism):
-    """See the module."""
+    """A contact edge that moves with a small dynamic force."""
 
     name = "moving_contact_edge"
+    plain = (
+        "The edge of the contact moves with the dynamic force, so the oscillating part of the pressure sits towards "
+        "the rim, and a wide contact gives less charge than the steady pressure's shape says."
+    )
+    law = (
+        "σ → (1 − m) σ + m d(Fσ)/dF at fixed R, with every other mechanism of contact and stress inside the "
+        "derivative (d33 multiplies it: preload_dependent_d33's is the tangent coefficient already); for the linear "
+        "Hertz case d(Fσ)/dF = σ + (a/3) ∂σ/∂a, the flat punch's σ. FRF = charge over oscillating force."
+    )
+    assumptions = "m, the mobile fraction, is the same for all recordings; oscillations small against the preload."
+    source = (
+        "Johnson, Contact Mechanics (1985), section 3.4 (an increment of Hertz' pressure is the flat punch's); "
+        "Seminara 2018, equations 12 to 16, holds the edge still."
+    )
+    stage = Stage.LOAD_INCREMENT
+    order = 10
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
@@ -38,6 +43,7 @@ class MovingContactEdge(Mechanism):
                 prior=Uniform(),
                 scale="linear",
                 limit=0.0,
+                shown=1.0,
                 reason="from an edge pinned by adhesion to one that moves freely: nothing is known beforehand",
             ),
         )

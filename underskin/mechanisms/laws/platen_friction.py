@@ -1,25 +1,29 @@
-"""The plates hold the ends of the compressed cylinder, so that it cannot widen freely and looks too stiff, the more so
-the flatter it is.
+"""The mechanism `platen_friction`."""
 
-Law: nominal stress · (1 + 2 f S²), S = D/4H of the unloaded sample, f from 0 (slips) to 1 (sticks fully).
-
-Assumptions: incompressible; Gent and Lindley's factor for bonded cylinders, which they use with the unloaded shape at
-large compressions as well; f constant. Samples of one shape cannot tell it from the modulus.
-
-Source: Gent & Lindley, Proc. Inst. Mech. Eng. 173 (1959) 111.
-"""
-
-from underskin.mechanisms.base import Kind, Mechanism, Parameter, Uniform, Values
+from underskin.mechanisms.base import Kind, Mechanism, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.recordings.campaign import Campaign
 
 
 class PlatenFriction(Mechanism):
-    """See the module."""
+    """Platens that hold the ends of a compressed cylinder."""
 
     name = "platen_friction"
+    plain = (
+        "The plates hold the ends of the compressed cylinder, so that it cannot widen freely and looks too stiff, the "
+        "more so the flatter it is."
+    )
+    law = "nominal stress · (1 + 2 f S²), S = D/4H of the unloaded sample, f from 0 (slips) to 1 (sticks fully)."
+    assumptions = (
+        "incompressible; Gent and Lindley's factor for bonded cylinders, which they use with the unloaded shape at "
+        "large compressions as well; f constant. Samples of one shape cannot tell it from the modulus."
+    )
+    source = "Gent & Lindley, Proc. Inst. Mech. Eng. 173 (1959) 111."
+    stage = Stage.CURVE
+    order = 20
     kinds = ("compression",)
     axes = ("sample_height_mm", "sample_diameter_mm")
+    figure = ("displacement_mm",)
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """How far the platens hold the sample."""
@@ -32,6 +36,7 @@ class PlatenFriction(Mechanism):
                 prior=Uniform(),
                 scale="linear",
                 limit=0.0,
+                shown=0.5,
                 reason="from well oiled to bonded: nothing is known beforehand",
             ),
         )

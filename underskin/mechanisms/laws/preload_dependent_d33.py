@@ -1,25 +1,31 @@
-"""The preload squeezes the sensor itself and changes how strongly it answers, so d33 comes out different at each
-preload and under each sphere.
-
-Law: d33 = d0 (1 + β T0/(1 + |T0|/Ts)), T0 = 3Fσ/(2πh²) > 0 in compression; linear as Ts → ∞, saturating at 1 + β Ts.
-
-Assumptions: d33(T0) is the tangent coefficient, felt by the small oscillation; T0 is the mean over the sensor, of the
-static σ at its own offset. The same law for all sensors.
-
-Source: Seminara 2018, section 3.2 (22 pC/N at 3 N against 14 pC/N at 1 N on the array).
-"""
+"""The mechanism `preload_dependent_d33`."""
 
 import numpy as np
 
 from underskin.mechanisms.autodiff import Differentiated, chain
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.recordings.campaign import Campaign
 
 
 class PreloadDependentD33(Mechanism):
-    """See the module."""
+    """A d33 that depends on the static stress on the sensor."""
 
     name = "preload_dependent_d33"
+    plain = (
+        "The preload squeezes the sensor itself and changes how strongly it answers, so d33 comes out different at "
+        "each preload and under each sphere."
+    )
+    law = (
+        "d33 = d0 (1 + β T0/(1 + |T0|/Ts)), T0 = 3Fσ/(2πh²) > 0 in compression; linear as Ts → ∞, saturating at 1 + β "
+        "Ts."
+    )
+    assumptions = (
+        "d33(T0) is the tangent coefficient, felt by the small oscillation; T0 is the mean over the sensor, of the "
+        "static σ at its own offset. The same law for all sensors."
+    )
+    source = "Seminara 2018, section 3.2 (22 pC/N at 3 N against 14 pC/N at 1 N on the array)."
+    stage = Stage.SENSOR
+    order = 10
     axes = ("preload_n", "indenter_radius_mm", "position_mm", "sensor")
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
@@ -33,6 +39,7 @@ class PreloadDependentD33(Mechanism):
                 prior=Normal(0.0, 3.0),
                 scale="linear",
                 limit=0.0,
+                shown=2.0,
                 reason="the paper's array, 14 to 22 pC/N from 1 to 3 N, needs 5 to 6 per MPa; ceramics about -0.01",
             ),
             Parameter(
@@ -43,6 +50,7 @@ class PreloadDependentD33(Mechanism):
                 prior=Normal(0.0, 1.5),
                 scale="log",
                 limit=None,
+                shown=1.0,
                 reason="no saturation has been published; 1 MPa is ten times the stress of a firm touch",
             ),
         )

@@ -1,17 +1,9 @@
-"""The sensor's material follows a change only with delay, so the response falls with rising frequency and the charge
-lags behind the force.
-
-Law: (iω/ω_ref)^(−n) · (1 + s/(1 + iω/ω_s)), n ≥ 0, s ≥ 0, ω_ref = 2π · 30 Hz: a power law, a step, or both.
-
-Assumptions: linear, the same for all sensors and preloads; causal, so that real and imaginary part belong together.
-
-Source: Jonscher, Dielectric Relaxation in Solids (1983), chapters 3 and 5 (Debye's step, universal power law).
-"""
+"""The mechanism `sensor_relaxation`."""
 
 import numpy as np
 
 from underskin.mechanisms.autodiff import Differentiated, exp
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.recordings.campaign import Campaign
@@ -20,9 +12,20 @@ _REFERENCE = 30.0  # Hz
 
 
 class SensorRelaxation(Mechanism):
-    """See the module."""
+    """Dielectric relaxation of the sensor's material."""
 
     name = "sensor_relaxation"
+    plain = (
+        "The sensor's material follows a change only with delay, so the response falls with rising frequency and the "
+        "charge lags behind the force."
+    )
+    law = "(iω/ω_ref)^(−n) · (1 + s/(1 + iω/ω_s)), n ≥ 0, s ≥ 0, ω_ref = 2π · 30 Hz: a power law, a step, or both."
+    assumptions = (
+        "linear, the same for all sensors and preloads; causal, so that real and imaginary part belong together."
+    )
+    source = "Jonscher, Dielectric Relaxation in Solids (1983), chapters 3 and 5 (Debye's step, universal power law)."
+    stage = Stage.LINES
+    order = 20
     axes = ("frequency_hz", "phase")
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
@@ -36,6 +39,7 @@ class SensorRelaxation(Mechanism):
                 prior=Normal(0.0, 0.08),
                 scale="linear",
                 limit=0.0,
+                shown=0.03,
                 reason="tan δ of PVDF and its copolymers is 0.02 to 0.2, and n is 2/π of it",
             ),
             Parameter(
@@ -46,6 +50,7 @@ class SensorRelaxation(Mechanism):
                 prior=Normal(0.0, 0.4),
                 scale="linear",
                 limit=0.0,
+                shown=0.1,
                 reason="a relaxation inside the band changes d33 by some tens of percent",
             ),
             Parameter(
@@ -56,6 +61,7 @@ class SensorRelaxation(Mechanism):
                 prior=Normal(3.0, 1.5),
                 scale="log",
                 limit=None,
+                shown=20.0,
                 reason="it must lie in or near the band of measurement to be seen; 20 Hz within a factor of 4.5",
             ),
         )

@@ -1,27 +1,33 @@
-"""The sensors are not alike, so the same press gives each of them a charge that is off by a factor of its own, in all
-of its recordings.
+"""The mechanism `sensor_spread`."""
 
-Law: d33 of sensor j = d33 · e^(g_j), g_j normal with the standard deviation `spread`.
-
-Assumptions: the gains are the sensors' own, constant over the campaign; they are marginalised by whoever fits, as a
-random effect along the model's response that a sensor's recordings share. Without this mechanism the spread is 1 %.
-
-Source: Seminara 2018, section 3.2 (d33 over the sensors of an array); a gain is positive, so its logarithm is normal.
-"""
-
-from underskin.mechanisms.autodiff import Differentiated
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.frf_design import frf_recordings
 from underskin.recordings.campaign import Campaign
 
 
 class SensorSpread(Mechanism):
-    """See the module."""
+    """Sensors with different d33."""
 
     name = "sensor_spread"
+    plain = (
+        "The sensors are not alike, so the same press gives each of them a charge that is off by a factor of its own, "
+        "in all of its recordings."
+    )
+    law = "d33 of sensor j = d33 · e^(g_j), g_j normal with the standard deviation `spread`."
+    assumptions = (
+        "the gains are the sensors' own, constant over the campaign; they are marginalised by whoever fits, as a "
+        "random effect along the model's response that a sensor's recordings share. Without this mechanism the spread "
+        "is 1 %."
+    )
+    source = (
+        "Seminara 2018, section 3.2 (d33 over the sensors of an array); a gain is positive, so its logarithm is normal."
+    )
+    stage = Stage.SENSOR
+    order = 20
     axes = ("sensor",)
     needs = "recordings of at least two sensors"
+    moves_predictions = False
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The spread."""
@@ -34,6 +40,8 @@ class SensorSpread(Mechanism):
                 prior=Normal(-2.5, 0.9),
                 scale="log",
                 limit=SENSOR_SPREAD,
+                shown=0.12,
+                acts_on="gain_spread",
                 reason="poled films and printed electrodes vary by some to 30 percent; 8 % within a factor of 2.5",
             ),
         )
@@ -43,7 +51,3 @@ class SensorSpread(Mechanism):
         if len({entry.sensor for entry in frf_recordings(campaign)}) < 2:
             return "all recordings are of one sensor"
         return None
-
-    def spread(self, values: Values) -> Differentiated:
-        """The spread."""
-        return values["spread"]

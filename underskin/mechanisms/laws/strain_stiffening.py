@@ -1,22 +1,9 @@
-"""The elastomer gets stiffer the more it is deformed, so at high preloads and under small spheres the contact grows
-less, and the force rises more, than a constant modulus would have it.
-
-Law: FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved together.
-Curves: Yeoh's law, nominal stress (E/3)(λ⁻² − λ)(1 + 2 c2 I + 3 c3 I²), I = λ² + 2/λ − 3, λ = 1 − strain; under a
-sphere its secant ratio at ε multiplies the force.
-
-Assumptions: incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative strain; for
-FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0 a curve is neo-Hookean, not
-a straight line: the base model is recovered at small strain.
-
-Source: Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of Metals (1951), for 0.2 a/R; Lin, Dimitriadis
-& Horkay, J. Biomech. Eng. 129 (2007) 904.
-"""
+"""The mechanism `strain_stiffening`."""
 
 import numpy as np
 
 from underskin.mechanisms.autodiff import Array, chain
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.recordings.campaign import Campaign
@@ -32,6 +19,7 @@ _COEFFICIENT = Parameter(
     prior=Normal(1.0, 4.0),
     scale="linear",
     limit=0.0,
+    shown=5.0,
     reason="1 for a neo-Hookean solid, 1.1 to 1.2 for the silicones of docs/mechanisms.md; filled elastomers more",
 )
 _YEOH = (
@@ -43,6 +31,7 @@ _YEOH = (
         prior=Normal(0.0, 0.3),
         scale="linear",
         limit=None,
+        shown=0.1,
         reason="c2 of the silicones of docs/mechanisms.md: -0.03 to 0.09 over their range, -0.2 to 0.6 below 40 %",
     ),
     Parameter(
@@ -53,17 +42,40 @@ _YEOH = (
         prior=Normal(0.0, 0.1),
         scale="linear",
         limit=None,
+        shown=0.02,
         reason="c3 of the silicones of docs/mechanisms.md: 0 to 0.03 over their range, -0.4 to 0.1 below 40 %",
     ),
 )
 
 
 class StrainStiffening(Mechanism):
-    """See the module."""
+    """A modulus that grows with strain."""
 
     name = "strain_stiffening"
+    plain = (
+        "The elastomer gets stiffer the more it is deformed, so at high preloads and under small spheres the contact "
+        "grows less, and the force rises more, than a constant modulus would have it."
+    )
+    law = (
+        "FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved "
+        "together. Curves: Yeoh's law, nominal stress (E/3)(λ⁻² − λ)(1 + 2 c2 I + 3 c3 I²), I = λ² + 2/λ − 3, λ = 1 − "
+        "strain; under a sphere its secant ratio at ε multiplies the force."
+    )
+    assumptions = (
+        "incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative strain; for "
+        "FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0 a curve is "
+        "neo-Hookean, not a straight line: the base model is recovered at small strain."
+    )
+    source = (
+        "Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of Metals (1951), for 0.2 a/R; Lin, "
+        "Dimitriadis & Horkay, J. Biomech. Eng. 129 (2007) 904."
+    )
+    stage = Stage.MATERIAL
+    order = 40
     kinds = ("frf", "indentation", "compression")
     axes = ("preload_n", "indenter_radius_mm", "displacement_mm")
+    imitated_by_seating = True
+    figure = ("preload_n", "displacement_mm")
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The stiffening coefficient, or for curves the law's constants C20/C10 and C30/C10."""

@@ -1,22 +1,23 @@
-"""The thickness that was declared is not the skin's, a wrong number rather than missing physics, so the pressure
-spreads out more or less on its way to the sensors than computed, in every recording.
+"""The mechanism `thickness_error`."""
 
-Law: h = declared h · factor; it acts through a/h, rT/h and e/h: everything.
-
-Assumptions: one factor for the whole skin, in all recordings.
-
-Source: Seminara 2018, equations 15 and 16: h is the unit of every length.
-"""
-
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.recordings.campaign import Campaign
 
 
 class ThicknessError(Mechanism):
-    """See the module."""
+    """A declared thickness that is wrong by a factor."""
 
     name = "thickness_error"
+    plain = (
+        "The thickness that was declared is not the skin's, a wrong number rather than missing physics, so the "
+        "pressure spreads out more or less on its way to the sensors than computed, in every recording."
+    )
+    law = "h = declared h · factor; it acts through a/h, rT/h and e/h: everything."
+    assumptions = "one factor for the whole skin, in all recordings."
+    source = "Seminara 2018, equations 15 and 16: h is the unit of every length."
+    stage = Stage.DECLARED
+    order = 20
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     largest_stretch = 1.55
 
@@ -31,6 +32,7 @@ class ThicknessError(Mechanism):
                 prior=Normal(0.0, 0.12),
                 scale="log",
                 limit=1.0,
+                shown=0.9,
                 reason="a cast layer differs from its mould by shrinkage, meniscus and tilt: some to 20 percent",
             ),
         )

@@ -1,27 +1,31 @@
-"""Charge and force are not sampled at the same instant, so the phase goes off in proportion to frequency while the size
-of the response stays.
-
-Law: FRF · exp(−iωt0), t0 the delay.
-
-Assumptions: one constant delay for all recordings; positive where the charge comes later than the force.
-
-Source: a shift in time is a phase linear in frequency (Bendat & Piersol, Random Data, 4th ed., 2010, section 5.1).
-"""
+"""The mechanism `timing_delay`."""
 
 import numpy as np
 
 from underskin.mechanisms.autodiff import Differentiated, exp
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.recordings.campaign import Campaign
 
 
 class TimingDelay(Mechanism):
-    """See the module."""
+    """A constant delay between the channels of charge and force."""
 
     name = "timing_delay"
+    plain = (
+        "Charge and force are not sampled at the same instant, so the phase goes off in proportion to frequency while "
+        "the size of the response stays."
+    )
+    law = "FRF · exp(−iωt0), t0 the delay."
+    assumptions = "one constant delay for all recordings; positive where the charge comes later than the force."
+    source = (
+        "a shift in time is a phase linear in frequency (Bendat & Piersol, Random Data, 4th ed., 2010, section 5.1)."
+    )
+    stage = Stage.LINES
+    order = 40
     axes = ("phase", "frequency_hz")
+    figure = ("phase",)
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The delay."""
@@ -34,6 +38,7 @@ class TimingDelay(Mechanism):
                 prior=Normal(0.0, 300.0),
                 scale="linear",
                 limit=0.0,
+                shown=300.0,
                 reason="multiplexed converters and their filters delay by a few samples at 1 to 50 kS/s",
             ),
         )

@@ -55,6 +55,7 @@ class Composition:
             for (name, group), start in zip(own.items(), starts[:-1], strict=True)
         }
         self._nuisances = {parameter.name: int(starts[-1]) + index for index, parameter in enumerate(nuisances)}
+        self._gain_spreads = {entry.name for entry in self.parameters if entry.acts_on == "gain_spread"}
         self._log = np.array([parameter.scale == "log" for parameter in self.parameters])
 
     def values(self, fit: Floats, further: int = 0) -> tuple[dict[str, Values], Values, list[Differentiated]]:
@@ -78,10 +79,10 @@ class Composition:
     def sensor_spread(self, fit: Floats) -> tuple[float, Floats]:
         """The spread that a mechanism frees, or the usual one."""
         own, _, _ = self.values(fit)
-        for mechanism in self.mechanisms:
-            spread = mechanism.spread(own[mechanism.name])
-            if spread is not None:
-                return float(spread.value[0]), spread.slopes[:, 0]
+        for values in own.values():
+            for name, value in values.items():
+                if name in self._gain_spreads:
+                    return float(value.value[0]), value.slopes[:, 0]
         return SENSOR_SPREAD, np.zeros(len(self.parameters))
 
 

@@ -22,7 +22,7 @@ from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign, Indices, largest_offset
 from underskin.mechanisms.models.nuisances import FRF_NUISANCES
 from underskin.mechanisms.models.off_centre_response import PROFILE_END, offset_sigma
-from underskin.mechanisms.models.pickup import Pickup
+from underskin.mechanisms.models.pickup import Pickup, together
 from underskin.mechanisms.models.sigma_curves import layer_of, sigma_curves
 from underskin.physics.contact_curves import ContactCurves
 from underskin.physics.elastic_layer import Layer
@@ -43,9 +43,9 @@ class FrfModel:
         self.names = tuple(mechanism.name for mechanism in mechanisms)
         self.parameters = self._composition.parameters
         self._mechanisms = self._composition.mechanisms
-        axes = {axis for mechanism in mechanisms for axis in mechanism.contact_axes}
+        fields = {field for mechanism in mechanisms for field in mechanism.needs_fields}
         neighbours = any(mechanism.needs_neighbours for mechanism in mechanisms)
-        self.design = design = FrfDesign.of(campaign, axes, neighbours=neighbours)
+        self.design = design = FrfDesign.of(campaign, fields, neighbours=neighbours)
         self.recording = design.recording
         self.sensor: Indices | None = design.sensor
         skin = campaign.skin
@@ -60,7 +60,7 @@ class FrfModel:
         self._needs_stiffness = any(mechanism.needs_stiffness for mechanism in mechanisms)
         self._last_layer: tuple[Layer, ContactCurves] | None = None
         pickups = [mechanism.pickup(campaign, design) for mechanism in self._mechanisms]
-        self.pickup: Pickup | None = next((pickup for pickup in pickups if pickup is not None), None)
+        self.pickup: Pickup | None = together([pickup for pickup in pickups if pickup is not None])
         self._force, self._increments = _force_nodes(self._mechanisms, design)
         self.valid = self._declared_inside(table)[design.point][design.recording]
 

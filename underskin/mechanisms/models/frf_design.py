@@ -47,8 +47,8 @@ class FrfDesign:
     row_frequency: Floats
 
     @classmethod
-    def of(cls, campaign: Campaign, contact_axes: Collection[str], *, neighbours: bool) -> "FrfDesign":
-        """The design; `contact_axes` names what else tells contacts apart: "dwell_s", "dynamic_force_n"."""
+    def of(cls, campaign: Campaign, fields: Collection[str], *, neighbours: bool) -> "FrfDesign":
+        """The design; `fields` may name what else tells contacts apart: "dwell_s", "dynamic_force_n"."""
         recordings = frf_recordings(campaign)
         sensor_ids = tuple(sensor.id for sensor in campaign.skin.sensors)
         number = {name: index for index, name in enumerate(sensor_ids)}
@@ -60,7 +60,7 @@ class FrfDesign:
                 for own, entry in zip(sensor, recordings, strict=True)
             ]
         )
-        keys = np.array([_contact_key(entry, contact_axes) for entry in recordings])
+        keys = np.array([_contact_key(entry, fields) for entry in recordings])
         contacts, contact = np.unique(keys, axis=0, return_inverse=True)
         force, radius, dynamic_force, dwell = contacts.T
         pairs = _neighbours(places) if neighbours else np.zeros((len(places), len(places)), dtype=bool)
@@ -132,9 +132,9 @@ def _neighbours(places: Floats) -> NDArray[np.bool_]:
     return near
 
 
-def _contact_key(entry: FrfRecording, contact_axes: Collection[str]) -> tuple[float, float, float, float]:
-    dwell = entry.dwell_s if "dwell_s" in contact_axes and entry.dwell_s is not None else 0.0
-    dynamic_force = entry.dynamic_force_n if "dynamic_force_n" in contact_axes else 0.0
+def _contact_key(entry: FrfRecording, fields: Collection[str]) -> tuple[float, float, float, float]:
+    dwell = entry.dwell_s if "dwell_s" in fields and entry.dwell_s is not None else 0.0
+    dynamic_force = entry.dynamic_force_n if "dynamic_force_n" in fields else 0.0
     return entry.preload_n, float(to_si("indenter_radius_mm", entry.indenter_radius_mm)), dynamic_force, dwell
 
 

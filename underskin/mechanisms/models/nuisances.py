@@ -18,6 +18,7 @@ D33 = Parameter(
     prior=Normal(float(np.log(15.0)), 1.5),
     scale="log",
     limit=None,
+    proportional=True,
     reason="what is measured; PVDF and its copolymers have 5 to 40 pC/N, ceramics up to some hundred",
 )
 YOUNGS_MODULUS = Parameter(
@@ -58,6 +59,7 @@ def modulus_parameter(skin: SkinDescription, estimates: Sequence[float]) -> Para
         prior=Normal(float(np.log(middle)), _WIDE_SD),
         scale="log",
         limit=None,
+        proportional=True,
         reason="what is measured; wide around the base model's own fit",
     )
 

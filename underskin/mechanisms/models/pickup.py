@@ -1,12 +1,12 @@
 """Charge that comes from elsewhere than the skin: random on each row, so it moves the covariance and not the mean."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from underskin.mechanisms.models.frf_design import Indices
 from underskin.units import Floats
-
-PICKUP_NAMES = ("pickup_charge", "pickup_width", "pickup_harmonics")
 
 
 @dataclass(frozen=True)
@@ -18,3 +18,19 @@ class Pickup:
 
     rows: Indices
     deviation: Callable[[Mapping[str, Floats]], Floats]
+
+
+def together(pickups: Sequence[Pickup]) -> Pickup | None:
+    """Independent charges as one: their variances add on the rows that several reach; None where there is none."""
+    if len(pickups) < 2:
+        return pickups[0] if pickups else None
+    rows = np.unique(np.concatenate([pickup.rows for pickup in pickups]))
+
+    def deviation(values: Mapping[str, Floats]) -> Floats:
+        each = [(np.searchsorted(rows, pickup.rows), pickup.deviation(values)) for pickup in pickups]
+        variance = np.zeros((*np.broadcast_shapes(*(sd.shape[:-1] for _, sd in each)), len(rows)))
+        for places, sd in each:
+            variance[..., places] += sd**2
+        return np.sqrt(variance)
+
+    return Pickup(rows, deviation)

@@ -1,8 +1,15 @@
-"""The formats that are read, each by a module of its own, and how a file is told to be of one: by its content."""
+"""The file formats that are read: those of this package, by a file's content, and those of others, by its name.
+
+Another package adds a format through an entry point of the group `underskin.readers`, which names a `FileFormat`.
+"""
 
 import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
 from typing import Any, BinaryIO
 
+from underskin import extensions
 from underskin.errors import FileError
 from underskin.recordings.channels import Contents
 from underskin.recordings.readers import csv_template, lvm_file, text
@@ -18,6 +25,8 @@ MODULES = {
     "HDF5": "hdf5_file",
 }
 BINARY = ("TDMS", "UFF", "MATLAB", "HDF5")
+GROUP = "underskin.readers"
+_SUFFIXES = (".json", ".csv", ".tdms", ".lvm", ".uff", ".unv", ".mat", ".h5", ".hdf5")  # of the formats of MODULES
 _HEAD_BYTES = 4096
 _FOREIGN = {
     b"TDSh": "a TDMS index: send the .tdms file itself",
@@ -34,8 +43,69 @@ _STARTS = {
 }
 
 
+@dataclass(frozen=True)
+class FileFormat:
+    """A file format of another package.
+
+    `name` is what it is called in messages. Files whose names end with one of the `suffixes` (such as ".dat") are read
+    by `read`, which gets the open file and its name, and answers with its channels or raises FileError. It runs in a
+    process of its own that has limits on memory and time.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    read: Callable[[BinaryIO, str], Contents]
+
+
+@cache
+def formats_of_other_packages() -> Mapping[str, FileFormat]:
+    """By name.
+
+    Raises
+    ------
+    ExtensionError
+        Where one cannot be used: names its package, the format and the field.
+    """
+    formats: dict[str, FileFormat] = {}
+    for extension in extensions.load(GROUP):
+        _check(extension, formats)
+        formats[extension.value.name] = extension.value
+    return formats
+
+
+def _check(extension: extensions.Extension, others: Mapping[str, FileFormat]) -> None:
+    new = extension.value
+    if not isinstance(new, FileFormat):
+        raise extension.refused("the entry point", f"must name a {FileFormat.__module__}.FileFormat")
+    if not isinstance(new.name, str) or not new.name.strip():
+        raise extension.refused("name", f"{new.name!r}: must be a text")
+    if new.name in (*MODULES, *others):
+        raise extension.refused("name", f"{new.name!r}: is taken", new.name)
+    if not isinstance(new.suffixes, tuple) or not new.suffixes:
+        raise extension.refused("suffixes", f"{new.suffixes!r}: must be a tuple of at least one", new.name)
+    taken = {*_SUFFIXES, *(suffix for other in others.values() for suffix in other.suffixes)}
+    for suffix in new.suffixes:
+        if not isinstance(suffix, str) or not suffix.startswith(".") or suffix != suffix.lower() or len(suffix) < 2:
+            raise extension.refused("suffixes", f"{suffix!r}: must be lower case and begin with a point", new.name)
+        if suffix in taken:
+            raise extension.refused("suffixes", f"{suffix!r}: is taken by another format", new.name)
+    if not callable(new.read):
+        raise extension.refused("read", f"{new.read!r}: must be a function", new.name)
+
+
+def is_parsed_apart(name: str) -> bool:
+    """Whether files of a format are parsed in a process of their own, whatever their size."""
+    return name in BINARY or name not in MODULES
+
+
 def detect(stream: BinaryIO, file: str) -> str:
-    """The format of a file, a key of MODULES; raises FileError where it is none of them."""
+    """The format of a file: one of another package by the name's end, else a key of MODULES by the content.
+
+    Raises FileError where it is none of them.
+    """
+    for other in formats_of_other_packages().values():
+        if file.lower().endswith(other.suffixes):
+            return other.name
     stream.seek(0)
     head = stream.read(_HEAD_BYTES)
     if not head:
@@ -72,5 +142,14 @@ def parse(name: str, stream: BinaryIO, file: str) -> Contents | dict[str, Any]:
 
     Raises FileError that names the place; MemoryError where there is not enough of it.
     """
-    module = importlib.import_module(f"underskin.recordings.readers.{MODULES[name]}")
-    return module.read(stream, file)
+    if name in MODULES:
+        module = importlib.import_module(f"underskin.recordings.readers.{MODULES[name]}")
+        return module.read(stream, file)
+    stream.seek(0)
+    contents = formats_of_other_packages()[name].read(stream, file)
+    if not isinstance(contents, Contents):
+        raise FileError(file, "", f"the reader of {name} must answer with Contents")
+    for channel in (channel for block in contents.blocks for channel in block.channels):
+        if getattr(channel.values, "ndim", None) != 1 or channel.values.dtype.kind not in "iufc":
+            raise FileError(file, f"channel {channel.name}", "its values must be an array of numbers with one axis")
+    return contents

@@ -1,0 +1,259 @@
+"""Mechanisms and file formats of other packages: what is refused when they are loaded, and in which words."""
+
+import io
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from underskin import ExtensionError, FileError, InvalidInput, extensions
+from underskin.mechanisms import CATALOGUE, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
+from underskin.mechanisms.autodiff import Differentiated
+from underskin.mechanisms.contract import check
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.models.pickup import Pickup, together
+from underskin.mechanisms.registry import GROUP, built_in
+from underskin.recordings.campaign import Campaign
+from underskin.recordings.readers import formats
+
+EXAMPLE = Path(__file__).parent.parent / "examples" / "lab-skin"
+
+
+class LowPass(Mechanism):
+    """One that keeps the contract; a test changes one attribute or one field of its parameter."""
+
+    name = "low_pass"
+    plain = "The response falls."
+    law = "FRF / (1 + i f/corner)"
+    assumptions = "one pole"
+    source = "a book"
+    stage = Stage.LINES
+    axes = ("frequency_hz",)
+    changes: Mapping[str, Any] = {}
+
+    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        fields: dict[str, Any] = {
+            "name": "upper_corner",
+            "unit": "Hz",
+            "low": 10.0,
+            "high": 1e5,
+            "prior": Normal(7.0, 1.5),
+            "scale": "log",
+            "limit": None,
+            "reason": "a guess",
+        }
+        return (Parameter(**{name: value for name, value in (fields | self.changes).items() if value != "gone"}),)
+
+    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
+        return 1.0 / (1.0 + 1j * design.line_frequency / values["upper_corner"])
+
+
+def changed(base: type[Mechanism] = LowPass, **attributes: Any) -> Mechanism:
+    return type("Changed", (base,), attributes)()
+
+
+def test_one_that_keeps_the_contract_is_taken() -> None:
+    check(LowPass(), built_in())
+
+
+@pytest.mark.parametrize(
+    ("attributes", "field", "allowed"),
+    [
+        ({"name": "Low pass"}, "name", "lower case"),
+        ({"name": "adhesion"}, "name", "taken"),
+        ({"law": " "}, "law", "text"),
+        ({"source": None}, "source", "text"),
+        ({"stage": "lines"}, "stage", "LINES"),
+        ({"stage": Stage.SENSOR}, "stage", "must be LINES, since on_lines is overridden"),
+        ({"order": "last"}, "order", "whole number"),
+        ({"kinds": ()}, "kinds", "indentation"),
+        ({"axes": ("temperature_c",)}, "axes", "preload_n"),
+        ({"needs_fields": ("day",)}, "needs_fields", "dwell_s"),
+        ({"moves_predictions": False}, "moves_predictions", "True"),
+        ({"on_lines": Mechanism.on_lines}, "law", "none is overridden"),
+        ({"changes": {"name": "d33"}}, "parameters[d33].name", "the base model"),
+        ({"changes": {"name": "corner"}}, "parameters[corner].name", "amplifier_high_pass"),
+        ({"changes": {"unit": "furlong"}}, "parameters[upper_corner].unit", "1/MPa"),
+        ({"changes": {"unit": None}}, "parameters[upper_corner].unit", "pC/N"),
+        ({"changes": {"unit": "gone"}}, "parameters", "unit"),
+        ({"changes": {"low": "gone"}}, "parameters", "low"),
+        ({"changes": {"prior": "gone"}}, "parameters", "prior"),
+        ({"changes": {"prior": None}}, "parameters[upper_corner].prior", "Uniform"),
+        ({"changes": {"prior": Normal(1e6, 1.0)}}, "parameters[upper_corner].prior", "mass"),
+        ({"changes": {"low": 0.0}}, "parameters[upper_corner].low", "above 0"),
+        ({"changes": {"high": float("inf")}}, "parameters[upper_corner].high", "finite"),
+        ({"changes": {"high": 1.0}}, "parameters[upper_corner].high", "above low"),
+        ({"changes": {"scale": "square"}}, "parameters[upper_corner].scale", "linear or log"),
+        ({"changes": {"limit": "0"}}, "parameters[upper_corner].limit", "number"),
+        ({"changes": {"reason": ""}}, "parameters[upper_corner].reason", "text"),
+        ({"changes": {"acts_on": "line_variance"}}, "parameters[upper_corner].acts_on", "mean"),
+        ({"on_lines": lambda *_: 1 / 0}, "law (frf) at the priors' centres", "ZeroDivisionError"),
+        ({"parameters": lambda *_: None}, "parameters", "tuple"),
+    ],
+)
+def test_the_field_that_breaks_the_contract_is_named(attributes: dict[str, Any], field: str, allowed: str) -> None:
+    with pytest.raises(InvalidInput) as refusal:
+        check(changed(**attributes), built_in())
+    assert refusal.value.field == field
+    assert allowed in refusal.value.allowed
+
+
+def test_a_law_that_is_not_finite_at_a_bound_is_refused_there() -> None:
+    class Diverging(LowPass):
+        def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+            """From a limit at which the law divides by zero."""
+            return (Parameter("gap", "-", 0.0, 1.0, Uniform(), "linear", None, "a guess"),)
+
+        def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
+            return values["gap"] / (values["gap"] * design.line_frequency)
+
+    with pytest.raises(InvalidInput, match="not finite") as refusal:
+        check(Diverging(), built_in())
+    assert refusal.value.field == "law (frf) at gap = 0 -"
+
+
+def test_a_second_spread_of_the_sensors_gains_is_refused() -> None:
+    attributes = {
+        "stage": Stage.SENSOR,
+        "moves_predictions": False,
+        "on_lines": Mechanism.on_lines,
+        "changes": {"acts_on": "gain_spread"},
+    }
+    check(changed(**attributes))
+    with pytest.raises(InvalidInput, match="is taken by sensor_spread"):
+        check(changed(**attributes), built_in())
+
+
+def test_charges_of_several_mechanisms_add_their_variances() -> None:
+    one = Pickup(np.array([0, 2]), lambda values: 3.0 * values["q"] * np.ones(2))
+    two = Pickup(np.array([2, 5]), lambda values: 4.0 * values["q"] * np.ones(2))
+    both = together([one, two])
+    assert both is not None
+    assert both.rows.tolist() == [0, 2, 5]
+    assert both.deviation({"q": np.array([1.0])}) == pytest.approx([3, 5, 4])
+    assert both.deviation({"q": np.array([[1.0], [2.0]])}) == pytest.approx(np.array([[3, 5, 4], [6, 10, 8]]))
+    assert together([one]) is one
+    assert together([]) is None
+
+
+def installed(folder: Path, group: str, target: str, source: str) -> Path:
+    """A package as an installer leaves it."""
+    (folder / "lab_tools-2.1.dist-info").mkdir(parents=True)
+    (folder / "lab_tools.py").write_text(source, encoding="utf-8")
+    (folder / "lab_tools-2.1.dist-info" / "METADATA").write_text("Name: lab-tools\nVersion: 2.1\n")
+    (folder / "lab_tools-2.1.dist-info" / "entry_points.txt").write_text(f"[{group}]\nthing = lab_tools:{target}\n")
+    return folder
+
+
+def underskin(*arguments: str, path: Path, data: Path) -> "subprocess.CompletedProcess[str]":
+    environment = os.environ | {"UNDERSKIN_DATA": str(data)}
+    environment["PYTHONPATH"] = os.pathsep.join([str(path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    command = [sys.executable, "-m", "underskin", *arguments]
+    return subprocess.run(command, env=environment, capture_output=True, text=True)
+
+
+TAKEN = """
+from underskin.mechanisms.laws.ageing import Ageing
+class Other(Ageing):
+    name = "ageing"
+"""
+
+
+@pytest.mark.parametrize("command", [["diagnose", "examples/campaigns/2017-07.json"], ["serve", "--port", "0"]])
+def test_the_command_line_and_the_start_of_the_service_say_what_is_refused(command: list[str], tmp_path: Path) -> None:
+    folder = installed(tmp_path / "site", GROUP, "Other", TAKEN)
+    if command[0] == "diagnose":
+        command = [*command, "--output-dir", str(tmp_path / "reports")]
+    answer = underskin(*command, path=folder, data=tmp_path / "data")
+    assert answer.returncode == (1 if command[0] == "serve" else 2)
+    assert "'ageing' of the package lab-tools 2.1 cannot be used: name: 'ageing': is taken by another mechanism" in (
+        answer.stderr
+    )
+    assert "Traceback" not in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("source", "field", "reason"),
+    [
+        ("1 / 0", "the entry point lab_tools:Other", "ZeroDivisionError: division by zero"),
+        ("", "the entry point lab_tools:Other", "AttributeError: module 'lab_tools' has no attribute 'Other'"),
+    ],
+)
+def test_a_module_that_cannot_be_imported_is_refused(
+    source: str, field: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(installed(tmp_path, "underskin.test", "Other", source))
+    monkeypatch.delitem(sys.modules, "lab_tools", raising=False)
+    with pytest.raises(ExtensionError) as refusal:
+        extensions.load("underskin.test")
+    assert (refusal.value.package, refusal.value.name) == ("lab-tools 2.1", "thing")
+    assert (refusal.value.field, refusal.value.reason) == (field, reason)
+    assert str(pickle.loads(pickle.dumps(refusal.value))) == str(refusal.value)
+
+
+def test_without_other_packages_the_catalogue_is_that_of_this_one() -> None:
+    assert tuple(CATALOGUE.values()) == built_in()
+    assert CATALOGUE.packages == {}
+
+
+@pytest.fixture
+def format_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Installs a file format and loads it."""
+
+    def load(source: str) -> Mapping[str, formats.FileFormat]:
+        head = "from underskin.recordings.channels import Block, Channel, Contents\nfrom underskin.recordings.readers.formats import FileFormat\n"
+        monkeypatch.syspath_prepend(installed(tmp_path, formats.GROUP, "THING", head + source))
+        monkeypatch.delitem(sys.modules, "lab_tools", raising=False)
+        formats.formats_of_other_packages.cache_clear()
+        return formats.formats_of_other_packages()
+
+    yield load
+    formats.formats_of_other_packages.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("source", "field", "reason"),
+    [
+        ("THING = print", "the entry point", "FileFormat"),
+        ("THING = FileFormat('', ('.lab',), print)", "name", "text"),
+        ("THING = FileFormat('CSV', ('.lab',), print)", "name", "taken"),
+        ("THING = FileFormat('lab', (), print)", "suffixes", "at least one"),
+        ("THING = FileFormat('lab', ('lab',), print)", "suffixes", "point"),
+        ("THING = FileFormat('lab', ('.csv',), print)", "suffixes", "taken"),
+        ("THING = FileFormat('lab', ('.lab',), 3)", "read", "function"),
+    ],
+)
+def test_a_file_format_that_cannot_be_used_is_refused(source: str, field: str, reason: str, format_of: Any) -> None:
+    with pytest.raises(ExtensionError, match=reason) as refusal:
+        format_of(source)
+    assert refusal.value.package == "lab-tools 2.1"
+    assert refusal.value.field == field
+
+
+def test_a_file_is_read_by_the_format_of_its_suffix(format_of: Any) -> None:
+    format_of(
+        "THING = FileFormat('lab', ('.lab',), lambda stream, file: Contents((), {'said': stream.read().decode()}))"
+    )
+    stream = io.BytesIO(b"anything")
+    assert formats.detect(stream, "Monday.LAB") == "lab"
+    assert formats.is_parsed_apart("lab")
+    answer = formats.parse("lab", stream, "Monday.LAB")
+    assert not isinstance(answer, dict)
+    assert answer.properties == {"said": "anything"}
+
+
+@pytest.mark.parametrize(
+    ("answer", "reason"),
+    [("None", "must answer with Contents"), ("Contents((Block('1', (Channel('F', 'N', [1.0]),)),))", "one axis")],
+)
+def test_what_a_reader_of_another_package_answers_is_checked(answer: str, reason: str, format_of: Any) -> None:
+    format_of(f"THING = FileFormat('lab', ('.lab',), lambda stream, file: {answer})")
+    with pytest.raises(FileError, match=reason):
+        formats.parse("lab", io.BytesIO(b"x"), "a.lab")

@@ -1,0 +1,44 @@
+"""What other installed packages add through an entry-point group: mechanisms, file formats."""
+
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from underskin.errors import ExtensionError
+
+
+@dataclass(frozen=True)
+class Extension:
+    """What one entry point names, and the package that it comes from, with its version."""
+
+    package: str
+    name: str
+    value: Any
+
+    def refused(self, field: str, reason: str, name: str | None = None) -> ExtensionError:
+        """The error that says why it cannot be used; `name` where it is called otherwise than its entry point."""
+        return ExtensionError(self.package, name or self.name, field, reason)
+
+
+def load(group: str) -> list[Extension]:
+    """The extensions of a group, by package and name.
+
+    Raises
+    ------
+    ExtensionError
+        Where an entry point cannot be imported.
+    """
+    return sorted(map(_loaded, entry_points(group=group)), key=lambda entry: (entry.package, entry.name))
+
+
+def _loaded(entry: EntryPoint) -> Extension:
+    package = "a package without a name" if entry.dist is None else f"{entry.dist.name} {entry.dist.version}"
+    try:
+        return Extension(package, entry.name, entry.load())
+    except Exception as error:  # it may do anything when it is imported
+        raise ExtensionError(package, entry.name, f"the entry point {entry.value}", described(error)) from error
+
+
+def described(error: Exception) -> str:
+    """An error of another package's code in one line."""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"

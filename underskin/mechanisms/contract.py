@@ -1,0 +1,203 @@
+"""What every mechanism must keep to: texts, traits, parameters with unit, bounds and prior, a law with finite values.
+
+The mechanisms of this package are held to it by a test, those of other packages when they are loaded.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import Any, TypeVar, get_args
+
+import numpy as np
+
+from underskin.errors import InvalidInput
+from underskin.extensions import described
+from underskin.mechanisms.base import (
+    AXES,
+    NEEDED_FIELDS,
+    UNITS,
+    Kind,
+    Mechanism,
+    Normal,
+    Parameter,
+    Stage,
+    Uniform,
+)
+from underskin.mechanisms.models.compression import CompressionModel
+from underskin.mechanisms.models.frf import FrfModel
+from underskin.mechanisms.models.indentation import IndentationModel
+from underskin.mechanisms.models.nuisances import FRF_NUISANCES
+from underskin.mechanisms.reference_campaigns import reference_campaign
+from underskin.recordings.campaign import Campaign
+from underskin.surrogate.sigma_table import load_table
+from underskin.units import Floats
+
+TEXTS = ("plain", "law", "assumptions", "source", "needs")
+HOOKS = {  # by the stage that calls them
+    "on_declared": (Stage.DECLARED,),
+    "on_material": (Stage.MATERIAL, Stage.CONTACT),
+    "offset": (Stage.POSITION,),
+    "force_nodes": (Stage.LOAD_INCREMENT,),
+    "mobility": (Stage.LOAD_INCREMENT,),
+    "on_d33": (Stage.SENSOR,),
+    "neighbour_fraction": (Stage.NEIGHBOURS,),
+    "on_recordings": (Stage.RECORDING,),
+    "on_lines": (Stage.LINES,),
+    "pickup": (Stage.ADDED_CHARGE,),
+    "on_curve": (Stage.DECLARED, Stage.MATERIAL, Stage.CONTACT, Stage.CURVE),
+}
+T = TypeVar("T")
+_NAME = re.compile(r"[a-z][a-z0-9_]*")
+_NUISANCES = (*(entry.name for entry in FRF_NUISANCES), "contact_point", "force_offset")
+
+
+def check(mechanism: Mechanism, others: Sequence[Mechanism] = ()) -> None:
+    """Whether a mechanism can be composed with the others.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism to check.
+    others
+        Those whose names, and whose parameters' names, are taken.
+
+    Raises
+    ------
+    InvalidInput
+        Names the attribute that breaks the contract, its value and what is allowed.
+    """
+    _check_traits(mechanism)
+    if mechanism.name in {other.name for other in others}:
+        raise InvalidInput("name", mechanism.name, "is taken by another mechanism")
+    taken = {entry.name: other.name for other in others for kind in other.kinds for entry in _parameters(other, kind)}
+    taken |= dict.fromkeys(_NUISANCES, "the base model")
+    spreads = [other.name for other in others for entry in _parameters(other, "frf") if entry.acts_on == "gain_spread"]
+    for kind in mechanism.kinds:
+        parameters: Any = _parameters(mechanism, kind)
+        _require("parameters", parameters, isinstance(parameters, tuple), "must be a tuple of Parameter")
+        for entry in parameters:
+            _check_parameter(mechanism, entry)
+            if entry.name in taken:
+                raise InvalidInput(_field(entry, "name"), entry.name, f"is taken by {taken[entry.name]}")
+            if entry.acts_on == "gain_spread" and spreads:
+                raise InvalidInput(_field(entry, "acts_on"), entry.acts_on, f"is taken by {spreads[0]}")
+    for kind in mechanism.kinds:
+        _check_numbers(mechanism, kind)
+
+
+def _check_traits(mechanism: Mechanism) -> None:
+    name: Any = getattr(mechanism, "name", None)
+    _require("name", name, isinstance(name, str) and _NAME.fullmatch(name), "must be lower case letters, digits and _")
+    for field in TEXTS:
+        text: Any = getattr(mechanism, field, None)
+        _require(field, text, isinstance(text, str) and text.strip(), "must be a text")
+    stage: Any = getattr(mechanism, "stage", None)
+    _require("stage", stage, isinstance(stage, Stage), f"must be one of Stage: {', '.join(Stage.__members__)}")
+    _require("order", mechanism.order, isinstance(mechanism.order, int), "must be a whole number")
+    for field, allowed, needed in (
+        ("kinds", get_args(Kind), True),
+        ("axes", AXES, True),
+        ("needs_fields", NEEDED_FIELDS, False),
+    ):
+        values: Any = getattr(mechanism, field, None)
+        good = isinstance(values, tuple) and set(values) <= set(allowed) and (values or not needed)
+        _require(field, values, good, f"must be a tuple of {', '.join(allowed)}")
+    _check_hooks(mechanism)
+
+
+def _check_hooks(mechanism: Mechanism) -> None:
+    """Hooks are called at their stage: what reads the stage relies on it."""
+    own = [name for name in HOOKS if getattr(type(mechanism), name) is not getattr(Mechanism, name)]
+    for name in own:
+        stages = ", ".join(stage.name for stage in HOOKS[name])
+        # A mechanism of FRFs at any stage may act on curves as well
+        good = mechanism.stage in HOOKS[name] or (name == "on_curve" and "frf" in mechanism.kinds)
+        _require("stage", mechanism.stage.name, good, f"must be {stages}, since {name} is overridden")
+    if not own and mechanism.moves_predictions:
+        raise InvalidInput("law", None, f"must be in one of the hooks {', '.join(HOOKS)}; none is overridden")
+    moves = any(name != "pickup" for name in own)
+    _require("moves_predictions", mechanism.moves_predictions, mechanism.moves_predictions is moves, f"must be {moves}")
+
+
+def _check_parameter(mechanism: Mechanism, entry: Any) -> None:
+    _require("parameters", entry, isinstance(entry, Parameter), "must be a tuple of Parameter")
+
+    def require(field: str, good: object, allowed: str) -> None:
+        _require(_field(entry, field), getattr(entry, field), good, allowed)
+
+    require("name", isinstance(entry.name, str) and _NAME.fullmatch(entry.name), "must be lower case letters and _")
+    require("unit", entry.unit in UNITS, f"must be one of {', '.join(UNITS)}")
+    require("scale", entry.scale in ("linear", "log"), "must be linear or log")
+    for field in ("low", "high"):
+        number = _is_finite(getattr(entry, field)) and (entry.scale == "linear" or getattr(entry, field) > 0)
+        require(field, number, "must be a finite number" + ("" if entry.scale == "linear" else " above 0"))
+    require("high", entry.low < entry.high, f"must be above low, {entry.low!r}")
+    require("limit", entry.limit is None or isinstance(entry.limit, int | float), "must be a number or None")
+    require("reason", isinstance(entry.reason, str) and entry.reason.strip(), "must be a text")
+    require("prior", isinstance(entry.prior, Normal | Uniform), "must be Normal(mean, sd) or Uniform()")
+    if isinstance(entry.prior, Normal):
+        good = _is_finite(entry.prior.mean) and _is_finite(entry.prior.sd) and entry.prior.sd > 0
+        with np.errstate(divide="ignore"):
+            require("prior", good and np.isfinite(entry.log_prior(entry.start)), "must have mass within the bounds")
+    allowed = ("line_variance",) if mechanism.stage is Stage.ADDED_CHARGE else ("mean", "gain_spread")
+    require("acts_on", entry.acts_on in allowed, f"must be {' or '.join(allowed)}")
+    require("acts_on", entry.moves_covariance != mechanism.moves_predictions, "must fit moves_predictions")
+    require("scale", entry.scale == "log" or not entry.moves_covariance, "must be log: it does not act on the mean")
+
+
+def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
+    """The prediction and its derivatives are finite at the priors' centres and at every bound."""
+    campaign = reference_campaign(kind)
+    if _called(f"unsupported ({kind})", lambda: mechanism.unsupported(campaign, kind)) is not None:
+        return
+    field = f"law ({kind})"
+    model = _called(field, lambda: _model(mechanism, campaign, kind))
+    count = len(_parameters(mechanism, kind))
+    for fit, place in _points(model.parameters[:count], model.parameters[count:]):
+        with np.errstate(all="ignore"):
+            answer = _called(f"{field} at {place}", partial(model.predict, fit))
+        numbers = [answer.value, answer.slopes, *([] if answer.pickup is None else [answer.pickup])]
+        if not all(np.isfinite(part).all() for part in numbers):
+            raise InvalidInput(f"{field} at {place}", None, "gives numbers that are not finite")
+
+
+def _model(mechanism: Mechanism, campaign: Campaign, kind: Kind) -> FrfModel | IndentationModel | CompressionModel:
+    if kind == "frf":
+        return FrfModel([mechanism], campaign, load_table())
+    return (IndentationModel if kind == "indentation" else CompressionModel)([mechanism], campaign)
+
+
+def _points(own: Sequence[Parameter], nuisances: Sequence[Parameter]) -> Iterator[tuple[Floats, str]]:
+    """Fit coordinates and what they are called: the centre, and each parameter at either bound."""
+    centre = np.array([entry.start for entry in (*own, *nuisances)])
+    yield centre, "the priors' centres"
+    for place, entry in enumerate(own):
+        for end, value in zip(entry.bounds, (entry.low, entry.high), strict=True):
+            moved = centre.copy()
+            moved[place] = end
+            yield moved, f"{entry.name} = {value:g} {entry.unit}"
+
+
+def _parameters(mechanism: Mechanism, kind: Kind) -> tuple[Parameter, ...]:
+    return _called("parameters", lambda: mechanism.parameters(reference_campaign(kind), kind))
+
+
+def _called(field: str, function: Callable[[], T]) -> T:
+    """What another package's code answers; what it raises becomes the refusal of a field."""
+    try:
+        return function()
+    except Exception as error:
+        raise InvalidInput(field, None, described(error)) from error
+
+
+def _field(entry: Parameter, name: str) -> str:
+    return f"parameters[{entry.name}].{name}"
+
+
+def _require(field: str, value: Any, good: object, allowed: str) -> None:
+    if not good:
+        raise InvalidInput(field, value, allowed)
+
+
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, int | float | np.number) and bool(np.isfinite(value))
