@@ -10,7 +10,8 @@ from docs.mechanisms.silicones import RESULTS
 from docs.paper.markdown import table
 from underskin.mechanisms import CATALOGUE, Mechanism, Normal, Parameter
 from underskin.mechanisms.models.nuisances import FRF_NUISANCES
-from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription
+from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.conditions import Sensor, SkinDescription
 
 _INTRODUCTION = """\
 # What may have been left out

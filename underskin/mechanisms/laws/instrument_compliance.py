@@ -10,7 +10,7 @@ Source: Oliver & Pharr, J. Mater. Res. 7 (1992) 1564 (frame compliance).
 
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class InstrumentCompliance(Mechanism):
@@ -20,7 +20,7 @@ class InstrumentCompliance(Mechanism):
     kinds = ("indentation",)
     axes = ("force_n",)
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The stage's stiffness."""
         return (
             Parameter(

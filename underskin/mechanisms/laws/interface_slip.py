@@ -12,7 +12,7 @@ Source: Goodman, Taylor & Brekke, J. Soil Mech. Found. Div. 94 (1968) 637 (joint
 
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class InterfaceSlip(Mechanism):
@@ -21,7 +21,7 @@ class InterfaceSlip(Mechanism):
     name = "interface_slip"
     axes = ("position_mm", "preload_n", "indenter_radius_mm")
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The glue line's stiffness in units of the layer's own."""
         return (
             Parameter(

@@ -16,7 +16,7 @@ Source: Lebedev & Ufliand, J. Appl. Math. Mech. 22 (1958) 442; Dimitriadis et al
 from underskin.mechanisms.base import Kind, Mechanism, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class LayeredContact(Mechanism):
@@ -27,9 +27,9 @@ class LayeredContact(Mechanism):
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     needs = "a declared thickness_mm"
 
-    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+    def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """A thickness is needed."""
-        return "skin.thickness_mm is not given" if campaign.skin.thickness_mm is None else None
+        return "skin.thickness_mm is not given" if conditions.skin.thickness_mm is None else None
 
     def on_material(self, contacts: Contacts, values: Values) -> None:
         """Press the layer."""

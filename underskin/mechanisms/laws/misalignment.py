@@ -16,8 +16,7 @@ import numpy as np
 
 from underskin.mechanisms.autodiff import Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
-from underskin.mechanisms.models.frf_design import offsets
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions, offsets
 
 _LARGEST_MM = 2.0
 
@@ -30,13 +29,13 @@ class Misalignment(Mechanism):
     needs = "nothing; where every press is centred and nothing tells its direction, its length alone is a parameter"
     largest_offset = 1e-3 * _LARGEST_MM * np.sqrt(2)
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The offset's two components, or its length where its direction cannot be told."""
-        return self.parameters_beside((), campaign, kind)
+        return self.parameters_beside((), conditions, kind)
 
-    def parameters_beside(self, others: Collection[str], campaign: Campaign, kind: Kind) -> tuple[Parameter, ...]:
+    def parameters_beside(self, others: Collection[str], conditions: Conditions, kind: Kind) -> tuple[Parameter, ...]:
         """The same; the charge of neighbours, which lie in known directions, tells the direction too."""
-        told = offsets(campaign).any() or "crosstalk" in others
+        told = offsets(conditions).any() or "crosstalk" in others
         names, low = (("offset_x", "offset_y"), -_LARGEST_MM) if told else (("offset",), 0.0)
         return tuple(
             Parameter(

@@ -11,7 +11,7 @@ Source: Gent & Lindley, Proc. Inst. Mech. Eng. 173 (1959) 111.
 
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Uniform, Values
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class PlatenFriction(Mechanism):
@@ -21,7 +21,7 @@ class PlatenFriction(Mechanism):
     kinds = ("compression",)
     axes = ("sample_height_mm", "sample_diameter_mm")
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """How far the platens hold the sample."""
         return (
             Parameter(

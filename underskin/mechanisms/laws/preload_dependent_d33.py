@@ -13,7 +13,7 @@ import numpy as np
 
 from underskin.mechanisms.autodiff import Differentiated, chain
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class PreloadDependentD33(Mechanism):
@@ -22,7 +22,7 @@ class PreloadDependentD33(Mechanism):
     name = "preload_dependent_d33"
     axes = ("preload_n", "indenter_radius_mm", "position_mm", "sensor")
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The coefficient and the stress at which it saturates."""
         return (
             Parameter(

@@ -12,8 +12,7 @@ Source: Seminara 2018, section 3.2 (d33 over the sensors of an array); a gain is
 from underskin.mechanisms.autodiff import Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
-from underskin.mechanisms.models.frf_design import frf_recordings
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions, frf_of
 
 
 class SensorSpread(Mechanism):
@@ -23,7 +22,7 @@ class SensorSpread(Mechanism):
     axes = ("sensor",)
     needs = "recordings of at least two sensors"
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The spread."""
         return (
             Parameter(
@@ -38,9 +37,9 @@ class SensorSpread(Mechanism):
             ),
         )
 
-    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+    def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Two sensors are needed."""
-        if len({entry.sensor for entry in frf_recordings(campaign)}) < 2:
+        if len({entry.sensor for entry in frf_of(conditions)}) < 2:
             return "all recordings are of one sensor"
         return None
 

@@ -10,7 +10,7 @@ Source: Seminara 2018, equations 15 and 16: h is the unit of every length.
 
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class ThicknessError(Mechanism):
@@ -20,7 +20,7 @@ class ThicknessError(Mechanism):
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     largest_stretch = 1.55
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """True over declared thickness."""
         return (
             Parameter(

@@ -14,7 +14,7 @@ from underskin.mechanisms.autodiff import Differentiated, exp
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class TimingDelay(Mechanism):
@@ -23,7 +23,7 @@ class TimingDelay(Mechanism):
     name = "timing_delay"
     axes = ("phase", "frequency_hz")
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The delay."""
         return (
             Parameter(
