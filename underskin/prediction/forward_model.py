@@ -15,7 +15,7 @@ from underskin.errors import InvalidInput
 from underskin.mechanisms.autodiff import Array
 from underskin.mechanisms.base import Kind, Mechanism, Parameter
 from underskin.mechanisms.models.composed import Model, forward_model
-from underskin.mechanisms.models.composition import chosen, kind_of
+from underskin.mechanisms.models.composition import chosen, kind_of, parameters_together
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.conditions import Conditions, FrfConditions
 from underskin.surrogate.sigma_table import SigmaTable
@@ -93,7 +93,8 @@ def predict(
     declared = conditions.skin.d33_pc_per_n
     values = {} if declared is None or kind != "frf" else {"d33": declared}
     values |= parameters
-    fit = _fit_coordinates(model, values, own=sum(len(entry.parameters(conditions, kind)) for entry in acting))
+    own = sum(map(len, parameters_together(acting, conditions, kind).values()))
+    fit = _fit_coordinates(model, values, own)
     prediction = model.predict(fit)
     unit = float(to_lab("frf_pc_per_n", 1.0)) if kind == "frf" else 1.0
     return Predicted(
