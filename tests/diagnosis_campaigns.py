@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from underskin.mechanisms import compose
-from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription
+from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.conditions import Sensor, SkinDescription
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats
 

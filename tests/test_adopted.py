@@ -9,9 +9,8 @@ import pytest
 from tests.mechanism_campaigns import SKIN, frf_campaign, indentation_campaign, table
 from underskin import InvalidInput
 from underskin.mechanisms import CATALOGUE, compose
-from underskin.mechanisms.models.frf_design import frf_recordings
 from underskin.prediction.adopted_model import AdoptedModel, adopted
-from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 
 D33 = 14.0
 VALUES = {

@@ -9,7 +9,8 @@ import pytest
 
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.screening.curve_unit_errors import without_slips
-from underskin.recordings.campaign import Campaign, CompressionRecording, SkinDescription
+from underskin.recordings.campaign import Campaign, CompressionRecording
+from underskin.recordings.conditions import SkinDescription
 from underskin.surrogate.sigma_table import load_table
 
 Change = Callable[[CompressionRecording], CompressionRecording]

@@ -12,8 +12,7 @@ from tests.series_campaigns import codes, recorded
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.select_lines import telling
-from underskin.mechanisms.models.frf_design import frf_recordings
-from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 

@@ -18,7 +18,8 @@ from underskin.diagnosis.reporting.html_report import page
 from underskin.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings import read_file
-from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, SkinDescription, from_dict
+from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, from_dict
+from underskin.recordings.conditions import SkinDescription
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Floats
 

@@ -19,8 +19,10 @@ if TYPE_CHECKING:
     from underskin.inversion.invert import Inversion, invert
     from underskin.physics.charge_response import Sigma
     from underskin.physics.skin import Indenter, Skin
+    from underskin.prediction.forward_model import Predicted, predict
     from underskin.prediction.pressed_skin import Transmission, transmission
     from underskin.recordings.campaign import Campaign
+    from underskin.recordings.conditions import Conditions, SkinDescription, frf_conditions
     from underskin.recordings.reading import Reading, read_file
     from underskin.surrogate.sigma_table import SigmaTable, load_table
 
@@ -29,23 +31,28 @@ __version__ = "0.1.0"
 __all__ = [
     "Campaign",
     "Client",
+    "Conditions",
     "ExtensionError",
     "FileError",
     "Indenter",
     "InvalidInput",
     "Inversion",
+    "Predicted",
     "Reading",
     "ServiceError",
     "Sigma",
     "SigmaTable",
     "Skin",
+    "SkinDescription",
     "SolverError",
     "TableError",
     "Transmission",
     "UnderskinError",
     "Unreachable",
+    "frf_conditions",
     "invert",
     "load_table",
+    "predict",
     "read_file",
     "transmission",
 ]
@@ -54,15 +61,20 @@ __all__ = [
 _MODULES = {
     "Campaign": "recordings.campaign",
     "Client": "client",
+    "Conditions": "recordings.conditions",
     "Indenter": "physics.skin",
     "Inversion": "inversion.invert",
+    "Predicted": "prediction.forward_model",
     "Reading": "recordings.reading",
     "Sigma": "physics.charge_response",
     "SigmaTable": "surrogate.sigma_table",
     "Skin": "physics.skin",
+    "SkinDescription": "recordings.conditions",
     "Transmission": "prediction.pressed_skin",
+    "frf_conditions": "recordings.conditions",
     "invert": "inversion.invert",
     "load_table": "surrogate.sigma_table",
+    "predict": "prediction.forward_model",
     "read_file": "recordings.reading",
     "transmission": "prediction.pressed_skin",
 }

@@ -11,7 +11,8 @@ from docs.paper.markdown import table
 from underskin.mechanisms import Mechanism, Normal, Parameter
 from underskin.mechanisms.models.nuisances import FRF_NUISANCES
 from underskin.mechanisms.registry import built_in
-from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription
+from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.conditions import Sensor, SkinDescription
 
 _INTRODUCTION = """\
 # What may have been left out

@@ -10,7 +10,8 @@ import orjson
 from service.store.arrays import pack, unpack
 from service.store.tables import AnyRow
 from service.store.times import stored
-from underskin.recordings.campaign import KINDS, Campaign, Recording, Sensor, SkinDescription
+from underskin.recordings.campaign import KINDS, Campaign, Recording
+from underskin.recordings.conditions import Sensor, SkinDescription
 
 
 def about(campaign: Campaign) -> dict[str, Any]:

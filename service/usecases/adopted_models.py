@@ -17,6 +17,7 @@ from service.store.tables import AnyRow
 from underskin import InvalidInput
 from underskin.physics.charge_response import gain
 from underskin.prediction.answers import pressed
+from underskin.recordings.conditions import frf_conditions
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats, finite, non_negative
 
@@ -146,15 +147,13 @@ def _response(
     frequency_hz: Floats | None,
 ) -> tuple[Complexes, NDArray[np.bool_]]:
     """FRF over d33 (rows, lines), on the plateau where there are no frequencies, and which rows are inside."""
-    from underskin.prediction.adopted_model import pressed_campaign
-
     lines = _ANY_LINE if frequency_hz is None else frequency_hz
     count = len(rows["preload_n"])
     if count * len(lines) > _LARGEST_LINES:
         allowed = f"different rows times frequencies must be at most {_LARGEST_LINES} with an adopted model"
         raise InvalidInput("frequency_hz", f"{count} rows, {len(lines)} frequencies", allowed)
-    campaign = pressed_campaign(model.skin, request.sensor, rows, lines)
-    found = model.response(campaign, table, level=frequency_hz is None)
+    conditions = frf_conditions(model.skin, sensor=request.sensor, frequency_hz=lines, **rows)
+    found = model.response(conditions, table, level=frequency_hz is None)
     return found.value.reshape(count, -1), np.logical_and.reduce(found.inside.reshape(count, -1), axis=1)
 
 

@@ -14,7 +14,8 @@ from tests.store.server import Server
 from underskin import __version__
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.mechanisms import compose
-from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription, parse, to_dict
+from underskin.recordings.campaign import Campaign, FrfRecording, parse, to_dict
+from underskin.recordings.conditions import Sensor, SkinDescription
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 D33 = 14.0

@@ -13,7 +13,7 @@ import numpy as np
 from underskin.array_stress import pressure_map
 from underskin.errors import InvalidInput
 from underskin.recordings import validation as field
-from underskin.recordings.campaign import Sensors
+from underskin.recordings.conditions import Sensors
 from underskin.recordings.readers import json_file
 from underskin.recordings.validation import shown
 from underskin.requirement import Mention, Requirement

@@ -17,7 +17,7 @@ from scipy.special import ndtr, ndtri
 
 from underskin.errors import UnderskinError
 from underskin.mechanisms.autodiff import Array, Differentiated
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 from underskin.units import Floats
 
 if TYPE_CHECKING:
@@ -213,22 +213,22 @@ class Mechanism:
         """Whether it acts on single lines, so that a recording's lines cannot be replaced by their mean."""
         return self.stage in (Stage.LINES, Stage.ADDED_CHARGE)
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """Its parameters for recordings of one kind; bounds may depend on the campaign."""
         return ()
 
-    def parameters_beside(self, others: Collection[str], campaign: Campaign, kind: Kind) -> tuple[Parameter, ...]:
+    def parameters_beside(self, others: Collection[str], conditions: Conditions, kind: Kind) -> tuple[Parameter, ...]:
         """Its parameters in a model that these other mechanisms are in too, which may show more of it."""
-        return self.parameters(campaign, kind)
+        return self.parameters(conditions, kind)
 
-    def values_on(self, values: Mapping[str, float], campaign: Campaign) -> Mapping[str, float]:
+    def values_on(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
         """Values of its parameters found on one campaign, as those that it has on another.
 
         Raises InvalidInput where they say too little for that campaign.
         """
         return values
 
-    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+    def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """What the campaign lacks to support it, in words; None where nothing is lacking."""
         return None
 
@@ -268,7 +268,7 @@ class Mechanism:
         """The complex factor on each distinct line (contact and frequency)."""
         return None
 
-    def pickup(self, campaign: Campaign, design: FrfDesign) -> Pickup | None:
+    def pickup(self, conditions: Conditions, design: FrfDesign) -> Pickup | None:
         """Charge from elsewhere that is random on each row, and on which rows."""
         return None
 

@@ -15,15 +15,16 @@ from scipy.special import ndtri
 
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Mechanism, Parameter, Stage
+from underskin.mechanisms.models.composed import forward_model
 from underskin.mechanisms.models.composition import chosen, parameters_together
-from underskin.mechanisms.models.frf import FrfModel
-from underskin.mechanisms.models.frf_design import frf_recordings
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.prediction import plausibility
-from underskin.recordings.campaign import Campaign, FrfRecording, SkinDescription
+from underskin.prediction.forward_model import needed_fields, require_fields
+from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
+from underskin.recordings.conditions import Conditions, SkinDescription, frf_of
 from underskin.recordings.frf.estimation import lines_of
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Complexes, Floats, to_si
+from underskin.units import Complexes, to_si
 
 _DECLARED = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio")
 NOT_ADOPTED = {
@@ -36,6 +37,7 @@ NOT_ADOPTED = {
     "plans (next_experiment), send it together with these recordings, and diagnose that",
 }  # by verdict: why it is refused, and what to do
 _SAME = 1e-9  # relative
+_ANY_LINE = np.array([1.0])  # Hz
 _REPORTED_SDS = 2 * float(ndtri(0.975))  # width of a report's interval
 
 
@@ -73,10 +75,7 @@ class AdoptedModel:
     @property
     def needs(self) -> dict[str, str]:
         """Fields of a recording that its predictions need beside sphere, preload and lines; each with who needs it."""
-        found: dict[str, str] = {}
-        for mechanism in self.mechanisms:
-            found |= {name: mechanism.name for name in mechanism.needs_fields if name not in found}
-        return found
+        return needed_fields(self.mechanisms)
 
     def require_skin(self, declared: Mapping[str, Any]) -> None:
         """Raises InvalidInput where a skin is declared otherwise than the one that was diagnosed.
@@ -92,20 +91,20 @@ class AdoptedModel:
                     name, float(off), f"must be {here:g}, as the skin was declared when it was diagnosed"
                 )
 
-    def response(self, campaign: Campaign, table: SigmaTable, *, level: bool = False) -> Response:
-        """What each line of the campaign's FRF recordings shows; their `level` with one row a recording instead.
+    def response(self, conditions: Conditions, table: SigmaTable, *, level: bool = False) -> Response:
+        """What each line of FRFs under these conditions shows; their `level` with one row a recording instead.
 
         Raises InvalidInput where a recording lacks what a mechanism needs.
         """
         mechanisms = self.mechanisms
         if level:
             mechanisms = [mechanism for mechanism in mechanisms if mechanism.stage is not Stage.LINES]
-            campaign = _with_one_line(campaign)
-        self._require_fields(campaign)
+            conditions = _levels(conditions)
+        require_fields(self.mechanisms, conditions, "the adopted model")
         known: dict[str, float] = {}
         for mechanism in mechanisms:
-            known |= mechanism.values_on(self.parameters[mechanism.name], campaign)
-        model = FrfModel(mechanisms, campaign, table)
+            known |= mechanism.values_on(self.parameters[mechanism.name], conditions)
+        model = forward_model(mechanisms, conditions, table, "frf")
         fit = [_on_fit(parameter, known.get(parameter.name, 1.0)) for parameter in model.parameters]
         predicted = model.predict(np.array(fit))
         return Response(
@@ -121,24 +120,18 @@ class AdoptedModel:
         that are not finite, are left out, as are recordings of other kinds. Raises InvalidInput.
         """
         self.require_skin(vars(campaign.skin))
-        kept = replace(campaign, recordings=tuple(map(_with_lines, frf_recordings(campaign))))
-        found = self.response(kept, table)
+        kept = replace(campaign, recordings=tuple(map(_finite_lines, frf_recordings(campaign))))
+        own = self.response(kept, table)
         base = AdoptedModel(self.skin, {}, 0.0).response(kept, table)
-        ratio = base.value / found.value
+        ratio = base.value / own.value
         recordings, left_out = [], []
         for number, entry in enumerate(frf_recordings(kept)):
-            rows = found.recording == number
-            if found.inside[rows].all() and base.inside[rows].all():
+            rows = own.recording == number
+            if own.inside[rows].all() and base.inside[rows].all():
                 recordings.append(_times(entry, ratio[rows]))
             else:
                 left_out.append(entry.id)
         return replace(campaign, recordings=tuple(recordings)), left_out
-
-    def _require_fields(self, campaign: Campaign) -> None:
-        for name, mechanism in self.needs.items():
-            for entry in frf_recordings(campaign):
-                if getattr(entry, name) is None:
-                    raise InvalidInput(f"recordings[{entry.id}].{name}", None, _needed(mechanism))
 
 
 def adopted(report: Mapping[str, Any], campaign: Campaign) -> AdoptedModel:
@@ -180,72 +173,23 @@ def implausible_d33(report: Mapping[str, Any]) -> str | None:
     return None if reason is None else f"{d33:.4g} pC/N, {reason}"
 
 
-def pressed_campaign(
-    skin: SkinDescription, sensor: str | None, columns: Mapping[str, Floats], frequency_hz: Floats
-) -> Campaign:
-    """One recording a row: columns of one length, `offset_x_mm` and `offset_y_mm` from the centre of the sensor.
-
-    Columns that a model may need and that are not there stay unknown. Where no sensor is named, it is any one of the
-    array. Raises InvalidInput for a sensor that the array does not have.
-    """
-    places = {entry.id: entry for entry in skin.sensors}
-    if sensor is not None and sensor not in places:
-        raise InvalidInput("sensor", sensor, f"must be one of {', '.join(places)}")
-    centre = skin.sensors[0] if sensor is None else places[sensor]
-    lines = np.zeros(len(frequency_hz))
-    names = ("indenter_radius_mm", "preload_n", "offset_x_mm", "offset_y_mm")
-    further = [name for name in ("dynamic_force_n", "dwell_s", "load_cycles") if name in columns]
-    rows = zip(*(columns[name].tolist() for name in (*names, *further)), strict=True)
-    recordings = [
-        FrfRecording(
-            id=f"row {number}",
-            sensor=centre.id,
-            indenter_radius_mm=radius,
-            preload_n=preload,
-            position_mm=(centre.x_mm + x, centre.y_mm + y),
-            frequency_hz=frequency_hz,
-            frf_re_pc_per_n=lines,
-            frf_im_pc_per_n=lines,
-            **({"dynamic_force_n": 0.0} | dict(zip(further, more, strict=True))),
-        )
-        for number, (radius, preload, x, y, *more) in enumerate(rows)
-    ]
-    return Campaign("rows", skin, tuple(recordings))
-
-
-def _needed(mechanism: str) -> str:
-    return f"is required: the adopted model has {mechanism}"
-
-
 def _on_fit(parameter: Parameter, value: float) -> float:
     """Within the bounds, which rounding may have left."""
     return float(np.clip(parameter.to_fit(value), *parameter.bounds))
 
 
-def _with_one_line(campaign: Campaign) -> Campaign:
-    one = np.array([1.0])
-    recordings = [
-        replace(_without_lines(entry), frequency_hz=one, frf_re_pc_per_n=one, frf_im_pc_per_n=one)
-        for entry in frf_recordings(campaign)
-    ]
-    return replace(campaign, recordings=tuple(recordings))
+def _levels(conditions: Conditions) -> Conditions:
+    """Each FRF at one line: without the mechanisms that act line by line, any frequency shows the level."""
+    recordings = [entry.without_measurements(frequency_hz=_ANY_LINE) for entry in frf_of(conditions)]
+    return Conditions(conditions.name, conditions.skin, tuple(recordings))
 
 
-def _with_lines(entry: FrfRecording) -> FrfRecording:
+def _finite_lines(entry: FrfRecording) -> FrfRecording:
     """With its lines in place of its time series, those that are finite."""
     measured = lines_of(entry)
     good = np.isfinite(measured.values)
-    return replace(
-        _without_lines(entry),
-        frequency_hz=measured.frequency[good],
-        frf_re_pc_per_n=1e12 * measured.values.real[good],
-        frf_im_pc_per_n=1e12 * measured.values.imag[good],
-        coherence=None if measured.coherence is None else measured.coherence[good],
-    )
-
-
-def _without_lines(entry: FrfRecording) -> FrfRecording:
-    return replace(entry, sample_rate_hz=None, force_n=None, charge_pc=None, coherence=None)
+    coherence = None if measured.coherence is None else measured.coherence[good]
+    return FrfRecording.of_lines(entry, measured.frequency[good], measured.values[good], coherence)
 
 
 def _times(entry: FrfRecording, factor: Complexes) -> FrfRecording:

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.prediction.pressed_skin import Transmission
-from underskin.recordings.campaign import FrfRecording, SkinDescription
+from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.conditions import SkinDescription
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 

@@ -1,4 +1,4 @@
-"""The campaign (`campaign/1`): a skin, and what was recorded on it, in the lab's units.
+"""The campaign (`campaign/1`): recordings of one skin, each its conditions and what was measured, in the lab's units.
 
 Fields are named as in the document and keep its units; a field that a document leaves out is None. Reading a document
 keeps the good recordings and says of each of the others what is wrong; writing one gives the canonical document.
@@ -6,80 +6,34 @@ keeps the good recordings and says of each of the others what is wrong; writing 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Annotated, Any
+from typing import Any, Self
 
 import numpy as np
 
 from underskin.errors import InvalidInput
 from underskin.recordings import validation as field
+from underskin.recordings.conditions import (
+    CompressionConditions,
+    Conditions,
+    FrfConditions,
+    IndentationConditions,
+    SkinDescription,
+)
 from underskin.recordings.validation import named, shown
 from underskin.requirement import REQUIRED, Mention, Requirement
+from underskin.units import Complexes, Floats
 
 SCHEMA = "campaign/1"
 
 
-@dataclass(frozen=True)
-class Sensor:
-    """A sensor of the array and its centre: x along the skin's length, y along its width."""
-
-    id: field.Name
-    x_mm: field.Number
-    y_mm: field.Number
-
-
-def _sensors(name: str, value: Any, units_checked: bool) -> tuple[Sensor, ...]:
-    if not isinstance(value, list | tuple):
-        raise InvalidInput(name, shown(value), "must be a list of sensors")
-    sensors = [field.build(Sensor, f"{name}[{index}]", entry, units_checked) for index, entry in enumerate(value)]
-    seen: set[str] = set()
-    for index, sensor in enumerate(sensors):
-        if sensor.id in seen:
-            raise InvalidInput(f"{name}[{index}].id", sensor.id, "must differ from every other sensor's")
-        seen.add(sensor.id)
-    return tuple(sensors)
-
-
-Sensors = Annotated[tuple[Sensor, ...], _sensors]
-
-
-@dataclass(frozen=True)
-class SkinDescription:
-    """The skin as the lab declares it.
-
-    `thickness_mm`, `youngs_modulus_mpa`, `sensor_radius_mm` and `sensors` may be unknown (None, empty) where no
-    `frf` recording needs them; `d33_pc_per_n` may always be.
-    """
-
-    poisson_ratio: field.PoissonRatio
-    id: field.Name | None = None
-    thickness_mm: field.Declared | None = None
-    youngs_modulus_mpa: field.Declared | None = None
-    sensor_radius_mm: field.Declared | None = None
-    d33_pc_per_n: field.Declared | None = None
-    width_mm: field.Declared | None = None
-    length_mm: field.Declared | None = None
-    sensors: Sensors = ()
-
-
 @dataclass(frozen=True, eq=False)
-class FrfRecording:
-    """Charge over force while the skin is pressed by `preload_n` and shaken by `dynamic_force_n` (peak amplitude).
+class FrfRecording(FrfConditions):
+    """Charge over force under these conditions.
 
     Either the FRF (`frequency_hz`, real and imaginary part, e^(+iωt); γ² in `coherence`) or the time series
     (`sample_rate_hz`, `force_n`, `charge_pc`) that it is estimated from.
     """
 
-    id: field.Name
-    sensor: field.Name
-    indenter_radius_mm: field.Declared
-    preload_n: field.Declared
-    dynamic_force_n: field.Positive
-    kind: field.Name = "frf"
-    recorded_at: field.TimeOfDay | None = None
-    load_cycles: field.Count | None = None
-    dwell_s: field.NotNegative | None = None
-    position_mm: field.Position | None = None
-    frequency_hz: field.Frequencies | None = None
     frf_re_pc_per_n: field.Series | None = None
     frf_im_pc_per_n: field.Series | None = None
     coherence: field.Coherence | None = None
@@ -87,38 +41,28 @@ class FrfRecording:
     force_n: field.Series | None = None
     charge_pc: field.Series | None = None
 
-
-@dataclass(frozen=True, eq=False)
-class IndentationRecording:
-    """A sphere pressed in and drawn back, loading and unloading in order; compression positive."""
-
-    id: field.Name
-    indenter_radius_mm: field.Declared
-    displacement_mm: field.Series
-    force_n: field.Series
-    kind: field.Name = "indentation"
-    sensor: field.Name | None = None
-    time_s: field.Times | None = None
-    recorded_at: field.TimeOfDay | None = None
-    load_cycles: field.Count | None = None
-    dwell_s: field.NotNegative | None = None
-    position_mm: field.Position | None = None
+    @classmethod
+    def of_lines(
+        cls, conditions: FrfConditions, frequency: Floats, values: Complexes, coherence: Floats | None = None
+    ) -> Self:
+        """The recording of an FRF `values` [C/N] at lines `frequency` [Hz], in other conditions as these."""
+        known = {entry.name: getattr(conditions, entry.name) for entry in fields(FrfConditions)}
+        lines = {"frf_re_pc_per_n": 1e12 * values.real, "frf_im_pc_per_n": 1e12 * values.imag, "coherence": coherence}
+        return cls(**{**known, "frequency_hz": frequency, **lines})
 
 
 @dataclass(frozen=True, eq=False)
-class CompressionRecording:
-    """A cylinder between platens; compression positive, tension negative."""
+class IndentationRecording(IndentationConditions):
+    """The force on a sphere that is pressed in and drawn back; compression positive."""
 
-    id: field.Name
-    sample_height_mm: field.Declared
-    sample_diameter_mm: field.Declared
-    displacement_mm: field.Series
     force_n: field.Series
-    kind: field.Name = "compression"
-    time_s: field.Times | None = None
-    recorded_at: field.TimeOfDay | None = None
-    load_cycles: field.Count | None = None
-    dwell_s: field.NotNegative | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class CompressionRecording(CompressionConditions):
+    """The force on a cylinder between platens; compression positive, tension negative."""
+
+    force_n: field.Series
 
 
 Recording = FrfRecording | IndentationRecording | CompressionRecording
@@ -140,11 +84,9 @@ COLUMNS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Campaign:
+class Campaign(Conditions):
     """Recordings of one skin; `units_checked` accepts magnitudes that look like a slip of units."""
 
-    name: str
-    skin: SkinDescription
     recordings: tuple[Recording, ...]
     units_checked: bool = False
 
@@ -157,6 +99,14 @@ class RecordingProblem:
     field: str
     value: Any
     allowed: str
+
+
+def frf_recordings(campaign: Campaign) -> list[FrfRecording]:
+    """The campaign's FRF recordings, in order; raises InvalidInput where there is none."""
+    recordings = [entry for entry in campaign.recordings if isinstance(entry, FrfRecording)]
+    if not recordings:
+        raise InvalidInput("recordings", "none of kind frf", "must hold at least one")
+    return recordings
 
 
 def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:

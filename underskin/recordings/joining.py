@@ -10,7 +10,8 @@ from typing import Any
 
 from underskin.errors import InvalidInput
 from underskin.recordings import validation as field
-from underskin.recordings.campaign import Campaign, Recording, SkinDescription
+from underskin.recordings.campaign import Campaign, Recording
+from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.reading import Reading
 from underskin.recordings.repeats import digest
 

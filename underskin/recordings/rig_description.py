@@ -21,7 +21,8 @@ import yaml
 
 from underskin.errors import FileError, InvalidInput
 from underskin.recordings import validation as field
-from underskin.recordings.campaign import COLUMNS, KINDS, SkinDescription
+from underskin.recordings.campaign import COLUMNS, KINDS
+from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.readers import json_file, text
 from underskin.recordings.validation import mapping, named, shown
 from underskin.requirement import Mention, Requirement

@@ -4,8 +4,8 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from underskin.mechanisms.models.frf_design import offsets
 from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.conditions import offsets
 from underskin.units import Floats
 
 _LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n")

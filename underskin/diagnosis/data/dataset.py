@@ -16,8 +16,7 @@ from underskin.diagnosis.noise.correlated_error import SmoothError, Whitening
 from underskin.diagnosis.noise.line_noise import LineNoise, line_noise
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.models.composition import kind_of
-from underskin.mechanisms.models.frf_design import frf_recordings
-from underskin.recordings.campaign import Campaign, FrfRecording, Recording
+from underskin.recordings.campaign import Campaign, FrfRecording, Recording, frf_recordings
 from underskin.recordings.frf.estimation import lines_of
 from underskin.units import Complexes, Floats
 
@@ -83,7 +82,7 @@ class Lines:
         campaign = replace(
             self.campaign,
             recordings=tuple(
-                _with_lines(entry, np.array([COLLAPSED_HZ]), mean[[number]])
+                FrfRecording.of_lines(entry, np.array([COLLAPSED_HZ]), mean[[number]])
                 for number, entry in enumerate(frf_recordings(self.campaign))
             ),
         )
@@ -139,7 +138,7 @@ def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None, expect
         if len(order) == 0:
             continue
         value, frequency = measured.values[order], measured.frequency[order]
-        entries.append(_with_lines(entry, frequency, value))
+        entries.append(FrfRecording.of_lines(entry, frequency, value))
         values.append(value)
         frequencies.append(frequency)
         coherence = measured.coherence
@@ -171,21 +170,7 @@ def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None, expect
 def _with_rows(entry: Recording, lines: Lines, own: NDArray[np.intp]) -> Recording:
     """A recording with only some of its rows, given by their places among all rows."""
     if isinstance(entry, FrfRecording):
-        return _with_lines(entry, lines.frequency[own], lines.value[own])
+        return FrfRecording.of_lines(entry, lines.frequency[own], lines.value[own])
     rows = own - int(np.searchsorted(lines.recording, lines.recording[own[0]]))
     time = None if entry.time_s is None else entry.time_s[rows]
     return replace(entry, displacement_mm=entry.displacement_mm[rows], force_n=entry.force_n[rows], time_s=time)
-
-
-def _with_lines(entry: FrfRecording, frequency: Floats, value: Complexes) -> FrfRecording:
-    """The recording with other lines, written as the campaign writes them."""
-    return replace(
-        entry,
-        frequency_hz=frequency,
-        frf_re_pc_per_n=value.real * 1e12,
-        frf_im_pc_per_n=value.imag * 1e12,
-        coherence=None,
-        sample_rate_hz=None,
-        force_n=None,
-        charge_pc=None,
-    )

@@ -11,7 +11,7 @@ posterior updated: the chance that the true explanation then holds at least 0.8.
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from underskin.formatting import in_percent
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.conditions import Conditions, FrfConditions
 from underskin.units import Floats
 
 DECIDED = 0.8
@@ -101,12 +101,12 @@ def _together(words: Sequence[str]) -> str:
 
 
 def _outlook(
-    bench: Workbench, surviving: Sequence[Answer], allowed: Sequence[FrfRecording]
-) -> tuple[list[Answer], "_Outlook", list[FrfRecording]]:
+    bench: Workbench, surviving: Sequence[Answer], allowed: Sequence[FrfConditions]
+) -> tuple[list[Answer], "_Outlook", list[FrfConditions]]:
     """The rivals whose laws can be predicted there, what they predict, and the candidates that all tables hold."""
     # The campaign's own recordings go along, so that each model has the parameters that it was fitted with.
     campaign = bench.collapsed.campaign
-    together = replace(campaign, recordings=(*campaign.recordings, *allowed))
+    together = Conditions(campaign.name, campaign.skin, (*campaign.recordings, *allowed))
     own = len(campaign.recordings)
     inside = np.ones(len(allowed), dtype=bool)
     rivals, predictions = [], []
@@ -180,7 +180,7 @@ class _Outlook:
         return list(dict.fromkeys(found))
 
 
-def _choose(outlook: _Outlook, candidates: Sequence[FrfRecording], limits: Limits) -> tuple[list[int], float]:
+def _choose(outlook: _Outlook, candidates: Sequence[FrfConditions], limits: Limits) -> tuple[list[int], float]:
     """Recordings, two and then one at a time, until they decide or a further one brings too little."""
     promising = outlook.promising
     chosen: list[int] = []
@@ -201,7 +201,7 @@ def _choose(outlook: _Outlook, candidates: Sequence[FrfRecording], limits: Limit
     return chosen, best
 
 
-def _described(candidates: Sequence[FrfRecording], chosen: Sequence[int]) -> list[dict[str, Any]]:
+def _described(candidates: Sequence[FrfConditions], chosen: Sequence[int]) -> list[dict[str, Any]]:
     found = []
     for index in sorted(set(chosen)):
         entry = candidates[index]
@@ -219,7 +219,7 @@ def _described(candidates: Sequence[FrfRecording], chosen: Sequence[int]) -> lis
 
 
 def _statement(
-    candidates: Sequence[FrfRecording],
+    candidates: Sequence[FrfConditions],
     chosen: Sequence[int],
     chance: float,
     names: Sequence[Sequence[str]],

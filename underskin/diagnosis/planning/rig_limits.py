@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from underskin.diagnosis.data.dataset import COLLAPSED_HZ
 from underskin.errors import InvalidInput
-from underskin.mechanisms.models.frf_design import frf_recordings, offsets
-from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.conditions import Conditions, FrfConditions, frf_of, offsets
 
 MOST_RECORDINGS = 8
 _FURTHER = 1.25  # beyond the highest preload used
@@ -57,12 +57,12 @@ class Limits:
         )
 
 
-def inferred(campaign: Campaign, limits: Limits) -> Limits:
+def inferred(conditions: Conditions, limits: Limits) -> Limits:
     """The limits, those left open as the campaign did it: its spheres, amplitudes, dwells and distances from the
     sensor, its preloads and a quarter beyond the highest."""
-    entries = frf_recordings(campaign)
+    entries = frf_of(conditions)
     preloads = [entry.preload_n for entry in entries]
-    distances = np.round(1e3 * np.hypot(*offsets(campaign).T), 1)
+    distances = np.round(1e3 * np.hypot(*offsets(conditions).T), 1)
     dwells = [entry.dwell_s for entry in entries if entry.dwell_s is not None]
     return replace(
         limits,
@@ -74,10 +74,10 @@ def inferred(campaign: Campaign, limits: Limits) -> Limits:
     )
 
 
-def wider(campaign: Campaign, limits: Limits) -> Limits:
+def wider(conditions: Conditions, limits: Limits) -> Limits:
     """Inferred limits with what most rigs can do besides: a larger dynamic force, a longer dwell, half and all of the
     thickness beside the sensor."""
-    thickness = campaign.skin.thickness_mm
+    thickness = conditions.skin.thickness_mm
     assert thickness is not None
     assert limits.dynamic_force_n is not None
     assert limits.dwell_s is not None
@@ -94,31 +94,25 @@ def _ends(values: Sequence[float]) -> list[float]:
     return sorted({min(values), max(values)}) if values else []
 
 
-def candidates(campaign: Campaign, limits: Limits) -> list[FrfRecording]:
-    """One recording at every combination of what the rig can do, at the sensor that was recorded most, after all."""
-    entries = frf_recordings(campaign)
+def candidates(conditions: Conditions, limits: Limits) -> list[FrfConditions]:
+    """A recording for every combination within the limits, at the sensor that was recorded most, after all others."""
+    entries = frf_of(conditions)
     sensors = [entry.sensor for entry in entries]
     sensor = max(dict.fromkeys(sensors), key=sensors.count)
-    place = next((known.x_mm, known.y_mm) for known in campaign.skin.sensors if known.id == sensor)
+    place = next((known.x_mm, known.y_mm) for known in conditions.skin.sensors if known.id == sensor)
     cycles = [entry.load_cycles for entry in entries if entry.load_cycles is not None]
     return [
-        replace(
-            entries[0],
+        FrfConditions(
             id=f"candidate {number}",
             sensor=sensor,
             indenter_radius_mm=sphere,
             preload_n=force,
             dynamic_force_n=amplitude,
+            recorded_at=entries[0].recorded_at,
             dwell_s=dwell,
             load_cycles=max(cycles) if len(cycles) == len(entries) else None,
             position_mm=(place[0] + round(offset, 3), place[1]),
-            frequency_hz=np.array([30.0]),
-            frf_re_pc_per_n=np.array([1.0]),
-            frf_im_pc_per_n=np.array([0.0]),
-            coherence=None,
-            sample_rate_hz=None,
-            force_n=None,
-            charge_pc=None,
+            frequency_hz=np.array([COLLAPSED_HZ]),
         )
         for number, (force, sphere, amplitude, dwell, offset) in enumerate(_settings(limits))
     ]

@@ -11,7 +11,8 @@ import numpy as np
 
 from underskin.diagnosis.data.inspected import Inspected
 from underskin.mechanisms.base import Kind
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, SkinDescription
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.finding import Finding
 from underskin.units import Floats
 

@@ -16,8 +16,7 @@ from underskin.diagnosis.screening.model_consistency import against_model
 from underskin.diagnosis.screening.position_errors import huddled, misplaced
 from underskin.diagnosis.screening.time_series import as_given, as_lines
 from underskin.diagnosis.screening.unit_errors import faint_oscillation, lone_slips, loose_sphere
-from underskin.mechanisms.models.frf_design import frf_recordings
-from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 from underskin.recordings.finding import Finding
 from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.plausibility import overlapping_sensors

@@ -11,7 +11,8 @@ from dataclasses import fields, replace
 import numpy as np
 
 from underskin.diagnosis.data.inspected import Inspected
-from underskin.recordings.campaign import Campaign, Recording, SkinDescription
+from underskin.recordings.campaign import Campaign, Recording
+from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.finding import Finding
 
 _LENGTH, _FORCE, _TIME = (1e-9, 1e6), (1e-8, 1e8), (1e-12, 1e12)

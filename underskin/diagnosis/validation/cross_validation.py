@@ -20,7 +20,7 @@ from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import Prediction as Predicted
 from underskin.mechanisms.models.composed import compose
-from underskin.mechanisms.models.frf_design import frf_recordings
+from underskin.recordings.campaign import frf_recordings
 
 _FURTHEST = 0.6  # of a curve's highest force
 _LEAST_AFTER = 6  # samples beyond the highest force that make a hold or a way back

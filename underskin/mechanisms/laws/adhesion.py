@@ -3,7 +3,7 @@
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class Adhesion(Mechanism):
@@ -30,7 +30,7 @@ class Adhesion(Mechanism):
     kinds = ("frf", "indentation")
     axes = ("preload_n", "indenter_radius_mm", "position_mm", "force_n")
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The work of adhesion."""
         return (
             Parameter(

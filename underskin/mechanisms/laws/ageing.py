@@ -4,8 +4,8 @@ import numpy as np
 
 from underskin.mechanisms.autodiff import Differentiated, chain, log
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
-from underskin.mechanisms.models.frf_design import FrfDesign, frf_recordings
-from underskin.recordings.campaign import Campaign
+from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.recordings.conditions import Conditions, frf_of
 
 _SMALL = 1e-3  # below it (1 − e^(−x))/x is taken from its series
 _LEAST = 0.05  # what is left of a response before its fall slows down
@@ -36,7 +36,7 @@ class Ageing(Mechanism):
     needs = "load_cycles of every recording, not all the same"
     needs_fields = ("load_cycles",)
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The loss, by the decade or in the end, the cycles at which it sets in, and the shape."""
         return (
             Parameter(
@@ -74,9 +74,9 @@ class Ageing(Mechanism):
             ),
         )
 
-    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+    def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Counts that differ are needed."""
-        cycles = {entry.id: entry.load_cycles for entry in frf_recordings(campaign)}
+        cycles = {entry.id: entry.load_cycles for entry in frf_of(conditions)}
         lacking = [name for name, value in cycles.items() if value is None]
         if lacking:
             return f"recording {lacking[0]!r} has no load_cycles"

@@ -4,7 +4,7 @@ from underskin.mechanisms.autodiff import Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class AmplifierHighPass(Mechanism):
@@ -25,7 +25,7 @@ class AmplifierHighPass(Mechanism):
     order = 30
     axes = ("frequency_hz", "phase")
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The corner frequency."""
         return (
             Parameter(

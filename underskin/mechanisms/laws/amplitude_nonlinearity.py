@@ -4,8 +4,7 @@ import numpy as np
 
 from underskin.mechanisms.autodiff import Array, Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Stage, Uniform, Values
-from underskin.mechanisms.models.frf_design import frf_recordings
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions, frf_of
 from underskin.units import Floats
 
 _NODES = 6
@@ -39,7 +38,7 @@ class AmplitudeNonlinearity(Mechanism):
     needs = "dynamic_force_n below preload_n in every recording"
     needs_fields = ("dynamic_force_n",)
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The edge's mobility."""
         return (
             Parameter(
@@ -55,9 +54,9 @@ class AmplitudeNonlinearity(Mechanism):
             ),
         )
 
-    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+    def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """The contact must not open."""
-        for entry in frf_recordings(campaign):
+        for entry in frf_of(conditions):
             if entry.dynamic_force_n >= entry.preload_n:
                 return f"recording {entry.id!r}: dynamic_force_n reaches preload_n, the contact would open"
         return None

@@ -4,7 +4,7 @@ from underskin.mechanisms.base import Kind, Mechanism, Parameter, Stage, Uniform
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.physics.skin import INCOMPRESSIBLE
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class CompressibleLayer(Mechanism):
@@ -31,7 +31,7 @@ class CompressibleLayer(Mechanism):
     needs = "a skin declared with poisson_ratio 0.5"
     figure = ("preload_n", "position_mm")
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The Poisson ratio."""
         return (
             Parameter(
@@ -47,10 +47,10 @@ class CompressibleLayer(Mechanism):
             ),
         )
 
-    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+    def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """A skin that is declared compressible has its ν in the base model."""
-        if campaign.skin.poisson_ratio != INCOMPRESSIBLE:
-            return f"the skin is declared compressible already (poisson_ratio {campaign.skin.poisson_ratio:g})"
+        if conditions.skin.poisson_ratio != INCOMPRESSIBLE:
+            return f"the skin is declared compressible already (poisson_ratio {conditions.skin.poisson_ratio:g})"
         return None
 
     def on_material(self, contacts: Contacts, values: Values) -> None:

@@ -7,7 +7,7 @@ from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage,
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.models.curve_timing import time_runs_with_displacement
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.conditions import CompressionConditions, Conditions, IndentationConditions
 from underskin.units import Floats
 
 _RETURN = 0.05  # of the range of displacement: smaller returns are noise
@@ -51,7 +51,7 @@ class ContactCreep(Mechanism):
     needs_history = True
     figure = ("dwell_s", "time_s")
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """One Prony pair."""
         return (
             Parameter(
@@ -78,21 +78,21 @@ class ContactCreep(Mechanism):
             ),
         )
 
-    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+    def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Times are needed that say more than the loads: dwell_s that differ, or time_s apart from displacement."""
         if kind != "frf":
             curves = [
                 entry
-                for entry in campaign.recordings
-                if isinstance(entry, IndentationRecording | CompressionRecording) and entry.kind == kind
+                for entry in conditions.recordings
+                if isinstance(entry, IndentationConditions | CompressionConditions) and entry.kind == kind
             ]
             lacking = [entry.id for entry in curves if entry.time_s is None]
             if lacking:
                 return f"recording {lacking[0]!r} has no time_s"
             if time_runs_with_displacement(curves):
                 return "all curves go one way at one speed: time cannot be told from displacement"
-            return _again(campaign)
-        dwell = {entry.id: entry.dwell_s for entry in campaign.recordings if entry.kind == kind}
+            return _again(conditions)
+        dwell = {entry.id: entry.dwell_s for entry in conditions.recordings if entry.kind == kind}
         lacking = [name for name, value in dwell.items() if value is None]
         if lacking:
             return f"recording {lacking[0]!r} has no dwell_s"
@@ -109,10 +109,10 @@ class ContactCreep(Mechanism):
         curve.relaxation = values["relaxed_fraction"], values["relaxation_time"]
 
 
-def _again(campaign: Campaign) -> str | None:
+def _again(conditions: Conditions) -> str | None:
     """The first indentation that goes in again after it had come back."""
-    for entry in campaign.recordings:
-        if isinstance(entry, IndentationRecording) and _presses_again(entry.displacement_mm):
+    for entry in conditions.recordings:
+        if isinstance(entry, IndentationConditions) and _presses_again(entry.displacement_mm):
             return f"recording {entry.id!r} presses again after it was drawn back: give each way in and back by itself"
     return None
 

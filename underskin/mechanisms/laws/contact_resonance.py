@@ -6,7 +6,7 @@ from underskin.mechanisms.autodiff import Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class ContactResonance(Mechanism):
@@ -36,7 +36,7 @@ class ContactResonance(Mechanism):
     axes = ("frequency_hz", "phase", "preload_n", "indenter_radius_mm")
     needs_stiffness = True
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """Tip mass and damping ratio."""
         return (
             Parameter(

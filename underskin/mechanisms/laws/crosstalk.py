@@ -5,7 +5,7 @@ import numpy as np
 from underskin.mechanisms.autodiff import Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 from underskin.units import to_si
 
 _FELT_WITHIN = 3.0  # thicknesses; further off a bonded layer passes on less than a thousandth
@@ -36,7 +36,7 @@ class Crosstalk(Mechanism):
     needs_fields = ("sensor",)
     figure = ("position_mm",)
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The fraction."""
         return (
             Parameter(
@@ -52,13 +52,13 @@ class Crosstalk(Mechanism):
             ),
         )
 
-    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+    def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """A neighbour that feels something is needed."""
-        if len(campaign.skin.sensors) < 2:
+        if len(conditions.skin.sensors) < 2:
             return "the skin has one sensor, and so no neighbours"
-        design = FrfDesign.of(campaign, (), neighbours=True)
+        design = FrfDesign.of(conditions, (), neighbours=True)
         nearest = np.hypot(design.point_x, design.point_y)[design.neighbour_point].min(initial=np.inf)
-        if nearest > _FELT_WITHIN * to_si("thickness_mm", campaign.skin.thickness_mm or 0.0):
+        if nearest > _FELT_WITHIN * to_si("thickness_mm", conditions.skin.thickness_mm or 0.0):
             return "no recording presses within three thicknesses of a sensor's neighbour (position_mm)"
         return None
 

@@ -2,7 +2,7 @@
 
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class InstrumentCompliance(Mechanism):
@@ -21,7 +21,7 @@ class InstrumentCompliance(Mechanism):
     kinds = ("indentation",)
     axes = ("force_n",)
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The stage's stiffness."""
         return (
             Parameter(

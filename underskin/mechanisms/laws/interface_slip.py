@@ -2,7 +2,7 @@
 
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class InterfaceSlip(Mechanism):
@@ -30,7 +30,7 @@ class InterfaceSlip(Mechanism):
     axes = ("position_mm", "preload_n", "indenter_radius_mm")
     figure = ("preload_n", "position_mm")
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The glue line's stiffness in units of the layer's own."""
         return (
             Parameter(

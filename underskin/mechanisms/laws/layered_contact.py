@@ -3,7 +3,7 @@
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class LayeredContact(Mechanism):
@@ -33,9 +33,9 @@ class LayeredContact(Mechanism):
     needs = "a declared thickness_mm"
     figure = ("preload_n", "force_n")
 
-    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+    def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """A thickness is needed."""
-        return "skin.thickness_mm is not given" if campaign.skin.thickness_mm is None else None
+        return "skin.thickness_mm is not given" if conditions.skin.thickness_mm is None else None
 
     def on_material(self, contacts: Contacts, values: Values) -> None:
         """Press the layer."""

@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage
-from underskin.mechanisms.models.frf_design import FrfDesign, frf_recordings
+from underskin.mechanisms.models.frf_design import FrfDesign, frequencies
 from underskin.mechanisms.models.pickup import Pickup
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.conditions import Conditions, frf_of
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.units import Floats
 
@@ -51,7 +52,7 @@ class MainsPickup(Mechanism):
     moves_predictions = False
     figure = ("mains",)
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The charge, and what its lines look like."""
         return (
             Parameter(
@@ -92,17 +93,16 @@ class MainsPickup(Mechanism):
             ),
         )
 
-    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+    def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Lines near the mains are needed."""
-        for entry in frf_recordings(campaign):
-            frequency = lines_of(entry).frequency
-            if any(np.abs(frequency - mains).min() < _REACH_HZ for mains in _MAINS_HZ):
+        for entry in frf_of(conditions):
+            if any(np.abs(frequencies(entry) - mains).min() < _REACH_HZ for mains in _MAINS_HZ):
                 return None
         return "no line lies within 3 Hz of 50 or 60 Hz (frequency_hz)"
 
-    def pickup(self, campaign: Campaign, design: FrfDesign) -> Pickup:
+    def pickup(self, conditions: Conditions, design: FrfDesign) -> Pickup:
         """Of the lines within the reach of the mains that stand out, each by the nearest multiple."""
-        away = np.abs(design.row_frequency[:, None] - _outstanding_mains(campaign) * _HARMONICS)
+        away = np.abs(design.row_frequency[:, None] - _outstanding_mains(conditions) * _HARMONICS)
         rows = np.flatnonzero(away.min(axis=1) < _FURTHEST_HZ)
         harmonic = _HARMONICS[away[rows].argmin(axis=1)]
         half_square, force = 0.5 * away[rows].min(axis=1) ** 2, design.row_dynamic_force[rows]
@@ -115,12 +115,13 @@ class MainsPickup(Mechanism):
         return Pickup(rows, deviation)
 
 
-@lru_cache(maxsize=4)  # by the campaign's identity: a diagnosis composes dozens of models of one campaign
-def _outstanding_mains(campaign: Campaign) -> float:
+@lru_cache(maxsize=4)  # by the conditions' identity: a diagnosis composes dozens of models of one campaign
+def _outstanding_mains(conditions: Conditions) -> float:
     """The mains frequency [Hz] whose lines stand out; where none does, the one that has a line nearest."""
-    lines = [lines_of(entry) for entry in frf_recordings(campaign)]
-    nearest = {mains: min(float(np.abs(one.frequency - mains).min()) for one in lines) for mains in _MAINS_HZ}
-    return max(_MAINS_HZ, key=lambda mains: (_excess(lines, mains), -nearest[mains]))
+    lines = np.concatenate([frequencies(entry) for entry in frf_of(conditions)])
+    nearest = {mains: float(np.abs(lines - mains).min()) for mains in _MAINS_HZ}
+    measured = [lines_of(entry) for entry in conditions.recordings if isinstance(entry, FrfRecording)]
+    return max(_MAINS_HZ, key=lambda mains: (_excess(measured, mains), -nearest[mains]))
 
 
 def _excess(recordings: Sequence[Frf], mains: float) -> float:

@@ -7,8 +7,7 @@ import numpy as np
 from underskin.errors import InvalidInput
 from underskin.mechanisms.autodiff import Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
-from underskin.mechanisms.models.frf_design import frf_recordings, offsets
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions, frf_of, offsets
 
 _LARGEST_MM = 2.0
 
@@ -37,13 +36,13 @@ class Misalignment(Mechanism):
     largest_offset = 1e-3 * _LARGEST_MM * np.sqrt(2)
     figure = ("preload_n", "position_mm")
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The offset's two components, or its length where its direction cannot be told."""
-        return self.parameters_beside((), campaign, kind)
+        return self.parameters_beside((), conditions, kind)
 
-    def parameters_beside(self, others: Collection[str], campaign: Campaign, kind: Kind) -> tuple[Parameter, ...]:
+    def parameters_beside(self, others: Collection[str], conditions: Conditions, kind: Kind) -> tuple[Parameter, ...]:
         """The same; the charge of neighbours, which lie in known directions, tells the direction too."""
-        directed = offsets(campaign).any() or "crosstalk" in others
+        directed = offsets(conditions).any() or "crosstalk" in others
         shown, low = ({"offset_x": 0.6, "offset_y": 0.3}, -_LARGEST_MM) if directed else ({"offset": 0.7}, 0.0)
         return tuple(
             Parameter(
@@ -60,13 +59,13 @@ class Misalignment(Mechanism):
             for name, value in shown.items()
         )
 
-    def values_on(self, values: Mapping[str, float], campaign: Campaign) -> Mapping[str, float]:
+    def values_on(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
         """Centred presses need the offset's length alone; a length without its direction serves no others."""
         if "offset" not in values:
             return {**values, "offset": float(np.hypot(values["offset_x"], values["offset_y"]))}
-        beside = offsets(campaign).any(axis=1)
+        beside = offsets(conditions).any(axis=1)
         if beside.any():
-            entry = frf_recordings(campaign)[int(np.argmax(beside))]
+            entry = frf_of(conditions)[int(np.argmax(beside))]
             allowed = (
                 "must be the sensor's centre: the adopted model knows how far presses miss it, not in which direction"
             )

@@ -3,7 +3,7 @@
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class ModulusError(Mechanism):
@@ -28,7 +28,7 @@ class ModulusError(Mechanism):
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     needs = "a declared youngs_modulus_mpa"
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """True over declared modulus."""
         return (
             Parameter(
@@ -44,9 +44,9 @@ class ModulusError(Mechanism):
             ),
         )
 
-    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+    def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """A declared modulus is needed."""
-        if campaign.skin.youngs_modulus_mpa is None:
+        if conditions.skin.youngs_modulus_mpa is None:
             return "skin.youngs_modulus_mpa is not declared, and so free already"
         return None
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from underskin.mechanisms.autodiff import Array, Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Stage, Uniform, Values
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 from underskin.units import Floats
 
 _STEP = 1e-3  # of the central difference over F, relative; its error is of the order of the step's square
@@ -32,7 +32,7 @@ class MovingContactEdge(Mechanism):
     order = 10
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The mobile fraction."""
         return (
             Parameter(

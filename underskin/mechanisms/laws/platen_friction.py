@@ -2,7 +2,7 @@
 
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class PlatenFriction(Mechanism):
@@ -25,7 +25,7 @@ class PlatenFriction(Mechanism):
     axes = ("sample_height_mm", "sample_diameter_mm")
     figure = ("displacement_mm",)
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """How far the platens hold the sample."""
         return (
             Parameter(

@@ -4,7 +4,7 @@ import numpy as np
 
 from underskin.mechanisms.autodiff import Differentiated, chain
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class PreloadDependentD33(Mechanism):
@@ -28,7 +28,7 @@ class PreloadDependentD33(Mechanism):
     order = 10
     axes = ("preload_n", "indenter_radius_mm", "position_mm", "sensor")
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The coefficient and the stress at which it saturates."""
         return (
             Parameter(

@@ -6,7 +6,7 @@ from underskin.mechanisms.autodiff import Differentiated, exp
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 _REFERENCE = 30.0  # Hz
 
@@ -28,7 +28,7 @@ class SensorRelaxation(Mechanism):
     order = 20
     axes = ("frequency_hz", "phase")
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The power law's exponent, the step and its frequency."""
         return (
             Parameter(

@@ -2,8 +2,7 @@
 
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
-from underskin.mechanisms.models.frf_design import frf_recordings
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions, frf_of
 
 
 class SensorSpread(Mechanism):
@@ -29,7 +28,7 @@ class SensorSpread(Mechanism):
     needs = "recordings of at least two sensors"
     moves_predictions = False
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The spread."""
         return (
             Parameter(
@@ -46,8 +45,8 @@ class SensorSpread(Mechanism):
             ),
         )
 
-    def unsupported(self, campaign: Campaign, kind: Kind) -> str | None:
+    def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Two sensors are needed."""
-        if len({entry.sensor for entry in frf_recordings(campaign)}) < 2:
+        if len({entry.sensor for entry in frf_of(conditions)}) < 2:
             return "all recordings are of one sensor"
         return None

@@ -6,7 +6,7 @@ from underskin.mechanisms.autodiff import Array, chain
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 _STRAIN = 0.2  # of the contact, times R/a
 _NEWTON_STEPS = 8
@@ -77,7 +77,7 @@ class StrainStiffening(Mechanism):
     imitated_by_seating = True
     figure = ("preload_n", "displacement_mm")
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The stiffening coefficient, or for curves the law's constants C20/C10 and C30/C10."""
         return (_COEFFICIENT,) if kind == "frf" else _YEOH
 

@@ -2,7 +2,7 @@
 
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class ThicknessError(Mechanism):
@@ -21,7 +21,7 @@ class ThicknessError(Mechanism):
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     largest_stretch = 1.55
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """True over declared thickness."""
         return (
             Parameter(

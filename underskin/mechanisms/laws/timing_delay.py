@@ -6,7 +6,7 @@ from underskin.mechanisms.autodiff import Differentiated, exp
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class TimingDelay(Mechanism):
@@ -27,7 +27,7 @@ class TimingDelay(Mechanism):
     axes = ("phase", "frequency_hz")
     figure = ("phase",)
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The delay."""
         return (
             Parameter(

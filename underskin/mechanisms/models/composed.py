@@ -1,4 +1,4 @@
-"""A model of a campaign's recordings: the base model, and a set of mechanisms composed with it in a fixed order."""
+"""A model of recordings: the base model, and a set of mechanisms composed with it in a fixed order."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.errors import InvalidInput
-from underskin.mechanisms.base import Kind, Parameter
+from underskin.mechanisms.base import Kind, Mechanism, Parameter
 from underskin.mechanisms.models.composition import Prediction, check_supported, chosen, kind_of
 from underskin.mechanisms.models.compression import CompressionModel
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.models.indentation import IndentationModel
 from underskin.mechanisms.models.pickup import Pickup
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
@@ -46,19 +46,48 @@ class Model(Protocol):
         ...
 
 
-def compose(names: Sequence[str], campaign: Campaign, table: SigmaTable, kind: Kind | None = None) -> Model:
-    """The model of these mechanisms, by name, in any order, for the campaign's recordings of one kind.
+def compose(names: Sequence[str], conditions: Conditions, table: SigmaTable, kind: Kind | None = None) -> Model:
+    """The model of some mechanisms for all recordings of one kind, where these can support the mechanisms.
 
-    `kind` must be given where the campaign has several. Raises Unsupported(mechanism, reason) where the campaign
-    cannot support one, InvalidInput for an unknown name, or a kind of which the campaign has no recording.
+    Parameters
+    ----------
+    names
+        Mechanisms of the catalogue, in any order.
+    conditions
+        Conditions of recordings, or a campaign. Of measured curves, contact points, force offsets and an undeclared
+        modulus start from the base model's own fits.
+    table
+        The σ table.
+    kind
+        Must be given where the conditions hold several kinds.
+
+    Raises
+    ------
+    Unsupported
+        Where the recordings cannot support a mechanism: they would say nothing about its parameters.
+    InvalidInput
+        For an unknown name, or a kind of which there is no recording.
     """
-    kind = kind or kind_of(campaign)
-    if all(recording.kind != kind for recording in campaign.recordings):
-        raise InvalidInput("kind", kind, "must be that of at least one of the campaign's recordings")
+    kind = kind or kind_of(conditions)
+    _require_kind(conditions, kind)
     mechanisms = chosen(names, CATALOGUE)
-    check_supported(mechanisms, campaign, kind)
+    check_supported(mechanisms, conditions, kind)
+    return forward_model(mechanisms, conditions, table, kind)
+
+
+def forward_model(mechanisms: Sequence[Mechanism], conditions: Conditions, table: SigmaTable, kind: Kind) -> Model:
+    """The model of mechanisms in order of composition, whether or not the recordings would tell their parameters.
+
+    Raises InvalidInput for a kind of which there is no recording, and where a declared value is lacking.
+    """
+    _require_kind(conditions, kind)
     if kind == "frf":
-        return FrfModel(mechanisms, campaign, table)
+        return FrfModel(mechanisms, conditions, table)
     if kind == "indentation":
-        return IndentationModel(mechanisms, campaign)
-    return CompressionModel(mechanisms, campaign)
+        return IndentationModel(mechanisms, conditions)
+    return CompressionModel(mechanisms, conditions)
+
+
+def _require_kind(conditions: Conditions, kind: Kind) -> None:
+    if all(recording.kind != kind for recording in conditions.recordings):
+        raise InvalidInput("kind", kind, "must be that of at least one of the campaign's recordings")

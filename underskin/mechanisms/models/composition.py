@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from underskin.errors import InvalidInput
 from underskin.mechanisms.autodiff import Array, Differentiated, variables
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Unsupported, Values
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 from underskin.units import Floats
 
 SENSOR_SPREAD = 0.01  # sd of the logarithms of the sensors' gains, without `sensor_spread`
@@ -43,11 +43,11 @@ class Composition:
     """The mechanisms of a model, in order, and how one vector of fit coordinates is theirs and the nuisances'."""
 
     def __init__(
-        self, mechanisms: Sequence[Mechanism], campaign: Campaign, kind: Kind, nuisances: Sequence[Parameter]
+        self, mechanisms: Sequence[Mechanism], conditions: Conditions, kind: Kind, nuisances: Sequence[Parameter]
     ) -> None:
         """Take the parameters of each mechanism, then the nuisances."""
         self.mechanisms = tuple(mechanisms)
-        own = parameters_together(mechanisms, campaign, kind)
+        own = parameters_together(mechanisms, conditions, kind)
         self.parameters = (*(parameter for group in own.values() for parameter in group), *nuisances)
         starts = np.cumsum([0, *(len(group) for group in own.values())])
         self._places = {
@@ -87,28 +87,28 @@ class Composition:
 
 
 def parameters_together(
-    mechanisms: Sequence[Mechanism], campaign: Campaign, kind: Kind
+    mechanisms: Sequence[Mechanism], conditions: Conditions, kind: Kind
 ) -> dict[str, tuple[Parameter, ...]]:
     """The parameters of each mechanism by its name, as they are where all of these act together."""
     names = [mechanism.name for mechanism in mechanisms]
-    return {mechanism.name: mechanism.parameters_beside(names, campaign, kind) for mechanism in mechanisms}
+    return {mechanism.name: mechanism.parameters_beside(names, conditions, kind) for mechanism in mechanisms}
 
 
-def kind_of(campaign: Campaign) -> Kind:
+def kind_of(conditions: Conditions) -> Kind:
     """The kind of the campaign's recordings; raises InvalidInput where there are several, or none."""
-    kinds = {recording.kind for recording in campaign.recordings}
+    kinds = {recording.kind for recording in conditions.recordings}
     if len(kinds) != 1:
         raise InvalidInput("kind", sorted(kinds), "name one: the campaign's recordings are of several kinds, or none")
     kind: Kind = kinds.pop()  # type: ignore[assignment]
     return kind
 
 
-def check_supported(mechanisms: Sequence[Mechanism], campaign: Campaign, kind: Kind) -> None:
-    """Raises Unsupported at the first mechanism that the campaign, or this kind of recording, cannot support."""
+def check_supported(mechanisms: Sequence[Mechanism], conditions: Conditions, kind: Kind) -> None:
+    """Raises Unsupported at the first mechanism that the conditions, or this kind of recording, cannot support."""
     for mechanism in mechanisms:
         if kind not in mechanism.kinds:
             raise Unsupported(mechanism.name, f"does not act on recordings of kind {kind}")
-        reason = mechanism.unsupported(campaign, kind)
+        reason = mechanism.unsupported(conditions, kind)
         if reason is not None:
             raise Unsupported(mechanism.name, reason)
 

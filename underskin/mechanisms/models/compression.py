@@ -1,4 +1,4 @@
-"""The force of a campaign's compression (or tension) curves, sample by sample, under a set of mechanisms.
+"""The force of compression (or tension) curves, sample by sample, under a set of mechanisms.
 
 Base model: one modulus, F = E A (d − d0)/H, compression positive. Stages: declared value → nominal stress of the
 material → friction at the platens → relaxation.
@@ -15,32 +15,37 @@ from underskin.mechanisms.base import Mechanism, Parameter, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
 from underskin.mechanisms.models.curve_state import Curve, stiffened
 from underskin.mechanisms.models.indentation import declared_modulus, times_of
-from underskin.mechanisms.models.nuisances import contact_point, modulus_parameter
+from underskin.mechanisms.models.nuisances import contact_point, modulus_parameter, required_modulus
 from underskin.mechanisms.models.pickup import Pickup
 from underskin.mechanisms.models.relaxation import relaxed
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings import elastomer
-from underskin.recordings.campaign import Campaign, CompressionRecording
+from underskin.recordings.campaign import CompressionRecording
+from underskin.recordings.conditions import CompressionConditions, Conditions, SkinDescription
 from underskin.units import Floats, to_si
 
-_CONTACT_SD = 0.01  # of the sample's height
+_CONTACT_SD, _CONTACT_REACH = 0.01, 0.1  # of the sample's height: the contact point's prior and bounds
 
 
 class CompressionModel:
-    """See the module; `predict` gives all samples of all recordings, one recording after another."""
+    """The force of compressions under a set of mechanisms; rows are all samples, one recording after another.
+
+    Of measured curves, contact points and an undeclared modulus have priors around the base model's own fits. Of
+    conditions alone, contact is around displacement 0 and the modulus must be declared.
+    """
 
     sensor: NDArray[np.intp] | None = None
 
-    def __init__(self, mechanisms: Sequence[Mechanism], campaign: Campaign) -> None:
+    def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions) -> None:
         """Work out everything that no parameter changes; InvalidInput names a recording that does not load."""
-        recordings = [entry for entry in campaign.recordings if isinstance(entry, CompressionRecording)]
-        self._skin = campaign.skin
-        self._composition = Composition(mechanisms, campaign, "compression", _nuisances(recordings, campaign))
+        recordings = [entry for entry in conditions.recordings if isinstance(entry, CompressionConditions)]
+        self._skin = conditions.skin
+        self._composition = Composition(mechanisms, conditions, "compression", _nuisances(recordings, self._skin))
         self.names = tuple(mechanism.name for mechanism in mechanisms)
         self.parameters = self._composition.parameters
         self._mechanisms = self._composition.mechanisms
         self._ids = [entry.id for entry in recordings]
-        self.recording = np.repeat(np.arange(len(recordings)), [len(entry.force_n) for entry in recordings])
+        self.recording = np.repeat(np.arange(len(recordings)), [len(entry.displacement_mm) for entry in recordings])
         self.valid = np.ones(len(self.recording), dtype=bool)
         self.pickup: Pickup | None = None
         self._first = np.diff(self.recording, prepend=-1) > 0
@@ -87,15 +92,21 @@ class CompressionModel:
         return stress * (1.0 + 2.0 * self._shape_factor**2 * curve.platen_friction)
 
 
-def _nuisances(recordings: Sequence[CompressionRecording], campaign: Campaign) -> list[Parameter]:
+def _nuisances(recordings: Sequence[CompressionConditions], skin: SkinDescription) -> list[Parameter]:
+    """The nuisances' parameters; raises InvalidInput where a measured curve does not load."""
     estimates, points = [], []
     for entry in recordings:
-        try:
-            estimates.append(elastomer.of_compression(entry).modulus)
-        except InvalidInput as refusal:
-            raise InvalidInput(f"recordings[{entry.id}].{refusal.field}", refusal.value, refusal.allowed) from refusal
         height = float(to_si("sample_height_mm", entry.sample_height_mm))
-        unloaded = int(np.abs(entry.force_n).argmin())
-        begins = float(to_si("displacement_mm", entry.displacement_mm[unloaded]))
-        points.append(contact_point(entry.id, begins, _CONTACT_SD * height, 0.1 * height))
-    return [modulus_parameter(campaign.skin, estimates), *points]
+        begins = 0.0
+        if isinstance(entry, CompressionRecording):
+            try:
+                estimates.append(elastomer.of_compression(entry).modulus)
+            except InvalidInput as refusal:
+                field = f"recordings[{entry.id}].{refusal.field}"
+                raise InvalidInput(field, refusal.value, refusal.allowed) from refusal
+            unloaded = int(np.abs(entry.force_n).argmin())
+            begins = float(to_si("displacement_mm", entry.displacement_mm[unloaded]))
+        else:
+            required_modulus(skin)
+        points.append(contact_point(entry.id, begins, _CONTACT_SD * height, _CONTACT_REACH * height))
+    return [modulus_parameter(skin, estimates), *points]

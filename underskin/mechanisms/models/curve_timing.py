@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from underskin.recordings.campaign import CompressionRecording, IndentationRecording
+from underskin.recordings.conditions import CurveConditions
 
 _TURNED_BACK = 0.02  # of the span
 _UNEVEN = 0.1  # of the duration
 _LIKE_SPEEDS = 1.5
 
 
-def time_runs_with_displacement(recordings: Sequence[IndentationRecording | CompressionRecording]) -> bool:
+def time_runs_with_displacement(recordings: Sequence[CurveConditions]) -> bool:
     """True where all curves go one way at one and the same constant speed; recordings without time_s do not count."""
     speeds = []
     for entry in recordings:

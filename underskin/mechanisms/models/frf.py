@@ -26,7 +26,7 @@ from underskin.mechanisms.models.pickup import Pickup, together
 from underskin.mechanisms.models.sigma_curves import layer_of, sigma_curves
 from underskin.physics.contact_curves import ContactCurves
 from underskin.physics.elastic_layer import Layer
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_si
 
@@ -37,18 +37,18 @@ _POSITION = 2  # two more variables: the contact's x and y
 class FrfModel:
     """See the module; `predict` gives all lines of all recordings, one recording after another."""
 
-    def __init__(self, mechanisms: Sequence[Mechanism], campaign: Campaign, table: SigmaTable) -> None:
+    def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions, table: SigmaTable) -> None:
         """Work out everything that no parameter changes."""
-        self._composition = Composition(mechanisms, campaign, "frf", FRF_NUISANCES)
+        self._composition = Composition(mechanisms, conditions, "frf", FRF_NUISANCES)
         self.names = tuple(mechanism.name for mechanism in mechanisms)
         self.parameters = self._composition.parameters
         self._mechanisms = self._composition.mechanisms
         fields = {field for mechanism in mechanisms for field in mechanism.needs_fields}
         neighbours = any(mechanism.needs_neighbours for mechanism in mechanisms)
-        self.design = design = FrfDesign.of(campaign, fields, neighbours=neighbours)
+        self.design = design = FrfDesign.of(conditions, fields, neighbours=neighbours)
         self.recording = design.recording
         self.sensor: Indices | None = design.sensor
-        skin = campaign.skin
+        skin = conditions.skin
         self._modulus = _required("youngs_modulus_mpa", skin.youngs_modulus_mpa)
         self._thickness = _required("thickness_mm", skin.thickness_mm)
         self._sensor_radius = _required("sensor_radius_mm", skin.sensor_radius_mm)
@@ -59,7 +59,7 @@ class FrfModel:
         self._sigma = offset_sigma(table, self._sensor_radius / self._thickness, stretch, reached)
         self._needs_stiffness = any(mechanism.needs_stiffness for mechanism in mechanisms)
         self._last_layer: tuple[Layer, ContactCurves] | None = None
-        pickups = [mechanism.pickup(campaign, design) for mechanism in self._mechanisms]
+        pickups = [mechanism.pickup(conditions, design) for mechanism in self._mechanisms]
         self.pickup: Pickup | None = together([pickup for pickup in pickups if pickup is not None])
         self._force, self._increments = _force_nodes(self._mechanisms, design)
         self.valid = self._declared_inside(table)[design.point][design.recording]

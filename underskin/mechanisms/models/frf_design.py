@@ -1,4 +1,4 @@
-"""What a campaign's FRF recordings amount to for a model, worked out once: everything that no parameter changes.
+"""What the conditions of FRF recordings amount to for a model, worked out once: everything that no parameter changes.
 
 Recordings share contacts (sphere, preload and what else a mechanism asks for), contacts at one place beside a sensor
 are points, and a contact at one frequency is a line. Only these distinct ones are computed.
@@ -9,11 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.distance import cdist, pdist
+from scipy.spatial.distance import cdist
 
 from underskin.errors import InvalidInput
-from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.conditions import Conditions, FrfConditions, frf_of
 from underskin.units import Floats, to_si
 
 Indices = NDArray[np.intp]
@@ -47,12 +46,12 @@ class FrfDesign:
     row_frequency: Floats
 
     @classmethod
-    def of(cls, campaign: Campaign, fields: Collection[str], *, neighbours: bool) -> "FrfDesign":
+    def of(cls, conditions: Conditions, fields: Collection[str], *, neighbours: bool) -> "FrfDesign":
         """The design; `fields` may name what else tells contacts apart: "dwell_s", "dynamic_force_n"."""
-        recordings = frf_recordings(campaign)
-        sensor_ids = tuple(sensor.id for sensor in campaign.skin.sensors)
+        recordings = frf_of(conditions)
+        sensor_ids = tuple(sensor.id for sensor in conditions.skin.sensors)
         number = {name: index for index, name in enumerate(sensor_ids)}
-        places = to_si("thickness_mm", [(sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors])
+        places = to_si("thickness_mm", [(sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors])
         sensor = np.array([number[entry.sensor] for entry in recordings])
         position = np.array(
             [
@@ -70,9 +69,9 @@ class FrfDesign:
         points, point = np.unique(
             np.column_stack([contact[all_recordings], np.round(beside, 12)]), axis=0, return_inverse=True
         )
-        frequencies = [lines_of(entry).frequency for entry in recordings]
-        recording = np.repeat(np.arange(len(recordings)), [len(entry) for entry in frequencies])
-        row_frequency = np.concatenate(frequencies)
+        lines_hz = [frequencies(entry) for entry in recordings]
+        recording = np.repeat(np.arange(len(recordings)), [len(column) for column in lines_hz])
+        row_frequency = np.concatenate(lines_hz)
         distinct, frequency = np.unique(row_frequency, return_inverse=True)
         lines, line = np.unique(contact[recording] * len(distinct) + frequency, return_inverse=True)
         return cls(
@@ -100,28 +99,11 @@ class FrfDesign:
         )
 
 
-def frf_recordings(campaign: Campaign) -> list[FrfRecording]:
-    """The campaign's FRF recordings, in order; raises InvalidInput where there is none."""
-    recordings = [entry for entry in campaign.recordings if isinstance(entry, FrfRecording)]
-    if not recordings:
-        raise InvalidInput("recordings", "none of kind frf", "must hold at least one")
-    return recordings
-
-
-def offsets(campaign: Campaign) -> Floats:
-    """The commanded place of each FRF recording, seen from its sensor's centre (recordings, 2) [m]."""
-    places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-    beside = [
-        np.subtract(entry.position_mm or places[entry.sensor], places[entry.sensor])
-        for entry in frf_recordings(campaign)
-    ]
-    return to_si("thickness_mm", np.array(beside))
-
-
-def sensor_pitch(campaign: Campaign) -> float:
-    """The smallest distance between two sensors [m]; 0 where there is one."""
-    places = to_si("thickness_mm", [(sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors])
-    return float(pdist(places).min()) if len(places) > 1 else 0.0
+def frequencies(entry: FrfConditions) -> Floats:
+    """The lines of one FRF [Hz]; raises InvalidInput where they are yet to be estimated from a time series."""
+    if entry.frequency_hz is None:
+        raise InvalidInput(f"recordings[{entry.id}].frequency_hz", None, "required for a prediction")
+    return entry.frequency_hz
 
 
 def _neighbours(places: Floats) -> NDArray[np.bool_]:
@@ -132,7 +114,7 @@ def _neighbours(places: Floats) -> NDArray[np.bool_]:
     return near
 
 
-def _contact_key(entry: FrfRecording, fields: Collection[str]) -> tuple[float, float, float, float]:
+def _contact_key(entry: FrfConditions, fields: Collection[str]) -> tuple[float, float, float, float]:
     dwell = entry.dwell_s if "dwell_s" in fields and entry.dwell_s is not None else 0.0
     dynamic_force = entry.dynamic_force_n if "dynamic_force_n" in fields else 0.0
     return entry.preload_n, float(to_si("indenter_radius_mm", entry.indenter_radius_mm)), dynamic_force, dwell

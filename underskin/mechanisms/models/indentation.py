@@ -1,4 +1,4 @@
-"""The force of a campaign's indentation curves, sample by sample, under a set of mechanisms.
+"""The force of indentation curves, sample by sample, under a set of mechanisms.
 
 Base model: Hertz on a half space, F = (4/3) E/(1 − ν²) √R (d − d0)^(3/2), with the contact point d0 and, where none is
 declared, E free. Stages: declared value → material → contact radius, depth and force together with the stage's give,
@@ -17,32 +17,45 @@ from underskin.mechanisms.base import Mechanism, Parameter, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.models.indentation_law import Sphere, in_contact
-from underskin.mechanisms.models.nuisances import THICKNESS, contact_point, force_offset, modulus_parameter
+from underskin.mechanisms.models.nuisances import (
+    THICKNESS,
+    contact_point,
+    force_offset,
+    modulus_parameter,
+    required_modulus,
+)
 from underskin.mechanisms.models.pickup import Pickup
 from underskin.mechanisms.models.receding_contact import Presses, relaxing
 from underskin.mechanisms.models.stage_compliance import relaxing_on_stage
 from underskin.physics.contact_curves import ContactCurves, CurveGrid
 from underskin.physics.elastic_layer import Layer
 from underskin.recordings import elastomer
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.campaign import IndentationRecording
+from underskin.recordings.conditions import Conditions, CurveConditions, IndentationConditions, SkinDescription
 from underskin.units import Floats, to_si
+
+_CONTACT_SD, _CONTACT_REACH = 0.1, 0.8  # of the range of displacement: the contact point's prior and bounds
 
 
 class IndentationModel:
-    """See the module; `predict` gives all samples of all recordings, one recording after another."""
+    """The force of indentations under a set of mechanisms; rows are all samples, one recording after another.
+
+    Of measured curves, contact points, force offsets and an undeclared modulus have priors around the base model's own
+    fits. Of conditions alone they are those expected of the declared modulus, with contact at displacement 0.
+    """
 
     sensor: NDArray[np.intp] | None = None
 
-    def __init__(self, mechanisms: Sequence[Mechanism], campaign: Campaign) -> None:
+    def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions) -> None:
         """Work out everything that no parameter changes; InvalidInput names a recording that does not load."""
-        recordings = [entry for entry in campaign.recordings if isinstance(entry, IndentationRecording)]
-        self._skin = campaign.skin
-        self._composition = Composition(mechanisms, campaign, "indentation", _nuisances(recordings, campaign))
+        recordings = [entry for entry in conditions.recordings if isinstance(entry, IndentationConditions)]
+        self._skin = conditions.skin
+        self._composition = Composition(mechanisms, conditions, "indentation", _nuisances(recordings, self._skin))
         self.names = tuple(mechanism.name for mechanism in mechanisms)
         self.parameters = self._composition.parameters
         self._mechanisms = self._composition.mechanisms
         self._ids = [entry.id for entry in recordings]
-        lengths = [len(entry.force_n) for entry in recordings]
+        lengths = [len(entry.displacement_mm) for entry in recordings]
         self.recording = np.repeat(np.arange(len(recordings)), lengths)
         self.valid = np.ones(len(self.recording), dtype=bool)
         self.pickup: Pickup | None = None
@@ -129,10 +142,10 @@ def declared_modulus(youngs_modulus_mpa: float | None) -> float:
     return float(to_si("youngs_modulus_mpa", 1.0 if youngs_modulus_mpa is None else youngs_modulus_mpa))
 
 
-def times_of(recordings: Sequence[IndentationRecording | CompressionRecording]) -> Floats:
+def times_of(recordings: Sequence[CurveConditions]) -> Floats:
     """time_s of all samples; the sample's number where a recording has none, and no mechanism asks."""
     return np.concatenate(
-        [np.arange(float(len(entry.force_n))) if entry.time_s is None else entry.time_s for entry in recordings]
+        [np.arange(float(len(entry.displacement_mm))) if entry.time_s is None else entry.time_s for entry in recordings]
     )
 
 
@@ -149,34 +162,48 @@ def _grid() -> CurveGrid:
     return CurveGrid(np.ones(1))
 
 
-def _nuisances(recordings: Sequence[IndentationRecording], campaign: Campaign) -> list[Parameter]:
-    """Around the base model's own fits; a recording that does not load begins where it shows least force.
-
-    Raises InvalidInput where none loads, or one does not move.
-    """
+def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescription) -> list[Parameter]:
+    """The nuisances' parameters; raises InvalidInput where no measured curve loads, or one does not move."""
     estimates, per_recording, refused = [], [], None
     for entry in recordings:
-        columns = [np.asarray(column, dtype=float).tobytes() for column in (entry.displacement_mm, entry.force_n)]
-        try:
-            modulus, begins = _hertz(*columns, entry.indenter_radius_mm, campaign.skin.poisson_ratio)
-            estimates.append(modulus)
-        except InvalidInput as refusal:
-            refused = InvalidInput(f"recordings[{entry.id}].{refusal.field}", refusal.value, refusal.allowed)
-            begins = float(to_si("displacement_mm", entry.displacement_mm[int(np.abs(entry.force_n).argmin())]))
         span = float(np.ptp(to_si("displacement_mm", entry.displacement_mm)))
-        if refused is not None and span == 0:
-            raise refused
-        per_recording.append(contact_point(entry.id, begins, 0.1 * span, 0.8 * span))
-        per_recording.append(force_offset(entry.id, float(np.abs(entry.force_n).max())))
+        if not isinstance(entry, IndentationRecording):
+            begins, largest = 0.0, _expected_force(entry, skin)
+        else:
+            columns = [np.asarray(column, dtype=float).tobytes() for column in (entry.displacement_mm, entry.force_n)]
+            try:
+                modulus, begins = _hertz(*columns, entry.indenter_radius_mm, skin.poisson_ratio)
+                estimates.append(modulus)
+            except InvalidInput as refusal:
+                refused = InvalidInput(f"recordings[{entry.id}].{refusal.field}", refusal.value, refusal.allowed)
+                # A curve that does not load begins where it shows least force.
+                begins = float(to_si("displacement_mm", entry.displacement_mm[int(np.abs(entry.force_n).argmin())]))
+            if refused is not None and span == 0:
+                raise refused
+            largest = float(np.abs(entry.force_n).max())
+        per_recording.append(contact_point(entry.id, begins, _CONTACT_SD * span, _CONTACT_REACH * span))
+        per_recording.append(force_offset(entry.id, largest))
     if refused is not None and not estimates:
         raise refused
-    thickness = [] if campaign.skin.thickness_mm is None else [THICKNESS]
-    return [modulus_parameter(campaign.skin, estimates), *thickness, *per_recording]
+    thickness = [] if skin.thickness_mm is None else [THICKNESS]
+    return [modulus_parameter(skin, estimates), *thickness, *per_recording]
+
+
+def _expected_force(entry: IndentationConditions, skin: SkinDescription) -> float:
+    """The largest force [N] by the base model, F = (4/3) E/(1 − ν²) √R d^(3/2), at the declared modulus."""
+    depth = float(to_si("displacement_mm", np.abs(entry.displacement_mm).max()))
+    modulus = float(to_si("youngs_modulus_mpa", required_modulus(skin)))
+    radius = float(to_si("indenter_radius_mm", entry.indenter_radius_mm))
+    return float(4 / 3 * modulus / (1 - skin.poisson_ratio**2) * np.sqrt(radius) * depth**1.5)
 
 
 @lru_cache(maxsize=1024)  # a diagnosis composes some dozen models of the same recordings
 def _hertz(displacement_mm: bytes, force_n: bytes, radius_mm: float, poisson_ratio: float) -> tuple[float, float]:
     """Modulus [Pa] and contact point [m] of the base model's own fit."""
-    columns = np.frombuffer(displacement_mm), np.frombuffer(force_n)
-    found = elastomer.of_indentation(IndentationRecording("", radius_mm, *columns), poisson_ratio)
-    return found.modulus, found.contact_point
+    fit = elastomer.indentation_modulus(
+        to_si("displacement_mm", np.frombuffer(displacement_mm)),
+        to_si("force_n", np.frombuffer(force_n)),
+        float(to_si("indenter_radius_mm", radius_mm)),
+        poisson_ratio,
+    )
+    return fit.modulus, fit.contact_point

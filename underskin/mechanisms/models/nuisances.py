@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Normal, Parameter
-from underskin.recordings.campaign import SkinDescription
+from underskin.recordings.conditions import SkinDescription
 from underskin.units import to_lab
 
 D33 = Parameter(
@@ -42,7 +43,7 @@ THICKNESS = Parameter(
     reason="a declared thickness is good to 1 %; a larger error is the mechanism thickness_error",
 )
 FRF_NUISANCES = (D33, YOUNGS_MODULUS, THICKNESS)
-_WIDE_SD = 1.5
+_WIDE_SD = 1.5  # of the logarithm of a modulus that nobody declared
 _OFFSET_SHARE = 0.01  # of the largest force
 
 
@@ -62,6 +63,13 @@ def modulus_parameter(skin: SkinDescription, estimates: Sequence[float]) -> Para
         proportional=True,
         reason="what is measured; wide around the base model's own fit",
     )
+
+
+def required_modulus(skin: SkinDescription) -> float:
+    """The declared modulus [MPa]; raises InvalidInput where there is none and no measured curve tells it either."""
+    if skin.youngs_modulus_mpa is None:
+        raise InvalidInput("skin.youngs_modulus_mpa", None, "required to predict curves that were not measured")
+    return skin.youngs_modulus_mpa
 
 
 def contact_point(recording: str, middle: float, sd: float, reach: float) -> Parameter:

@@ -20,7 +20,8 @@ from dataclasses import fields
 from typing import Any, BinaryIO
 
 from underskin.errors import FileError
-from underskin.recordings.campaign import COLUMNS, KINDS, SCHEMA, SkinDescription
+from underskin.recordings.campaign import COLUMNS, KINDS, SCHEMA
+from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.readers import text
 from underskin.recordings.readers.unit_labels import lab_field, labelled_unit
 from underskin.units import LAB, LabField

@@ -1,0 +1,147 @@
+"""The forward model: what recordings under given conditions would show, with derivatives by every parameter.
+
+skin = SkinDescription(poisson_ratio=0.5, thickness_mm=2.5, youngs_modulus_mpa=16, sensor_radius_mm=1.5)
+conditions = frf_conditions(skin, indenter_radius_mm=4, preload_n=[0.5, 1, 2], frequency_hz=[30])
+predict(conditions, load_table(), {"d33": 14, "mobile_fraction": 0.4}, mechanisms=["moving_contact_edge"]).value
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.errors import InvalidInput
+from underskin.mechanisms.autodiff import Array
+from underskin.mechanisms.base import Kind, Mechanism, Parameter
+from underskin.mechanisms.models.composed import Model, forward_model
+from underskin.mechanisms.models.composition import chosen, kind_of, parameters_together
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.recordings.conditions import Conditions, FrfConditions
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import to_lab
+
+_NOTHING: Mapping[str, float] = {}
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """What recordings would show; rows are lines of FRFs or samples of curves, one recording after another.
+
+    Attributes
+    ----------
+    value
+        (rows,) complex FRF [pC/N], or force [N] of a curve.
+    derivatives
+        Of `value` by each parameter in its unit, (rows,) each, by name.
+    recording
+        (rows,) number of the recording.
+    inside
+        (rows,) False where the contact lies beyond the tables, which are continued there.
+    """
+
+    value: Array
+    derivatives: Mapping[str, Array]
+    recording: NDArray[np.intp]
+    inside: NDArray[np.bool_]
+
+
+def predict(
+    conditions: Conditions,
+    table: SigmaTable,
+    parameters: Mapping[str, float] = _NOTHING,
+    *,
+    mechanisms: Sequence[str] = (),
+    kind: Kind | None = None,
+) -> Predicted:
+    """What recordings under these conditions show, by the base model with a set of mechanisms.
+
+    Parameters
+    ----------
+    conditions
+        Conditions of recordings, or a campaign, whose measurements are not used but for the contact points of curves.
+    table
+        The σ table (`load_table`).
+    parameters
+        Values by name, in the parameter's unit: those of every mechanism, and of the base model `d33` [pC/N] (default
+        the declared one), `youngs_modulus` and `thickness` (factors on the declared ones, default 1), and of curves
+        `contact_point <id>` [mm] and `force_offset <id>` [N].
+    mechanisms
+        Names from the catalogue, in any order.
+    kind
+        Of the recordings; needed where the conditions hold several kinds.
+
+    Returns
+    -------
+    Predicted
+        Values and derivatives in lab units.
+
+    Raises
+    ------
+    InvalidInput
+        For a mechanism or parameter that is unknown, missing or beyond its bounds, and for a recording that lacks what
+        a mechanism needs.
+    """
+    kind = kind or kind_of(conditions)
+    acting = chosen(mechanisms, CATALOGUE)
+    for mechanism in acting:
+        if kind not in mechanism.kinds:
+            raise InvalidInput("mechanisms", mechanism.name, f"does not act on recordings of kind {kind}")
+    if kind == "frf":
+        require_fields(acting, conditions)
+    model = forward_model(acting, conditions, table, kind)
+    declared = conditions.skin.d33_pc_per_n
+    values = {} if declared is None or kind != "frf" else {"d33": declared}
+    values |= parameters
+    own = sum(map(len, parameters_together(acting, conditions, kind).values()))
+    fit = _fit_coordinates(model, values, own)
+    prediction = model.predict(fit)
+    unit = float(to_lab("frf_pc_per_n", 1.0)) if kind == "frf" else 1.0
+    return Predicted(
+        value=unit * prediction.value,
+        derivatives={
+            entry.name: unit * slopes / (entry.from_fit(at) if entry.scale == "log" else 1.0)
+            for entry, slopes, at in zip(model.parameters, prediction.slopes, fit.tolist(), strict=True)
+        },
+        recording=model.recording,
+        inside=model.valid & prediction.inside,
+    )
+
+
+def needed_fields(mechanisms: Sequence[Mechanism]) -> dict[str, str]:
+    """Fields of an FRF's conditions needed beside sphere, preload and lines, each with the mechanism that needs it."""
+    needed: dict[str, str] = {}
+    for mechanism in mechanisms:
+        needed |= {name: mechanism.name for name in mechanism.needs_fields if name not in needed}
+    return needed
+
+
+def require_fields(mechanisms: Sequence[Mechanism], conditions: Conditions, model: str = "the model") -> None:
+    """Raises InvalidInput for the first FRF whose conditions lack a field that a mechanism of this model needs."""
+    for name, mechanism in needed_fields(mechanisms).items():
+        for entry in conditions.recordings:
+            if isinstance(entry, FrfConditions) and getattr(entry, name) is None:
+                raise InvalidInput(f"recordings[{entry.id}].{name}", None, f"is required: {model} has {mechanism}")
+
+
+def _fit_coordinates(model: Model, values: Mapping[str, float], own: int) -> NDArray[np.float64]:
+    """The fit coordinates (parameters,) of values by name; nuisances that are not given are at their priors' centres.
+
+    `own`: how many of the parameters, the first ones, are the mechanisms'.
+    """
+    names = [entry.name for entry in model.parameters]
+    for name in values:
+        if name not in names:
+            raise InvalidInput("parameters", name, f"must be one of {', '.join(names)}")
+    required = {*names[:own], "d33"}
+    return np.array([_coordinate(entry, values.get(entry.name), entry.name in required) for entry in model.parameters])
+
+
+def _coordinate(entry: Parameter, value: float | None, required: bool) -> float:
+    if value is None:
+        if required:
+            raise InvalidInput(f"parameters.{entry.name}", None, f"required, in {entry.unit}: {entry.reason}")
+        return entry.start
+    if not entry.low <= value <= entry.high:
+        raise InvalidInput(f"parameters.{entry.name}", value, f"must be {entry.low:g} to {entry.high:g} {entry.unit}")
+    return entry.to_fit(value)
