@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from service.jobs.process import Worker
-from service.jobs.runner import Terms, logger
+from service.jobs.runner import JobSettings, logger
 from service.jobs.worker import Job
 from service.problems import Refusal
 from service.store import diagnoses
@@ -46,9 +46,9 @@ class Planned:
 class Planner:
     """See the module; between the server's start and `stop`."""
 
-    def __init__(self, store: Database, terms: Terms) -> None:
+    def __init__(self, store: Database, job_settings: JobSettings) -> None:
         self._store = store
-        self._terms = terms
+        self._job_settings = job_settings
         self._known: OrderedDict[tuple[str, str], Planned] = OrderedDict()
         self._lock = threading.Lock()
         self._turn = threading.Lock()
@@ -65,7 +65,7 @@ class Planner:
             if known is not None and (known.state != "failed" or time.monotonic() < known.failed_at + _TOLD_S):
                 self._known.move_to_end(key)
                 return known
-            if not self._terms.workers:
+            if not self._job_settings.workers:
                 raise Refusal(503, "This server runs no diagnoses and plans nothing; use the command below.")
             if len(self._threads) >= _MOST_WAITING:
                 raise Refusal(503, "Many plans are being worked out: try again in a minute.")
@@ -104,8 +104,15 @@ class Planner:
         with self._store.reading() as connection:
             campaign, _ = diagnoses.campaign_of(connection, row)
         content = json_file.write(campaign)
-        terms = self._terms
-        job = Job(len(content), str(terms.table), terms.table_sha256, terms.memory_bytes, (), asdict(limits))
+        job_settings = self._job_settings
+        job = Job(
+            len(content),
+            str(job_settings.table),
+            job_settings.table_sha256,
+            job_settings.memory_bytes,
+            (),
+            asdict(limits),
+        )
         with tempfile.TemporaryFile() as stderr, Worker(job, content, stderr) as worker:
             with self._lock:
                 self._worker = worker

@@ -29,7 +29,7 @@ _STORE_FAILED = (SQLAlchemyError, StorageFull, StoreMoved, OSError)
 
 
 @dataclass(frozen=True)
-class Terms:
+class JobSettings:
     """What a runner works with; memory is a worker's, beyond what its program takes."""
 
     workers: int
@@ -41,9 +41,9 @@ class Terms:
 class Runner:
     """See the module. Threads of the server's process; between `start` and `stop`."""
 
-    def __init__(self, store: Database, terms: Terms) -> None:
+    def __init__(self, store: Database, job_settings: JobSettings) -> None:
         self._store = store
-        self._terms = terms
+        self._job_settings = job_settings
         self._server = secrets.token_hex(8)
         self._ending = threading.Event()
         self._stirred = threading.Event()
@@ -54,7 +54,7 @@ class Runner:
 
     def start(self) -> None:
         """Take up what is in the queue, and what was running when its server ended."""
-        if self._terms.workers:
+        if self._job_settings.workers:
             self._dispatcher.start()
 
     def stir(self) -> None:
@@ -77,7 +77,7 @@ class Runner:
         while not self._ending.is_set():
             self._stirred.clear()
             try:
-                while len(self._jobs) < self._terms.workers and (row := self._claim()) is not None:
+                while len(self._jobs) < self._job_settings.workers and (row := self._claim()) is not None:
                     thread = threading.Thread(target=self._job, args=(row,), name=row.id, daemon=True)
                     with self._lock:
                         self._jobs[thread] = None
@@ -88,7 +88,7 @@ class Runner:
 
     def _claim(self) -> AnyRow | None:
         with self._store.writing() as connection:
-            row = diagnoses.claim(connection, self._server, self._terms.table_sha256, __version__)
+            row = diagnoses.claim(connection, self._server, self._job_settings.table_sha256, __version__)
         self._failure.is_over()
         return row
 
@@ -112,8 +112,8 @@ class Runner:
             campaign, excluded = diagnoses.campaign_of(connection, row)
         content = json_file.write(campaign)
         left_out = tuple((left.recording, left.reason) for left in excluded)
-        terms = self._terms
-        job = Job(len(content), str(terms.table), terms.table_sha256, terms.memory_bytes, left_out)
+        job_settings = self._job_settings
+        job = Job(len(content), str(job_settings.table), job_settings.table_sha256, job_settings.memory_bytes, left_out)
         with tempfile.TemporaryFile() as stderr, Worker(job, content, stderr) as worker:
             with self._lock:
                 self._jobs[threading.current_thread()] = worker

@@ -33,7 +33,7 @@ def rig(store: Database, sent: Upload | None, skin: str | None) -> tuple[RigDesc
             return None, all_told(error)
     if skin is not None:
         with store.reading() as connection:
-            kept = skins.rig_of(connection, skin)
-        if kept is not None:
-            return rig_description.from_dict(orjson.loads(kept)), []
+            document = skins.rig_of(connection, skin)
+        if document is not None:
+            return rig_description.from_dict(orjson.loads(document)), []
     return None, []
