@@ -96,7 +96,7 @@ _API = ("/v1/", "/umbridge/", "/health", "/ready", "/metrics", "/openapi.json")
 
 
 def is_browsing(path: str, accept: str) -> bool:
-    """Whether somebody looks at a page, who is to be told of an error on a page."""
+    """Whether a browser asks for a page, so that an error is answered as a page."""
     return "text/html" in accept and not path.startswith(_API)
 
 

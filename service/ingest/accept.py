@@ -1,4 +1,4 @@
-"""POST /v1/campaigns: from uploads to what is kept, in one transaction, answered the same when asked again."""
+"""Storing the campaigns of uploads in one transaction; a repeated request is answered as before."""
 
 import hashlib
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ _MOST_ERRORS = 100  # in the problem of a request of which nothing is kept
 
 @dataclass(frozen=True)
 class IngestOptions:
-    """What the client says about its uploads beside them."""
+    """What a client says about its uploads."""
 
     skin: str | None
     corrects: str | None
@@ -128,7 +128,7 @@ def _require_keepable(arrived: Sequence[CheckedCampaign], options: IngestOptions
         return
     errors = [error for entry in arrived for error in _flat(entry, many=len(arrived) > 1)]
     detail = f"Nothing was kept: {errors[0]['field']} {errors[0]['allowed']}" if errors else "No campaign was sent."
-    more = len(errors) - 1 + sum(entry.untold for entry in arrived)
+    more = len(errors) - 1 + sum(entry.unlisted for entry in arrived)
     if more > 0:
         detail += f"; and {more} more"
     raise Refusal(422, detail, title="Invalid input", errors=errors[:_MOST_ERRORS])

@@ -29,7 +29,7 @@ READING_SLOTS = asyncio.Semaphore(2)
 
 MOST_CAMPAIGNS = 1000  # a request
 MOST_RECORDINGS = 50_000  # a request, good or not
-_MOST_ERRORS = 100  # told of each campaign
+_MOST_ERRORS = 100  # listed of each campaign
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class CheckedCampaign:
     notes: list[str] = field(default_factory=list)
     by_rig: bool = False
     in_list: bool = False
-    untold: int = 0  # errors beyond those listed
+    unlisted: int = 0  # errors beyond those listed
 
 
 def read(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> list[ReadCampaign]:
@@ -72,7 +72,7 @@ def read(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> li
 
 @dataclass(frozen=True)
 class InspectedFile:
-    """A file before anything of it is kept: its format, its channels where it holds such, its campaigns."""
+    """A file that was read and not stored: its format, its channels where it has any, and its campaigns."""
 
     kind: str
     contents: Contents | None
@@ -80,7 +80,7 @@ class InspectedFile:
 
 
 def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> InspectedFile:
-    """As `read`, with what it was read from."""
+    """As `read`, with the format and the channels of the file."""
     label = upload.label or _UNNAMED
     kind, contents = "", None
     try:
@@ -114,11 +114,11 @@ def checked(read: ReadCampaign) -> CheckedCampaign:
         if number < _MOST_ERRORS:
             errors.append(_error(problem.field, problem.value, problem.allowed))
     count = len(read.reading.problems)
-    untold = max(0, count - _MOST_ERRORS)
-    if untold:
+    unlisted = max(0, count - _MOST_ERRORS)
+    if unlisted:
         notes = [*notes, f"{len(refused)} recordings have {count} errors; the first {_MOST_ERRORS} are told"]
     entries = [{"id": name, "errors": errors} for name, errors in refused.items()]
-    whole = replace(whole, refused=entries, notes=notes, untold=untold)
+    whole = replace(whole, refused=entries, notes=notes, unlisted=unlisted)
     if campaign.recordings:
         return replace(whole, campaign=campaign)
     return replace(whole, errors=[_nothing(len(entries))])

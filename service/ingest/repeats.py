@@ -1,4 +1,4 @@
-"""Identical recordings in several campaigns: told when they come, counted once in histories."""
+"""Identical recordings in several campaigns: noted when they arrive, counted once in histories."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass

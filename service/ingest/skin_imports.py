@@ -55,7 +55,7 @@ class CheckedExport:
 
 def look(store: Database, upload: Upload) -> CheckedExport:
     """Check a file against itself and against the store; raises InvalidInput that names what in it is wrong."""
-    with upload.path.open("rb") as stream, _told(upload, ""):
+    with upload.path.open("rb") as stream, _naming_the_part(upload, ""):
         overview = read_overview(stream, _label(upload))
         skins = import_checks.overview(overview)
         diagnosed = diagnosis_export.checked(
@@ -70,7 +70,7 @@ def look(store: Database, upload: Upload) -> CheckedExport:
         for name, campaign in _campaigns(stream, upload, overview.campaigns):
             row = campaigns_here.get(name)
             if row is None:
-                with _told(upload, f"campaign {name}: "):
+                with _naming_the_part(upload, f"campaign {name}: "):
                     checked = import_checks.campaign(campaign, name, skins.skins)
                 summaries.append(_campaign(checked.row, present=False, differs=False))
                 continue
@@ -89,7 +89,7 @@ def bring_in(store: Database, upload: Upload) -> Imported:
         raise Conflict(f"{export.clashes[0]}{more}; nothing was imported.")
     missing = [campaign.id for campaign in export.campaigns if not campaign.present]
     importing.add_skins(store, export.skins)
-    with upload.path.open("rb") as stream, _told(upload, ""):
+    with upload.path.open("rb") as stream, _naming_the_part(upload, ""):
         for name, campaign in _campaigns(stream, upload, missing):
             importing.add(store, import_checks.campaign(campaign, name, export.skins.skins))
     diagnosis_export.add(store, export.diagnosed)
@@ -112,7 +112,7 @@ def _label(upload: Upload) -> str:
 
 
 @contextmanager
-def _told(upload: Upload, place: str) -> Iterator[None]:
+def _naming_the_part(upload: Upload, place: str) -> Iterator[None]:
     """Turns what is raised about a part of a file into InvalidInput that names the part."""
     try:
         yield

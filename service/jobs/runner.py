@@ -39,7 +39,7 @@ class JobSettings:
 
 
 class Runner:
-    """See the module. Threads of the server's process; between `start` and `stop`."""
+    """Runs the queue in threads of the server's process, between `start` and `stop`."""
 
     def __init__(self, store: Database, job_settings: JobSettings) -> None:
         self._store = store
@@ -98,7 +98,7 @@ class Runner:
         except StoreMoved as error:
             self._failure.log("a diagnosis cannot be run now", error)
             self._release(row)
-        except Exception as error:  # nobody else would hear of it
+        except Exception as error:  # the thread has no caller to raise to
             logger.exception("a diagnosis could not be run", extra={"fields": {"diagnosis": row.id}})
             self._end(row, None, f"{type(error).__name__}: {error}")
         finally:
@@ -107,7 +107,7 @@ class Runner:
             self._stirred.set()
 
     def _run(self, row: AnyRow) -> None:
-        """One diagnosis, until it has ended, is no longer ours, or the server ends."""
+        """One diagnosis, until it has ended, another server has claimed it, or this server ends."""
         with self._store.reading() as connection:
             campaign, excluded = diagnoses.campaign_of(connection, row)
         content = json_file.write(campaign)
@@ -131,7 +131,7 @@ class Runner:
                 self._end(row, None, worker.failure)
 
     def _is_ours(self, row: AnyRow, worker: Worker) -> bool:
-        """Say that it runs; whether it was neither cancelled nor taken by another server. A silent store says yes."""
+        """Renew the claim; False where it was cancelled or another server claimed it, True where the store fails."""
         try:
             with self._store.writing() as connection:
                 ours = diagnoses.keep_alive(connection, row.number, self._server, worker.progress)
@@ -144,7 +144,7 @@ class Runner:
     def _end(
         self, row: AnyRow, report: dict[str, Any] | None, reason: str, figures: dict[str, str] | None = None
     ) -> None:
-        """Keep what came of it; again and again where the store fails, since it was long work."""
+        """Store the outcome, and try again where the store fails: it took long to compute."""
         while True:
             try:
                 with self._store.writing() as connection:

@@ -3,7 +3,7 @@ memory.
 
 Standard input: a line of JSON (`Job`), then the campaign (`campaign/1`), then nothing until the runner ends: a worker
 whose runner is gone ends too. Standard output: a line of JSON for each progress, then one with the report and one with
-its figures, or one with the plan where the rig's limits are told, or one with the error.
+its figures, or one with the plan where the job has limits of a rig, or one with the error.
 """
 
 import os
@@ -22,7 +22,7 @@ _NICENESS = 10
 
 @dataclass(frozen=True)
 class Job:
-    """What a worker is told beside the campaign: where its bytes end, the table to use, what was left out and why.
+    """What a worker needs beside the campaign: where its bytes end, the table to use, what was left out and why.
 
     With `limits` (of `Limits`, by name) it plans the next experiment within them, and makes no report.
     """

@@ -1,4 +1,4 @@
-"""d33 of campaigns in the store: computed once for each state of a campaign, and kept."""
+"""d33 of stored campaigns, computed once for each state of a campaign and cached in the store."""
 
 import logging
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What to measure next within the limits of the reader's rig; worked out beside the server, and not kept."""
+"""What to measure next within the limits of the reader's rig; planned in a worker process, and not stored."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -101,7 +101,7 @@ def _diagnosed(store: Database, diagnosis_id: str) -> tuple[AnyRow, str]:
 
 
 def _limits(given: Mapping[str, str]) -> dict[str, Any]:
-    """Of `Limits`, by name, those that were told; raises InvalidInput."""
+    """The fields of `Limits` that the form gives; raises InvalidInput."""
     limits: dict[str, Any] = {}
     ends = [given.get(name, "").strip() for name in (_LOWEST, _HIGHEST)]
     if all(ends):

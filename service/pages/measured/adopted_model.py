@@ -36,16 +36,16 @@ class ByModel:
     """What the model in force says of the same measurements.
 
     `fields`: what the form asks for besides (name, words, unit, value); `document`: the request of `POST /v1/d33` and
-    `answer`: its answer, both None where `not_told` says why.
+    `answer`: its answer, both None where `unavailable` says why.
     """
 
     fields: Sequence[tuple[str, str, str, str]] = ()
     document: Mapping[str, Any] | None = None
     answer: Columns | None = None
-    not_told: str | None = None
+    unavailable: str | None = None
 
     def columns(self) -> dict[str, list[float]]:
-        """d33 by it, a row a measurement; without any where it could not be told."""
+        """d33 by it, a row a measurement; none where it is unavailable."""
         if self.answer is None:
             return {}
         names = {"d33_pc_per_n": "d33_adopted_pc_per_n", "d33_uncertainty_pc_per_n": "d33_adopted_uncertainty_pc_per_n"}
@@ -63,13 +63,13 @@ def by_model(
     except Refusal:
         return None
     except Conflict as outdated:
-        return ByModel(not_told=str(outdated))
+        return ByModel(unavailable=str(outdated))
     fields = [(name, *_NEEDED[name], given.get(name, "").strip()) for name in model.needs]
     try:
         asked = {**document, **_needed(model, fields), "model": "adopted", "skin_id": skin}
         return ByModel(fields, asked, d33(table, store, D33Columns.model_validate(asked)))
     except UnderskinError as refused:
-        return ByModel(fields, not_told=in_form_words(refused, _LABELS))
+        return ByModel(fields, unavailable=in_form_words(refused, _LABELS))
 
 
 def _needed(model: "AdoptedModel", fields: Sequence[tuple[str, str, str, str]]) -> dict[str, Any]:

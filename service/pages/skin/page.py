@@ -63,7 +63,7 @@ def skin(
     answer = None if last is None else d33_cache.answer(store, table, last, None)
     by_model, why_not = (None, None) if last is None or not serves else answer_by_it(store, table, root, last)
     by = (by or ("paper" if by_model is None else "adopted")) if serves else "paper"
-    history = _told(store, table, root, by)
+    history = _history_by(store, table, root, by)
     sensor = sensor if sensor in {entry.sensor for entry in history.sensors} else None
     mapped = by_model if by == "adopted" else answer
     figures = []
@@ -119,7 +119,7 @@ def withdraw_model(request: Request, skin_id: SkinId, sent: Form, store: Store) 
 def map_csv(skin_id: SkinId, store: Store, table: Table, by: Annotated[By, Query(alias="model")] = "paper") -> Response:
     """d33 of each sensor in the latest campaign, and its trend."""
     root, _ = _completed(store, table, skin_id)
-    trends = {entry.sensor: entry.trend for entry in _told(store, table, root, by).sensors}
+    trends = {entry.sensor: entry.trend for entry in _history_by(store, table, root, by).sensors}
     with store.reading() as connection:
         latest = campaigns.listed(connection, campaigns.CampaignFilters(skin=root, state="current"), None, 1)
     columns: dict[str, list[Any]] = {name: [] for name in (*_MAP_COLUMNS, *_TREND_COLUMNS)}
@@ -152,7 +152,7 @@ def history_csv(
 ) -> Response:
     """d33 of every sensor in every current campaign, and the model that each value rests on."""
     root, _ = _completed(store, table, skin_id)
-    history = _told(store, table, root, by)
+    history = _history_by(store, table, root, by)
     points = [(entry.sensor, point) for entry in history.sensors for point in entry.points]
     return csv_answer(
         "history",
@@ -193,7 +193,7 @@ def _completed(store: Database, table: SigmaTable, skin_id: str) -> tuple[str, i
     return root, missing
 
 
-def _told(store: Database, table: SigmaTable, root: str, by: By) -> History:
+def _history_by(store: Database, table: SigmaTable, root: str, by: By) -> History:
     if by == "adopted":
         return histories.adopted_history(store, table, root)
     with store.reading() as connection:

@@ -9,7 +9,7 @@ from service.ingest import skin_imports
 from service.pages.shared import same_request
 from service.pages.shared.html import page
 from service.pages.upload.file_summary import FileSummary
-from service.pages.upload.keep import all_told
+from service.pages.upload.keep import field_errors
 from service.pages.upload.pending_uploads import PendingUpload
 from service.pages.upload.skin_summary import MOST_LISTED, skin_summary
 from service.store.engine import Database
@@ -30,7 +30,7 @@ def holds_skin(pending: PendingUpload) -> bool:
 
 
 async def look(store: Database, pending: PendingUpload) -> None:
-    """See what is in it; where it cannot be read, what is wrong is told as of any other file."""
+    """Summarise it; where it cannot be read, list the errors as for any other file."""
     async with skin_imports.one:
         await run_in_threadpool(_look, store, pending)
 
@@ -49,7 +49,7 @@ def shown(request: Request, pending: PendingUpload) -> Response:
 
 
 async def bring_in(request: Request, store: Database, pending: PendingUpload) -> None:
-    """Keep what is not here; what kept it from being kept is told on the upload's page. Twice asked, kept once."""
+    """Keep what is not here; errors are shown on the upload's page. A second request stores nothing again."""
     async with skin_imports.one:
         await run_in_threadpool(_bring_in, request, store, pending)
 
@@ -59,7 +59,7 @@ def _look(store: Database, pending: PendingUpload) -> None:
         pending.skin_summary = skin_summary(skin_imports.look(store, pending.files[0]))
     except InvalidInput as error:
         label = pending.files[0].label or "the file"
-        pending.seen = [FileSummary(label, KIND, 0, (), (), all_told(error), (), (), None)]
+        pending.seen = [FileSummary(label, KIND, 0, (), (), field_errors(error), (), (), None)]
         pending.drawn = {0: []}
 
 

@@ -1,4 +1,4 @@
-"""From an upload that was looked at to what is kept, or to why nothing is."""
+"""Storing an upload that was shown, or the errors that prevent it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -21,7 +21,7 @@ SKIN_FIELD, CORRECTS = "skin", "corrects"
 
 
 def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str], store: Database) -> list[str]:
-    """The ids of what was kept; what kept it from being kept is told on the upload's page. Twice asked, kept once."""
+    """The ids of what was kept; errors are shown on the upload's page. A second request stores nothing again."""
     with pending.lock:
         if pending.kept_at is not None:
             return []
@@ -36,7 +36,7 @@ def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str],
             )
             answer, _ = accept(store, [*pending.files, *_rig_upload(pending)], options)
         except (InvalidInput, Conflict, Missing, Refusal) as error:
-            pending.refused = all_told(error)
+            pending.refused = field_errors(error)
             return []
         stored = [result for result in answer["campaigns"] if result["id"] is not None]
         one = f"/campaigns/{stored[0]['id']}"
@@ -54,14 +54,14 @@ def _rig_upload(pending: PendingUpload) -> list[Upload]:
     return [Upload(path, None, RIG, "", in_form=True)]
 
 
-def _told(error: InvalidInput) -> dict[str, Any]:
+def _field_error(error: InvalidInput) -> dict[str, Any]:
     return {"field": error.field, "value": error.value, "allowed": error.allowed}
 
 
-def all_told(error: Exception) -> list[dict[str, Any]]:
+def field_errors(error: Exception) -> list[dict[str, Any]]:
     """What is wrong, field by field."""
     if isinstance(error, InvalidInput):
-        return [_told(error)]
+        return [_field_error(error)]
     if isinstance(error, Refusal) and error.errors:
         return [dict(entry) for entry in error.errors]
     if isinstance(error, FileError):

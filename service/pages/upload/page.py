@@ -1,4 +1,4 @@
-"""Upload: files are looked at, told of channel by channel, and kept only when somebody says so."""
+"""Upload: files are read, shown channel by channel, and stored only on confirmation."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -20,7 +20,7 @@ from service.pages.shared.html import page
 from service.pages.upload import before_keeping, exported_skin, rig_in_use, similar_errors
 from service.pages.upload.figures import figures, lines_columns, trace_columns
 from service.pages.upload.file_summary import MOST_LISTED, ChannelSummary, FileSummary, seen
-from service.pages.upload.keep import CORRECTS, SKIN_FIELD, all_told, keep_good
+from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good
 from service.pages.upload.mapping import (
     CHANNELS,
     KINDS,
@@ -164,7 +164,7 @@ async def mapping(request: Request, upload_id: str, sent: Form) -> Response:
         rig = rig_description.from_dict(pending.draft)
     except InvalidInput as error:
         wrong.append(error)
-    pending.refused = [entry for error in wrong for entry in all_told(error)]
+    pending.refused = [entry for error in wrong for entry in field_errors(error)]
     if wrong:
         return see(f"/upload/{upload_id}")
     pending.rig, pending.draft, pending.rig_label = rig, None, "rig.json"  # as the page saves it

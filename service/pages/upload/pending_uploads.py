@@ -1,7 +1,7 @@
-"""Uploads that were looked at and not kept yet: each in a folder of its own, of one session, for an hour.
+"""Uploads that were read and not stored yet: each in a folder of its own, of one session, for an hour.
 
-They lie in the server's folder of uploads, which ends with the server, and take no more room together than one upload
-may; the oldest make room for the newest.
+They lie in the server's folder of uploads, which is removed with the server. Together they take at most the room of one
+upload; the oldest are removed first.
 """
 
 import hashlib
@@ -59,7 +59,7 @@ class PendingUpload:
 
 
 class PendingUploads:
-    """See the module."""
+    """All uploads of this server that were read and not stored yet."""
 
     def __init__(self, folder: Path, most_bytes: int) -> None:
         self._folder = folder

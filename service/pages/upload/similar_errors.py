@@ -1,4 +1,4 @@
-"""Refusals that are alike: told once, with how many there are and which."""
+"""Refusals that differ in numbers and names alone: listed once, with how many there are and which."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -7,7 +7,7 @@ from typing import Any
 
 from service.pages.upload.file_summary import FileSummary
 
-_FEWEST = 3  # that are told together
+_FEWEST = 3  # that are listed together
 _NUMBER = re.compile(r"\d+(?:[.,]\d+)*")
 
 Errors = Sequence[Mapping[str, Any]]
@@ -31,7 +31,7 @@ class SimilarErrors:
 
 
 def of_files(files: Sequence[FileSummary]) -> list[SimilarErrors]:
-    """Files, those together of which nothing was understood for the same reasons."""
+    """Groups of files; those of which nothing was understood for the same reasons are one group."""
     return _together([(file.label, [] if file.recordings else _reasons(file)) for file in files])
 
 
@@ -45,7 +45,7 @@ def _reasons(file: FileSummary) -> Errors:
 
 
 def _together(entries: Sequence[tuple[str, Errors]]) -> list[SimilarErrors]:
-    """In the order of their first; few that are alike, and those without errors, one by one."""
+    """By their first entries; fewer than three similar ones, and those without errors, are groups of one."""
     by_reason: dict[Any, list[int]] = {}
     for place, (name, errors) in enumerate(entries):
         reason = tuple(_what(name, error) for error in errors) or place

@@ -24,7 +24,7 @@ class ModelSummary:
 
 @dataclass(frozen=True)
 class SkinSummary:
-    """See the module; `joined`: other ids that count as the skin's."""
+    """An exported skin in short; `joined`: other ids that count as the skin's."""
 
     skin: str
     joined: Sequence[str]
