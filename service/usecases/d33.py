@@ -56,7 +56,7 @@ def _by_adopted_model(table: SigmaTable, store: Database, request: D33Columns) -
         each_row = np.zeros(len(request.frf_re_pc_per_n or ()))
         pressed = press(model_in_force, table, request, rows(given | {"frf_re_pc_per_n": each_row}))
         pressed.require_lines("frf_im_pc_per_n")
-        measured = _checked(_plateau(request, lambda line: pressed.level[:, None] / pressed.response(line)))
+        measured = _plateau(request, lambda line: pressed.level[:, None] / pressed.response(line))
     else:
         measured = _checked(_given(request))
         pressed = press(model_in_force, table, request, _rows(request, given | measured))
@@ -84,12 +84,10 @@ def _given(request: D33Columns) -> dict[str, Floats]:
 
 
 def _checked(measured: Mapping[str, Floats]) -> dict[str, Floats]:
-    """The plateau with its uncertainty, NaN where that is unknown; raises InvalidInput."""
+    """Plateau values that were sent, the uncertainty NaN where none was; raises InvalidInput."""
     name = "frf_uncertainty_pc_per_n"
     unsure = non_negative(name, measured[name]) if name in measured else np.full((), np.nan)
-    return {"frf_pc_per_n": finite("frf_pc_per_n", measured["frf_pc_per_n"]), name: unsure} | {
-        other: values for other, values in measured.items() if other not in ("frf_pc_per_n", name)
-    }
+    return {"frf_pc_per_n": finite("frf_pc_per_n", measured["frf_pc_per_n"]), name: unsure}
 
 
 def _require_lines(request: D33Columns) -> None:
@@ -117,7 +115,8 @@ def _plateau(request: D33Columns, factor: Callable[[Floats], Complexes] | None =
     level, error = charge_response.plateau(real, inside)
     measured = {"frf_pc_per_n": level}
     if request.frf_uncertainty_pc_per_n is not None:
-        measured["frf_uncertainty_pc_per_n"] = request.column("frf_uncertainty_pc_per_n")
+        sent = "frf_uncertainty_pc_per_n"
+        measured[sent] = non_negative(sent, request.column(sent))
     elif inside.sum() < 2:
         raise InvalidInput(
             "frf_uncertainty_pc_per_n", None, "is required where band_hz holds one line, which has no scatter"
