@@ -11,12 +11,12 @@ from service import pages
 from service.auth.access_control import AccessControl
 from service.dependencies import authorised
 from service.ingest.uploads import UploadFolder
-from service.jobs import Planner, Runner, Terms
+from service.jobs import JobSettings, Planner, Runner
 from service.middleware import request_log
 from service.middleware.asgi_middleware import AsgiMiddleware
 from service.middleware.error_handlers import install_handlers
 from service.pages.shared.problem import problem_page
-from service.pages.upload.pending_uploads import Shelf
+from service.pages.upload.pending_uploads import PendingUploads
 from service.routes import (
     campaigns,
     d33,
@@ -45,7 +45,7 @@ from underskin.surrogate.sigma_table import SIGMA_TABLE, SigmaTable
 async def _lifespan(api: FastAPI) -> AsyncIterator[None]:
     state = api.state
     state.uploads = UploadFolder(state.settings.data)
-    state.shelf = Shelf(state.uploads.path, state.settings.max_upload_bytes)
+    state.pending_uploads = PendingUploads(state.uploads.path, state.settings.max_upload_bytes)
     state.access.requirement.start()
     state.runner.start()
     yield
@@ -72,10 +72,10 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     api.state.table = table
     api.state.access = access
     api.state.store = store
-    terms = diagnosing_terms(settings, table)
-    api.state.runner = Runner(store, terms)
-    api.state.planner = Planner(store, terms)
-    install_handlers(api, problem_page)
+    job_settings = job_settings_of(settings, table)
+    api.state.runner = Runner(store, job_settings)
+    api.state.planner = Planner(store, job_settings)
+    install_handlers(api, problem_page, _methods)
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"]), Depends(known_query)])
     for noun in (sigma, frf, d33, stress, design, tables, campaigns, diagnoses, exports, skins, models):
         v1.include_router(noun.router)
@@ -84,10 +84,14 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     return api
 
 
-def diagnosing_terms(settings: Settings, table: SigmaTable) -> Terms:
+def _methods(api: FastAPI, path: str) -> list[str]:
+    return openapi.methods(api, path) or pages.methods(path)
+
+
+def job_settings_of(settings: Settings, table: SigmaTable) -> JobSettings:
     """What diagnoses and plans are run with."""
     memory_bytes = int(settings.diagnosis_memory_mb * 1e6)
-    return Terms(settings.diagnosis_workers, memory_bytes, settings.tables / SIGMA_TABLE, table.sha256)
+    return JobSettings(settings.diagnosis_workers, memory_bytes, settings.tables / SIGMA_TABLE, table.sha256)
 
 
 def create_app(settings: Settings, table: SigmaTable, access: AccessControl, store: Database) -> ASGIApp:

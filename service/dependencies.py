@@ -32,7 +32,7 @@ StoreToRead = Annotated[Database, Depends(_store_to_read)]
 
 
 def _store(request: Request, store: StoreToRead) -> Database:
-    """The store; for requests that may change it, only where it keeps what it is told: otherwise StoreMoved."""
+    """The store; raises StoreMoved for a request that may change it while its files are not in place."""
     if request.method not in SAFE:
         store.require_in_place()
     return store

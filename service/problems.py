@@ -66,9 +66,9 @@ class Refusal(Exception):
             return None
         if not self.errors:
             return self.detail
-        told = [f"{error['field']}: {error['allowed']}" for error in self.errors[:_MOST_LOGGED]]
-        more = len(self.errors) - len(told)
-        return "; ".join([*told, *([f"and {more} more"] if more > 0 else [])])
+        shown = [f"{error['field']}: {error['allowed']}" for error in self.errors[:_MOST_LOGGED]]
+        more = len(self.errors) - len(shown)
+        return "; ".join([*shown, *([f"and {more} more"] if more > 0 else [])])
 
     def media_type(self, path: str) -> str:
         """Content-Type of the answer to `path`."""
@@ -96,7 +96,7 @@ _API = ("/v1/", "/umbridge/", "/health", "/ready", "/metrics", "/openapi.json")
 
 
 def is_browsing(path: str, accept: str) -> bool:
-    """Whether somebody looks at a page, who is to be told of an error on a page."""
+    """Whether a browser asks for a page, so that an error is answered as a page."""
     return "text/html" in accept and not path.startswith(_API)
 
 
@@ -106,15 +106,15 @@ def _is_umbridge(path: str) -> bool:
 
 def invalid_input(errors: Iterable[InvalidInput]) -> Refusal:
     """The problem of values that cannot be used: 422."""
-    found = [
+    shortened = [
         InvalidInput(_brief(error.field), _brief(error.value), _writable(error.allowed), error.index)
         for error in errors
     ]
     entries = [
         {"field": error.field, "index": error.index, "value": _in_json(error.value), "allowed": error.allowed}
-        for error in found
+        for error in shortened
     ]
-    return Refusal(422, "; ".join(str(error) for error in found), title="Invalid input", errors=entries)
+    return Refusal(422, "; ".join(str(error) for error in shortened), title="Invalid input", errors=entries)
 
 
 def given_twice(field: str, place: str) -> Refusal:

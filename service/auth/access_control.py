@@ -1,4 +1,4 @@
-"""Who may pass: known Host, own Origin, a key where keys are needed, a body within the limit."""
+"""Which requests are accepted: known Host, own Origin, a key where keys are needed, a body within the limit."""
 
 import logging
 from collections.abc import Iterator, Mapping
@@ -21,7 +21,7 @@ SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
 class AccessControl:
-    """Refuses what must not reach a route."""
+    """Refuses requests before they reach a route."""
 
     def __init__(
         self,

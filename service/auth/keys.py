@@ -90,11 +90,11 @@ class KeyStore:
     def find(self, token: bytes) -> Key | None:
         """The key that `token` is, compared in constant time."""
         digest = sha256(token).hexdigest()
-        found = None
+        match = None
         for key in self.entries():
             if hmac.compare_digest(digest, key.sha256):
-                found = key
-        return found
+                match = key
+        return match
 
     def create(self, name: str, scope: Scope) -> str:
         """Keep a new key and return its token, which is shown once and kept nowhere."""
@@ -109,10 +109,10 @@ class KeyStore:
     def revoke(self, name: str) -> None:
         """Forget a key; raises InvalidInput where there is none of that name."""
         with self._changing() as keys:
-            kept = [key for key in keys if key.name != name]
-            if len(kept) == len(keys):
+            remaining = [key for key in keys if key.name != name]
+            if len(remaining) == len(keys):
                 raise InvalidInput("name", name, f"must be one of {[key.name for key in keys]}")
-            keys[:] = kept
+            keys[:] = remaining
 
     def remove(self) -> None:
         """Forget all keys, and that there were any; a damaged file goes, too."""

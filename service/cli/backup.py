@@ -46,7 +46,7 @@ def restore(
 
 
 def _of_keys(keys: KeyStore) -> str:
-    """What whoever restored a store in which keys are needed is told."""
+    """Where the keys are, after a store that needs them was restored."""
     if keys.file_exists():
         return f"keys are needed: those in {keys.path}"
     return keys_missing(keys)

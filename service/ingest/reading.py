@@ -29,11 +29,11 @@ READING_SLOTS = asyncio.Semaphore(2)
 
 MOST_CAMPAIGNS = 1000  # a request
 MOST_RECORDINGS = 50_000  # a request, good or not
-_MOST_ERRORS = 100  # told of each campaign
+_MOST_ERRORS = 100  # listed of each campaign
 
 
 @dataclass(frozen=True)
-class Found:
+class ReadCampaign:
     """What was read of one campaign, or why the whole is refused."""
 
     file: str | None
@@ -52,7 +52,7 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Arrived:
+class CheckedCampaign:
     """What one campaign became: None where the whole was refused; `refused` has one entry a recording."""
 
     file: str | None
@@ -62,78 +62,80 @@ class Arrived:
     notes: list[str] = field(default_factory=list)
     by_rig: bool = False
     in_list: bool = False
-    untold: int = 0  # errors beyond those listed
+    unlisted: int = 0  # errors beyond those listed
 
 
-def read(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> list[Found]:
+def read(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> list[ReadCampaign]:
     """The campaigns of a file, by its content: JSON may hold one or a list of them."""
-    return look(upload, rig, most_json_bytes).found
+    return look(upload, rig, most_json_bytes).campaigns
 
 
 @dataclass(frozen=True)
-class Look:
-    """A file before anything of it is kept: its format, its channels where it holds such, its campaigns."""
+class InspectedFile:
+    """A file that was read and not stored: its format, its channels where it has any, and its campaigns."""
 
     kind: str
     contents: Contents | None
-    found: list[Found]
+    campaigns: list[ReadCampaign]
 
 
-def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> Look:
-    """As `read`, with what it was read from."""
+def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> InspectedFile:
+    """As `read`, with the format and the channels of the file."""
     label = upload.label or _UNNAMED
     kind, contents = "", None
     try:
         with upload.path.open("rb") as stream:
             kind = formats.detect(stream, label)
         if kind == "JSON":
-            return Look(kind, None, _read_json(upload, most_json_bytes))
+            return InspectedFile(kind, None, _read_json(upload, most_json_bytes))
         held = read_contents(upload.path, label)
         contents = held if isinstance(held, Contents) else None
-        found = understood(held, label, rig)
-        _require_usable(found.campaign)
+        reading = understood(held, label, rig)
+        _require_usable(reading.campaign)
     except FileError as error:
         allowed = Requirement(Mention(error.place), ": ", error.reason) if error.place else error.reason
-        return Look(kind, contents, [Found(upload.label, errors=[_error("file", upload.label, allowed)])])
+        return InspectedFile(
+            kind, contents, [ReadCampaign(upload.label, errors=[_error("file", upload.label, allowed)])]
+        )
     except InvalidInput as error:
-        return Look(kind, contents, [Found(upload.label, errors=[_invalid(error)])])
-    return Look(kind, contents, [Found(upload.label, found, by_rig=rig is not None)])
+        return InspectedFile(kind, contents, [ReadCampaign(upload.label, errors=[_invalid(error)])])
+    return InspectedFile(kind, contents, [ReadCampaign(upload.label, reading, by_rig=rig is not None)])
 
 
-def arrived_as(found: Found) -> Arrived:
+def checked(read: ReadCampaign) -> CheckedCampaign:
     """A campaign with its refused recordings; one of which nothing is left is refused as a whole."""
-    whole = Arrived(found.file, errors=found.errors, by_rig=found.by_rig, in_list=found.in_list)
-    if found.reading is None:
+    whole = CheckedCampaign(read.file, errors=read.errors, by_rig=read.by_rig, in_list=read.in_list)
+    if read.reading is None:
         return whole
-    campaign, notes = found.reading.campaign, found.reading.warnings
+    campaign, notes = read.reading.campaign, read.reading.warnings
     refused: dict[str, list[Mapping[str, Any]]] = {}
-    for number, problem in enumerate(found.reading.problems):
-        told = refused.setdefault(problem.recording, [])
+    for number, problem in enumerate(read.reading.problems):
+        errors = refused.setdefault(problem.recording, [])
         if number < _MOST_ERRORS:
-            told.append(_error(problem.field, problem.value, problem.allowed))
-    count = len(found.reading.problems)
-    untold = max(0, count - _MOST_ERRORS)
-    if untold:
+            errors.append(_error(problem.field, problem.value, problem.allowed))
+    count = len(read.reading.problems)
+    unlisted = max(0, count - _MOST_ERRORS)
+    if unlisted:
         notes = [*notes, f"{len(refused)} recordings have {count} errors; the first {_MOST_ERRORS} are told"]
     entries = [{"id": name, "errors": errors} for name, errors in refused.items()]
-    whole = replace(whole, refused=entries, notes=notes, untold=untold)
+    whole = replace(whole, refused=entries, notes=notes, unlisted=unlisted)
     if campaign.recordings:
         return replace(whole, campaign=campaign)
     return replace(whole, errors=[_nothing(len(entries))])
 
 
-def joined(found: Sequence[Found], name: str, skin_id: str | None) -> Arrived:
+def joined(files_read: Sequence[ReadCampaign], name: str, skin_id: str | None) -> CheckedCampaign:
     """All of them as one campaign; a file that cannot be read is a refused recording, by the file's name.
 
     Raises InvalidInput where they are not of one skin.
     """
-    files = [(one.file or _UNNAMED, one.reading) for one in found if one.reading is not None]
-    unread = [{"id": one.file or _UNNAMED, "errors": one.errors} for one in found if one.reading is None]
-    in_list = found[0].in_list
+    files = [(one.file or _UNNAMED, one.reading) for one in files_read if one.reading is not None]
+    unread = [{"id": one.file or _UNNAMED, "errors": one.errors} for one in files_read if one.reading is None]
+    in_list = files_read[0].in_list
     if not files:
-        return Arrived(None, errors=[_nothing(len(unread))], refused=unread, in_list=in_list)
-    by_rig = any(one.by_rig for one in found)
-    together = arrived_as(Found(None, join(name, files, skin_id), by_rig=by_rig, in_list=in_list))
+        return CheckedCampaign(None, errors=[_nothing(len(unread))], refused=unread, in_list=in_list)
+    by_rig = any(one.by_rig for one in files_read)
+    together = checked(ReadCampaign(None, join(name, files, skin_id), by_rig=by_rig, in_list=in_list))
     origin = f"joined from {files[0][0]}" + (f" to {files[-1][0]}, {len(files)} files" if len(files) > 1 else "")
     return replace(together, refused=unread + together.refused, notes=[origin, *together.notes])
 
@@ -150,7 +152,7 @@ def _require_usable(campaign: Campaign) -> None:
         skins.require_usable("skin.id", campaign.skin.id)
 
 
-def _read_json(upload: Upload, most_bytes: int) -> list[Found]:
+def _read_json(upload: Upload, most_bytes: int) -> list[ReadCampaign]:
     if upload.path.stat().st_size > most_bytes:
         limit = f"{most_bytes / 1e6:g} MB (UNDERSKIN_MAX_BODY_MB)"
         raise Refusal(413, f"JSON may have up to {limit}; send more in several requests, or as HDF5.")
@@ -163,12 +165,12 @@ def _read_json(upload: Upload, most_bytes: int) -> list[Found]:
                 400, f"The body is not JSON: line {error.lineno}, column {error.colno}: {error.msg}."
             ) from None
         allowed = f"must be JSON; line {error.lineno}, column {error.colno}: {error.msg}"
-        return [Found(upload.label, errors=[_error("file", upload.label, allowed)])]
+        return [ReadCampaign(upload.label, errors=[_error("file", upload.label, allowed)])]
     try:
         require_unique_keys(content)
     except Refusal as twice:
         return [
-            Found(
+            ReadCampaign(
                 upload.label,
                 errors=[_error(error["field"], error["value"], error["allowed"]) for error in twice.errors],
             )
@@ -185,13 +187,13 @@ def _recordings_in(document: Any) -> int:
     return len(recordings) if isinstance(recordings, list) else 0
 
 
-def _checked(label: str | None, document: Any) -> Found:
+def _checked(label: str | None, document: Any) -> ReadCampaign:
     try:
         campaign, problems = from_dict(document)
         _require_usable(campaign)
     except InvalidInput as error:
-        return Found(label, errors=[_invalid(error)])
-    return Found(label, Reading(campaign, problems, []))
+        return ReadCampaign(label, errors=[_invalid(error)])
+    return ReadCampaign(label, Reading(campaign, problems, []))
 
 
 def _nothing(refused: int) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Identical recordings in several campaigns: told when they come, counted once in histories."""
+"""Identical recordings in several campaigns: noted when they arrive, counted once in histories."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from sqlalchemy import Connection
 from service.store import campaigns, repeated
 from underskin.recordings.campaign import Campaign
 
-Point = tuple[str, str]  # of a history: id of the campaign, sensor
+HistoryPoint = tuple[str, str]  # of a history: id of the campaign, sensor
 
 
 @dataclass(frozen=True)
@@ -45,11 +45,11 @@ def already_kept(
     some = f"{earlier.identical} of these {earlier.of} recordings {'is' if earlier.identical == 1 else 'are'}"
     which = "these recordings are" if earlier.identical == earlier.of else some
     row = earlier.row
-    said = f"{which} in campaign {row.name} of skin {row.skin_id} already (kept {row.received_at[:10]})."
-    return said, row.id
+    sentence = f"{which} in campaign {row.name} of skin {row.skin_id} already (kept {row.received_at[:10]})."
+    return sentence, row.id
 
 
-def left_out(connection: Connection, root: str, points: Collection[Point]) -> dict[Point, Repeat]:
+def left_out(connection: Connection, root: str, points: Collection[HistoryPoint]) -> dict[HistoryPoint, Repeat]:
     """The points of a skin's history that do not count, since no recording counts in two.
 
     Of points that share a recording, the one of more recordings counts; of equal ones that of the campaign that came
@@ -59,11 +59,11 @@ def left_out(connection: Connection, root: str, points: Collection[Point]) -> di
     if not rows:
         return {}
     count = repeated.recordings_by_sensor(connection, root)
-    digests: dict[Point, list[str]] = {}
+    digests: dict[HistoryPoint, list[str]] = {}
     for row in sorted(rows, key=lambda row: (-count[row.id, row.sensor], row.number)):
         digests.setdefault((row.id, row.sensor), []).append(row.digest)
     counted: dict[str, str] = {}  # by digest, the campaign
-    repeats: dict[Point, Repeat] = {}
+    repeats: dict[HistoryPoint, Repeat] = {}
     for point, held in digests.items():
         there = [counted[digest] for digest in held if digest in counted]
         if there:
@@ -73,7 +73,7 @@ def left_out(connection: Connection, root: str, points: Collection[Point]) -> di
     return repeats
 
 
-def of_campaigns(repeats: Mapping[Point, Repeat]) -> dict[str, Repeat]:
+def of_campaigns(repeats: Mapping[HistoryPoint, Repeat]) -> dict[str, Repeat]:
     """The same of all points of a campaign together, by its id."""
     by_campaign: dict[str, list[Repeat]] = {}
     for (campaign_id, _), repeat in repeats.items():

@@ -29,7 +29,7 @@ class Imported(BaseModel):
 
 
 @dataclass(frozen=True)
-class CampaignFound:
+class ExportedCampaignSummary:
     """A campaign of the file; `present`: it is in the store already, where it `differs` or is the same."""
 
     id: str
@@ -42,20 +42,20 @@ class CampaignFound:
 
 
 @dataclass(frozen=True)
-class Found:
+class CheckedExport:
     """A file of which every part was checked; `clashes`: sentences, what of it contradicts the store."""
 
     overview: Overview
     skins: import_checks.CheckedOverview
     diagnosed: diagnosis_export.Checked
-    campaigns: list[CampaignFound]
+    campaigns: list[ExportedCampaignSummary]
     known: set[str]  # ids of those diagnoses and models that are in the store
     clashes: list[str]
 
 
-def look(store: Database, upload: Upload) -> Found:
+def look(store: Database, upload: Upload) -> CheckedExport:
     """Check a file against itself and against the store; raises InvalidInput that names what in it is wrong."""
-    with upload.path.open("rb") as stream, _told(upload, ""):
+    with upload.path.open("rb") as stream, _naming_the_part(upload, ""):
         overview = read_overview(stream, _label(upload))
         skins = import_checks.overview(overview)
         diagnosed = diagnosis_export.checked(
@@ -66,34 +66,34 @@ def look(store: Database, upload: Upload) -> Found:
             clashes += diagnosis_export.clashes(connection, diagnosed)
             diagnosed_here = diagnosis_export.known(connection, diagnosed)
             campaigns_here = importing.known(connection, overview.campaigns)
-        found = []
+        summaries = []
         for name, campaign in _campaigns(stream, upload, overview.campaigns):
             row = campaigns_here.get(name)
             if row is None:
-                with _told(upload, f"campaign {name}: "):
+                with _naming_the_part(upload, f"campaign {name}: "):
                     checked = import_checks.campaign(campaign, name, skins.skins)
-                found.append(_campaign(checked.row, present=False, differs=False))
+                summaries.append(_campaign(checked.row, present=False, differs=False))
                 continue
             with store.reading() as connection:
                 differs = importing.differs(connection, row, campaign)
-            found.append(_campaign(row._mapping, present=True, differs=differs))
-    clashes += [f"Campaign {one.name!r} ({one.id}) is there already and differs" for one in found if one.differs]
-    return Found(overview, skins, diagnosed, found, diagnosed_here, clashes)
+            summaries.append(_campaign(row._mapping, present=True, differs=differs))
+    clashes += [f"Campaign {one.name!r} ({one.id}) is there already and differs" for one in summaries if one.differs]
+    return CheckedExport(overview, skins, diagnosed, summaries, diagnosed_here, clashes)
 
 
 def bring_in(store: Database, upload: Upload) -> Imported:
     """Keep what is not there; raises as `look`, and Conflict, with nothing kept, where it contradicts the store."""
-    found = look(store, upload)
-    if found.clashes:
-        more = f", and {len(found.clashes) - 1} more clashes" if len(found.clashes) > 1 else ""
-        raise Conflict(f"{found.clashes[0]}{more}; nothing was imported.")
-    missing = [campaign.id for campaign in found.campaigns if not campaign.present]
-    importing.add_skins(store, found.skins)
-    with upload.path.open("rb") as stream, _told(upload, ""):
+    export = look(store, upload)
+    if export.clashes:
+        more = f", and {len(export.clashes) - 1} more clashes" if len(export.clashes) > 1 else ""
+        raise Conflict(f"{export.clashes[0]}{more}; nothing was imported.")
+    missing = [campaign.id for campaign in export.campaigns if not campaign.present]
+    importing.add_skins(store, export.skins)
+    with upload.path.open("rb") as stream, _naming_the_part(upload, ""):
         for name, campaign in _campaigns(stream, upload, missing):
-            importing.add(store, import_checks.campaign(campaign, name, found.skins.skins))
-    diagnosis_export.add(store, found.diagnosed)
-    return Imported(skin_id=found.overview.skin, kept=len(missing), present=len(found.campaigns) - len(missing))
+            importing.add(store, import_checks.campaign(campaign, name, export.skins.skins))
+    diagnosis_export.add(store, export.diagnosed)
+    return Imported(skin_id=export.overview.skin, kept=len(missing), present=len(export.campaigns) - len(missing))
 
 
 def _campaigns(stream: BinaryIO, upload: Upload, names: list[str]) -> Iterator[tuple[str, ExportedCampaign]]:
@@ -102,9 +102,9 @@ def _campaigns(stream: BinaryIO, upload: Upload, names: list[str]) -> Iterator[t
         yield from zip(some, read_campaigns(stream, _label(upload), some), strict=True)
 
 
-def _campaign(row: Any, *, present: bool, differs: bool) -> CampaignFound:
+def _campaign(row: Any, *, present: bool, differs: bool) -> ExportedCampaignSummary:
     about = (row["id"], row["name"], row["recorded_at"], row["recordings"], row["excluded"])
-    return CampaignFound(*about, present=present, differs=differs)
+    return ExportedCampaignSummary(*about, present=present, differs=differs)
 
 
 def _label(upload: Upload) -> str:
@@ -112,7 +112,7 @@ def _label(upload: Upload) -> str:
 
 
 @contextmanager
-def _told(upload: Upload, place: str) -> Iterator[None]:
+def _naming_the_part(upload: Upload, place: str) -> Iterator[None]:
     """Turns what is raised about a part of a file into InvalidInput that names the part."""
     try:
         yield

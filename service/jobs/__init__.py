@@ -5,6 +5,6 @@ planner.py plans next experiments within a rig's limits, which are not kept.
 """
 
 from service.jobs.planner import Planner
-from service.jobs.runner import Runner, Terms
+from service.jobs.runner import JobSettings, Runner
 
-__all__ = ["Planner", "Runner", "Terms"]
+__all__ = ["JobSettings", "Planner", "Runner"]

@@ -1,6 +1,6 @@
-"""Next experiments within the limits of a reader's rig: each worked out in a worker process, one after the other.
+"""Next experiments within the limits of a rig: each is planned in a worker process, one at a time.
 
-Nothing of them is kept in the store: a server remembers the latest, and after a restart they are worked out again.
+Plans are not stored: a server remembers the latest ones, and plans again after a restart.
 """
 
 import tempfile
@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from service.jobs.process import Worker
-from service.jobs.runner import Terms, logger
+from service.jobs.runner import JobSettings, logger
 from service.jobs.worker import Job
 from service.problems import Refusal
 from service.store import diagnoses
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 _REMEMBERED = 50
 _MOST_WAITING = 8
 _JOIN_S = 10.0
-_TOLD_S = 60.0  # so long a failure is told before it is tried again
+_RETRY_S = 60.0  # how long a failure is answered before the plan is tried again
 
 
 @dataclass
 class Planned:
-    """One plan; `plan` is empty where nothing can be told apart better."""
+    """One plan; `plan` is empty where no experiment would separate the explanations better."""
 
     state: Literal["queued", "running", "done", "failed"] = "queued"
     progress: float = 0.0
@@ -44,11 +44,11 @@ class Planned:
 
 
 class Planner:
-    """See the module; between the server's start and `stop`."""
+    """Plans next experiments one after another, until `stop`, and remembers the latest."""
 
-    def __init__(self, store: Database, terms: Terms) -> None:
+    def __init__(self, store: Database, job_settings: JobSettings) -> None:
         self._store = store
-        self._terms = terms
+        self._job_settings = job_settings
         self._known: OrderedDict[tuple[str, str], Planned] = OrderedDict()
         self._lock = threading.Lock()
         self._turn = threading.Lock()
@@ -62,10 +62,10 @@ class Planner:
         key = (str(row.id), repr(limits))
         with self._lock:
             known = self._known.get(key)
-            if known is not None and (known.state != "failed" or time.monotonic() < known.failed_at + _TOLD_S):
+            if known is not None and (known.state != "failed" or time.monotonic() < known.failed_at + _RETRY_S):
                 self._known.move_to_end(key)
                 return known
-            if not self._terms.workers:
+            if not self._job_settings.workers:
                 raise Refusal(503, "This server runs no diagnoses and plans nothing; use the command below.")
             if len(self._threads) >= _MOST_WAITING:
                 raise Refusal(503, "Many plans are being worked out: try again in a minute.")
@@ -92,7 +92,7 @@ class Planner:
             with self._turn:
                 if not self._ending.is_set():
                     self._run(row, limits, planned)
-        except Exception as error:  # nobody else would hear of it
+        except Exception as error:  # the thread has no caller to raise to
             logger.exception("a plan could not be made", extra={"fields": {"diagnosis": row.id}})
             planned.fail(f"{type(error).__name__}: {error}")
         finally:
@@ -104,8 +104,15 @@ class Planner:
         with self._store.reading() as connection:
             campaign, _ = diagnoses.campaign_of(connection, row)
         content = json_file.write(campaign)
-        terms = self._terms
-        job = Job(len(content), str(terms.table), terms.table_sha256, terms.memory_bytes, (), asdict(limits))
+        job_settings = self._job_settings
+        job = Job(
+            len(content),
+            str(job_settings.table),
+            job_settings.table_sha256,
+            job_settings.memory_bytes,
+            (),
+            asdict(limits),
+        )
         with tempfile.TemporaryFile() as stderr, Worker(job, content, stderr) as worker:
             with self._lock:
                 self._worker = worker

@@ -29,7 +29,7 @@ _STORE_FAILED = (SQLAlchemyError, StorageFull, StoreMoved, OSError)
 
 
 @dataclass(frozen=True)
-class Terms:
+class JobSettings:
     """What a runner works with; memory is a worker's, beyond what its program takes."""
 
     workers: int
@@ -39,11 +39,11 @@ class Terms:
 
 
 class Runner:
-    """See the module. Threads of the server's process; between `start` and `stop`."""
+    """Runs the queue in threads of the server's process, between `start` and `stop`."""
 
-    def __init__(self, store: Database, terms: Terms) -> None:
+    def __init__(self, store: Database, job_settings: JobSettings) -> None:
         self._store = store
-        self._terms = terms
+        self._job_settings = job_settings
         self._server = secrets.token_hex(8)
         self._ending = threading.Event()
         self._stirred = threading.Event()
@@ -54,7 +54,7 @@ class Runner:
 
     def start(self) -> None:
         """Take up what is in the queue, and what was running when its server ended."""
-        if self._terms.workers:
+        if self._job_settings.workers:
             self._dispatcher.start()
 
     def stir(self) -> None:
@@ -77,7 +77,7 @@ class Runner:
         while not self._ending.is_set():
             self._stirred.clear()
             try:
-                while len(self._jobs) < self._terms.workers and (row := self._claim()) is not None:
+                while len(self._jobs) < self._job_settings.workers and (row := self._claim()) is not None:
                     thread = threading.Thread(target=self._job, args=(row,), name=row.id, daemon=True)
                     with self._lock:
                         self._jobs[thread] = None
@@ -88,7 +88,7 @@ class Runner:
 
     def _claim(self) -> AnyRow | None:
         with self._store.writing() as connection:
-            row = diagnoses.claim(connection, self._server, self._terms.table_sha256, __version__)
+            row = diagnoses.claim(connection, self._server, self._job_settings.table_sha256, __version__)
         self._failure.is_over()
         return row
 
@@ -98,7 +98,7 @@ class Runner:
         except StoreMoved as error:
             self._failure.log("a diagnosis cannot be run now", error)
             self._release(row)
-        except Exception as error:  # nobody else would hear of it
+        except Exception as error:  # the thread has no caller to raise to
             logger.exception("a diagnosis could not be run", extra={"fields": {"diagnosis": row.id}})
             self._end(row, None, f"{type(error).__name__}: {error}")
         finally:
@@ -107,13 +107,13 @@ class Runner:
             self._stirred.set()
 
     def _run(self, row: AnyRow) -> None:
-        """One diagnosis, until it has ended, is no longer ours, or the server ends."""
+        """One diagnosis, until it has ended, another server has claimed it, or this server ends."""
         with self._store.reading() as connection:
             campaign, excluded = diagnoses.campaign_of(connection, row)
         content = json_file.write(campaign)
         left_out = tuple((left.recording, left.reason) for left in excluded)
-        terms = self._terms
-        job = Job(len(content), str(terms.table), terms.table_sha256, terms.memory_bytes, left_out)
+        job_settings = self._job_settings
+        job = Job(len(content), str(job_settings.table), job_settings.table_sha256, job_settings.memory_bytes, left_out)
         with tempfile.TemporaryFile() as stderr, Worker(job, content, stderr) as worker:
             with self._lock:
                 self._jobs[threading.current_thread()] = worker
@@ -131,7 +131,7 @@ class Runner:
                 self._end(row, None, worker.failure)
 
     def _is_ours(self, row: AnyRow, worker: Worker) -> bool:
-        """Say that it runs; whether it was neither cancelled nor taken by another server. A silent store says yes."""
+        """Renew the claim; False where it was cancelled or another server claimed it, True where the store fails."""
         try:
             with self._store.writing() as connection:
                 ours = diagnoses.keep_alive(connection, row.number, self._server, worker.progress)
@@ -144,7 +144,7 @@ class Runner:
     def _end(
         self, row: AnyRow, report: dict[str, Any] | None, reason: str, figures: dict[str, str] | None = None
     ) -> None:
-        """Keep what came of it; again and again where the store fails, since it was long work."""
+        """Store the outcome, and try again where the store fails: it took long to compute."""
         while True:
             try:
                 with self._store.writing() as connection:

@@ -3,7 +3,7 @@ memory.
 
 Standard input: a line of JSON (`Job`), then the campaign (`campaign/1`), then nothing until the runner ends: a worker
 whose runner is gone ends too. Standard output: a line of JSON for each progress, then one with the report and one with
-its figures, or one with the plan where the rig's limits are told, or one with the error.
+its figures, or one with the plan where the job has limits of a rig, or one with the error.
 """
 
 import os
@@ -22,7 +22,7 @@ _NICENESS = 10
 
 @dataclass(frozen=True)
 class Job:
-    """What a worker is told beside the campaign: where its bytes end, the table to use, what was left out and why.
+    """What a worker needs beside the campaign: where its bytes end, the table to use, what was left out and why.
 
     With `limits` (of `Limits`, by name) it plans the next experiment within them, and makes no report.
     """
@@ -41,11 +41,11 @@ class Job:
 
 def main() -> None:
     """The process."""
-    said = os.fdopen(os.dup(1), "wb", buffering=0)
+    answers = os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)  # what a library prints is no answer
 
     def say(message: dict[str, Any]) -> None:
-        said.write(orjson.dumps(message, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_APPEND_NEWLINE))
+        answers.write(orjson.dumps(message, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_APPEND_NEWLINE))
 
     os.nice(_NICENESS)
     job = Job(**orjson.loads(sys.stdin.buffer.readline()))
@@ -77,17 +77,17 @@ def _work(job: Job, campaign: bytes, say: Callable[[dict[str, Any]], None]) -> N
         raise TableError(f"{job.table} changed since the server started: restart it")
     limit_process(job.memory_bytes)
     limits = Limits(**job.limits or {})
-    found = diagnose(parse(orjson.loads(campaign)), table, lambda share: say({"progress": share}), limits)
+    diagnosis = diagnose(parse(orjson.loads(campaign)), table, lambda share: say({"progress": share}), limits)
     if job.limits is not None:
-        say({"plan": dict(found.next_experiment)})
+        say({"plan": dict(diagnosis.next_experiment)})
         return
-    document = report(found)
+    document = report(diagnosis)
     left_out = [
         {"code": "excluded", "recording": name, "field": "", "statement": f"Left out: {reason}"}
         for name, reason in job.excluded
     ]
     say({"report": {**document, "findings": left_out + list(document["findings"])}})
-    say({"figures": {name: figure.to_json() for name, figure in figures(found, document).items()}})
+    say({"figures": {name: figure.to_json() for name, figure in figures(diagnosis, document).items()}})
 
 
 def _end_with_the_runner(stdin: BinaryIO) -> None:

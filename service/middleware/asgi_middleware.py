@@ -144,8 +144,8 @@ class _Exchange:
         """A problem."""
         if is_browsing(self._path, self._accept):
             page = self._problem_page(refusal, self._request_id)
-            kept = [header for header in page.raw_headers if header[0] != b"content-length"]
-            await self._whole(page.status_code, bytes(page.body), kept)
+            headers = [header for header in page.raw_headers if header[0] != b"content-length"]
+            await self._whole(page.status_code, bytes(page.body), headers)
             return
         headers = [(name.lower().encode(), value.encode()) for name, value in refusal.headers.items()]
         content_type = (b"content-type", refusal.media_type(self._path).encode())

@@ -1,11 +1,10 @@
 """Every error that a route raises, as a problem."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
-from fastapi.routing import APIRoute
 from sqlalchemy.exc import DataError, IntegrityError, OperationalError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
@@ -20,13 +19,14 @@ logger = logging.getLogger("underskin")
 
 
 ProblemPage = Callable[[Refusal, str], Response]  # of a refusal and the request's id
+Methods = Callable[[FastAPI, str], Sequence[str]]  # of a path
 
 
-def install_handlers(api: FastAPI, problem_page: ProblemPage) -> None:
+def install_handlers(api: FastAPI, problem_page: ProblemPage, methods: Methods) -> None:
     """One shape for what we raise, what FastAPI raises, and what nobody expected; a page for who looks at pages."""
 
     async def handle(request: Request, error: Exception) -> Response:
-        refusal = _as_refusal(request, error)
+        refusal = _as_refusal(request, error, methods)
         request.scope["why"] = refusal.in_log()
         path, request_id = request.scope["path"], request.scope["request_id"]
         if is_browsing(path, request.headers.get("accept", "")):
@@ -40,7 +40,7 @@ def install_handlers(api: FastAPI, problem_page: ProblemPage) -> None:
         api.add_exception_handler(kind, handle)
 
 
-def _as_refusal(request: Request, error: Exception) -> Refusal:
+def _as_refusal(request: Request, error: Exception, methods: Methods) -> Refusal:
     match error:
         case Refusal():
             return error
@@ -55,18 +55,12 @@ def _as_refusal(request: Request, error: Exception) -> Refusal:
         case HTTPException(status_code=404):
             return Refusal(404, f"There is nothing at {request.url.path}; /openapi.json lists all routes.")
         case HTTPException(status_code=405):
-            allowed = {"Allow": ", ".join(_methods(request.app, request.scope["route"].path))}
+            allowed = {"Allow": ", ".join(methods(request.app, request.scope["route"].path))}
             return Refusal(405, f"{request.url.path} does not take {request.method}.", headers=allowed)
         case HTTPException():
             return Refusal(error.status_code, str(error.detail), headers=error.headers)
         case _:
             return _of_the_store(request, error)
-
-
-def _methods(api: FastAPI, path: str) -> list[str]:
-    """All methods of a path, in the order of its routes; the router knows those of one of them only."""
-    routes = [route for route in api.routes if isinstance(route, APIRoute) and route.path == path]
-    return list(dict.fromkeys(method for route in routes for method in sorted(route.methods or ())))
 
 
 def _unreadable(error: RequestValidationError) -> Refusal | None:

@@ -1,4 +1,4 @@
-"""What is kept of each request: a line in the log and a count in the metrics."""
+"""A line in the log and an observation in the metrics for each request."""
 
 import asyncio
 import os
@@ -30,7 +30,7 @@ _seconds = Histogram(
 def record(
     request_id: str, method: str, route: str, path: str, status: int, seconds: float, key: Key | None, why: str | None
 ) -> None:
-    """Keep what is to be said of a request; `route` is its path as documented, `why` the reason of an error."""
+    """Log a request and count it, a moment later; `route` is its path as documented, `why` the reason of an error."""
     if not _waiting:
         asyncio.get_running_loop().call_later(_DELAY_S, flush)
     _waiting.append((time.time(), request_id, method, route, path, status, seconds, key, why))

@@ -1,6 +1,7 @@
 """The pages: what a browser sees of the service, without JavaScript to build and with nothing from outside."""
 
 from fastapi import APIRouter
+from fastapi.routing import APIRoute
 
 from service.pages.array import loads, pressure_map
 from service.pages.campaign import page as campaign
@@ -37,3 +38,9 @@ _PAGES = (
 router = APIRouter(include_in_schema=False)
 for _page in _PAGES:
     router.include_router(_page.router)
+
+
+def methods(path: str) -> list[str]:
+    """All methods of a page's path; pages are not in the OpenAPI document."""
+    routes = [route for page in _PAGES for route in page.router.routes if isinstance(route, APIRoute)]
+    return sorted({method for route in routes if route.path == path for method in route.methods or ()})

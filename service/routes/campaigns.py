@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import WRITE, CampaignId, Store, Table, number_of_cursor, sender
-from service.ingest.accept import RIG, Terms, accept
+from service.ingest.accept import RIG, IngestOptions, accept
 from service.ingest.form_fields import FILE, split
 from service.ingest.reading import READING_SLOTS
 from service.ingest.uploads import received
@@ -24,7 +24,7 @@ from service.store import campaigns
 from service.store.times import stored
 from service.usecases import campaign_documents, d33_cache
 from service.usecases import campaigns as usecase
-from service.usecases.adopted_models import serving
+from service.usecases.adopted_models import model_in_force
 from underskin import InvalidInput
 
 router = APIRouter(prefix="/v1", tags=["campaigns"], route_class=JsonRoute)
@@ -118,13 +118,13 @@ async def post(
     settings = request.app.state.settings
     async with received(request, request.app.state.uploads) as parts, READING_SLOTS:
         fields, uploads = split(parts, list(models.SendOptions.model_fields), [RIG])
-        terms = Terms(
+        options = IngestOptions(
             **_options(query, fields),
             idempotency_key=idempotency_key,
             sender=sender(request),
             most_json_bytes=settings.max_body_bytes,
         )
-        answer, repeats = await run_in_threadpool(accept, store, uploads, terms)
+        answer, repeats = await run_in_threadpool(accept, store, uploads, options)
         await run_in_threadpool(d33_cache.derive, store, table, _ids(answer))
     headers = {"Idempotency-Replayed": "true"} if repeats else {}
     return Response(orjson.dumps(answer), status_code=201, headers=headers, media_type="application/json")
@@ -155,7 +155,7 @@ def listed(
     cursor: Annotated[str | None, Query(description="`next` of the page before.")] = None,
 ) -> models.CampaignList:
     """Without their recordings; a page holds `limit` of them."""
-    filters = campaigns.Filters(
+    filters = campaigns.CampaignFilters(
         skin=skin,
         state=None if state == "all" else state,
         name_contains=name_contains,
@@ -228,7 +228,7 @@ def d33(
     with store.reading() as connection:
         row = campaigns.find(connection, campaign_id)
     if model == "adopted":
-        return D33(**d33_cache.adopted_answer(store, table, row, serving(store, row.skin_id), band))
+        return D33(**d33_cache.adopted_answer(store, table, row, model_in_force(store, row.skin_id), band))
     return D33(**d33_cache.answer(store, table, row, band))
 
 

@@ -11,10 +11,10 @@ from service.schemas.columns import ColumnsRequest
 from underskin import InvalidInput
 from underskin.columns import CsvError, from_csv
 
-Request = TypeVar("Request", bound=ColumnsRequest)
+Kind = TypeVar("Kind", bound=ColumnsRequest)
 
 
-def parse(kind: type[Request], body: bytes, content_type: str) -> Request:
+def parse(kind: type[Kind], body: bytes, content_type: str) -> Kind:
     """The request in `body`; raises Refusal 400 (unreadable), 415 (another type) or 422 (a field is wrong)."""
     fields = (
         _from_csv(kind, body)

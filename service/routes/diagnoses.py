@@ -7,7 +7,7 @@ from fastapi.responses import JSONResponse
 
 from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, Store, Table, number_of_cursor
 from service.middleware.unique_keys import JsonRoute
-from service.routes.idempotency import IdempotentOnce
+from service.routes.idempotency import Idempotent
 from service.schemas import diagnoses as models
 from service.store import diagnoses
 from service.usecases import diagnoses as usecase
@@ -23,15 +23,17 @@ router = APIRouter(prefix="/v1", tags=["diagnoses"], route_class=JsonRoute)
     dependencies=WRITE,
     responses={202: {"model": models.Asked}},
 )
-def ask(campaign_id: CampaignId, runner: RunnerInUse, once: IdempotentOnce, store: Store, table: Table) -> JSONResponse:
+def ask(
+    campaign_id: CampaignId, runner: RunnerInUse, idempotency: Idempotent, store: Store, table: Table
+) -> JSONResponse:
     """Puts it into the queue; excluded recordings are left out. A campaign that was diagnosed as it is now, with this
     table and version, is answered with that diagnosis.
     """
-    answer = once.answer(
+    answer = idempotency.answer(
         store,
         None,
         lambda connection: models.Asked.model_validate(
-            usecase.ask(connection, campaign_id, table, once.sender), from_attributes=True
+            usecase.ask(connection, campaign_id, table, idempotency.sender), from_attributes=True
         ).model_dump(),
     )
     runner.stir()
@@ -48,7 +50,7 @@ def listed(
     cursor: Annotated[str | None, Query(description="`next` of the page before.")] = None,
 ) -> models.DiagnosisList:
     """Without their reports; a page holds `limit` of them."""
-    filters = diagnoses.Filters(campaign, skin, state)
+    filters = diagnoses.DiagnosisFilters(campaign, skin, state)
     with store.reading() as connection:
         rows = diagnoses.listed(connection, filters, number_of_cursor(cursor), limit + 1)
     page = [models.DiagnosisEntry(**usecase.entry(row)) for row in rows[:limit]]

@@ -12,7 +12,7 @@ from service.store import answers
 from service.store.engine import Database
 
 
-class Once:
+class Idempotency:
     """The request as a repetition of it would be recognised."""
 
     def __init__(
@@ -32,13 +32,13 @@ class Once:
         self._path = request.url.path
         self._key = idempotency_key
 
-    def answer(self, store: Database, told: Any, act: Callable[[Connection], dict[str, Any]]) -> dict[str, Any]:
+    def answer(self, store: Database, body: Any, act: Callable[[Connection], dict[str, Any]]) -> dict[str, Any]:
         """What `act` answers in a transaction of its own, or what it answered before; `told` is the request's body."""
         if self._key is None:
             with store.writing() as connection:
                 return act(connection)
-        digest = hashlib.sha256(repr([self._path, told]).encode()).hexdigest()
-        request = answers.Request(self.sender or "", self._key, digest)
+        digest = hashlib.sha256(repr([self._path, body]).encode()).hexdigest()
+        request = answers.KnownRequest(self.sender or "", self._key, digest)
         with store.writing() as connection:
             before = answers.replayed(connection, request)
             if before is None and not answers.claim(connection, request):
@@ -50,4 +50,4 @@ class Once:
         return answer
 
 
-IdempotentOnce = Annotated[Once, Depends()]
+Idempotent = Annotated[Idempotency, Depends()]

@@ -9,7 +9,7 @@ from sqlalchemy import Connection
 from service.dependencies import WRITE, SkinId, Store
 from service.middleware.unique_keys import JsonRoute
 from service.problems import Refusal
-from service.routes.idempotency import IdempotentOnce
+from service.routes.idempotency import Idempotent
 from service.schemas import diagnoses as answers
 from service.schemas.campaigns import Reason
 from service.store import models, skins
@@ -26,16 +26,16 @@ router = APIRouter(prefix="/v1", tags=["skins"], route_class=JsonRoute)
     dependencies=WRITE,
     responses={201: {"model": answers.ModelEntry}},
 )
-def adopt(skin_id: SkinId, adoption: answers.Adoption, once: IdempotentOnce, store: Store) -> JSONResponse:
+def adopt(skin_id: SkinId, adoption: answers.Adoption, idempotency: Idempotent, store: Store) -> JSONResponse:
     """Makes an explained diagnosis the skin's model: `/v1/frf`, `/v1/d33`, the d33 of campaigns and the history serve
     it on request from now on. Adopted already, it is answered as it is."""
 
     def act(connection: Connection) -> dict[str, object]:
         return usecase.entry(
-            connection, usecase.adopt(connection, skin_id, adoption.diagnosis_id, once.sender)
+            connection, usecase.adopt(connection, skin_id, adoption.diagnosis_id, idempotency.sender)
         ).model_dump()
 
-    return JSONResponse(once.answer(store, adoption.diagnosis_id, act), status_code=201)
+    return JSONResponse(idempotency.answer(store, adoption.diagnosis_id, act), status_code=201)
 
 
 @router.delete(
@@ -44,7 +44,7 @@ def adopt(skin_id: SkinId, adoption: answers.Adoption, once: IdempotentOnce, sto
 def withdraw(
     skin_id: SkinId,
     reason: Annotated[Reason, Query(description="Why; kept with it.")],
-    once: IdempotentOnce,
+    idempotency: Idempotent,
     store: Store,
 ) -> answers.ModelVersion:
     """Has no model in force, as before the first adoption: the paper's model serves. Nothing is deleted: the version
@@ -52,9 +52,9 @@ def withdraw(
 
     def act(connection: Connection) -> dict[str, object]:
         root = skins.require_root(connection, skin_id)
-        return usecase.version(models.withdraw(connection, root, reason, once.sender)).model_dump()
+        return usecase.version(models.withdraw(connection, root, reason, idempotency.sender)).model_dump()
 
-    return answers.ModelVersion(**once.answer(store, {"withdraw": reason}, act))
+    return answers.ModelVersion(**idempotency.answer(store, {"withdraw": reason}, act))
 
 
 @router.get("/skins/{skin_id}/model", operation_id="skin_model", summary="The model in force")

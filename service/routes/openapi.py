@@ -44,6 +44,11 @@ async def openapi(request: Request) -> dict[str, Any]:
     return document
 
 
+def methods(api: FastAPI, path: str) -> list[str]:
+    """All methods of a path of the document; none where it has no such path."""
+    return [method.upper() for method in _document(api)["paths"].get(path, ())]
+
+
 def query_parameters(api: FastAPI, path: str, method: str) -> list[str]:
     """The query parameters of a route of the API, as they stand in the document."""
     operation = _document(api)["paths"][path][method.lower()]

@@ -34,12 +34,12 @@ class SendOptions(BaseModel):
 
     def with_form(self, fields: Mapping[str, str]) -> "SendOptions":
         """These, from the query, and those of a form; raises ValidationError, InvalidInput where the two differ."""
-        said = SendOptions.model_validate(fields)
-        for name in said.model_fields_set & self.model_fields_set:
-            if getattr(said, name) != getattr(self, name):
+        options = SendOptions.model_validate(fields)
+        for name in options.model_fields_set & self.model_fields_set:
+            if getattr(options, name) != getattr(self, name):
                 allowed = f"must be {getattr(self, name)!r}, as in the query, or be given once"
                 raise InvalidInput(name, fields[name], allowed)
-        return self.model_copy(update={name: getattr(said, name) for name in said.model_fields_set})
+        return self.model_copy(update={name: getattr(options, name) for name in options.model_fields_set})
 
 
 class Refused(BaseModel):

@@ -12,7 +12,7 @@ from service.store.times import now
 
 
 @dataclass(frozen=True)
-class Request:
+class KnownRequest:
     """A request that may come again: who sent it, under which key, and the digest of what it carried."""
 
     sender: str
@@ -24,7 +24,7 @@ class OtherRequest(ValueError):
     """The key was used for a request that carried something else."""
 
 
-def replayed(connection: Connection, request: Request) -> Any | None:
+def replayed(connection: Connection, request: KnownRequest) -> Any | None:
     """The answer given before; None where there is none. Raises OtherRequest."""
     query = select(answers.c.request_sha256, answers.c.answer).where(
         answers.c.sender == request.sender, answers.c.idempotency_key == request.idempotency_key
@@ -37,7 +37,7 @@ def replayed(connection: Connection, request: Request) -> Any | None:
     return decompressed(row.answer)
 
 
-def claim(connection: Connection, request: Request) -> bool:
+def claim(connection: Connection, request: KnownRequest) -> bool:
     """Take the key for this transaction; False where another request has it, which by then has ended.
 
     A second request with the same key waits here for the first one's transaction.
@@ -54,7 +54,7 @@ def claim(connection: Connection, request: Request) -> bool:
     return connection.execute(claimed, row).first() is not None
 
 
-def keep(connection: Connection, request: Request, answer: Any) -> None:
+def keep(connection: Connection, request: KnownRequest, answer: Any) -> None:
     """Fill in the answer of a claimed key."""
     this = (answers.c.sender == request.sender) & (answers.c.idempotency_key == request.idempotency_key)
     connection.execute(answers.update().where(this).values(answer=compressed(answer)))

@@ -48,12 +48,12 @@ def verify(database: Database, file: Path) -> None:
     if database.is_sqlite:
         with closing(_open_sqlite(file)) as copy:
             try:
-                found = copy.execute("PRAGMA integrity_check").fetchone()[0]
+                result = copy.execute("PRAGMA integrity_check").fetchone()[0]
                 copy.execute("SELECT version_num FROM alembic_version").fetchone()
             except sqlite3.DatabaseError as error:
                 raise StoreError(f"{file} is not a backup of an SQLite store: {error}") from error
-        if found != "ok":
-            raise StoreError(f"{file} is damaged: {found}")
+        if result != "ok":
+            raise StoreError(f"{file} is damaged: {result}")
         return
     try:
         run("pg_restore", "--file=/dev/null", str(file))

@@ -23,7 +23,7 @@ CURRENT = campaigns.c.withdrawn_at.is_(None) & campaigns.c.corrected_by.is_(None
 
 
 @dataclass(frozen=True)
-class Arrival:
+class NewCampaign:
     """A campaign as it came: what was refused of it, what its reader remarked, where it came from."""
 
     campaign: Campaign
@@ -35,7 +35,7 @@ class Arrival:
 
 
 @dataclass(frozen=True)
-class Filters:
+class CampaignFilters:
     """Which campaigns a list shows; None does not filter. Times in the store's form."""
 
     skin: str | None = None
@@ -55,7 +55,7 @@ class Excluded:
 
 
 def add(
-    connection: Connection, arrival: Arrival, *, corrects: str | None = None, reason: str | None = None
+    connection: Connection, arrival: NewCampaign, *, corrects: str | None = None, reason: str | None = None
 ) -> tuple[str, str]:
     """Keep a campaign; its id and its skin's. A correction takes the place of the other, on its skin unless
     `arrival.skin_id` names another, whatever the campaign says of itself."""
@@ -88,11 +88,11 @@ def add(
     return campaign_id, skin_id
 
 
-def rows_of(number: int, kept: Sequence[Recording]) -> list[dict[str, Any]]:
+def rows_of(number: int, stored: Sequence[Recording]) -> list[dict[str, Any]]:
     """Rows of the recordings of the campaign `number`."""
     return [
         {"campaign": number, "position": position, **codec.recording_columns(recording)}
-        for position, recording in enumerate(kept)
+        for position, recording in enumerate(stored)
     ]
 
 
@@ -104,7 +104,7 @@ def find(connection: Connection, campaign_id: str) -> AnyRow:
     return row
 
 
-def listed(connection: Connection, filters: Filters, before: int | None, limit: int) -> Sequence[AnyRow]:
+def listed(connection: Connection, filters: CampaignFilters, before: int | None, limit: int) -> Sequence[AnyRow]:
     """Rows of campaigns, the latest arrival first, those that arrived before the number `before`."""
     query = _filtered(select(campaigns), filters)
     if before is not None:
@@ -168,11 +168,11 @@ def exclude(connection: Connection, campaign_id: str, recording_id: str, reason:
     """Leave a recording out of all figures; raises Missing, Conflict."""
     row = _changeable(connection, campaign_id)
     this = (recordings.c.campaign == row.number) & (recordings.c.id == recording_id)
-    found = connection.execute(select(recordings.c.excluded_at, recordings.c.exclude_reason).where(this)).first()
-    if found is None:
+    recording = connection.execute(select(recordings.c.excluded_at, recordings.c.exclude_reason).where(this)).first()
+    if recording is None:
         raise Missing(f"Campaign {campaign_id!r} has no recording {recording_id!r}.")
-    if found.excluded_at is not None:
-        raise Conflict(f"Recording {recording_id!r} is excluded already: {found.exclude_reason}")
+    if recording.excluded_at is not None:
+        raise Conflict(f"Recording {recording_id!r} is excluded already: {recording.exclude_reason}")
     connection.execute(update(recordings).where(this).values(excluded_at=now(), exclude_reason=reason))
     _change(connection, row.number, excluded=campaigns.c.excluded + 1)
 
@@ -201,7 +201,7 @@ def _change(connection: Connection, number: int, **values: Any) -> None:
     connection.execute(update(campaigns).where(campaigns.c.number == number).values(**values))
 
 
-def _filtered(query: Select[Any], filters: Filters) -> Select[Any]:
+def _filtered(query: Select[Any], filters: CampaignFilters) -> Select[Any]:
     if filters.skin is not None:
         query = query.where(campaigns.c.skin_id.in_(skins.members(skins.root_of(filters.skin))))
     if filters.state == "current":

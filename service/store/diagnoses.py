@@ -39,7 +39,7 @@ _LISTED = (
 
 
 @dataclass(frozen=True)
-class Filters:
+class DiagnosisFilters:
     """Which diagnoses a list shows; None does not filter."""
 
     campaign: str | None = None
@@ -72,12 +72,12 @@ def ask(connection: Connection, campaign_id: str, table_sha256: str, version: st
     }
     same = [diagnoses.c[name] == value for name, value in basis.items()]
     query = select(diagnoses.c.id).where(*same, diagnoses.c.state.in_(_USABLE)).order_by(diagnoses.c.number).limit(1)
-    found = connection.execute(query).scalar()
-    if found is None:
-        found = f"d-{secrets.token_hex(8)}"
-        asked = {"id": found, "state": "queued", "progress": 0.0, "asked_at": now(), "asked_from": asked_from}
+    diagnosis_id = connection.execute(query).scalar()
+    if diagnosis_id is None:
+        diagnosis_id = f"d-{secrets.token_hex(8)}"
+        asked = {"id": diagnosis_id, "state": "queued", "progress": 0.0, "asked_at": now(), "asked_from": asked_from}
         connection.execute(insert(diagnoses), {**basis, **asked})
-    return find(connection, found)
+    return find(connection, diagnosis_id)
 
 
 def find(connection: Connection, diagnosis_id: str) -> AnyRow:
@@ -97,8 +97,8 @@ def report_of(connection: Connection, number: int) -> dict[str, Any] | None:
 def reports_of(connection: Connection, numbers: Sequence[int]) -> dict[int, dict[str, Any]]:
     """The reports of those diagnoses that are done."""
     query = select(diagnoses.c.number, diagnoses.c.report).where(diagnoses.c.number.in_(numbers))
-    found = connection.execute(query.where(diagnoses.c.report.is_not(None))).all()
-    return {row.number: dict(decompressed(row.report)) for row in found}
+    rows = connection.execute(query.where(diagnoses.c.report.is_not(None))).all()
+    return {row.number: dict(decompressed(row.report)) for row in rows}
 
 
 def figures_of(connection: Connection, number: int) -> dict[str, str]:
@@ -107,7 +107,7 @@ def figures_of(connection: Connection, number: int) -> dict[str, str]:
     return {} if blob is None else dict(decompressed(blob))
 
 
-def listed(connection: Connection, filters: Filters, before: int | None, limit: int) -> Sequence[AnyRow]:
+def listed(connection: Connection, filters: DiagnosisFilters, before: int | None, limit: int) -> Sequence[AnyRow]:
     """Rows of diagnoses, the latest first, those asked for before the number `before`."""
     query = rows()
     if filters.campaign is not None:
@@ -167,9 +167,9 @@ def finish(
     connection: Connection, number: int, server: str, report: dict[str, Any], figures: dict[str, str] | None = None
 ) -> bool:
     """Keep the report, and JSON of its figures; False where it is no longer this server's."""
-    told = {"verdict": report["verdict"], "probability": report["probability"], "report": compressed(report)}
+    outcome = {"verdict": report["verdict"], "probability": report["probability"], "report": compressed(report)}
     drawn = None if figures is None else compressed(figures)
-    return _end(connection, number, server, state="done", progress=1.0, figures=drawn, **told)
+    return _end(connection, number, server, state="done", progress=1.0, figures=drawn, **outcome)
 
 
 def fail(connection: Connection, number: int, server: str, reason: str) -> bool:

@@ -119,17 +119,17 @@ def exported(connection: Connection, root: str) -> tuple[list[dict[str, Any]], l
     of_skin = skins.members(root)
     query = select(diagnoses, campaigns.c.id.label("campaign_id")).join(campaigns)
     query = query.where(campaigns.c.skin_id.in_(of_skin), diagnoses.c.state.in_(_ENDED))
-    found = [_diagnosis(row) for row in connection.execute(query.order_by(diagnoses.c.number))]
+    entries = [_diagnosis(row) for row in connection.execute(query.order_by(diagnoses.c.number))]
     query = select(models, diagnoses.c.id.label("diagnosis_id")).join(diagnoses).where(models.c.skin_id.in_(of_skin))
-    return found, [_model(row) for row in connection.execute(query.order_by(models.c.number))]
+    return entries, [_model(row) for row in connection.execute(query.order_by(models.c.number))]
 
 
 def checked(
-    found: Sequence[Mapping[str, Any]], adopted: Sequence[Mapping[str, Any]], campaign_ids: Sequence[str],
+    diagnosed: Sequence[Mapping[str, Any]], adopted: Sequence[Mapping[str, Any]], campaign_ids: Sequence[str],
     skin_ids: Sequence[str],
 ) -> Checked:  # fmt: skip
     """The rows of an export; raises pydantic's ValidationError, or KeyError where one refers to what is not there."""
-    rows = [DiagnosisRow.model_validate(row) for row in found]
+    rows = [DiagnosisRow.model_validate(row) for row in diagnosed]
     model_rows = [ModelRow.model_validate(row) for row in adopted]
     for row in rows:
         if row.campaign_id not in set(campaign_ids):
@@ -149,28 +149,28 @@ def checked(
 
 def known(connection: Connection, file: Checked) -> set[str]:
     """Ids of those diagnoses and models that are in the store, the same or not."""
-    found: set[str] = set()
+    ids: set[str] = set()
     for table, rows in ((diagnoses, file.diagnoses), (models, file.models)):
         for row in rows:
-            found.update(connection.execute(select(table.c.id).where(table.c.id == row.id)).scalars())
-    return found
+            ids.update(connection.execute(select(table.c.id).where(table.c.id == row.id)).scalars())
+    return ids
 
 
 def clashes(connection: Connection, file: Checked) -> list[str]:
     """Which diagnoses and versions of models are there already and differ."""
-    found = []
+    sentences = []
     for row in file.diagnoses:
         there = connection.execute(
             select(diagnoses, campaigns.c.id.label("campaign_id")).join(campaigns).where(diagnoses.c.id == row.id)
         ).first()
         if there is not None and _diagnosis(there) != row.model_dump():
-            found.append(f"Diagnosis {row.id!r} is there already and differs")
+            sentences.append(f"Diagnosis {row.id!r} is there already and differs")
     for model in file.models:
         same = (models.c.id == model.id) | ((models.c.skin_id == model.skin_id) & (models.c.version == model.version))
         query = select(models, diagnoses.c.id.label("diagnosis_id")).join(diagnoses).where(same)
         if any(_model(there) != model.model_dump() for there in connection.execute(query)):
-            found.append(f"Model {model.version} of skin {model.skin_id!r} is there already and differs")
-    return found
+            sentences.append(f"Model {model.version} of skin {model.skin_id!r} is there already and differs")
+    return sentences
 
 
 def add(store: Database, file: Checked) -> None:

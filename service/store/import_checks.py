@@ -92,11 +92,11 @@ class CheckedCampaign:
     exclusions: list[ExclusionRow]
 
 
-def overview(found: Overview) -> CheckedOverview:
+def overview(exported: Overview) -> CheckedOverview:
     """The skins, one of them the root of all, and rigs of theirs."""
-    rows = [SkinRow.model_validate(row) for row in found.skins]
-    rigs = [RigRow.model_validate(row) for row in found.rigs]
-    _require_joined(found.skin, rows)
+    rows = [SkinRow.model_validate(row) for row in exported.skins]
+    rigs = [RigRow.model_validate(row) for row in exported.rigs]
+    _require_joined(exported.skin, rows)
     ids = {row.id for row in rows}
     for rig in rigs:
         _require(rig.skin_id in ids, "rigs", rig.skin_id, "must be of a skin in the file")
@@ -107,19 +107,19 @@ def overview(found: Overview) -> CheckedOverview:
     return CheckedOverview(rows, rigs)
 
 
-def campaign(found: ExportedCampaign, name: str, skins: Sequence[SkinRow]) -> CheckedCampaign:
+def campaign(exported: ExportedCampaign, name: str, skins: Sequence[SkinRow]) -> CheckedCampaign:
     """The campaign that the file has under `name`, checked as an upload is."""
-    state = CampaignRow.model_validate(found.about)
+    state = CampaignRow.model_validate(exported.about)
     _require(state.id == name, "id", state.id, f"must be {name}, as the file names it")
     _require(state.skin_id in {row.id for row in skins}, "skin_id", state.skin_id, "must be a skin in the file")
     _require_together(state, "corrects", "correct_reason")
     _require_together(state, "withdrawn_at", "withdraw_reason")
     for entry in state.refused:
         RecordingResult.model_validate(entry)
-    exclusions = [ExclusionRow(**{key: row[key] for key in ExclusionRow.model_fields}) for row in found.recordings]
+    exclusions = [ExclusionRow(**{key: row[key] for key in ExclusionRow.model_fields}) for row in exported.recordings]
     for exclusion in exclusions:
         _require_together(exclusion, "excluded_at", "exclude_reason")
-    entries = [{**row["scalars"], **arrays} for row, arrays in zip(found.recordings, found.arrays, strict=True)]
+    entries = [{**row["scalars"], **arrays} for row, arrays in zip(exported.recordings, exported.arrays, strict=True)]
     parsed = parse({**state.about, "schema": SCHEMA, "recordings": entries})
     _require(state.name == parsed.name, "name", state.name, f"must be {parsed.name!r}, as the campaign says")
     row = {

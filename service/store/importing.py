@@ -26,19 +26,19 @@ def otherwise_joined(connection: Connection, skins: Sequence[SkinRow]) -> list[s
     """What clashes: skins that are there already and were joined otherwise."""
     clashes = []
     for row in skins:
-        found = connection.execute(select(skins_table).where(skins_table.c.id == row.id)).first()
-        if found is not None and (found.root_id, found.joined_to) != (row.root_id, row.joined_to):
+        stored = connection.execute(select(skins_table).where(skins_table.c.id == row.id)).first()
+        if stored is not None and (stored.root_id, stored.joined_to) != (row.root_id, row.joined_to):
             clashes.append(f"Skin {row.id!r} is there already and was joined otherwise")
     return clashes
 
 
 def known(connection: Connection, names: Sequence[str]) -> dict[str, AnyRow]:
     """Rows, by id, of those of the file's campaigns that the store has."""
-    found: dict[str, AnyRow] = {}
+    rows: dict[str, AnyRow] = {}
     for start in range(0, len(names), _AT_A_TIME):
         these = campaigns_table.c.id.in_(names[start : start + _AT_A_TIME])
-        found.update((row.id, row) for row in connection.execute(select(campaigns_table).where(these)))
-    return found
+        rows.update((row.id, row) for row in connection.execute(select(campaigns_table).where(these)))
+    return rows
 
 
 def differs(connection: Connection, row: AnyRow, campaign: ExportedCampaign) -> bool:
@@ -69,9 +69,9 @@ def add(store: Database, checked: CheckedCampaign) -> None:
     with store.writing() as connection:
         made = connection.execute(insert(campaigns_table).returning(campaigns_table.c.number), checked.row)
         number = made.scalar_one()
-        kept = [
+        stored = [
             {**columns, **entry.model_dump()}
             for columns, entry in zip(rows_of(number, checked.campaign.recordings), checked.exclusions, strict=True)
         ]
-        connection.execute(insert(recordings), kept)
+        connection.execute(insert(recordings), stored)
         digests.keep(connection, number, checked.campaign.recordings)

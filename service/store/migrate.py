@@ -35,11 +35,11 @@ def migrate(database: Database, folder: Path) -> None:
     if version(database) == VERSIONS[-1]:
         return
     with _one_at_a_time(database, folder):
-        found = version(database)
-        if found == VERSIONS[-1]:
+        before = version(database)
+        if before == VERSIONS[-1]:
             return
-        if found is not None:
-            require_known(found)
+        if before is not None:
+            require_known(before)
             backup.make(database, folder / "backups" / f"before-{VERSIONS[-1]}-{_stamp()}{backup.suffix(database)}")
         _upgrade(database)
 
@@ -54,15 +54,15 @@ def version_of(connection: Connection) -> str | None:
     """As `version`, on a connection."""
     if not inspect(connection).has_table("alembic_version"):
         return None
-    found = connection.execute(text("SELECT version_num FROM alembic_version")).scalar()
-    return None if found is None else str(found)
+    number = connection.execute(text("SELECT version_num FROM alembic_version")).scalar()
+    return None if number is None else str(number)
 
 
-def require_known(found: str) -> None:
+def require_known(number: str) -> None:
     """Refuses the schema of a newer underskin."""
-    if found not in VERSIONS:
+    if number not in VERSIONS:
         raise StoreError(
-            f"the store has schema {found}, which this underskin does not know (newest: {VERSIONS[-1]}): "
+            f"the store has schema {number}, which this underskin does not know (newest: {VERSIONS[-1]}): "
             "it was written by a newer one. Run that one, or restore a backup made before it."
         )
 

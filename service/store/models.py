@@ -75,16 +75,16 @@ def last(connection: Connection, root: str) -> AnyRow | None:
 
 def in_force(connection: Connection, root: str) -> AnyRow | None:
     """The same unless it was withdrawn: those before it do not come back."""
-    found = last(connection, root)
-    return None if found is None or found.model_withdrawn_at is not None else found
+    row = last(connection, root)
+    return None if row is None or row.model_withdrawn_at is not None else row
 
 
 def in_force_of(connection: Connection, roots: Sequence[str]) -> dict[str, AnyRow]:
     """As `in_force`, of each of these skins that has one."""
     query = kept.rows().add_columns(*_OWN, skin_rows.c.root_id).join(models, models.c.diagnosis == diagnoses.c.number)
     query = query.join(skin_rows, skin_rows.c.id == models.c.skin_id).where(skin_rows.c.root_id.in_(roots))
-    found = connection.execute(query.order_by(models.c.adopted_at, models.c.number))
-    latest = {row.root_id: row for row in found}
+    rows = connection.execute(query.order_by(models.c.adopted_at, models.c.number))
+    latest = {row.root_id: row for row in rows}
     return {root: row for root, row in latest.items() if row.model_withdrawn_at is None}
 
 

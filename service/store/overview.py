@@ -45,17 +45,17 @@ def glances(
         query = query.where(func.lower(skins.c.root_id).contains(contains.lower(), autoescape=True))
     if before is not None:
         query = query.having(last < before)
-    found = {row[0]: Glance(row[0], row[1], None, row[2]) for row in connection.execute(query)}
-    recent = _recent(connection, list(found))
+    by_skin = {row[0]: Glance(row[0], row[1], None, row[2]) for row in connection.execute(query)}
+    recent = _recent(connection, list(by_skin))
     values = medians(connection, [row.number for row in recent], table_sha256)
     for row in recent:
-        glance = found[row.root_id]
+        glance = by_skin[row.root_id]
         glance.last = row
         if row.number in values:
             glance.d33.append((row.time, values[row.number]))
     diagnosed = latest_diagnoses(connection, [row.number for row in recent])
-    adopted = adopted_models.in_force_of(connection, list(found))
-    for glance in found.values():
+    adopted = adopted_models.in_force_of(connection, list(by_skin))
+    for glance in by_skin.values():
         if glance.last is not None:
             glance.diagnosis = diagnosed.get(glance.last.number)
         glance.model = adopted.get(glance.skin_id)
@@ -63,7 +63,7 @@ def glances(
             by_model = inversions.find_adopted(connection, glance.last, glance.model.model_id, table_sha256)
             glance.adopted_d33 = _of_array(by_model)
             glance.paper_d33 = _of_array(inversions.find(connection, glance.last, table_sha256))
-    return list(found.values())
+    return list(by_skin.values())
 
 
 def _recent(connection: Connection, roots: Sequence[str]) -> Sequence[AnyRow]:

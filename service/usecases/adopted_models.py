@@ -32,14 +32,14 @@ _ANY_LINE = np.array([1.0])
 
 
 @dataclass(frozen=True)
-class Serving:
+class ModelInForce:
     """The model in force of a skin, and its id."""
 
     model: "AdoptedModel"
     model_id: str
 
 
-def serving(store: Database, skin_id: str) -> Serving:
+def model_in_force(store: Database, skin_id: str) -> ModelInForce:
     """The model in force; raises Refusal 404 where there is none, Conflict where it is outdated."""
     with store.reading() as connection:
         skin = skins.find(connection, skin_id)
@@ -52,7 +52,7 @@ def serving(store: Database, skin_id: str) -> Serving:
                 f"Model {row.model_id!r} of skin {skin_id!r} serves no figures: its campaign {row.campaign_id!r} was "
                 f"{why}. Diagnose it again and adopt that, or use model paper."
             )
-        return Serving(of_row(connection, row), row.model_id)
+        return ModelInForce(of_row(connection, row), row.model_id)
 
 
 def of_row(connection: Connection, row: AnyRow) -> "AdoptedModel":
@@ -69,18 +69,18 @@ def of_row(connection: Connection, row: AnyRow) -> "AdoptedModel":
     return _known[row.id]
 
 
-def serving_of(store: Database, request: PressedSkinColumns) -> Serving:
+def model_asked_for(store: Database, request: PressedSkinColumns) -> ModelInForce:
     """The model that a request asks for."""
     if request.skin_id is None:
         raise InvalidInput("skin_id", None, "is required with model adopted")
-    return serving(store, request.skin_id)
+    return model_in_force(store, request.skin_id)
 
 
 @dataclass(frozen=True)
-class Pressed:
+class RowsUnderModel:
     """The rows of a request under an adopted model."""
 
-    serving: Serving
+    model_in_force: ModelInForce
     columns: Mapping[str, Floats]  # as in the answer, those that an adopted model can tell
     level: Floats  # (rows,) FRF over d33 on the plateau [-]
     inside: NDArray[np.bool_]  # (rows,)
@@ -91,28 +91,30 @@ class Pressed:
 
     def response(self, frequency_hz: Floats) -> Complexes:
         """FRF over d33 (rows, lines) [-]."""
-        return _response(self.serving.model, self._request, self._table, self._rows, frequency_hz)[0][self._which]
+        return _response(self.model_in_force.model, self._request, self._table, self._rows, frequency_hz)[0][
+            self._which
+        ]
 
     def require_lines(self, field: str) -> None:
         """Raises InvalidInput that names `field` where the model depends on frequency and it was not given."""
-        if self.serving.model.of_lines and getattr(self._request, field) is None:
-            names = " and ".join(self.serving.model.of_lines)
+        if self.model_in_force.model.of_lines and getattr(self._request, field) is None:
+            names = " and ".join(self.model_in_force.model.of_lines)
             raise InvalidInput(field, None, f"is required: the adopted model depends on frequency ({names})")
 
 
-def press(serving: Serving, table: SigmaTable, request: PressedSkinColumns, count: int) -> Pressed:
+def press(model_in_force: ModelInForce, table: SigmaTable, request: PressedSkinColumns, count: int) -> RowsUnderModel:
     """The rows of a request, so many, under an adopted model; raises InvalidInput."""
     given = {name: request.column(name) for name in FIELDS}
-    felt = pressed(table, given, request.units_checked)  # which checks them
-    serving.model.require_skin(given)
-    for name, mechanism in serving.model.needs.items():
+    transmitted = pressed(table, given, request.units_checked)  # which checks them
+    model_in_force.model.require_skin(given)
+    for name, mechanism in model_in_force.model.needs.items():
         if getattr(request, name) is None:
             raise InvalidInput(name, None, f"is required: the adopted model has {mechanism}")
     rows = _distinct_columns(request, given)
     stacked = np.column_stack([np.broadcast_to(column, (count,)) for column in rows.values()])
     distinct, which = np.unique(stacked, axis=0, return_inverse=True)
     each = dict(zip(rows, distinct.T, strict=True))
-    level, inside = _response(serving.model, request, table, each, None)
+    level, inside = _response(model_in_force.model, request, table, each, None)
     which = which.reshape(-1)
     on_plateau = level[:, 0].real[which]
     on_plateau = np.where(inside[which], on_plateau, np.nan)
@@ -120,13 +122,13 @@ def press(serving: Serving, table: SigmaTable, request: PressedSkinColumns, coun
     columns = {
         "contact_radius_mm": none,
         "a_over_h": none,
-        "rt_over_h": felt.rt_over_h,
+        "rt_over_h": transmitted.rt_over_h,
         "load_parameter": none,
-        "sigma": on_plateau / gain(1.0, felt.rt_over_h),
-        "rel_error": np.hypot(felt.rel_error, serving.model.unsure),
+        "sigma": on_plateau / gain(1.0, transmitted.rt_over_h),
+        "rel_error": np.hypot(transmitted.rel_error, model_in_force.model.unsure),
         "mean_stress_mpa": none,
     }
-    return Pressed(serving, columns, on_plateau, inside[which], request, table, each, which)
+    return RowsUnderModel(model_in_force, columns, on_plateau, inside[which], request, table, each, which)
 
 
 def _distinct_columns(request: PressedSkinColumns, given: Mapping[str, Floats]) -> dict[str, Floats]:
@@ -153,8 +155,8 @@ def _response(
         allowed = f"different rows times frequencies must be at most {_LARGEST_LINES} with an adopted model"
         raise InvalidInput("frequency_hz", f"{count} rows, {len(lines)} frequencies", allowed)
     conditions = frf_conditions(model.skin, sensor=request.sensor, frequency_hz=lines, **rows)
-    found = model.response(conditions, table, level=frequency_hz is None)
-    return found.value.reshape(count, -1), np.logical_and.reduce(found.inside.reshape(count, -1), axis=1)
+    response = model.response(conditions, table, level=frequency_hz is None)
+    return response.value.reshape(count, -1), np.logical_and.reduce(response.inside.reshape(count, -1), axis=1)
 
 
 def require_paper(request: PressedSkinColumns) -> None:

@@ -9,7 +9,7 @@ from service.schemas.columns_answer import Columns
 from service.schemas.d33 import D33Columns
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS
 from service.store import Database
-from service.usecases.adopted_models import press, require_paper, serving_of
+from service.usecases.adopted_models import model_asked_for, press, require_paper
 from underskin import InvalidInput
 from underskin.columns import rows
 from underskin.physics import charge_response
@@ -29,15 +29,16 @@ def d33(table: SigmaTable, store: Database, request: D33Columns) -> Columns:
     columns = {name: request.column(name) for name in FIELDS} | measured
     count = _rows(request, columns)
     answer = answers.d33(table, columns, request.units_checked)
-    leading = {name: values for name, values in answer.columns.items() if name not in (*measured, *_RESULTS)}
+    plateau = {name: answer.columns[name] for name in ("frf_pc_per_n", "frf_uncertainty_pc_per_n")}
     results = {name: answer.columns[name] for name in _RESULTS}
+    leading = {name: values for name, values in answer.columns.items() if name not in plateau | results}
     return Columns(
         rows=count,
         model=request.model,
         table_sha256=table.sha256,
         inside=answer.inside,
         shared={"findings": [asdict(finding) for finding in answer.findings]},
-        columns={**leading, **measured, **results},
+        columns={**leading, **plateau, **measured, **results},
     )
 
 
@@ -49,16 +50,16 @@ def _rows(request: D33Columns, columns: Mapping[str, Floats]) -> int:
 
 def _by_adopted_model(table: SigmaTable, store: Database, request: D33Columns) -> Columns:
     given = {name: request.column(name) for name in (*FIELDS, *ADOPTED_COLUMNS) if getattr(request, name) is not None}
-    serving = serving_of(store, request)
+    model_in_force = model_asked_for(store, request)
     if request.frf_pc_per_n is None:
         _require_lines(request)
         each_row = np.zeros(len(request.frf_re_pc_per_n or ()))
-        pressed = press(serving, table, request, rows(given | {"frf_re_pc_per_n": each_row}))
+        pressed = press(model_in_force, table, request, rows(given | {"frf_re_pc_per_n": each_row}))
         pressed.require_lines("frf_im_pc_per_n")
-        measured = _plateau(request, lambda frequency: pressed.level[:, None] / pressed.response(frequency))
+        measured = _plateau(request, lambda line: pressed.level[:, None] / pressed.response(line))
     else:
-        measured = _given(request)
-        pressed = press(serving, table, request, _rows(request, given | measured))
+        measured = _checked(_given(request))
+        pressed = press(model_in_force, table, request, _rows(request, given | measured))
         pressed.require_lines("frequency_hz")
     value = measured["frf_pc_per_n"] / pressed.level
     unsure = np.hypot(measured["frf_uncertainty_pc_per_n"] / pressed.level, value * pressed.columns["rel_error"])
@@ -68,7 +69,7 @@ def _by_adopted_model(table: SigmaTable, store: Database, request: D33Columns) -
         model=request.model,
         table_sha256=table.sha256,
         inside=pressed.inside & np.isfinite(value),
-        shared={"model_id": serving.model_id, "findings": findings},
+        shared={"model_id": model_in_force.model_id, "findings": findings},
         columns={**pressed.columns, **measured, "d33_pc_per_n": value, "d33_uncertainty_pc_per_n": unsure},
     )
 
@@ -78,14 +79,15 @@ def _given(request: D33Columns) -> dict[str, Floats]:
     for name in sorted(request.json_only):
         if getattr(request, name) is not None:
             raise InvalidInput(name, "given", "goes with lines; leave it out, or leave out frf_pc_per_n")
-    return {"frf_pc_per_n": finite("frf_pc_per_n", request.column("frf_pc_per_n")), **_uncertainty(request)}
+    sent = ("frf_pc_per_n", "frf_uncertainty_pc_per_n")
+    return {name: request.column(name) for name in sent if getattr(request, name) is not None}
 
 
-def _uncertainty(request: D33Columns) -> dict[str, Floats]:
+def _checked(measured: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Plateau values that were sent, the uncertainty NaN where none was; raises InvalidInput."""
     name = "frf_uncertainty_pc_per_n"
-    if request.frf_uncertainty_pc_per_n is None:
-        return {name: np.full((), np.nan)}
-    return {name: non_negative(name, request.column(name))}
+    unsure = non_negative(name, measured[name]) if name in measured else np.full((), np.nan)
+    return {"frf_pc_per_n": finite("frf_pc_per_n", measured["frf_pc_per_n"]), name: unsure}
 
 
 def _require_lines(request: D33Columns) -> None:
@@ -113,7 +115,8 @@ def _plateau(request: D33Columns, factor: Callable[[Floats], Complexes] | None =
     level, error = charge_response.plateau(real, inside)
     measured = {"frf_pc_per_n": level}
     if request.frf_uncertainty_pc_per_n is not None:
-        measured |= _uncertainty(request)
+        sent = "frf_uncertainty_pc_per_n"
+        measured[sent] = non_negative(sent, request.column(sent))
     elif inside.sum() < 2:
         raise InvalidInput(
             "frf_uncertainty_pc_per_n", None, "is required where band_hz holds one line, which has no scatter"

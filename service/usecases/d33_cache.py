@@ -1,4 +1,4 @@
-"""d33 of campaigns in the store: computed once for each state of a campaign, and kept."""
+"""d33 of stored campaigns, computed once for each state of a campaign and cached in the store."""
 
 import logging
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from service.store.engine import Database, StorageFull
 from service.store.errors import Conflict, StoreMoved
 from service.store.tables import AnyRow
 from service.usecases import figure_data
-from service.usecases.adopted_models import Serving, serving
+from service.usecases.adopted_models import ModelInForce, model_in_force
 from service.usecases.campaign_d33 import of_inversion, of_moduli
 from underskin import InvalidInput
 from underskin.recordings.campaign import Campaign
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("underskin")
 
-Band = tuple[float, float]
+BandHz = tuple[float, float]
 
 _NOTHING: dict[str, Any] = dict.fromkeys(
     ("band", "array", "sensor_spread_percent", "gain_scatter_percent", "position_scatter_mm", "declared_percent")
@@ -33,47 +33,53 @@ _NOTHING: dict[str, Any] = dict.fromkeys(
 _EMPTY: dict[str, Any] = {"sensors": [], "cells": [], "findings": []}
 
 
-def answer(store: Database, table: SigmaTable, row: AnyRow, band_hz: Band | None) -> dict[str, Any]:
+def answer(store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | None) -> dict[str, Any]:
     """The d33 of a campaign as it is now (fields of D33), over its flat zone or a band of the user's own."""
     with store.reading() as connection:
-        kept = inversions.find(connection, row, table.sha256) if band_hz is None else None
-    return dict(kept) if kept is not None else _derived(store, table, row, band_hz)[0]
+        cached = inversions.find(connection, row, table.sha256) if band_hz is None else None
+    return dict(cached) if cached is not None else _derived(store, table, row, band_hz)[0]
 
 
 def with_numbers(
-    store: Database, table: SigmaTable, row: AnyRow, band_hz: Band | None
+    store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | None
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """The same, and the numbers that its figures show (service.usecases.figure_data)."""
     with store.reading() as connection:
-        kept = inversions.find_with_numbers(connection, row, table.sha256)
-    if kept is not None and band_hz is None:
-        return kept
-    return _derived(store, table, row, band_hz, None if kept is None else kept[1]["spreads"])
+        cached = inversions.find_with_numbers(connection, row, table.sha256)
+    if cached is not None and band_hz is None:
+        return cached
+    return _derived(store, table, row, band_hz, None if cached is None else cached[1]["spreads"])
 
 
 def adopted_answer(
-    store: Database, table: SigmaTable, row: AnyRow, serving: Serving, band_hz: Band | None
+    store: Database, table: SigmaTable, row: AnyRow, model_in_force: ModelInForce, band_hz: BandHz | None
 ) -> dict[str, Any]:
     """The same under an adopted model: by the lines that the base model would have shown.
 
     Raises InvalidInput where the campaign lacks what the model needs, or declares the skin otherwise.
     """
     with store.reading() as connection:
-        kept = inversions.find_adopted(connection, row, serving.model_id, table.sha256) if band_hz is None else None
-        if kept is not None:
-            return dict(kept)
+        cached = (
+            inversions.find_adopted(connection, row, model_in_force.model_id, table.sha256) if band_hz is None else None
+        )
+        if cached is not None:
+            return dict(cached)
         campaign = campaigns.load(connection, row, with_excluded=False)
         excluded = campaigns.excluded_of(connection, row.number)
-    translated, beyond = serving.model.as_base_model(campaign, table)
+    translated, beyond = model_in_force.model.as_base_model(campaign, table)
     left_out = [(left.recording, left.reason) for left in excluded]
     left_out += [(name, "beyond the table under the adopted model") for name in beyond]
-    model = {"model": "adopted", "model_id": serving.model_id, "model_percent": 100 * serving.model.unsure}
+    model = {
+        "model": "adopted",
+        "model_id": model_in_force.model_id,
+        "model_percent": 100 * model_in_force.model.unsure,
+    }
     document = {"campaign_id": row.id, "table_sha256": table.sha256, **model}
     document, _, failed = _computed(document, translated, table, band_hz, left_out)
     if band_hz is None and not failed:
         try:
             with store.writing() as connection:
-                inversions.keep_adopted(connection, row, serving.model_id, table.sha256, document)
+                inversions.keep_adopted(connection, row, model_in_force.model_id, table.sha256, document)
         except (StorageFull, StoreMoved) as error:
             _not_kept(row, error)
     return document
@@ -94,15 +100,15 @@ def derive(store: Database, table: SigmaTable, campaign_ids: Sequence[str]) -> N
 def _derive_adopted(store: Database, table: SigmaTable, row: AnyRow) -> None:
     """The same by the model in force of its skin, where there is one that can tell it."""
     with suppress(Refusal, Conflict, InvalidInput):
-        adopted_answer(store, table, row, serving(store, row.skin_id), None)
+        adopted_answer(store, table, row, model_in_force(store, row.skin_id), None)
 
 
 def foreseen(table: SigmaTable, campaign: Campaign) -> list[str]:
     """The findings of a campaign that is not kept yet."""
     model = {"model": "paper", "model_id": None, "model_percent": None}
     document = {"campaign_id": campaign.name, "table_sha256": table.sha256, **model}
-    found: list[str] = _computed(document, campaign, table, None, [])[0]["findings"]
-    return found
+    findings: list[str] = _computed(document, campaign, table, None, [])[0]["findings"]
+    return findings
 
 
 def complete(store: Database, table: SigmaTable, root: str) -> None:
@@ -113,7 +119,7 @@ def complete(store: Database, table: SigmaTable, root: str) -> None:
 
 
 def _derived(
-    store: Database, table: SigmaTable, row: AnyRow, band_hz: Band | None, spreads: list[dict[str, Any]] | None = None
+    store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | None, spreads: list[dict[str, Any]] | None = None
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Answer and numbers, computed, and kept where they are of the flat zone; `spreads`: where these are known."""
     with store.reading() as connection:
@@ -122,8 +128,8 @@ def _derived(
     model = {"model": "paper", "model_id": None, "model_percent": None}
     document = {"campaign_id": row.id, "table_sha256": table.sha256, **model}
     left_out = [(left.recording, left.reason) for left in excluded]
-    document, found, failed = _computed(document, campaign, table, band_hz, left_out)
-    numbers = figure_data.numbers(campaign, found, spreads)
+    document, inversion, failed = _computed(document, campaign, table, band_hz, left_out)
+    numbers = figure_data.numbers(campaign, inversion, spreads)
     if band_hz is None and not failed:
         _keep(store, row, document, numbers)
     return document, numbers
@@ -133,7 +139,7 @@ def _computed(
     document: dict[str, Any],
     campaign: Campaign,
     table: SigmaTable,
-    band_hz: Band | None,
+    band_hz: BandHz | None,
     left_out: Sequence[tuple[str, str]],
 ) -> "tuple[dict[str, Any], Inversion | None, bool]":
     """The document with the campaign's figures, the inversion that they are of, where there is one, and whether they
@@ -143,7 +149,7 @@ def _computed(
     """
     entries = [{"recording": recording, "reason": reason} for recording, reason in left_out]
     try:
-        fields, found = _inverted(campaign, table, band_hz)
+        fields, inversion = _inverted(campaign, table, band_hz)
         whole = {**document, **fields, "left_out": entries + fields["left_out"]}
         D33.model_validate(orjson.loads(orjson.dumps(whole)))  # what is kept can be answered
     except InvalidInput:  # of the band
@@ -152,24 +158,26 @@ def _computed(
         logger.exception("no d33 from a campaign", extra={"fields": {"campaign": document["campaign_id"]}})
         reason = f"the figures cannot be computed ({type(error).__name__}: {error}); the server's log says more"
         return {**document, **_none(reason), "moduli": [], "left_out": entries}, None, True
-    return whole, found, False
+    return whole, inversion, False
 
 
-def _inverted(campaign: Campaign, table: SigmaTable, band_hz: Band | None) -> "tuple[dict[str, Any], Inversion | None]":
+def _inverted(
+    campaign: Campaign, table: SigmaTable, band_hz: BandHz | None
+) -> "tuple[dict[str, Any], Inversion | None]":
     # Imported here: statistics take half a second to load, which a start need not wait for.
     from underskin.inversion.invert import invert
     from underskin.recordings import elastomer, plausibility
 
     moduli, silent = of_moduli(elastomer.of_campaign(campaign))
     try:
-        found = invert(campaign, table, band_hz)
+        inversion = invert(campaign, table, band_hz)
     except InvalidInput as error:
         if band_hz is not None and error.field == "band_hz":
             raise
         findings = list(plausibility.in_words(campaign))
         return {**_none(str(error)), "findings": findings, "moduli": moduli, "left_out": silent}, None
-    left_out = [{"recording": None, "reason": reason} for reason in found.left_out]
-    return {**of_inversion(found), "moduli": moduli, "left_out": left_out + silent}, found
+    left_out = [{"recording": None, "reason": reason} for reason in inversion.left_out]
+    return {**of_inversion(inversion), "moduli": moduli, "left_out": left_out + silent}, inversion
 
 
 def _none(reason: str) -> dict[str, Any]:

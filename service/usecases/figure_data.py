@@ -21,11 +21,13 @@ MOST_SINGLE = 48  # recordings whose lines are drawn one by one, from the record
 _RANGES = ("magnitude_pc_per_n", "phase_deg", "coherence")
 
 
-def numbers(campaign: Campaign, found: "Inversion | None", known: list[dict[str, Any]] | None = None) -> dict[str, Any]:
+def numbers(
+    campaign: Campaign, inversion: "Inversion | None", known: list[dict[str, Any]] | None = None
+) -> dict[str, Any]:
     """`recordings`: columns of FRF against preload; `spreads`: FRFs of recordings alike, over all lines, whatever the
     band, and so perhaps `known`; None where they are few."""
     return {
-        "recordings": {} if found is None else _preload_columns(campaign, found),
+        "recordings": {} if inversion is None else _preload_columns(campaign, inversion),
         "spreads": known or _kept_spreads(measured(campaign)),
     }
 
@@ -34,14 +36,14 @@ def measured(campaign: Campaign, show: str = "") -> list[tuple[FrfRecording, "Fr
     """The FRF recordings that have an FRF, or those of them that are called `show` or of the sensor of that name."""
     from underskin.recordings.frf.estimation import lines_of
 
-    found = []
+    pairs = []
     for recording in campaign.recordings:
         if isinstance(recording, FrfRecording) and show in ("", recording.sensor, recording.id):
             try:
-                found.append((recording, lines_of(recording)))
+                pairs.append((recording, lines_of(recording)))
             except InvalidInput:
                 continue
-    return found
+    return pairs
 
 
 def frf_columns(campaign: Campaign, show: str = "") -> dict[str, list[Any]]:
@@ -59,7 +61,7 @@ def frf_columns(campaign: Campaign, show: str = "") -> dict[str, list[Any]]:
     return columns
 
 
-def spreads(kept: Sequence[Mapping[str, Any]]) -> "list[FrfSpread]":
+def spreads(cached: Sequence[Mapping[str, Any]]) -> "list[FrfSpread]":
     """Those of `numbers` again."""
     from underskin.recordings.frf.summary import FrfSpread
 
@@ -71,32 +73,32 @@ def spreads(kept: Sequence[Mapping[str, Any]]) -> "list[FrfSpread]":
                 **{name: tuple(np.array(values, dtype=float) for values in entry[name]) for name in _RANGES},
             }
         )
-        for entry in kept
+        for entry in cached
     ]
 
 
-def _preload_columns(campaign: Campaign, found: "Inversion") -> dict[str, list[Any]]:
+def _preload_columns(campaign: Campaign, inversion: "Inversion") -> dict[str, list[Any]]:
     """FRF in the flat zone against preload, a row a recording."""
     from underskin.figures.campaign_figures import model_frf
 
-    rows = found.recordings
+    rows = inversion.recordings
     return {
         "recording": list(rows.ids),
-        "sensor": [found.sensor_ids[number] for number in rows.sensor.tolist()],
+        "sensor": [inversion.sensor_ids[number] for number in rows.sensor.tolist()],
         "indenter_radius_mm": to_lab("indenter_radius_mm", rows.indenter_radius).tolist(),
         "preload_n": rows.preload.tolist(),
         "frf_pc_per_n": to_lab("frf_pc_per_n", rows.frf).tolist(),
         "frf_uncertainty_pc_per_n": to_lab("frf_pc_per_n", rows.frf_uncertainty).tolist(),
-        "model_frf_pc_per_n": to_lab("frf_pc_per_n", model_frf(campaign, found)).tolist(),
+        "model_frf_pc_per_n": to_lab("frf_pc_per_n", model_frf(campaign, inversion)).tolist(),
     }
 
 
-def spreads_of(found: "Sequence[tuple[FrfRecording, Frf]]") -> "list[FrfSpread]":
+def spreads_of(measured_frfs: "Sequence[tuple[FrfRecording, Frf]]") -> "list[FrfSpread]":
     """FRFs of recordings alike."""
     from underskin.recordings.frf import summary
 
-    conditions = [(recording.indenter_radius_mm, recording.preload_n) for recording, _ in found]
-    return summary.spreads([frf for _, frf in found], conditions)
+    conditions = [(recording.indenter_radius_mm, recording.preload_n) for recording, _ in measured_frfs]
+    return summary.spreads([frf for _, frf in measured_frfs], conditions)
 
 
 def _kept_spreads(lines: "Sequence[tuple[FrfRecording, Frf]]") -> list[dict[str, Any]] | None:

@@ -6,7 +6,7 @@ from service.schemas.columns_answer import Columns
 from service.schemas.frf import FrfColumns
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS
 from service.store import Database
-from service.usecases.adopted_models import press, require_paper, serving_of
+from service.usecases.adopted_models import model_asked_for, press, require_paper
 from underskin import InvalidInput
 from underskin.columns import rows
 from underskin.prediction import answers
@@ -41,7 +41,7 @@ def frf(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
 def _by_adopted_model(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
     columns = {name: request.column(name) for name in _GIVEN if getattr(request, name) is not None}
     count = rows(columns)
-    pressed = press(serving_of(store, request), table, request, count)
+    pressed = press(model_asked_for(store, request), table, request, count)
     pressed.require_lines("frequency_hz")
     d33 = checked("d33_pc_per_n", columns["d33_pc_per_n"], units_checked=request.units_checked)
     results = {**pressed.columns, "frf_pc_per_n": to_lab("frf_pc_per_n", d33 * pressed.level)}
@@ -59,7 +59,10 @@ def _by_adopted_model(table: SigmaTable, store: Database, request: FrfColumns) -
         model=request.model,
         table_sha256=table.sha256,
         inside=pressed.inside & np.isfinite(results["frf_pc_per_n"]),
-        shared={"model_id": pressed.serving.model_id, **({} if frequency is None else {"frequency_hz": frequency})},
+        shared={
+            "model_id": pressed.model_in_force.model_id,
+            **({} if frequency is None else {"frequency_hz": frequency}),
+        },
         columns=results,
         line_hz=frequency,
     )

@@ -30,21 +30,21 @@ def history(connection: Connection, root: str, table_sha256: str) -> models.Hist
 
 def adopted_history(store: Database, table: SigmaTable, root: str) -> models.History:
     """The same under the model in force; raises Refusal where there is none."""
-    serving = adopted_models.serving(store, root)
+    model_in_force = adopted_models.model_in_force(store, root)
     by_sensor: dict[str, list[models.Point]] = {}
     unfit: dict[str, str] = {}
     with store.reading() as connection:
         rows = [row for row in campaigns.of_skin(connection, root) if campaigns.state(row) == "current"]
     for row in rows:
         try:
-            found = d33_cache.adopted_answer(store, table, row, serving, None)
+            answer = d33_cache.adopted_answer(store, table, row, model_in_force, None)
         except InvalidInput as error:
             unfit[row.id] = f"cannot be told by the adopted model: {error}"
             continue
-        for entry in found["sensors"]:
+        for entry in answer["sensors"]:
             if entry["d33_pc_per_n"] is not None:
                 values = (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"])
-                by_sensor.setdefault(entry["sensor"], []).append(_point(row, values, serving.model_id))
+                by_sensor.setdefault(entry["sensor"], []).append(_point(row, values, model_in_force.model_id))
     with store.reading() as connection:
         return _history(connection, root, by_sensor, unfit)
 
@@ -52,8 +52,8 @@ def adopted_history(store: Database, table: SigmaTable, root: str) -> models.His
 def _history(
     connection: Connection, root: str, by_sensor: dict[str, list[models.Point]], unfit: Mapping[str, str]
 ) -> models.History:
-    told = {(point.campaign_id, sensor) for sensor, points in by_sensor.items() for point in points}
-    repeated = repeats.left_out(connection, root, told)
+    known = {(point.campaign_id, sensor) for sensor, points in by_sensor.items() for point in points}
+    repeated = repeats.left_out(connection, root, known)
     by_sensor = _counted(by_sensor, repeated)
     names = sorted(by_sensor)
     used = {point.campaign_id for points in by_sensor.values() for point in points}
@@ -62,8 +62,8 @@ def _history(
         skin_id=root,
         joined=[joined(row) for row in skins.joined_to(connection, root)],
         sensors=[
-            models.SensorHistory(sensor=name, points=by_sensor[name], trend=found, no_trend=_no_trend(by_sensor[name]))
-            for name, found in zip(names, _trends([by_sensor[name] for name in names]), strict=True)
+            models.SensorHistory(sensor=name, points=by_sensor[name], trend=line, no_trend=_no_trend(by_sensor[name]))
+            for name, line in zip(names, _trends([by_sensor[name] for name in names]), strict=True)
         ],
         left_out_campaigns=campaigns_out,
         left_out_points=[
@@ -76,7 +76,7 @@ def _history(
 
 
 def _counted(
-    by_sensor: Mapping[str, Sequence[models.Point]], repeated: Mapping[repeats.Point, repeats.Repeat]
+    by_sensor: Mapping[str, Sequence[models.Point]], repeated: Mapping[repeats.HistoryPoint, repeats.Repeat]
 ) -> dict[str, list[models.Point]]:
     """The points that count, by time."""
     return {
@@ -105,9 +105,9 @@ def _point(row: AnyRow, d33: tuple[float, float], model_id: str | None) -> model
 
 
 def _trends(sensors: Sequence[Sequence[models.Point]]) -> list[models.TrendAnswer | None]:
-    found = [_line(points) for points in sensors]
-    adjusted = iter(holm([line.p_value for line in found if line is not None]))
-    return [None if line is None else _answer(line, next(adjusted)) for line in found]
+    lines = [_line(points) for points in sensors]
+    adjusted = iter(holm([line.p_value for line in lines if line is not None]))
+    return [None if line is None else _answer(line, next(adjusted)) for line in lines]
 
 
 def _no_trend(points: Sequence[models.Point]) -> str | None:

@@ -8,7 +8,7 @@ import httpx
 import pytest
 
 from service.ingest.uploads import Upload
-from service.pages.upload.pending_uploads import Shelf
+from service.pages.upload.pending_uploads import PendingUploads
 from service.store.errors import Missing
 from tests.pages.test_pages_security import BROWSING, token_of
 from tests.pages.test_pages_upload import as_json, campaigns_of
@@ -106,15 +106,15 @@ def test_the_shelf_holds_no_more_than_one_upload_may(tmp_path: Path) -> None:
     arriving, shelf_folder = tmp_path / "arriving", tmp_path / "shelf"
     arriving.mkdir()
     shelf_folder.mkdir()
-    shelf = Shelf(shelf_folder, 1000)
-    first, second = (shelf.put(cookie, [upload(arriving, 400)]) for cookie in ("one", "two"))
-    assert shelf.find("one", first.id) is first
-    third = shelf.put("three", [upload(arriving, 400)])
+    pending_uploads = PendingUploads(shelf_folder, 1000)
+    first, second = (pending_uploads.put(cookie, [upload(arriving, 400)]) for cookie in ("one", "two"))
+    assert pending_uploads.find("one", first.id) is first
+    third = pending_uploads.put("three", [upload(arriving, 400)])
     with pytest.raises(Missing):
-        shelf.find("two", second.id)  # looked at longest ago
-    assert shelf.find("one", first.id) is first
-    again = shelf.put("one", [upload(arriving, 100)])  # a session has one
+        pending_uploads.find("two", second.id)  # looked at longest ago
+    assert pending_uploads.find("one", first.id) is first
+    again = pending_uploads.put("one", [upload(arriving, 100)])  # a session has one
     with pytest.raises(Missing):
-        shelf.find("one", first.id)
+        pending_uploads.find("one", first.id)
     assert sum(path.stat().st_size for path in shelf_folder.rglob("*") if path.is_file()) == 500
-    assert [shelf.find("one", again.id), shelf.find("three", third.id)] == [again, third]
+    assert [pending_uploads.find("one", again.id), pending_uploads.find("three", third.id)] == [again, third]

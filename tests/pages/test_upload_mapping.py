@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import yaml
 
-from service.pages.upload.file_summary import ChannelSeen
+from service.pages.upload.file_summary import ChannelSummary
 from service.pages.upload.mapping import CHANNELS, KINDS, document_of, field_words, guessed, sensors_text, what_to_do
 from underskin import InvalidInput
 from underskin.recordings import rig_description
@@ -16,8 +16,8 @@ from underskin.units import checked
 RIGS = sorted((Path(__file__).parents[2] / "examples" / "formats" / "rigs").glob("*.yaml"))
 
 
-def channel(name: str, unit: str, *, is_complex: bool = False) -> ChannelSeen:
-    return ChannelSeen(name, unit, 10, 0.0, 1.0, is_complex)
+def channel(name: str, unit: str, *, is_complex: bool = False) -> ChannelSummary:
+    return ChannelSummary(name, unit, 10, 0.0, 1.0, is_complex)
 
 
 def form_of(document: dict[str, Any]) -> dict[str, str]:

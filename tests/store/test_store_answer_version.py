@@ -83,7 +83,7 @@ def test_what_a_store_of_the_first_schema_kept_is_computed_anew(place: Place, mo
         migrate.migrate(store, place.folder)
     with store.writing() as connection, monkeypatch.context() as earlier:
         earlier.setattr(digests, "keep", lambda *_: None)  # a table of a later schema
-        campaign_id, _ = campaigns.add(connection, campaigns.Arrival(parse(campaign("one")), "palm"))
+        campaign_id, _ = campaigns.add(connection, campaigns.NewCampaign(parse(campaign("one")), "palm"))
         row = campaigns.find(connection, campaign_id)
         old = "INSERT INTO inversions (campaign, revision, table_sha256, document) VALUES (:campaign, 0, :table, :old)"
         kept = {"campaign": row.number, "table": table.sha256, "old": compressed({"d33": 99})}

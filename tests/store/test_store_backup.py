@@ -60,7 +60,7 @@ def test_what_is_acknowledged_during_a_restore_is_in_the_store_or_in_its_backup(
 
     def write() -> None:
         with store.writing() as connection:
-            campaigns.add(connection, campaigns.Arrival(parse(campaign("meanwhile")), None))
+            campaigns.add(connection, campaigns.NewCampaign(parse(campaign("meanwhile")), None))
 
     writer = threading.Thread(target=write)
 
@@ -73,7 +73,7 @@ def test_what_is_acknowledged_during_a_restore_is_in_the_store_or_in_its_backup(
     restore(store, file, undo)
     writer.join()
     with store.reading() as connection:
-        assert [row.name for row in campaigns.listed(connection, campaigns.Filters(), None, 9)] == ["meanwhile"]
+        assert [row.name for row in campaigns.listed(connection, campaigns.CampaignFilters(), None, 9)] == ["meanwhile"]
     store.close()
 
 

@@ -59,7 +59,7 @@ def test_a_document_takes_the_memory_of_a_few_recordings(place: Place, tmp_path:
     store = open_store(place.database_url, place.folder)
     sent = parse(large())
     with store.writing() as connection:
-        campaign_id, _ = campaigns.add(connection, campaigns.Arrival(sent, "palm"))
+        campaign_id, _ = campaigns.add(connection, campaigns.NewCampaign(sent, "palm"))
         row = campaigns.find(connection, campaign_id)
     assert orjson.loads(b"".join(campaign_documents.json_parts(store, row))) == to_dict(sent)
     assert peak(lambda: consume(store, row)) < RECORDINGS / 2 * ONE

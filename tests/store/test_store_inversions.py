@@ -29,7 +29,7 @@ def store(place: Place) -> Iterator[Database]:
 def kept(store: Database, name: str) -> AnyRow:
     """The row of a campaign of the skin `palm`, as it arrived."""
     with store.writing() as connection:
-        campaign_id, _ = campaigns.add(connection, campaigns.Arrival(parse(campaign(name)), "palm"))
+        campaign_id, _ = campaigns.add(connection, campaigns.NewCampaign(parse(campaign(name)), "palm"))
         return campaigns.find(connection, campaign_id)
 
 

@@ -46,7 +46,8 @@ class PressureMap:
 
 def _contacts(name: str, value: Any, units_checked: bool) -> tuple[LabContact, ...]:
     if not isinstance(value, list | tuple) or not 0 < len(value) <= MOST_CONTACTS:
-        raise InvalidInput(name, shown(value), f"must be a list of 1 to {MOST_CONTACTS} contacts")
+        allowed = Requirement(f"must be a list of 1 to {MOST_CONTACTS} ", Mention("contacts"))
+        raise InvalidInput(name, shown(value), allowed)
     return tuple(field.build(LabContact, f"{name}[{i}]", entry, units_checked) for i, entry in enumerate(value))
 
 

@@ -83,9 +83,9 @@ def answered(request: Request, document: Mapping[str, Any]) -> StressAnswer:
         return answer(table, read_request(document))
 
 
-def charge_columns(found: StressAnswer) -> dict[str, list[Any]]:
+def charge_columns(answer: StressAnswer) -> dict[str, list[Any]]:
     """Charge and stress on each sensor."""
-    return {"sensor": list(found.sensors), **{name: column.tolist() for name, column in found.columns.items()}}
+    return {"sensor": list(answer.sensors), **{name: column.tolist() for name, column in answer.columns.items()}}
 
 
 def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:
@@ -106,8 +106,8 @@ def _latest(store: Database, skin_id: str) -> Mapping[str, Any]:
     """The skin as its latest campaign declares it."""
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
-        latest = campaigns.listed(connection, campaigns.Filters(skin=root, state="current"), None, 1)
-    found: dict[str, Any] = latest[0].about["skin"] if latest else {"sensors": []}
-    if not found["sensors"]:
+        latest = campaigns.listed(connection, campaigns.CampaignFilters(skin=root, state="current"), None, 1)
+    skin: dict[str, Any] = latest[0].about["skin"] if latest else {"sensors": []}
+    if not skin["sensors"]:
         raise InvalidInput("skin", skin_id, "must have a current campaign that names its sensors")
-    return found
+    return skin

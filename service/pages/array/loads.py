@@ -21,19 +21,19 @@ _LOADS = "10 8 4 1\n14 16 10 3 0.5 0"
 _ORDER = ("x_mm", "y_mm", "indenter_radius_mm", "normal_force_n")
 
 Loads = Annotated[str, Query(max_length=_LONGEST)]
-Skin = Annotated[str | None, Query()]
+SkinQuery = Annotated[str | None, Query()]
 
 
 @router.get("")
-def view(request: Request, store: Store, table: Table, skin: Skin = None, loads: Loads = _LOADS) -> Response:
+def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, loads: Loads = _LOADS) -> Response:
     """With the skin and the loads of the address, or else the paper's prototype under two spheres."""
     array = described(store, table, request.query_params, skin)
     error: str | None = None
     document: dict[str, Any] = {}
-    found: StressAnswer | None = None
+    answer: StressAnswer | None = None
     try:
         document = _document(array, loads)
-        found = answered(request, document)
+        answer = answered(request, document)
     except UnderskinError as found_wrong:
         error = refused(found_wrong, [place for place, line in enumerate(loads.splitlines(), 1) if line.strip()])
     return page(
@@ -42,25 +42,25 @@ def view(request: Request, store: Store, table: Table, skin: Skin = None, loads:
         array=array,
         loads=loads,
         error=error,
-        found=found,
-        figures=[] if found is None else [_figure(request, document, found)],
+        answer=answer,
+        figures=[] if answer is None else [_figure(request, document, answer)],
         same=same_request.post(request, "/v1/stress", document, f"client.stress({document!r})"),
     )
 
 
 @router.get("/charge.csv")
-def charge_csv(request: Request, store: Store, table: Table, skin: Skin = None, loads: Loads = _LOADS) -> Response:
+def charge_csv(request: Request, store: Store, table: Table, skin: SkinQuery = None, loads: Loads = _LOADS) -> Response:
     """Charge and stress on each sensor."""
-    found = answered(request, _document(described(store, table, request.query_params, skin), loads))
-    return csv_answer("charge", charge_columns(found))
+    answer = answered(request, _document(described(store, table, request.query_params, skin), loads))
+    return csv_answer("charge", charge_columns(answer))
 
 
-def _figure(request: Request, document: Mapping[str, Any], found: StressAnswer) -> Any:
+def _figure(request: Request, document: Mapping[str, Any], answer: StressAnswer) -> Any:
     from underskin.figures import loaded_array
 
-    columns = found.columns
+    columns = answer.columns
     figure = loaded_array(
-        found.sensors,
+        answer.sensors,
         columns["x_mm"],
         columns["y_mm"],
         columns["charge_pc"],

@@ -62,13 +62,13 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
     described = description.described(store, request.app.state.table, given, given.get(_SKIN))
     error: str | None = None
     document: dict[str, Any] = {}
-    found: StressAnswer | None = None
+    answer: StressAnswer | None = None
     try:
         if len(content) > _LARGEST_BYTES:
             raise InvalidInput("pressure_map", name, f"must have at most {_LARGEST_BYTES / 1e6:g} MB: make it coarser")
         pressure = pressure_map.parse(content, name)
         document = {**described.document(), "pressure_map": pressure}
-        found = description.answered(request, document)
+        answer = description.answered(request, document)
     except UnderskinError as refused:
         error = description.refused(refused)
     return page(
@@ -78,21 +78,21 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
         map=_text(content[:_LARGEST_BYTES]),
         example=_EXAMPLE,
         error=error,
-        found=found,
-        figures=[] if found is None else _figures(document, found),
-        body=None if found is None else _inside("application/json", orjson.dumps(document)),
+        answer=answer,
+        figures=[] if answer is None else _figures(document, answer),
+        body=None if answer is None else _inside("application/json", orjson.dumps(document)),
         same=same_request.from_file(request, "/v1/stress", "request.json", "client.stress({})"),
     )
 
 
-def _figures(document: Mapping[str, Any], found: StressAnswer) -> list[Drawn]:
+def _figures(document: Mapping[str, Any], answer: StressAnswer) -> list[Drawn]:
     from underskin.figures import loaded_array, pressure_on_array
 
-    columns, held = found.columns, document["pressure_map"]
+    columns, held = answer.columns, document["pressure_map"]
     places = list(zip(columns["x_mm"].tolist(), columns["y_mm"].tolist(), strict=True))
     pressed = pressure_on_array(held["x_mm"], held["y_mm"], held["pressure_mpa"], places, document["sensor_radius_mm"])
     charge = loaded_array(
-        found.sensors, columns["x_mm"], columns["y_mm"], columns["charge_pc"], columns["charge_error_pc"], []
+        answer.sensors, columns["x_mm"], columns["y_mm"], columns["charge_pc"], columns["charge_error_pc"], []
     )
     as_map = {"y_mm \\ x_mm": held["y_mm"]} | {
         f"{x!r}": column for x, column in zip(held["x_mm"], zip(*held["pressure_mpa"], strict=True), strict=True)
@@ -103,7 +103,7 @@ def _figures(document: Mapping[str, Any], found: StressAnswer) -> list[Drawn]:
             "charge",
             charge,
             "Each sensor where it lies, coloured by its charge.",
-            _csv(description.charge_columns(found)),
+            _csv(description.charge_columns(answer)),
         ),
     ]
 

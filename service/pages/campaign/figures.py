@@ -36,11 +36,11 @@ def figures(
         f"lines {show}": lambda: _frf(row, loaded, answer, numbers, show),
         "d33": lambda: _d33(row, answer, numbers),
     }
-    found = []
+    all_figures = []
     for name, make in makers.items():
         before = _kept.get((*basis, name))
-        found += before if before is not None else _keep((*basis, name), make())
-    return found
+        all_figures += before if before is not None else _keep((*basis, name), make())
+    return all_figures
 
 
 def _keep(which: Which, drawn_now: list[Drawn]) -> list[Drawn]:
@@ -84,14 +84,15 @@ def _frf(
             lines = [summary.lines_of(_title(recording, show), frf) for recording, frf in chosen]
             about = "Magnitude, phase and coherence of each recording."
             return [drawn("frf", frf_recordings(lines, zone), about, place)]
-        found = spreads_of(chosen)
+        summaries = spreads_of(chosen)
     else:
-        found = spreads(numbers["spreads"])
+        summaries = spreads(numbers["spreads"])
+    count = sum(spread.recordings for spread in summaries)
     about = (
-        f"{sum(spread.recordings for spread in found)} recordings: for each sphere and preload the median magnitude "
+        f"{count} recordings: for each sphere and preload the median magnitude "
         "and phase and the lowest coherence; as a band, the magnitudes of all its recordings."
     )
-    return [drawn("frf", frf_overview(found, zone), about, place)]
+    return [drawn("frf", frf_overview(summaries, zone), about, place)]
 
 
 def _title(recording: FrfRecording, show: str) -> str:

@@ -28,7 +28,7 @@ _MOST_DIAGNOSES = 5
 
 def _band(
     band_low_hz: Annotated[str, Query(max_length=40)] = "", band_high_hz: Annotated[str, Query(max_length=40)] = ""
-) -> d33_cache.Band | None:
+) -> d33_cache.BandHz | None:
     """The band that the reader chose; None: the flat zone."""
     if not band_low_hz and not band_high_hz:
         return None
@@ -39,7 +39,7 @@ def _band(
     return low, high
 
 
-Band = Annotated[d33_cache.Band | None, Depends(_band)]
+BandOfQuery = Annotated[d33_cache.BandHz | None, Depends(_band)]
 
 
 @router.get("")
@@ -48,18 +48,18 @@ def campaign(
     campaign_id: CampaignId,
     store: Store,
     table: Table,
-    band: Band,
+    band: BandOfQuery,
     show: Annotated[str, Query()] = "",
 ) -> Response:
     """All at a glance; `show` picks the sensor, or the recording, whose lines are drawn, `band` what is averaged."""
     with store.reading() as connection:
         row = campaigns.find(connection, campaign_id)
-        kept = campaigns.recordings_of(connection, row.number)
-        told = diagnoses.listed(connection, diagnoses.Filters(campaign=campaign_id), None, _MOST_DIAGNOSES)
-        told_of = verdicts.of_rows(connection, told)
+        recordings = campaigns.recordings_of(connection, row.number)
+        latest = diagnoses.listed(connection, diagnoses.DiagnosisFilters(campaign=campaign_id), None, _MOST_DIAGNOSES)
+        told_of = verdicts.of_rows(connection, latest)
     answer, numbers = d33_cache.with_numbers(store, table, row, band)
-    sensors = sorted({entry.sensor for entry in kept if entry.sensor is not None})
-    show = show if show in {"", *sensors, *(entry.id for entry in kept)} else ""
+    sensors = sorted({entry.sensor for entry in recordings if entry.sensor is not None})
+    show = show if show in {"", *sensors, *(entry.id for entry in recordings)} else ""
     path = f"/v1/campaigns/{quote(row.id, safe='')}/d33" + (f"?{band_query(band)}" if band else "")
     return page(
         request,
@@ -68,11 +68,11 @@ def campaign(
         state=campaigns.state(row),
         answer=answer,
         described=row.about["skin"],
-        recordings=kept,
+        recordings=recordings,
         most_listed=_MOST_LISTED,
         sensors=sensors,
         diagnoses=list(told_of.values()),
-        figures=figures(store, row, answer, numbers, show, curves=any(entry.kind != "frf" for entry in kept)),
+        figures=figures(store, row, answer, numbers, show, curves=any(entry.kind != "frf" for entry in recordings)),
         show=show,
         band=band,
         same=same_request.get(request, path, f"client.campaigns.d33({row.id!r}" + (f", {band})" if band else ")")),
@@ -86,7 +86,7 @@ def frf_csv(campaign_id: CampaignId, store: Store, show: Annotated[str, Query()]
 
 
 @router.get("/preload.csv")
-def preload_csv(campaign_id: CampaignId, store: Store, table: Table, band: Band) -> Response:
+def preload_csv(campaign_id: CampaignId, store: Store, table: Table, band: BandOfQuery) -> Response:
     """The FRF in the flat zone of each recording, and the model's."""
     with store.reading() as connection:
         row = campaigns.find(connection, campaign_id)
@@ -94,7 +94,7 @@ def preload_csv(campaign_id: CampaignId, store: Store, table: Table, band: Band)
 
 
 @router.get("/d33.csv")
-def d33_csv(campaign_id: CampaignId, store: Store, table: Table, band: Band) -> Response:
+def d33_csv(campaign_id: CampaignId, store: Store, table: Table, band: BandOfQuery) -> Response:
     """d33 of each sensor, and of each sensor, sphere and preload."""
     with store.reading() as connection:
         row = campaigns.find(connection, campaign_id)

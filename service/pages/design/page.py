@@ -48,11 +48,11 @@ def view(request: Request, store: Store, table: Table, skin: Annotated[str | Non
     own, taken = _start(store, table, skin, given)
     values = {**own, **given}
     error: str | None = None
-    found: DesignAnswer | None = None
+    answer: DesignAnswer | None = None
     figures: list[Drawn] = []
     try:
         asked = _asked(values)
-        found, figures = _answered(table, asked, own, skin)
+        answer, figures = _answered(table, asked, own, skin)
     except UnderskinError as refused:
         error = in_form_words(refused, _LABELS)
     return page(
@@ -61,7 +61,7 @@ def view(request: Request, store: Store, table: Table, skin: Annotated[str | Non
         skin_id=skin,
         values=values,
         sliders=SLIDERS,
-        told=[] if found is None else told(found),
+        results=[] if answer is None else results(answer),
         figures=figures,
         error=error,
         taken=taken,
@@ -76,14 +76,14 @@ def at_once(request: Request, store: Store, table: Table, skin: Annotated[str | 
     own, _ = _start(store, table, skin, given)
     values = {**own, **given}
     try:
-        found, figures = _answered(table, _asked(values), own, skin)
+        answer, figures = _answered(table, _asked(values), own, skin)
     except UnderskinError as refused:
         return _json(request, {"error": in_form_words(refused, _LABELS)})
     same = same_request.post(request, "/v1/design", values, _call(values))
     return _json(
         request,
         {
-            "told": {entry.name: [entry.text, entry.exact, entry.note] for entry in told(found)},
+            "told": {entry.name: [entry.text, entry.exact, entry.note] for entry in results(answer)},
             "figures": {figure.name: figure.json for figure in figures},
             "same": [same.curl, same.python],
         },
@@ -93,9 +93,9 @@ def at_once(request: Request, store: Store, table: Table, skin: Annotated[str | 
 @router.get("/sweeps.csv")
 def sweeps_csv(request: Request, table: Table) -> Response:
     """σ and γ along each axis."""
-    found = _computed(request, table)
+    answer = _computed(request, table)
     columns: dict[str, list[Any]] = {name: [] for name in ("axis", "value", "sigma", "gamma")}
-    for sweep in found.sweeps:
+    for sweep in answer.sweeps:
         columns["axis"] += [sweep.axis] * len(sweep.value)
         columns["value"] += sweep.value
         columns["sigma"] += sweep.sigma
@@ -110,7 +110,7 @@ def response_csv(request: Request, table: Table) -> Response:
 
 
 @dataclass(frozen=True)
-class Told:
+class DesignResult:
     """One thing that a design tells: short, exact, and with a remark."""
 
     name: str
@@ -132,23 +132,24 @@ class Told:
         return short_and_exact(self.value, self.unit, self.digits)[1]
 
 
-def told(found: DesignAnswer) -> list[Told]:
+def results(answer: DesignAnswer) -> list[DesignResult]:
     """What a design tells, in order."""
-    apart = found.two_point_separation_mm
-    blind = found.response_amid_percent is not None and found.response_amid_percent < BLIND_PERCENT
-    point = f"a/h {found.a_over_h:.3g}, rT/h {found.rt_over_h:.3g}, L {found.load_parameter:.2g}"
+    apart = answer.two_point_separation_mm
+    blind = answer.response_amid_percent is not None and answer.response_amid_percent < BLIND_PERCENT
+    point = f"a/h {answer.a_over_h:.3g}, rT/h {answer.rt_over_h:.3g}, L {answer.load_parameter:.2g}"
     anywhere = "wherever the array lies" if apart is not None else "not told apart everywhere at this pitch"
     return [
-        Told("sigma", "transmission σ", found.sigma, "", 4, point),
-        Told("frf", "FRF", found.frf_pc_per_n, "pC/N", 4, "what an instrument should show above the sensor"),
-        Told("gamma", "γ of a point load", found.gamma, "", 4, "above the sensor, linear layer"),
-        Told("stress", "mean stress on the sensor", found.mean_stress_mpa, "MPa", 3,
-             f"contact radius {found.contact_radius_mm:.3g} mm"),
-        Told("resolution", "spatial resolution", found.resolution_mm, "mm", 3, "width at half maximum of a response"),
-        Told("apart", "two-point separation", apart, "mm", 3, f"two equal loads, {anywhere}"),
-        Told("best", "two-point separation at best", found.two_point_best_mm, "mm", 3,
+        DesignResult("sigma", "transmission σ", answer.sigma, "", 4, point),
+        DesignResult("frf", "FRF", answer.frf_pc_per_n, "pC/N", 4, "what an instrument should show above the sensor"),
+        DesignResult("gamma", "γ of a point load", answer.gamma, "", 4, "above the sensor, linear layer"),
+        DesignResult("stress", "mean stress on the sensor", answer.mean_stress_mpa, "MPa", 3,
+             f"contact radius {answer.contact_radius_mm:.3g} mm"),
+        DesignResult("resolution", "spatial resolution", answer.resolution_mm, "mm", 3,
+                     "width at half maximum of a response"),
+        DesignResult("apart", "two-point separation", apart, "mm", 3, f"two equal loads, {anywhere}"),
+        DesignResult("best", "two-point separation at best", answer.two_point_best_mm, "mm", 3,
              "where the sensors lie best under them"),
-        Told("amid", "response amid four sensors", found.response_amid_percent, "%", 3,
+        DesignResult("amid", "response amid four sensors", answer.response_amid_percent, "%", 3,
              "of that above one" + (": blind spots" if blind else "")),
     ]  # fmt: skip
 
@@ -178,8 +179,8 @@ def _asked(values: Mapping[str, float]) -> DesignRequest:
 
 
 def _first(error: ValidationError) -> tuple[str, Any, str]:
-    told = from_validation(error).errors[0]
-    return told["field"], told["value"], told["allowed"]
+    results = from_validation(error).errors[0]
+    return results["field"], results["value"], results["allowed"]
 
 
 def _computed(request: Request, table: SigmaTable) -> DesignAnswer:
@@ -193,22 +194,22 @@ def _answered(
     from underskin.figures import Mark, array_response, design_overview
 
     with np.errstate(all="ignore"):
-        found = design_of(table, asked)
+        designed = design_of(table, asked)
         start = design_of(table, _asked(own)).contact
     name = "the paper's prototype" if skin is None else "the skin as it is"
     mark = Mark(name, float(start.a_over_h), float(start.rt_over_h), float(start.load_parameter), float(start.sigma))
     query = urlencode({name: getattr(asked, name) for name, *_ in SLIDERS})
-    return design_answer(table, asked, found), [
+    return design_answer(table, asked, designed), [
         drawn(
             "design",
-            design_overview(found, mark),
+            design_overview(designed, mark),
             "σ under the sphere and γ under a point load, above a sensor's centre, against contact radius, sensor "
             "radius and load; the other two stay as designed.",
             f"/design/sweeps.csv?{query}",
         ),
         drawn(
             "row",
-            array_response(found, asked.pitch_mm),
+            array_response(designed, asked.pitch_mm),
             "The reading of each sensor of a row while the sphere moves along it, over that above a sensor.",
             f"/design/response.csv?{query}",
         ),

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import orjson
 
-Columns = dict[str, list[Any]]
+FigureColumns = dict[str, list[Any]]
 
 
-def columns(name: str, report: Mapping[str, Any], figures: Mapping[str, str]) -> Columns:
+def columns(name: str, report: Mapping[str, Any], figures: Mapping[str, str]) -> FigureColumns:
     """Of the figure `name`; raises KeyError where it has none."""
     return _OF_REPORT[name](report) if name in _OF_REPORT else _OF_FIGURE[name](orjson.loads(figures[name]))
 
 
-def _explanations(report: Mapping[str, Any]) -> Columns:
+def _explanations(report: Mapping[str, Any]) -> FigureColumns:
     stated = {"no_mismatch": ["nothing_missing"], "unexplained": ["none_of_these"]}
     leader = stated.get(report["verdict"]) or [entry["name"] for entry in report["mechanisms"]]
     rows = [(leader, report["probability"], "")]
@@ -24,7 +24,7 @@ def _explanations(report: Mapping[str, Any]) -> Columns:
     return _by_name(("explanation", "probability", "why_not"), [(" + ".join(names), *more) for names, *more in rows])
 
 
-def _parameters(report: Mapping[str, Any]) -> Columns:
+def _parameters(report: Mapping[str, Any]) -> FigureColumns:
     names = ("mechanism", "parameter", "unit", "value", "low", "high")
     rows = [
         (entry["name"], one["name"], *(one[name] for name in names[2:]))
@@ -34,7 +34,7 @@ def _parameters(report: Mapping[str, Any]) -> Columns:
     return _by_name(names, rows)
 
 
-def _where(figure: Mapping[str, Any]) -> Columns:
+def _where(figure: Mapping[str, Any]) -> FigureColumns:
     (trace,) = figure["data"]
     layout = figure["layout"]
     heads = [layout[axis]["title"]["text"] or axis for axis in ("xaxis", "yaxis")]
@@ -44,7 +44,7 @@ def _where(figure: Mapping[str, Any]) -> Columns:
     return _by_name((*heads, f"{trace['colorbar']['title']['text']}, measured above the model", "points"), rows)
 
 
-def _before_after(figure: Mapping[str, Any]) -> Columns:
+def _before_after(figure: Mapping[str, Any]) -> FigureColumns:
     points = [trace for trace in figure["data"] if trace.get("mode") == "markers"]
     rows = [
         (trace["name"], recording, predicted, measured)
@@ -57,20 +57,20 @@ def _before_after(figure: Mapping[str, Any]) -> Columns:
     return _by_name(("model", "recording", f"predicted {unit}", f"measured {unit}"), rows)
 
 
-def _by_name(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> Columns:
+def _by_name(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> FigureColumns:
     return {name: [row[number] for row in rows] for number, name in enumerate(names)}
 
 
 def _numbers(column: Any) -> list[float]:
     """A column as plotly writes it: a list, or the bytes of an array; one of two axes row by row."""
     if isinstance(column, Mapping):
-        found: list[float] = np.frombuffer(base64.b64decode(column["bdata"]), dtype=column["dtype"]).tolist()
-        return found
+        values: list[float] = np.frombuffer(base64.b64decode(column["bdata"]), dtype=column["dtype"]).tolist()
+        return values
     return [float("nan") if value is None else float(value) for value in column]
 
 
-_OF_REPORT: dict[str, Callable[[Mapping[str, Any]], Columns]] = {
+_OF_REPORT: dict[str, Callable[[Mapping[str, Any]], FigureColumns]] = {
     "explanations": _explanations,
     "parameters": _parameters,
 }
-_OF_FIGURE: dict[str, Callable[[Mapping[str, Any]], Columns]] = {"where": _where, "before_after": _before_after}
+_OF_FIGURE: dict[str, Callable[[Mapping[str, Any]], FigureColumns]] = {"where": _where, "before_after": _before_after}

@@ -1,4 +1,4 @@
-"""What to measure next within the limits of the reader's rig; worked out beside the server, and not kept."""
+"""What to measure next within the limits of the reader's rig; planned in a worker process, and not stored."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -59,9 +59,9 @@ def plan(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, sto
     planned: Planned | None = None
     same: same_request.SameRequest | None = None
     try:
-        told = _limits(request.query_params)
-        same = _same(request, row.campaign_id, told)
-        planned = planner.plan(row, _checked(told))
+        limits = _limits(request.query_params)
+        same = _same(request, row.campaign_id, limits)
+        planned = planner.plan(row, _checked(limits))
     except UnderskinError as wrong:
         error = in_form_words(wrong, _LABELS)
     except Refusal as busy:
@@ -101,11 +101,11 @@ def _diagnosed(store: Database, diagnosis_id: str) -> tuple[AnyRow, str]:
 
 
 def _limits(given: Mapping[str, str]) -> dict[str, Any]:
-    """Of `Limits`, by name, those that were told; raises InvalidInput."""
-    told: dict[str, Any] = {}
+    """The fields of `Limits` that the form gives; raises InvalidInput."""
+    limits: dict[str, Any] = {}
     ends = [given.get(name, "").strip() for name in (_LOWEST, _HIGHEST)]
     if all(ends):
-        told["preload_n"] = tuple(number(name, text) for name, text in zip((_LOWEST, _HIGHEST), ends, strict=True))
+        limits["preload_n"] = tuple(number(name, text) for name, text in zip((_LOWEST, _HIGHEST), ends, strict=True))
     elif any(ends):
         raise InvalidInput("preload_n", None, "give both, or leave both empty")
     for name in _SEVERAL:
@@ -113,19 +113,19 @@ def _limits(given: Mapping[str, str]) -> dict[str, Any]:
         if len(parts) > _MOST_VALUES:
             raise InvalidInput(name, len(parts), f"must be at most {_MOST_VALUES} numbers")
         if parts:
-            told[name] = [number(name, part) for part in parts]
+            limits[name] = [number(name, part) for part in parts]
     count = given.get(_RECORDINGS, "").strip()
     if count:
         if not (count.isascii() and count.isdigit() and 1 <= int(count[:4]) <= _MOST_RECORDINGS):
             raise InvalidInput(_RECORDINGS, count[:80], f"must be a whole number from 1 to {_MOST_RECORDINGS}")
-        told[_RECORDINGS] = int(count)
-    return told
+        limits[_RECORDINGS] = int(count)
+    return limits
 
 
-def _checked(told: Mapping[str, Any]) -> "Limits":
+def _checked(limits: Mapping[str, Any]) -> "Limits":
     from underskin.diagnosis.planning.rig_limits import Limits
 
-    return Limits(**told)
+    return Limits(**limits)
 
 
 def _worded(planned: Mapping[str, Any]) -> Markup:
@@ -135,13 +135,13 @@ def _worded(planned: Mapping[str, Any]) -> Markup:
     return Markup(plan_of(planned))  # noqa: S704 -- every text in it is escaped where it is made
 
 
-def _same(request: Request, campaign_id: str, told: Mapping[str, Any]) -> same_request.SameRequest:
+def _same(request: Request, campaign_id: str, limits: Mapping[str, Any]) -> same_request.SameRequest:
     """The command and the library's call with these limits."""
     options: list[str] = []
-    for name, value in told.items():
+    for name, value in limits.items():
         options += _option("--" + name.replace("_", "-"), name, value)
     return same_request.planned(
-        request, campaign_id, options, ", ".join(f"{name}={value!r}" for name, value in told.items())
+        request, campaign_id, options, ", ".join(f"{name}={value!r}" for name, value in limits.items())
     )
 
 

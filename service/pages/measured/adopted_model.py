@@ -12,7 +12,7 @@ from service.schemas.columns_answer import Columns
 from service.schemas.d33 import D33Columns
 from service.store.engine import Database
 from service.store.errors import Conflict
-from service.usecases.adopted_models import serving
+from service.usecases.adopted_models import model_in_force
 from service.usecases.d33 import d33
 from underskin import InvalidInput, UnderskinError
 from underskin.surrogate.sigma_table import SigmaTable
@@ -36,20 +36,20 @@ class ByModel:
     """What the model in force says of the same measurements.
 
     `fields`: what the form asks for besides (name, words, unit, value); `document`: the request of `POST /v1/d33` and
-    `found`: its answer, both None where `not_told` says why.
+    `answer`: its answer, both None where `unavailable` says why.
     """
 
     fields: Sequence[tuple[str, str, str, str]] = ()
     document: Mapping[str, Any] | None = None
-    found: Columns | None = None
-    not_told: str | None = None
+    answer: Columns | None = None
+    unavailable: str | None = None
 
     def columns(self) -> dict[str, list[float]]:
-        """d33 by it, a row a measurement; without any where it could not be told."""
-        if self.found is None:
+        """d33 by it, a row a measurement; none where it is unavailable."""
+        if self.answer is None:
             return {}
         names = {"d33_pc_per_n": "d33_adopted_pc_per_n", "d33_uncertainty_pc_per_n": "d33_adopted_uncertainty_pc_per_n"}
-        return {new: self.found.full(name).tolist() for name, new in names.items()}
+        return {new: self.answer.full(name).tolist() for name, new in names.items()}
 
 
 def by_model(
@@ -59,17 +59,17 @@ def by_model(
     if skin is None:
         return None
     try:
-        model = serving(store, skin).model
+        model = model_in_force(store, skin).model
     except Refusal:
         return None
     except Conflict as outdated:
-        return ByModel(not_told=str(outdated))
+        return ByModel(unavailable=str(outdated))
     fields = [(name, *_NEEDED[name], given.get(name, "").strip()) for name in model.needs]
     try:
         asked = {**document, **_needed(model, fields), "model": "adopted", "skin_id": skin}
         return ByModel(fields, asked, d33(table, store, D33Columns.model_validate(asked)))
     except UnderskinError as refused:
-        return ByModel(fields, not_told=in_form_words(refused, _LABELS))
+        return ByModel(fields, unavailable=in_form_words(refused, _LABELS))
 
 
 def _needed(model: "AdoptedModel", fields: Sequence[tuple[str, str, str, str]]) -> dict[str, Any]:

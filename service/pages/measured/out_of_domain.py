@@ -8,10 +8,10 @@ from underskin.prediction.domain_checks import Pressed, beyond
 from underskin.surrogate.sigma_table import SigmaTable
 
 
-def reasons(document: Mapping[str, Any], found: Columns, table: SigmaTable) -> list[str]:
+def reasons(document: Mapping[str, Any], answer: Columns, table: SigmaTable) -> list[str]:
     """Of each row outside the table, which value is and what is allowed; `document`: the request that `found` is of."""
-    numbers = [found.full(name) for name in ("a_over_h", "rt_over_h", "load_parameter")]
-    status = found.status()
+    numbers = [answer.full(name) for name in ("a_over_h", "rt_over_h", "load_parameter")]
+    status = answer.status()
     skin = document["youngs_modulus_mpa"], document["poisson_ratio"]
     return [
         f"row {row + 1}, " + beyond(Pressed(force, radius, *skin), [float(part[row]) for part in numbers], table)

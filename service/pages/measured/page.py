@@ -35,21 +35,21 @@ _ORDER = ("indenter_radius_mm", "preload_n", "frf_pc_per_n", "frf_uncertainty_pc
 _WORDS = {"frf_pc_per_n": "FRF", "d33_pc_per_n": "d33"}  # that findings are about
 _ANSWERED = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "contact_radius_mm", "sigma", "mean_stress_mpa")
 
-Rows = Annotated[str, Query(max_length=_LONGEST)]
-Skin = Annotated[str | None, Query()]
+RowsText = Annotated[str, Query(max_length=_LONGEST)]
+SkinQuery = Annotated[str | None, Query()]
 
 
 @router.get("")
-def view(request: Request, store: Store, table: Table, skin: Skin = None, rows: Rows = _ROWS) -> Response:
+def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, rows: RowsText = _ROWS) -> Response:
     """With the skin and the rows of the address, or else the paper's prototype under a sphere."""
     values, taken = _values(store, table, request.query_params, skin)
     error: str | None = None
     document: dict[str, Any] = {}
-    found: Columns | None = None
+    answer: Columns | None = None
     adopted: ByModel | None = None
     try:
         document = _document(values, request.query_params, rows)
-        found = _answered(table, store, document)
+        answer = _answered(table, store, document)
         adopted = by_model(store, table, skin, request.query_params, document)
     except ValidationError as problem:
         entry = from_validation(problem).errors[0]
@@ -67,18 +67,18 @@ def view(request: Request, store: Store, table: Table, skin: Skin = None, rows: 
         units_checked=UNITS in request.query_params,
         rows=rows,
         error=error,
-        findings=[] if found is None else found.shared["findings"],
+        findings=[] if answer is None else answer.shared["findings"],
         words=_WORDS,
-        columns=None if found is None else _columns(document, found, adopted),
+        columns=None if answer is None else _columns(document, answer, adopted),
         adopted=adopted,
-        outside=[] if found is None else reasons(document, found, table),
+        outside=[] if answer is None else reasons(document, answer, table),
         query=request.url.query,
         same=same_request.post(request, "/v1/d33", shown, f"client.d33(**{shown!r})"),
     )
 
 
 @router.get("/rows.csv")
-def rows_csv(request: Request, store: Store, table: Table, skin: Skin = None, rows: Rows = _ROWS) -> Response:
+def rows_csv(request: Request, store: Store, table: Table, skin: SkinQuery = None, rows: RowsText = _ROWS) -> Response:
     """What was measured and what it says, a row a measurement."""
     values, _ = _values(store, table, request.query_params, skin)
     document = _document(values, request.query_params, rows)
@@ -105,12 +105,12 @@ def _answered(table: SigmaTable, store: Database, document: dict[str, Any]) -> C
     return d33(table, store, D33Columns.model_validate(document))
 
 
-def _columns(document: Mapping[str, Any], found: Columns, adopted: ByModel | None) -> dict[str, list[Any]]:
+def _columns(document: Mapping[str, Any], answer: Columns, adopted: ByModel | None) -> dict[str, list[Any]]:
     """What was sent and what is answered, a row a measurement."""
-    sent = {name: document.get(name, [math.nan] * found.rows) for name in _ORDER}
-    answered = {name: found.full(name).tolist() for name in _ANSWERED}
+    sent = {name: document.get(name, [math.nan] * answer.rows) for name in _ORDER}
+    answered = {name: answer.full(name).tolist() for name in _ANSWERED}
     beside = {} if adopted is None else adopted.columns()
-    return {**sent, **answered, **beside, "status": list(found.status())}
+    return {**sent, **answered, **beside, "status": list(answer.status())}
 
 
 def _document(values: Mapping[str, str], given: Mapping[str, str], rows: str) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 
 @dataclass(frozen=True)
-class Withdrawal:
+class ModelWithdrawal:
     """When a model was withdrawn, by whom (name of the API key), and why."""
 
     at: str
@@ -27,7 +27,7 @@ class Withdrawal:
 
 
 @dataclass(frozen=True)
-class Adoption:
+class AdoptedVersion:
     """A model that was adopted; `outdated`: why it serves no figures, None where it does."""
 
     diagnosis_id: str
@@ -35,14 +35,14 @@ class Adoption:
     at: str
     mechanisms: str
     outdated: str | None
-    withdrawn: Withdrawal | None
+    withdrawn: ModelWithdrawal | None
 
 
-def of_rows(connection: Connection, rows: Sequence[AnyRow]) -> list[Adoption]:
+def of_rows(connection: Connection, rows: Sequence[AnyRow]) -> list[AdoptedVersion]:
     """Of rows of models."""
     reports = diagnoses.reports_of(connection, [row.number for row in rows])
     return [
-        Adoption(
+        AdoptedVersion(
             row.id,
             row.model_version,
             row.adopted_at,
@@ -54,10 +54,10 @@ def of_rows(connection: Connection, rows: Sequence[AnyRow]) -> list[Adoption]:
     ]
 
 
-def _withdrawal(row: AnyRow) -> Withdrawal | None:
+def _withdrawal(row: AnyRow) -> ModelWithdrawal | None:
     if row.model_withdrawn_at is None:
         return None
-    return Withdrawal(row.model_withdrawn_at, row.model_withdrawn_from, row.model_withdraw_reason)
+    return ModelWithdrawal(row.model_withdrawn_at, row.model_withdrawn_from, row.model_withdraw_reason)
 
 
 def answer_by_it(
@@ -65,7 +65,7 @@ def answer_by_it(
 ) -> tuple[Mapping[str, Any] | None, str | None]:
     """d33 of a campaign by the model in force, or why there is none."""
     try:
-        return d33_cache.adopted_answer(store, table, row, adopted_models.serving(store, root), None), None
+        return d33_cache.adopted_answer(store, table, row, adopted_models.model_in_force(store, root), None), None
     except (InvalidInput, Conflict, Refusal) as error:
         return None, str(error)
 

@@ -57,10 +57,10 @@ def version(name: str) -> str:
 def library_style_hash() -> str:
     """How a policy names the one style sheet that plotly carries in its script, for its maps."""
     script = _content(LIBRARY).decode()
-    found = re.search(r"textContent='([^'\\]*)',document\.head\.appendChild", script)
-    if found is None:
+    style = re.search(r"textContent='([^'\\]*)',document\.head\.appendChild", script)
+    if style is None:
         return ""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(found[1].encode()).digest()).decode()}'"
+    return f"'sha256-{base64.b64encode(hashlib.sha256(style[1].encode()).digest()).decode()}'"
 
 
 @cache

@@ -26,9 +26,9 @@ async def _fields(request: Request) -> dict[str, str]:
         values = parse_qs(body.decode("utf-8", "replace"), keep_blank_values=True, max_num_fields=_MOST_FIELDS)
     except ValueError:
         raise Refusal(400, "The form has too many fields.") from None
-    found = {name: entries[0] for name, entries in values.items()}
-    require_own(request, found.get(TOKEN, ""))
-    return found
+    fields = {name: entries[0] for name, entries in values.items()}
+    require_own(request, fields.get(TOKEN, ""))
+    return fields
 
 
 def require_own(request: Request, token: str) -> None:

@@ -15,7 +15,6 @@ from service.pages.shared import formats
 from service.pages.shared.assets import address, library_style_hash
 from service.pages.shared.same_request import scheme
 from service.pages.shared.templates import environment
-from service.pages.upload.mapping import field_words, what_to_do
 from underskin import __version__
 
 # Of the empty style element that plotly fills through the object model.
@@ -51,7 +50,6 @@ def headers() -> dict[str, str]:
 def _templates() -> Environment:
     templates = environment()
     templates.filters.update(formats.FILTERS)
-    templates.filters.update(field_words=field_words, what_to_do=what_to_do)
     templates.globals.update(static=address, version=__version__, segment=lambda text: quote(text, safe=""))
     return templates
 
@@ -65,8 +63,8 @@ def page(
     request: Request, template: str, *, status: int = 200, cookie: str | None = None, **values: Any
 ) -> HTMLResponse:
     """A template as the answer to a request; `cookie` replaces the session's."""
-    kept = session.cookie_in(dict(request.scope["headers"]))
-    current = cookie or kept or session.anonymous()
+    cookie_sent = session.cookie_in(dict(request.scope["headers"]))
+    current = cookie or cookie_sent or session.anonymous()
     key: Key | None = request.scope["key"]
     viewer = {
         "key": key,
@@ -76,7 +74,7 @@ def page(
     }
     answer = HTMLResponse(render(template, viewer=viewer, **values), status, headers())
     compress(request, answer)
-    if current != kept:
+    if current != cookie_sent:
         set_session(request, answer, current)
     return answer
 

@@ -35,8 +35,8 @@ def from_file(request: Request, path: str, file: str, call: str) -> SameRequest:
     """POST a JSON document that is in a file; `call` has {} for the document."""
     send = f" \\\n  -H 'Content-Type: application/json' -d @{file}"
     document = f"json.loads(pathlib.Path({file!r}).read_text())"
-    told = _python(request, call.format(document))
-    return SameRequest(_curl(request, path) + send, f"import json\nimport pathlib\n{told}")
+    python = _python(request, call.format(document))
+    return SameRequest(_curl(request, path) + send, f"import json\nimport pathlib\n{python}")
 
 
 def files(request: Request, labels: Sequence[str], rig: str | None, skin: str) -> SameRequest:
@@ -44,8 +44,8 @@ def files(request: Request, labels: Sequence[str], rig: str | None, skin: str) -
     query = f"?skin={quote(skin, safe='')}" if skin else ""
     parts = [f"file=@{label}" for label in labels] + ([] if rig is None else [f"rig=@{rig}"])
     shown = "".join(f" \\\n  -F {shlex.quote(part)}" for part in parts)
-    told = [repr(list(labels)), *([f"skin={skin!r}"] if skin else []), *([] if rig is None else [f"rig={rig!r}"])]
-    call = f"client.campaigns.post_files({', '.join(told)})"
+    arguments = [repr(list(labels)), *([f"skin={skin!r}"] if skin else []), *([] if rig is None else [f"rig={rig!r}"])]
+    call = f"client.campaigns.post_files({', '.join(arguments)})"
     return SameRequest(_curl(request, f"/v1/campaigns{query}") + shown, _python(request, call))
 
 

@@ -34,7 +34,7 @@ def start(
         return dict(PROTOTYPE), []
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
-        latest = campaigns.listed(connection, campaigns.Filters(skin=root, state="current"), None, 1)
+        latest = campaigns.listed(connection, campaigns.CampaignFilters(skin=root, state="current"), None, 1)
         if not latest:
             return dict(PROTOTYPE), ["The skin has no campaign in use: all values are those of the paper's prototype"]
         recordings = campaigns.recordings_of(connection, latest[0].number)
@@ -46,12 +46,14 @@ def start(
     taken = []
     if "d33_pc_per_n" not in known and measured is not None and measured > 0:
         known["d33_pc_per_n"] = float(f"{measured:.4g}")
-        told = f"d33 {measured:.4g} pC/N is the median of the sensors in {latest[0].name[:60]}, by the paper's model"
-        taken += [f"{told}; the skin declares none"] if "d33_pc_per_n" in words else []
+        sentence = (
+            f"d33 {measured:.4g} pC/N is the median of the sensors in {latest[0].name[:60]}, by the paper's model"
+        )
+        taken += [f"{sentence}; the skin declares none"] if "d33_pc_per_n" in words else []
     lacking = [name for name in words if name in PROTOTYPE and name not in known]
-    told = ", ".join(f"{words[name][0]} {PROTOTYPE[name]:g} {words[name][1]}".strip() for name in lacking)
+    sentence = ", ".join(f"{words[name][0]} {PROTOTYPE[name]:g} {words[name][1]}".strip() for name in lacking)
     if lacking:
-        taken.append(f"Not declared, so taken from the paper's prototype: {told}")
+        taken.append(f"Not declared, so taken from the paper's prototype: {sentence}")
     return {**PROTOTYPE, **known}, taken
 
 

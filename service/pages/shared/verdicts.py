@@ -24,7 +24,7 @@ _SPECIAL = {"nothing_missing": "nothing missing", "none_of_these": "something wi
 
 
 @dataclass(frozen=True)
-class Verdict:
+class VerdictSummary:
     """The diagnosis, the words of its tag, what they mean for the reader, and what stands beside the tag."""
 
     id: str
@@ -34,7 +34,7 @@ class Verdict:
     at: str  # when it ended, or was asked for
 
 
-def of_rows(connection: Connection, rows: Sequence[AnyRow], adopted: Sequence[str] = ()) -> dict[str, Verdict]:
+def of_rows(connection: Connection, rows: Sequence[AnyRow], adopted: Sequence[str] = ()) -> dict[str, VerdictSummary]:
     """By the diagnosis' id; `adopted`: ids of those whose model is in force."""
     reports = diagnoses.reports_of(connection, [row.number for row in rows if row.state == "done"])
     return {row.id: _verdict(row, reports.get(row.number, {}), row.id in adopted) for row in rows}
@@ -50,19 +50,19 @@ def mechanisms_of(report: Mapping[str, Any]) -> list[str]:
     return [entry["name"] for entry in report["mechanisms"]]
 
 
-def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> Verdict:
+def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSummary:
     at = row.ended_at or row.asked_at
     if not report:
-        return Verdict(row.id, f"diagnosis {row.state}", "quiet", "", at)
+        return VerdictSummary(row.id, f"diagnosis {row.state}", "quiet", "", at)
     tag = _SAYS[report["verdict"]]
     if report["verdict"] == "insufficient_data":
-        return Verdict(row.id, tag, "quiet", "", at)
+        return VerdictSummary(row.id, tag, "quiet", "", at)
     probability = report["probability"]
     if report["verdict"] in ("no_mismatch", "unexplained"):
         tag = f"{tag}, {in_percent(probability)}"
     sure = report["verdict"] == "no_mismatch" and probability >= _SURE
     mood: Literal["good", "look"] = "good" if sure or adopted else "look"
-    return Verdict(row.id, f"{tag}, adopted" if adopted else tag, mood, _beside(report), at)
+    return VerdictSummary(row.id, f"{tag}, adopted" if adopted else tag, mood, _beside(report), at)
 
 
 def _beside(report: Mapping[str, Any]) -> str:

@@ -11,7 +11,7 @@ from starlette.background import BackgroundTask
 
 from service.dependencies import WRITE, SkinId, Store, Table, number_of_cursor, sender
 from service.pages.shared import same_request, verdicts
-from service.pages.shared.adoption import Adoption, answer_by_it, change_percent, of_rows
+from service.pages.shared.adoption import AdoptedVersion, answer_by_it, change_percent, of_rows
 from service.pages.shared.figures import Drawn, csv_answer, drawn
 from service.pages.shared.forms import Form, reason, see
 from service.pages.shared.html import page
@@ -20,7 +20,7 @@ from service.store import campaigns, inversions, models, overview, skins
 from service.store.engine import Database
 from service.store.tables import AnyRow
 from service.usecases import d33_cache, histories
-from service.usecases.adopted_models import serving
+from service.usecases.adopted_models import model_in_force
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/skins/{skin_id}")
@@ -48,9 +48,9 @@ def skin(
     one in force, or the paper's where that tells nothing of the latest campaign."""
     root, waiting = _completed(store, table, skin_id)
     with store.reading() as connection:
-        filters = campaigns.Filters(skin=root, state=None)
+        filters = campaigns.CampaignFilters(skin=root, state=None)
         rows = campaigns.listed(connection, filters, number_of_cursor(before), _ON_A_PAGE + 1)
-        latest = campaigns.listed(connection, campaigns.Filters(skin=root, state="current"), None, 1)
+        latest = campaigns.listed(connection, campaigns.CampaignFilters(skin=root, state="current"), None, 1)
         numbers = [row.number for row in rows]
         medians = overview.medians(connection, numbers, table.sha256)
         diagnosed = overview.latest_diagnoses(connection, numbers)
@@ -63,7 +63,7 @@ def skin(
     answer = None if last is None else d33_cache.answer(store, table, last, None)
     by_model, why_not = (None, None) if last is None or not serves else answer_by_it(store, table, root, last)
     by = (by or ("paper" if by_model is None else "adopted")) if serves else "paper"
-    history = _told(store, table, root, by)
+    history = _history_by(store, table, root, by)
     sensor = sensor if sensor in {entry.sensor for entry in history.sensors} else None
     mapped = by_model if by == "adopted" else answer
     figures = []
@@ -119,15 +119,15 @@ def withdraw_model(request: Request, skin_id: SkinId, sent: Form, store: Store) 
 def map_csv(skin_id: SkinId, store: Store, table: Table, by: Annotated[By, Query(alias="model")] = "paper") -> Response:
     """d33 of each sensor in the latest campaign, and its trend."""
     root, _ = _completed(store, table, skin_id)
-    trends = {entry.sensor: entry.trend for entry in _told(store, table, root, by).sensors}
+    trends = {entry.sensor: entry.trend for entry in _history_by(store, table, root, by).sensors}
     with store.reading() as connection:
-        latest = campaigns.listed(connection, campaigns.Filters(skin=root, state="current"), None, 1)
+        latest = campaigns.listed(connection, campaigns.CampaignFilters(skin=root, state="current"), None, 1)
     columns: dict[str, list[Any]] = {name: [] for name in (*_MAP_COLUMNS, *_TREND_COLUMNS)}
     for row in latest:
         answer = (
             d33_cache.answer(store, table, row, None)
             if by == "paper"
-            else d33_cache.adopted_answer(store, table, row, serving(store, root), None)
+            else d33_cache.adopted_answer(store, table, row, model_in_force(store, root), None)
         )
         places = {entry["id"]: entry for entry in row.about["skin"]["sensors"]}
         for entry in answer["sensors"]:
@@ -152,7 +152,7 @@ def history_csv(
 ) -> Response:
     """d33 of every sensor in every current campaign, and the model that each value rests on."""
     root, _ = _completed(store, table, skin_id)
-    history = _told(store, table, root, by)
+    history = _history_by(store, table, root, by)
     points = [(entry.sensor, point) for entry in history.sensors for point in entry.points]
     return csv_answer(
         "history",
@@ -169,12 +169,12 @@ def history_csv(
     )
 
 
-def _last_model(connection: Connection, root: str) -> Adoption | None:
+def _last_model(connection: Connection, root: str) -> AdoptedVersion | None:
     row = models.last(connection, root)
     return None if row is None else of_rows(connection, [row])[0]
 
 
-def _verdict(verdict: Mapping[str, verdicts.Verdict], row: AnyRow | None) -> verdicts.Verdict | None:
+def _verdict(verdict: Mapping[str, verdicts.VerdictSummary], row: AnyRow | None) -> verdicts.VerdictSummary | None:
     return None if row is None else verdict[row.id]
 
 
@@ -193,7 +193,7 @@ def _completed(store: Database, table: SigmaTable, skin_id: str) -> tuple[str, i
     return root, missing
 
 
-def _told(store: Database, table: SigmaTable, root: str, by: By) -> History:
+def _history_by(store: Database, table: SigmaTable, root: str, by: By) -> History:
     if by == "adopted":
         return histories.adopted_history(store, table, root)
     with store.reading() as connection:
@@ -208,9 +208,9 @@ def _map(root: str, row: AnyRow, answer: Mapping[str, Any], history: History, sh
     names = [entry["sensor"] for entry in entries]
     if show == "trend":
         trends = {entry.sensor: entry.trend for entry in history.sensors}
-        found = [trends.get(name) for name in names]
-        values = [None if line is None else line.slope_pc_per_n_per_year for line in found]
-        uncertainties = [None if line is None else line.slope_uncertainty_pc_per_n_per_year for line in found]
+        lines = [trends.get(name) for name in names]
+        values = [None if line is None else line.slope_pc_per_n_per_year for line in lines]
+        uncertainties = [None if line is None else line.slope_uncertainty_pc_per_n_per_year for line in lines]
         quantity = Quantity("trend", "pC/N a year", diverging=True)
     else:
         uncertainties = [entry["d33_uncertainty_pc_per_n"] for entry in entries]

@@ -8,7 +8,7 @@ from sqlalchemy import Connection
 from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import WRITE, Store, Table, sender
-from service.ingest.accept import Terms, accept
+from service.ingest.accept import IngestOptions, accept
 from service.ingest.uploads import Upload
 from service.pages.shared.forms import OWN_FORM, see
 from service.store import campaigns, skins
@@ -30,8 +30,10 @@ async def load(request: Request, store: Store, table: Table) -> Response:
         return see(f"/skins/{SKIN}")
     uploads = [_upload(file) for file in sorted(_FOLDER.glob("*.json"))]
     asked = f"the example skin, {withdrawn} withdrawn" if withdrawn else "the example skin"
-    terms = Terms(SKIN, None, None, False, None, asked, sender(request), request.app.state.settings.max_body_bytes)
-    answer, _ = await run_in_threadpool(accept, store, uploads, terms)
+    options = IngestOptions(
+        SKIN, None, None, False, None, asked, sender(request), request.app.state.settings.max_body_bytes
+    )
+    answer, _ = await run_in_threadpool(accept, store, uploads, options)
     await run_in_threadpool(d33_cache.derive, store, table, [entry["id"] for entry in answer["campaigns"]])
     return see(f"/skins/{SKIN}")
 
@@ -40,9 +42,9 @@ def _withdrawn(connection: Connection) -> int | None:
     """How many campaigns the skin had, all of which were withdrawn; None where one is in use."""
     if not skins.is_known(connection, SKIN):
         return 0
-    filters = campaigns.Filters(skin=skins.require_root(connection, SKIN))
-    found = campaigns.listed(connection, filters, None, _MOST)
-    return None if any(campaigns.state(row) == "current" for row in found) else len(found)
+    filters = campaigns.CampaignFilters(skin=skins.require_root(connection, SKIN))
+    rows = campaigns.listed(connection, filters, None, _MOST)
+    return None if any(campaigns.state(row) == "current" for row in rows) else len(rows)
 
 
 def _upload(file: Path) -> Upload:

@@ -27,11 +27,11 @@ def start(
 ) -> Response:
     """The skins whose campaigns came last, first."""
     with store.reading() as connection:
-        found = overview.glances(connection, find or None, number_of_cursor(before), _ON_A_PAGE + 1, table.sha256)
-        shown = found[:_ON_A_PAGE]
-        told = [glance.diagnosis for glance in shown if glance.diagnosis is not None]
+        glances = overview.glances(connection, find or None, number_of_cursor(before), _ON_A_PAGE + 1, table.sha256)
+        shown = glances[:_ON_A_PAGE]
+        diagnosed = [glance.diagnosis for glance in shown if glance.diagnosis is not None]
         models = [glance.model for glance in shown if glance.model is not None]
-        verdict = verdicts.of_rows(connection, told, [row.id for row in models])
+        verdict = verdicts.of_rows(connection, diagnosed, [row.id for row in models])
         adoptions = {one.diagnosis_id: one for one in adoption.of_rows(connection, models)}
     answer = page(
         request,
@@ -47,7 +47,7 @@ def start(
             for glance in shown
         ],
         find=find,
-        following=shown[-1].cursor if len(found) > _ON_A_PAGE else None,
+        following=shown[-1].cursor if len(glances) > _ON_A_PAGE else None,
         first=before is None,
         same=same_request.get(request, "/v1/skins", "list(client.skins.all())"),
     )

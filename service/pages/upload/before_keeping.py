@@ -9,22 +9,22 @@ from collections.abc import Iterator
 from fastapi import Request
 
 from service.ingest import repeats
-from service.ingest.reading import Look, arrived_as
+from service.ingest.reading import InspectedFile, checked
 from service.store import campaigns, skins
 from service.store.engine import Database
 from service.usecases import d33_cache
 from underskin.recordings.campaign import Campaign
 
 
-def worth_knowing(request: Request, look: Look, skin_id: str | None, corrects: str | None) -> list[str]:
+def worth_knowing(request: Request, look: InspectedFile, skin_id: str | None, corrects: str | None) -> list[str]:
     """In sentences, of the campaigns of one file, sent for the skin `skin_id` where that is said; `corrects`: the
     campaign whose place they take."""
     store, table = request.app.state.store, request.app.state.table
-    found = [one.campaign for one in map(arrived_as, look.found) if one.campaign is not None]
+    campaigns_read = [one.campaign for one in map(checked, look.campaigns) if one.campaign is not None]
     return [
-        said
-        for campaign in found
-        for said in (
+        sentence
+        for campaign in campaigns_read
+        for sentence in (
             *_kept(store, campaign, skin_id, corrects),
             *_elsewhere(store, campaign, corrects),
             *d33_cache.foreseen(table, campaign),

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from service.ingest.reading import Look
+from service.ingest.reading import InspectedFile
 from service.pages.shared.figures import Drawn, drawn
 from service.usecases.figure_data import frf_columns, measured
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
@@ -14,13 +14,13 @@ _MOST_FRF = 12
 _MOST_CURVES = 12
 
 
-def figures(look: Look, place: str) -> list[Drawn]:
+def figures(look: InspectedFile, place: str) -> list[Drawn]:
     """What there is to see; `place`: the address of the upload's file, under which its numbers are."""
     campaigns = _campaigns(look)
     return [*_traces(look, place), *_frf(campaigns, place), *_curves(campaigns)]
 
 
-def trace_columns(look: Look) -> dict[str, list[Any]]:
+def trace_columns(look: InspectedFile) -> dict[str, list[Any]]:
     """The channels of the file's first part, a row a sample."""
     if look.contents is None or not look.contents.blocks:
         return {}
@@ -34,17 +34,17 @@ def trace_columns(look: Look) -> dict[str, list[Any]]:
     return columns
 
 
-def lines_columns(look: Look) -> dict[str, list[Any]]:
+def lines_columns(look: InspectedFile) -> dict[str, list[Any]]:
     """Every line of every FRF in the file."""
     parts = [frf_columns(campaign) for campaign in _campaigns(look)]
     return {name: [value for part in parts for value in part[name]] for name in parts[0]} if parts else {}
 
 
-def _campaigns(look: Look) -> list[Campaign]:
-    return [found.reading.campaign for found in look.found if found.reading is not None]
+def _campaigns(look: InspectedFile) -> list[Campaign]:
+    return [campaign.reading.campaign for campaign in look.campaigns if campaign.reading is not None]
 
 
-def _traces(look: Look, place: str) -> list[Drawn]:
+def _traces(look: InspectedFile, place: str) -> list[Drawn]:
     from underskin.figures import Trace, raw_traces
 
     if look.contents is None or not look.contents.blocks:
@@ -68,14 +68,18 @@ def _frf(campaigns: list[Campaign], place: str) -> list[Drawn]:
     from underskin.figures import frf_recordings
     from underskin.recordings.frf import summary
 
-    found = [entry for campaign in campaigns for entry in measured(campaign)]
-    if not found:
+    measured_frfs = [entry for campaign in campaigns for entry in measured(campaign)]
+    if not measured_frfs:
         return []
     lines = [
         summary.lines_of(f"{one.id}: {one.sensor}, {one.indenter_radius_mm:g} mm, {one.preload_n:g} N", frf)
-        for one, frf in found[:_MOST_FRF]
+        for one, frf in measured_frfs[:_MOST_FRF]
     ]
-    some = f" of the first {_MOST_FRF} of {len(found)} recordings" if len(found) > _MOST_FRF else " of each recording"
+    some = (
+        f" of the first {_MOST_FRF} of {len(measured_frfs)} recordings"
+        if len(measured_frfs) > _MOST_FRF
+        else " of each recording"
+    )
     about = f"Magnitude, phase and coherence{some}."
     return [drawn("frf", frf_recordings(lines, None), about, f"{place}frf.csv")]
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from service.ingest.reading import Arrived, Look, arrived_as
+from service.ingest.reading import CheckedCampaign, InspectedFile, checked
 from service.ingest.uploads import Upload
 from underskin import InvalidInput
 from underskin.recordings.campaign import CompressionRecording, FrfRecording, Recording
@@ -20,7 +20,7 @@ _MOST_PROPERTIES = 40
 
 
 @dataclass(frozen=True)
-class ChannelSeen:
+class ChannelSummary:
     """A channel: over all parts of the file that have it."""
 
     name: str
@@ -32,7 +32,7 @@ class ChannelSeen:
 
 
 @dataclass(frozen=True)
-class RecordingSeen:
+class RecordingSummary:
     """A recording that can be kept; `frf_pc_per_n` is the median magnitude over its lines."""
 
     id: str
@@ -44,13 +44,13 @@ class RecordingSeen:
 
 
 @dataclass(frozen=True)
-class FileSeen:
+class FileSummary:
     """One file."""
 
     label: str
     kind: str
     recordings: int
-    listed: Sequence[RecordingSeen]
+    listed: Sequence[RecordingSummary]
     refused: Sequence[dict[str, Any]]  # id and errors of each
     errors: Sequence[dict[str, Any]]  # of the whole
     notes: Sequence[str]
@@ -59,20 +59,20 @@ class FileSeen:
     known: Sequence[str] = ()  # what to know before it is kept
     parts: int = 0
     sample_rate_hz: float | None = None
-    channels: Sequence[ChannelSeen] = ()
+    channels: Sequence[ChannelSummary] = ()
     properties: Mapping[str, str | float] = field(default_factory=dict)
     is_exported_skin: bool = False  # which is read alone, not among other files
 
 
-def seen(upload: Upload, look: Look, known: Sequence[str]) -> FileSeen:
+def seen(upload: Upload, look: InspectedFile, known: Sequence[str]) -> FileSummary:
     """A summary that is small however large the file; `known`: what to know before it is kept."""
-    arrived = [arrived_as(found) for found in look.found]
+    arrived = [checked(campaign) for campaign in look.campaigns]
     campaigns = [one.campaign for one in arrived if one.campaign is not None]
     recordings = [recording for campaign in campaigns for recording in campaign.recordings]
     skins = {campaign.skin.id for campaign in campaigns if campaign.skin.id is not None}
     contents = look.contents
     about: dict[str, Any] = {} if contents is None else _about(contents)
-    return FileSeen(
+    return FileSummary(
         label=upload.label or "the file",
         kind=look.kind,
         recordings=len(recordings),
@@ -88,20 +88,20 @@ def seen(upload: Upload, look: Look, known: Sequence[str]) -> FileSeen:
     )
 
 
-def _is_exported_skin(upload: Upload, arrived: Sequence[Arrived]) -> bool:
+def _is_exported_skin(upload: Upload, arrived: Sequence[CheckedCampaign]) -> bool:
     if any(one.campaign is not None for one in arrived):
         return False
     with upload.path.open("rb") as stream:
         return is_export(stream, upload.label or "the file")
 
 
-def _own_errors(one: Arrived) -> list[dict[str, Any]]:
+def _own_errors(one: CheckedCampaign) -> list[dict[str, Any]]:
     """Those of the file, not that all its recordings were refused, which are listed."""
     return [] if one.refused else one.errors
 
 
 def _about(contents: Contents) -> dict[str, Any]:
-    by_name: dict[str, ChannelSeen] = {}
+    by_name: dict[str, ChannelSummary] = {}
     for block in contents.blocks:
         for channel in block.channels:
             if channel.name in by_name or len(by_name) < _MOST_CHANNELS:
@@ -113,7 +113,7 @@ def _about(contents: Contents) -> dict[str, Any]:
                     )
                 samples = len(channel.values) if before is None else before.samples
                 complex_numbers = bool(np.iscomplexobj(channel.values))
-                by_name[channel.name] = ChannelSeen(channel.name, channel.unit, samples, low, high, complex_numbers)
+                by_name[channel.name] = ChannelSummary(channel.name, channel.unit, samples, low, high, complex_numbers)
     return {
         "parts": len(contents.blocks),
         "sample_rate_hz": contents.blocks[0].sample_rate_hz if contents.blocks else None,
@@ -127,12 +127,12 @@ def _properties(contents: Contents) -> dict[str, str | float]:
     first = contents.blocks[0].name if contents.blocks else ""
     others = tuple(f"{block.name}." for block in contents.blocks if block.name)
     own = f"{first}."
-    found = {
+    properties = {
         name.removeprefix(own) if first else name: value
         for name, value in contents.properties.items()
         if not name.startswith(others) or (first and name.startswith(own))
     }
-    return dict(list(found.items())[:_MOST_PROPERTIES])
+    return dict(list(properties.items())[:_MOST_PROPERTIES])
 
 
 def _range(values: Any) -> tuple[float | None, float | None]:
@@ -147,17 +147,17 @@ def _either(pick: Any, first: float | None, second: float | None) -> float | Non
     return pick(known) if known else None
 
 
-def _recording(recording: Recording) -> RecordingSeen:
+def _recording(recording: Recording) -> RecordingSummary:
     if isinstance(recording, CompressionRecording):
         size = f"{recording.sample_height_mm:g} mm high, {recording.sample_diameter_mm:g} mm across"
-        return RecordingSeen(recording.id, recording.kind, None, size, len(recording.force_n), None)
+        return RecordingSummary(recording.id, recording.kind, None, size, len(recording.force_n), None)
     if not isinstance(recording, FrfRecording):
         size = f"sphere of {recording.indenter_radius_mm:g} mm"
-        return RecordingSeen(recording.id, recording.kind, recording.sensor, size, len(recording.force_n), None)
+        return RecordingSummary(recording.id, recording.kind, recording.sensor, size, len(recording.force_n), None)
     column = recording.force_n if recording.force_n is not None else recording.frequency_hz
     pressed = f"{recording.preload_n:g} N, sphere of {recording.indenter_radius_mm:g} mm"
     points = 0 if column is None else len(column)
-    return RecordingSeen(recording.id, recording.kind, recording.sensor, pressed, points, _level(recording))
+    return RecordingSummary(recording.id, recording.kind, recording.sensor, pressed, points, _level(recording))
 
 
 def _level(recording: FrfRecording) -> float | None:

@@ -1,4 +1,4 @@
-"""From an upload that was looked at to what is kept, or to why nothing is."""
+"""Storing an upload that was shown, or the errors that prevent it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,9 +8,9 @@ import orjson
 from fastapi import Request
 
 from service.dependencies import sender
-from service.ingest.accept import RIG, Terms, accept
+from service.ingest.accept import RIG, IngestOptions, accept
 from service.ingest.uploads import Upload
-from service.pages.upload.pending_uploads import Shelved
+from service.pages.upload.pending_uploads import PendingUpload
 from service.problems import Refusal
 from service.store.engine import Database
 from service.store.errors import Conflict, Missing
@@ -20,46 +20,48 @@ from underskin.errors import FileError
 SKIN_FIELD, CORRECTS = "skin", "corrects"
 
 
-def keep_good(request: Request, shelved: Shelved, sent: Mapping[str, str], store: Database) -> list[str]:
-    """The ids of what was kept; what kept it from being kept is told on the upload's page. Twice asked, kept once."""
-    with shelved.lock:
-        if shelved.kept_at is not None:
+def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str], store: Database) -> list[str]:
+    """The ids of what was kept; errors are shown on the upload's page. A second request stores nothing again."""
+    with pending.lock:
+        if pending.kept_at is not None:
             return []
         together = sent.get("together", "").strip() if sent.get("as") == "one" else None
-        shelved.skin = sent.get(SKIN_FIELD, "").strip() or None
-        shelved.reason = sent.get("reason", "").strip()
-        reason = shelved.reason or None if shelved.corrects is not None else None
+        pending.skin = sent.get(SKIN_FIELD, "").strip() or None
+        pending.reason = sent.get("reason", "").strip()
+        reason = pending.reason or None if pending.corrects is not None else None
         most = request.app.state.settings.max_body_bytes
         try:
-            terms = Terms(shelved.skin, shelved.corrects, reason, False, together, None, sender(request), most)
-            answer, _ = accept(store, [*shelved.files, *_rig_upload(shelved)], terms)
+            options = IngestOptions(
+                pending.skin, pending.corrects, reason, False, together, None, sender(request), most
+            )
+            answer, _ = accept(store, [*pending.files, *_rig_upload(pending)], options)
         except (InvalidInput, Conflict, Missing, Refusal) as error:
-            shelved.refused = all_told(error)
+            pending.refused = field_errors(error)
             return []
-        kept = [result for result in answer["campaigns"] if result["id"] is not None]
-        one = f"/campaigns/{kept[0]['id']}"
-        shelved.kept_at = one if len(kept) == 1 else f"/skins/{quote(kept[0]['skin_id'], safe='')}"
-        request.app.state.shelf.empty(shelved)
-        return [result["id"] for result in kept]
+        stored = [result for result in answer["campaigns"] if result["id"] is not None]
+        one = f"/campaigns/{stored[0]['id']}"
+        pending.kept_at = one if len(stored) == 1 else f"/skins/{quote(stored[0]['skin_id'], safe='')}"
+        request.app.state.pending_uploads.empty(pending)
+        return [result["id"] for result in stored]
 
 
-def _rig_upload(shelved: Shelved) -> list[Upload]:
+def _rig_upload(pending: PendingUpload) -> list[Upload]:
     """The rig description that was looked with, as a part of the upload."""
-    if shelved.rig is None:
+    if pending.rig is None:
         return []
-    path = shelved.folder / RIG
-    path.write_bytes(orjson.dumps(shelved.rig.document))
+    path = pending.folder / RIG
+    path.write_bytes(orjson.dumps(pending.rig.document))
     return [Upload(path, None, RIG, "", in_form=True)]
 
 
-def _told(error: InvalidInput) -> dict[str, Any]:
+def _field_error(error: InvalidInput) -> dict[str, Any]:
     return {"field": error.field, "value": error.value, "allowed": error.allowed}
 
 
-def all_told(error: Exception) -> list[dict[str, Any]]:
+def field_errors(error: Exception) -> list[dict[str, Any]]:
     """What is wrong, field by field."""
     if isinstance(error, InvalidInput):
-        return [_told(error)]
+        return [_field_error(error)]
     if isinstance(error, Refusal) and error.errors:
         return [dict(entry) for entry in error.errors]
     if isinstance(error, FileError):

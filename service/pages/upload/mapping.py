@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
-from service.pages.upload.file_summary import ChannelSeen
+from service.pages.upload.file_summary import ChannelSummary
 from underskin import InvalidInput
 from underskin.recordings.readers.unit_labels import lab_field, unit
 from underskin.recordings.rig_description import SCHEMA, channel_fields
@@ -98,25 +98,27 @@ def _mention_words(mention: Mention) -> str:
     return field_words(mention.field)
 
 
-def guessed(channels: Sequence[ChannelSeen], properties: Mapping[str, Any], skin: Mapping[str, Any]) -> dict[str, Any]:
+def guessed(
+    channels: Sequence[ChannelSummary], properties: Mapping[str, Any], skin: Mapping[str, Any]
+) -> dict[str, Any]:
     """A first rig description by units and names of channels and properties, to be looked over; `skin`: what is known
     of it."""
     kind, fields = _likely(channels)
-    found: dict[str, Any] = {}
+    channels_by_field: dict[str, Any] = {}
     for one, field in zip(channels, fields, strict=True):
-        if field and field not in found:
-            found[field] = {"channel": one.name}
+        if field and field not in channels_by_field:
+            channels_by_field[field] = {"channel": one.name}
     known_skin = {name: skin[name] for name in (*[name for name, *_ in SKIN], "sensors") if skin.get(name) is not None}
     return {
         "schema": SCHEMA,
         "kind": kind,
         "skin": {"poisson_ratio": 0.5, **known_skin},
         "recording": _stated(properties, kind),
-        "channels": found,
+        "channels": channels_by_field,
     }
 
 
-def passed_over(channels: Sequence[ChannelSeen]) -> list[str]:
+def passed_over(channels: Sequence[ChannelSummary]) -> list[str]:
     """In words, which channels `guessed` left unused although they may be what another one was taken for."""
     by_field: dict[str, list[str]] = {}
     for one, field in zip(channels, _likely(channels)[1], strict=True):
@@ -129,21 +131,21 @@ def passed_over(channels: Sequence[ChannelSeen]) -> list[str]:
     ]
 
 
-def _likely(channels: Sequence[ChannelSeen]) -> tuple[str, list[str]]:
+def _likely(channels: Sequence[ChannelSummary]) -> tuple[str, list[str]]:
     """The kind of recording, and of each channel the field that it may be; empty where nothing speaks for one."""
     dimensions = [known.dimension if (known := unit(one.unit)) else "" for one in channels]
     kind = "frf"
     if "length" in dimensions and "charge" not in dimensions:
         named = any(words in one.name.lower() for one in channels for words in _OF_COMPRESSION)
         kind = "compression" if named else "indentation"
-    found = []
+    fields = []
     for one, dimension in zip(channels, dimensions, strict=True):
         word = next((field for word, field in _BY_WORD.items() if word in one.name.lower()), "")
         field = "frf_pc_per_n" if one.is_complex else _BY_DIMENSION[kind].get(dimension) or word
         if field == "frf_re_pc_per_n" and "imag" in one.name.lower():
             field = "frf_im_pc_per_n"
-        found.append(field if field in channel_fields(kind) else "")
-    return kind, found
+        fields.append(field if field in channel_fields(kind) else "")
+    return kind, fields
 
 
 def _stated(properties: Mapping[str, Any], kind: str) -> dict[str, Any]:
@@ -167,8 +169,8 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
     document: dict[str, Any] = {"schema": SCHEMA, **deepcopy(dict(base)), "kind": kind}
     document["skin"] = _replaced(base.get("skin", {}), {name: _number(form.get(name, "")) for name, *_ in SKIN})
     document["skin"] = _replaced(document["skin"], {"sensors": sensors})
-    said = {name: _said(form, name) if kind in kinds else None for name, _, _, kinds in RECORDING}
-    document["recording"] = _replaced(base.get("recording", {}), said)
+    values = {name: _said(form, name) if kind in kinds else None for name, _, _, kinds in RECORDING}
+    document["recording"] = _replaced(base.get("recording", {}), values)
     document["channels"] = channels
     document.pop("units_checked", None)
     if form.get("units_checked"):
@@ -179,13 +181,13 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
 def sensors_text(document: Mapping[str, Any]) -> str:
     """The layout, a line a sensor."""
     sensors = document.get("skin", {}).get("sensors") or []
-    told = [[one[name] for name in ("id", "x_mm", "y_mm") if name in one] for one in sensors]
-    return "\n".join(", ".join(f"{part:g}" if isinstance(part, float | int) else part for part in one) for one in told)
+    rows = [[one[name] for name in ("id", "x_mm", "y_mm") if name in one] for one in sensors]
+    return "\n".join(", ".join(f"{part:g}" if isinstance(part, float | int) else part for part in one) for one in rows)
 
 
 def _replaced(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    kept = {name: value for name, value in base.items() if name not in values}
-    return kept | {name: value for name, value in values.items() if value is not None}
+    others = {name: value for name, value in base.items() if name not in values}
+    return others | {name: value for name, value in values.items() if value is not None}
 
 
 def _said(form: Mapping[str, str], name: str) -> Any:
@@ -207,39 +209,39 @@ def _number(text: str) -> Any:
 
 def _sensors(layout: str) -> tuple[list[dict[str, Any]] | None, list[InvalidInput]]:
     """The sensors, and the lines that are none: these are kept as names without a place."""
-    found: list[dict[str, Any]] = []
+    sensors: list[dict[str, Any]] = []
     strange = []
     for number, line in enumerate(layout.splitlines(), start=1):
-        told = line.strip()
-        if not told:
+        text = line.strip()
+        if not text:
             continue
         # A comma separates, or is a decimal comma between semicolons, tabs or blanks: as three parts come out.
-        parts = next((parts for by in _SEPARATORS if len(parts := told.split(by)) == _PARTS), None)
+        parts = next((parts for by in _SEPARATORS if len(parts := text.split(by)) == _PARTS), None)
         if parts is None:
             must = f"line {number} must be: name, x [mm], y [mm]; such as s{number}, 8, 0"
-            strange.append(InvalidInput("skin.sensors", told[:80], must))
-            found.append({"id": told})
+            strange.append(InvalidInput("skin.sensors", text[:80], must))
+            sensors.append({"id": text})
         else:
             name, x, y = parts
-            found.append({"id": name.strip(), "x_mm": _number(x), "y_mm": _number(y)})
-    return found or None, strange
+            sensors.append({"id": name.strip(), "x_mm": _number(x), "y_mm": _number(y)})
+    return sensors or None, strange
 
 
 def _channels(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[str, Any], list[InvalidInput]]:
     """What each field's channel is, and the channels that a field has beside its first."""
-    found: dict[str, Any] = {}
+    by_field: dict[str, Any] = {}
     twice = []
     number = 0
     while f"channel-{number}" in form:
         field = form.get(f"is-{number}", "")
-        if field in found:
-            first = found[field]["channel"]
+        if field in by_field:
+            first = by_field[field]["channel"]
             allowed = f"{first[:80]} is {CHANNELS.get(field, field)} already: set one of the two to “not used”"
             twice.append(InvalidInput(f"channels.{field}", form[f"channel-{number}"], allowed))
         elif field:
-            found[field] = _channel(form, number, base.get(field, {}))
+            by_field[field] = _channel(form, number, base.get(field, {}))
         number += 1
-    return found, twice
+    return by_field, twice
 
 
 def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,7 +1,7 @@
-"""Uploads that were looked at and not kept yet: each in a folder of its own, of one session, for an hour.
+"""Uploads that were read and not stored yet: each in a folder of its own, of one session, for an hour.
 
-They lie in the server's folder of uploads, which ends with the server, and take no more room together than one upload
-may; the oldest make room for the newest.
+They lie in the server's folder of uploads, which is removed with the server. Together they take at most the room of one
+upload; the oldest are removed first.
 """
 
 import hashlib
@@ -16,8 +16,8 @@ from typing import Any
 
 from service.ingest.uploads import Upload
 from service.pages.shared.figures import Drawn
-from service.pages.upload.file_summary import FileSeen
-from service.pages.upload.skin_summary import SkinSeen
+from service.pages.upload.file_summary import FileSummary
+from service.pages.upload.skin_summary import SkinSummary
 from service.store.errors import Missing
 from underskin.recordings.rig_description import RigDescription
 
@@ -27,7 +27,7 @@ _MOST_DRAWN = 6  # files whose figures are kept
 
 
 @dataclass
-class Shelved:
+class PendingUpload:
     """One upload, and what was understood of it so far."""
 
     id: str
@@ -43,11 +43,11 @@ class Shelved:
     refused: list[dict[str, Any]] = field(
         default_factory=list
     )  # what is wrong with the form, or kept it from being kept
-    seen: list[FileSeen] = field(default_factory=list)
+    seen: list[FileSummary] = field(default_factory=list)
     drawn: dict[int, list[Drawn]] = field(default_factory=dict)
     corrects: str | None = None  # the campaign whose place it takes
     reason: str = ""  # why it does
-    skin_seen: SkinSeen | None = None  # where it is an exported skin
+    skin_summary: SkinSummary | None = None  # where it is an exported skin
     kept_at: str | None = None  # the page of what was kept
     lock: threading.Lock = field(default_factory=threading.Lock)
 
@@ -58,23 +58,23 @@ class Shelved:
         self.drawn[number] = figures
 
 
-class Shelf:
-    """See the module."""
+class PendingUploads:
+    """All uploads of this server that were read and not stored yet."""
 
     def __init__(self, folder: Path, most_bytes: int) -> None:
         self._folder = folder
         self._most_bytes = most_bytes
         self._lock = threading.Lock()
-        self._held: dict[str, Shelved] = {}
+        self._held: dict[str, PendingUpload] = {}
 
-    def put(self, cookie: str, sent: Sequence[Upload]) -> Shelved:
+    def put(self, cookie: str, sent: Sequence[Upload]) -> PendingUpload:
         """Take over the files of an upload; what the session had here before goes."""
         name = secrets.token_urlsafe(16)
         folder = self._folder / f"shelf-{name}"
         folder.mkdir()
         files = [replace(one, path=one.path.rename(folder / str(number))) for number, one in enumerate(sent)]
         size = sum(one.path.stat().st_size for one in files)
-        added = Shelved(name, _digest(cookie), folder, files, size, time.monotonic())
+        added = PendingUpload(name, _digest(cookie), folder, files, size, time.monotonic())
         with self._lock:
             for old in [held for held in self._held.values() if held.session == added.session]:
                 self._remove(old)
@@ -82,28 +82,28 @@ class Shelf:
             self._held[name] = added
         return added
 
-    def find(self, cookie: str, name: str) -> Shelved:
+    def find(self, cookie: str, name: str) -> PendingUpload:
         """The session's own; raises Missing where it is gone or another's."""
         with self._lock:
             self._sweep(0)
-            found = self._held.get(name)
-            if found is None or found.session != _digest(cookie):
+            upload = self._held.get(name)
+            if upload is None or upload.session != _digest(cookie):
                 raise Missing(
                     "This upload is not here any more: an upload that is not kept goes after an hour, when you send "
                     "another one, or when the server is restarted. Nothing of it was kept; send it again."
                 )
-            found.used = time.monotonic()
-            return found
+            upload.used = time.monotonic()
+            return upload
 
-    def empty(self, shelved: Shelved) -> None:
+    def empty(self, pending: PendingUpload) -> None:
         """Remove the files; the page that says where they went stays for a while."""
-        shutil.rmtree(shelved.folder, ignore_errors=True)
-        shelved.size = 0
+        shutil.rmtree(pending.folder, ignore_errors=True)
+        pending.size = 0
 
-    def discard(self, shelved: Shelved) -> None:
+    def discard(self, pending: PendingUpload) -> None:
         """Remove it whole."""
         with self._lock:
-            self._remove(shelved)
+            self._remove(pending)
 
     def _sweep(self, coming: int) -> None:
         """Remove what is too old, and the oldest until there is room."""
@@ -115,7 +115,7 @@ class Shelf:
                 total -= held.size
                 self._remove(held)
 
-    def _remove(self, held: Shelved) -> None:
+    def _remove(self, held: PendingUpload) -> None:
         self._held.pop(held.id, None)
         shutil.rmtree(held.folder, ignore_errors=True)
 

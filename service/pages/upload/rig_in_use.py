@@ -6,7 +6,7 @@ import orjson
 
 from service.ingest.accept import RIG
 from service.ingest.uploads import Upload
-from service.pages.upload.keep import all_told
+from service.pages.upload.keep import field_errors
 from service.store import campaigns, skins
 from service.store.engine import Database
 from underskin import InvalidInput
@@ -30,10 +30,10 @@ def rig(store: Database, sent: Upload | None, skin: str | None) -> tuple[RigDesc
             with sent.path.open("rb") as file:
                 return rig_description.parse(file.read(LARGEST_BYTES + 1), sent.label or RIG), []
         except (FileError, InvalidInput) as error:
-            return None, all_told(error)
+            return None, field_errors(error)
     if skin is not None:
         with store.reading() as connection:
-            kept = skins.rig_of(connection, skin)
-        if kept is not None:
-            return rig_description.from_dict(orjson.loads(kept)), []
+            document = skins.rig_of(connection, skin)
+        if document is not None:
+            return rig_description.from_dict(orjson.loads(document)), []
     return None, []

@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from service.ingest.skin_imports import CampaignFound, Found
+from service.ingest.skin_imports import CheckedExport, ExportedCampaignSummary
 
 MOST_LISTED = 200
 
 
 @dataclass(frozen=True)
-class ModelSeen:
+class ModelSummary:
     """A version of the skin's model, and the diagnosis that it was adopted from."""
 
     skin: str
@@ -23,19 +23,19 @@ class ModelSeen:
 
 
 @dataclass(frozen=True)
-class SkinSeen:
-    """See the module; `joined`: other ids that count as the skin's."""
+class SkinSummary:
+    """An exported skin in short; `joined`: other ids that count as the skin's."""
 
     skin: str
     joined: Sequence[str]
     campaigns: int
     new_campaigns: int
     recordings: int
-    listed: Sequence[CampaignFound]
+    listed: Sequence[ExportedCampaignSummary]
     rigs: int
     diagnoses: int
     new_diagnoses: int
-    models: Sequence[ModelSeen]
+    models: Sequence[ModelSummary]
     clashes: Sequence[str]
 
     @property
@@ -44,26 +44,26 @@ class SkinSeen:
         return bool(self.new_campaigns or self.new_diagnoses or any(not model.present for model in self.models))
 
 
-def skin_seen(found: Found) -> SkinSeen:
+def skin_summary(export: CheckedExport) -> SkinSummary:
     """The summary of a file that was looked at; what clashes is listed first."""
-    reports = {row.id: row.report or {} for row in found.diagnosed.diagnoses}
-    return SkinSeen(
-        skin=found.overview.skin,
-        joined=[row.id for row in found.skins.skins if row.id != found.overview.skin],
-        campaigns=len(found.campaigns),
-        new_campaigns=sum(not campaign.present for campaign in found.campaigns),
-        recordings=sum(campaign.recordings for campaign in found.campaigns),
-        listed=sorted(found.campaigns, key=lambda campaign: not campaign.differs)[:MOST_LISTED],
-        rigs=len(found.skins.rigs),
+    reports = {row.id: row.report or {} for row in export.diagnosed.diagnoses}
+    return SkinSummary(
+        skin=export.overview.skin,
+        joined=[row.id for row in export.skins.skins if row.id != export.overview.skin],
+        campaigns=len(export.campaigns),
+        new_campaigns=sum(not campaign.present for campaign in export.campaigns),
+        recordings=sum(campaign.recordings for campaign in export.campaigns),
+        listed=sorted(export.campaigns, key=lambda campaign: not campaign.differs)[:MOST_LISTED],
+        rigs=len(export.skins.rigs),
         diagnoses=len(reports),
-        new_diagnoses=len(reports.keys() - found.known),
-        models=[_model(row, reports[row.diagnosis_id], row.id in found.known) for row in found.diagnosed.models],
-        clashes=found.clashes,
+        new_diagnoses=len(reports.keys() - export.known),
+        models=[_model(row, reports[row.diagnosis_id], row.id in export.known) for row in export.diagnosed.models],
+        clashes=export.clashes,
     )
 
 
-def _model(row: Any, report: Mapping[str, Any], present: bool) -> ModelSeen:
+def _model(row: Any, report: Mapping[str, Any], present: bool) -> ModelSummary:
     mechanisms = [entry["name"] for entry in report["mechanisms"]]
-    return ModelSeen(
+    return ModelSummary(
         row.skin_id, row.version, row.adopted_at, row.withdrawn_at, mechanisms, report["probability"], present
     )

@@ -1,20 +1,20 @@
-"""Refusals that are alike: told once, with how many there are and which."""
+"""Refusals that differ in numbers and names alone: listed once, with how many there are and which."""
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from service.pages.upload.file_summary import FileSeen
+from service.pages.upload.file_summary import FileSummary
 
-_FEWEST = 3  # that are told together
+_FEWEST = 3  # that are listed together
 _NUMBER = re.compile(r"\d+(?:[.,]\d+)*")
 
 Errors = Sequence[Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
-class Alike:
+class SimilarErrors:
     """Entries, as (place in the list, name), and the errors of the first: of the others the numbers may differ."""
 
     entries: Sequence[tuple[int, str]]
@@ -30,24 +30,24 @@ class Alike:
         return any(place == own for own, _ in self.entries)
 
 
-def of_files(files: Sequence[FileSeen]) -> list[Alike]:
-    """Files, those together of which nothing was understood for the same reasons."""
+def of_files(files: Sequence[FileSummary]) -> list[SimilarErrors]:
+    """Groups of files; those of which nothing was understood for the same reasons are one group."""
     return _together([(file.label, [] if file.recordings else _reasons(file)) for file in files])
 
 
-def of_recordings(file: FileSeen) -> list[Alike]:
+def of_recordings(file: FileSummary) -> list[SimilarErrors]:
     """The refused recordings of a file."""
     return _together([(entry["id"], entry["errors"]) for entry in file.refused])
 
 
-def _reasons(file: FileSeen) -> Errors:
+def _reasons(file: FileSummary) -> Errors:
     return [*file.errors, *(error for entry in file.refused for error in entry["errors"])]
 
 
-def _together(found: Sequence[tuple[str, Errors]]) -> list[Alike]:
-    """In the order of their first; few that are alike, and those without errors, one by one."""
+def _together(entries: Sequence[tuple[str, Errors]]) -> list[SimilarErrors]:
+    """By their first entries; fewer than three similar ones, and those without errors, are groups of one."""
     by_reason: dict[Any, list[int]] = {}
-    for place, (name, errors) in enumerate(found):
+    for place, (name, errors) in enumerate(entries):
         reason = tuple(_what(name, error) for error in errors) or place
         by_reason.setdefault(reason, []).append(place)
     groups = [
@@ -55,7 +55,10 @@ def _together(found: Sequence[tuple[str, Errors]]) -> list[Alike]:
         for places in by_reason.values()
         for part in ([places] if len(places) >= _FEWEST else [[place] for place in places])
     ]
-    return [Alike([(place, found[place][0]) for place in places], found[places[0]][1]) for places in sorted(groups)]
+    return [
+        SimilarErrors([(place, entries[place][0]) for place in places], entries[places[0]][1])
+        for places in sorted(groups)
+    ]
 
 
 def _what(name: str, error: Mapping[str, Any]) -> tuple[str, str]:
