@@ -208,7 +208,8 @@ def format_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """Installs a file format and loads it."""
 
     def load(source: str) -> Mapping[str, formats.FileFormat]:
-        head = "from underskin.recordings.channels import Block, Channel, Contents\nfrom underskin.recordings.readers.formats import FileFormat\n"
+        head = "from underskin.recordings.channels import Block, Channel, Contents\n"
+        head += "from underskin.recordings.readers.formats import FileFormat\n"
         monkeypatch.syspath_prepend(installed(tmp_path, formats.GROUP, "THING", head + source))
         monkeypatch.delitem(sys.modules, "lab_tools", raising=False)
         formats.formats_of_other_packages.cache_clear()
