@@ -3,6 +3,7 @@
 import io
 import os
 import pickle
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -258,3 +259,60 @@ def test_what_a_reader_of_another_package_answers_is_checked(answer: str, reason
     format_of(f"THING = FileFormat('lab', ('.lab',), lambda stream, file: {answer})")
     with pytest.raises(FileError, match=reason):
         formats.parse("lab", io.BytesIO(b"x"), "a.lab")
+
+
+USE = """
+import numpy as np
+from docs.mechanisms.signatures import panels
+from tests.mechanism_campaigns import frf_campaign, table
+from tests.test_adopted import D33, recorded, report
+from underskin.mechanisms import CATALOGUE, compose
+from underskin.parallel import processes
+from underskin.prediction.adopted_model import adopted
+
+name, values = "amplifier_low_pass", {"amplifier_high_pass": (1.0,), "amplifier_low_pass": (800.0,)}
+if __name__ == "__main__":
+    names = list(CATALOGUE)
+    assert names[names.index(name) - 1] == "timing_delay", names
+    assert dict(CATALOGUE.packages) == {name: "lab-skin 1.0"}
+    assert compose([name, "amplifier_high_pass"], frf_campaign(), table()).names == tuple(values)
+    assert all(np.isfinite(y).all() for panel in panels(name, table()) for _, y in panel.curves.values())
+    model = adopted(report(values), frf_campaign())
+    assert model.of_lines == list(values)
+    measured = np.concatenate(
+        [entry.frf_re_pc_per_n + 1j * entry.frf_im_pc_per_n for entry in recorded(values).recordings]
+    )
+    assert np.allclose(D33 * model.response(frf_campaign(), table()).value, measured)
+    with processes(1) as pool:
+        assert pool.submit(list, CATALOGUE).result() == names
+        assert pool.submit(len, CATALOGUE).result() == len(names)
+    print("used")
+"""
+
+
+def test_one_of_another_package_is_composed_drawn_adopted_and_found_by_worker_processes(tmp_path: Path) -> None:
+    site = tmp_path / "site"
+    shutil.copytree(EXAMPLE / "lab_skin", site / "lab_skin")
+    (site / "lab_skin-1.0.dist-info").mkdir()
+    (site / "lab_skin-1.0.dist-info" / "METADATA").write_text("Name: lab-skin\nVersion: 1.0\n")
+    entry = f"[{GROUP}]\namplifier_low_pass = lab_skin.mechanisms:AmplifierLowPass\n"
+    (site / "lab_skin-1.0.dist-info" / "entry_points.txt").write_text(entry)
+    (tmp_path / "use.py").write_text(USE, encoding="utf-8")
+    path = [str(site), str(EXAMPLE.parent.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(path)}
+    command = [sys.executable, str(tmp_path / "use.py")]
+    answer = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stdout == "used\n"
+
+
+def test_the_texts_are_there_without_docstrings() -> None:
+    """`python -OO` drops docstrings and asserts; a statement and a report need the mechanisms' texts."""
+    script = (
+        "from underskin.diagnosis.reporting.wording import readable\n"
+        "from underskin.mechanisms import CATALOGUE, Mechanism\n"
+        "texts = [getattr(entry, name) for entry in CATALOGUE.values() for name in ('plain', 'law', 'source')]\n"
+        "print(Mechanism.__doc__, len(texts), all(texts), readable('contact_creep'))"
+    )
+    answer = subprocess.run([sys.executable, "-OO", "-c", script], capture_output=True, text=True)
+    assert answer.stdout == "None 66 True contact creep\n", answer.stderr
