@@ -217,7 +217,7 @@ class Mechanism:
         """Its parameters for recordings of one kind; bounds may depend on the campaign."""
         return ()
 
-    def parameters_beside(self, others: Collection[str], campaign: Campaign, kind: Kind) -> tuple[Parameter, ...]:
+    def parameters_beside(self, others: Collection[Mechanism], campaign: Campaign, kind: Kind) -> tuple[Parameter, ...]:
         """Its parameters in a model that these other mechanisms are in too, which may show more of it."""
         return self.parameters(campaign, kind)
 

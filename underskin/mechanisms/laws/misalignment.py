@@ -41,9 +41,9 @@ class Misalignment(Mechanism):
         """The offset's two components, or its length where its direction cannot be told."""
         return self.parameters_beside((), campaign, kind)
 
-    def parameters_beside(self, others: Collection[str], campaign: Campaign, kind: Kind) -> tuple[Parameter, ...]:
+    def parameters_beside(self, others: Collection[Mechanism], campaign: Campaign, kind: Kind) -> tuple[Parameter, ...]:
         """The same; the charge of neighbours, which lie in known directions, tells the direction too."""
-        directed = offsets(campaign).any() or "crosstalk" in others
+        directed = offsets(campaign).any() or any(other.needs_neighbours for other in others)
         shown, low = ({"offset_x": 0.6, "offset_y": 0.3}, -_LARGEST_MM) if directed else ({"offset": 0.7}, 0.0)
         return tuple(
             Parameter(

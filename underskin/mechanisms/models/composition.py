@@ -90,8 +90,7 @@ def parameters_together(
     mechanisms: Sequence[Mechanism], campaign: Campaign, kind: Kind
 ) -> dict[str, tuple[Parameter, ...]]:
     """The parameters of each mechanism by its name, as they are where all of these act together."""
-    names = [mechanism.name for mechanism in mechanisms]
-    return {mechanism.name: mechanism.parameters_beside(names, campaign, kind) for mechanism in mechanisms}
+    return {mechanism.name: mechanism.parameters_beside(mechanisms, campaign, kind) for mechanism in mechanisms}
 
 
 def kind_of(campaign: Campaign) -> Kind:
