@@ -38,7 +38,7 @@ class Misalignment(Mechanism):
     figure = ("preload_n", "position_mm")
 
     def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The offset's two components, or its length where its direction cannot be told."""
+        """The offset's two components, or its length where its direction cannot be determined."""
         return self.parameters_beside((), campaign, kind)
 
     def parameters_beside(self, others: Collection[Mechanism], campaign: Campaign, kind: Kind) -> tuple[Parameter, ...]:
