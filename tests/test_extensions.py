@@ -50,7 +50,7 @@ class LowPass(Mechanism):
             "limit": None,
             "reason": "a guess",
         }
-        return (Parameter(**{name: value for name, value in (fields | self.changes).items() if value != "gone"}),)
+        return (Parameter(**{name: value for name, value in {**fields, **self.changes}.items() if value != "gone"}),)
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         return 1.0 / (1.0 + 1j * design.line_frequency / values["upper_corner"])
@@ -121,7 +121,7 @@ def test_a_law_that_is_not_finite_at_a_bound_is_refused_there() -> None:
 
 
 def test_a_second_spread_of_the_sensors_gains_is_refused() -> None:
-    attributes = {
+    attributes: dict[str, Any] = {
         "stage": Stage.SENSOR,
         "moves_predictions": False,
         "on_lines": Mechanism.on_lines,
