@@ -8,7 +8,7 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -16,7 +16,8 @@ import pytest
 from underskin import ExtensionError, FileError, InvalidInput, extensions
 from underskin.mechanisms import CATALOGUE, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.autodiff import Differentiated
-from underskin.mechanisms.contract import check
+from underskin.mechanisms.base import AXES, NEEDED_FIELDS, UNITS, ActsOn
+from underskin.mechanisms.contract import HOOKS, check
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.models.pickup import Pickup, together
@@ -142,6 +143,15 @@ def test_charges_of_several_mechanisms_add_their_variances() -> None:
     assert both.deviation({"q": np.array([[1.0], [2.0]])}) == pytest.approx(np.array([[3, 5, 4], [6, 10, 8]]))
     assert together([one]) is one
     assert together([]) is None
+
+
+def test_the_page_lists_all_that_a_mechanism_may_state() -> None:
+    page = (EXAMPLE.parent.parent / "docs" / "extending.md").read_text(encoding="utf-8")
+    traits = [name for name in vars(Mechanism)["__annotations__"] if not name.startswith("_")]
+    for name in (*UNITS, *AXES, *NEEDED_FIELDS, *Stage.__members__, *traits, *get_args(ActsOn), *get_args(Kind)):
+        assert f"`{name}`" in page, name
+    for hook in HOOKS:
+        assert f"`{hook}(" in page, hook
 
 
 def installed(folder: Path, group: str, target: str, source: str) -> Path:
