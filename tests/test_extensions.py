@@ -21,6 +21,7 @@ from underskin.mechanisms.contract import HOOKS, check
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.models.pickup import Pickup, together
+from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.registry import GROUP, built_in
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.readers import formats
@@ -76,6 +77,7 @@ def test_one_that_keeps_the_contract_is_taken() -> None:
         ({"stage": Stage.SENSOR}, "stage", "must be LINES, since on_lines is overridden"),
         ({"order": "last"}, "order", "whole number"),
         ({"kinds": ()}, "kinds", "indentation"),
+        ({"kinds": ("frf", "compression")}, "kinds", "on_curve"),
         ({"axes": ("temperature_c",)}, "axes", "preload_n"),
         ({"needs_fields": ("day",)}, "needs_fields", "dwell_s"),
         ({"moves_predictions": False}, "moves_predictions", "True"),
@@ -119,6 +121,12 @@ def test_a_law_that_is_not_finite_at_a_bound_is_refused_there() -> None:
     with pytest.raises(InvalidInput, match="not finite") as refusal:
         check(Diverging(), built_in())
     assert refusal.value.field == "law (frf) at gap = 0 -"
+
+
+def test_two_parameters_of_one_name_are_refused() -> None:
+    twice = LowPass().parameters(reference_campaign("frf")) * 2
+    with pytest.raises(InvalidInput, match="one parameter"):
+        check(changed(parameters=lambda *_: twice), built_in())
 
 
 def test_a_second_spread_of_the_sensors_gains_is_refused() -> None:
