@@ -3,11 +3,12 @@
 import io
 import os
 import pickle
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -15,10 +16,12 @@ import pytest
 from underskin import ExtensionError, FileError, InvalidInput, extensions
 from underskin.mechanisms import CATALOGUE, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.autodiff import Differentiated
-from underskin.mechanisms.contract import check
+from underskin.mechanisms.base import AXES, NEEDED_FIELDS, UNITS, ActsOn
+from underskin.mechanisms.contract import HOOKS, check
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.models.pickup import Pickup, together
+from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.registry import GROUP, built_in
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.readers import formats
@@ -49,7 +52,7 @@ class LowPass(Mechanism):
             "limit": None,
             "reason": "a guess",
         }
-        return (Parameter(**{name: value for name, value in (fields | self.changes).items() if value != "gone"}),)
+        return (Parameter(**{name: value for name, value in {**fields, **self.changes}.items() if value != "gone"}),)
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         return 1.0 / (1.0 + 1j * design.line_frequency / values["upper_corner"])
@@ -74,6 +77,7 @@ def test_one_that_keeps_the_contract_is_taken() -> None:
         ({"stage": Stage.SENSOR}, "stage", "must be LINES, since on_lines is overridden"),
         ({"order": "last"}, "order", "whole number"),
         ({"kinds": ()}, "kinds", "indentation"),
+        ({"kinds": ("frf", "compression")}, "kinds", "on_curve"),
         ({"axes": ("temperature_c",)}, "axes", "preload_n"),
         ({"needs_fields": ("day",)}, "needs_fields", "dwell_s"),
         ({"moves_predictions": False}, "moves_predictions", "True"),
@@ -119,8 +123,14 @@ def test_a_law_that_is_not_finite_at_a_bound_is_refused_there() -> None:
     assert refusal.value.field == "law (frf) at gap = 0 -"
 
 
+def test_two_parameters_of_one_name_are_refused() -> None:
+    twice = LowPass().parameters(reference_campaign("frf")) * 2
+    with pytest.raises(InvalidInput, match="one parameter"):
+        check(changed(parameters=lambda *_: twice), built_in())
+
+
 def test_a_second_spread_of_the_sensors_gains_is_refused() -> None:
-    attributes = {
+    attributes: dict[str, Any] = {
         "stage": Stage.SENSOR,
         "moves_predictions": False,
         "on_lines": Mechanism.on_lines,
@@ -141,6 +151,15 @@ def test_charges_of_several_mechanisms_add_their_variances() -> None:
     assert both.deviation({"q": np.array([[1.0], [2.0]])}) == pytest.approx(np.array([[3, 5, 4], [6, 10, 8]]))
     assert together([one]) is one
     assert together([]) is None
+
+
+def test_the_page_lists_all_that_a_mechanism_may_state() -> None:
+    page = (EXAMPLE.parent.parent / "docs" / "extending.md").read_text(encoding="utf-8")
+    traits = [name for name in vars(Mechanism)["__annotations__"] if not name.startswith("_")]
+    for name in (*UNITS, *AXES, *NEEDED_FIELDS, *Stage.__members__, *traits, *get_args(ActsOn), *get_args(Kind)):
+        assert f"`{name}`" in page, name
+    for hook in HOOKS:
+        assert f"`{hook}(" in page, hook
 
 
 def installed(folder: Path, group: str, target: str, source: str) -> Path:
@@ -260,3 +279,60 @@ def test_what_a_reader_of_another_package_answers_is_checked(answer: str, reason
     format_of(f"THING = FileFormat('lab', ('.lab',), lambda stream, file: {answer})")
     with pytest.raises(FileError, match=reason):
         formats.parse("lab", io.BytesIO(b"x"), "a.lab")
+
+
+USE = """
+import numpy as np
+from docs.mechanisms.signatures import panels
+from tests.mechanism_campaigns import frf_campaign, table
+from tests.test_adopted import D33, recorded, report
+from underskin.mechanisms import CATALOGUE, compose
+from underskin.parallel import processes
+from underskin.prediction.adopted_model import adopted
+
+name, values = "amplifier_low_pass", {"amplifier_high_pass": (1.0,), "amplifier_low_pass": (800.0,)}
+if __name__ == "__main__":
+    names = list(CATALOGUE)
+    assert names[names.index(name) - 1] == "timing_delay", names
+    assert dict(CATALOGUE.packages) == {name: "lab-skin 1.0"}
+    assert compose([name, "amplifier_high_pass"], frf_campaign(), table()).names == tuple(values)
+    assert all(np.isfinite(y).all() for panel in panels(name, table()) for _, y in panel.curves.values())
+    model = adopted(report(values), frf_campaign())
+    assert model.of_lines == list(values)
+    measured = np.concatenate(
+        [entry.frf_re_pc_per_n + 1j * entry.frf_im_pc_per_n for entry in recorded(values).recordings]
+    )
+    assert np.allclose(D33 * model.response(frf_campaign(), table()).value, measured)
+    with processes(1) as pool:
+        assert pool.submit(list, CATALOGUE).result() == names
+        assert pool.submit(len, CATALOGUE).result() == len(names)
+    print("used")
+"""
+
+
+def test_one_of_another_package_is_composed_drawn_adopted_and_found_by_worker_processes(tmp_path: Path) -> None:
+    site = tmp_path / "site"
+    shutil.copytree(EXAMPLE / "lab_skin", site / "lab_skin")
+    (site / "lab_skin-1.0.dist-info").mkdir()
+    (site / "lab_skin-1.0.dist-info" / "METADATA").write_text("Name: lab-skin\nVersion: 1.0\n")
+    entry = f"[{GROUP}]\namplifier_low_pass = lab_skin.mechanisms:AmplifierLowPass\n"
+    (site / "lab_skin-1.0.dist-info" / "entry_points.txt").write_text(entry)
+    (tmp_path / "use.py").write_text(USE, encoding="utf-8")
+    path = [str(site), str(EXAMPLE.parent.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(path)}
+    command = [sys.executable, str(tmp_path / "use.py")]
+    answer = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stdout == "used\n"
+
+
+def test_the_texts_are_there_without_docstrings() -> None:
+    """`python -OO` drops docstrings and asserts; a statement and a report need the mechanisms' texts."""
+    script = (
+        "from underskin.diagnosis.reporting.wording import readable\n"
+        "from underskin.mechanisms import CATALOGUE, Mechanism\n"
+        "texts = [getattr(entry, name) for entry in CATALOGUE.values() for name in ('plain', 'law', 'source')]\n"
+        "print(Mechanism.__doc__, len(texts), all(texts), readable('contact_creep'))"
+    )
+    answer = subprocess.run([sys.executable, "-OO", "-c", script], capture_output=True, text=True)
+    assert answer.stdout == "None 66 True contact creep\n", answer.stderr

@@ -67,7 +67,7 @@ def test_unknown_name_is_an_attribute_error() -> None:
 def test_every_error_is_an_underskin_error() -> None:
     errors = [getattr(underskin, name) for name in PUBLIC if inspect.isclass(getattr(underskin, name))]
     raised = [error for error in errors if issubclass(error, Exception)]
-    assert len(raised) == 7
+    assert len(raised) == 8
     assert all(issubclass(error, underskin.UnderskinError) for error in raised)
 
 

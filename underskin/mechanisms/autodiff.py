@@ -1,6 +1,6 @@
 """Numbers that carry their derivatives with respect to a model's parameters (forward mode).
 
-Only what the mechanisms need: arithmetic, a few functions, picking rows, and `chain` for everything else.
+Only what the mechanisms need: arithmetic, a few functions, selecting rows, and `chain` for everything else.
 """
 
 from __future__ import annotations
@@ -16,7 +16,11 @@ Operand = "Differentiated | Array | float | complex"
 
 
 class Differentiated:
-    """`value` (rows,) and `slopes` (parameters, rows); one row stands for all, as NumPy broadcasts."""
+    """An array with its derivatives: `value` (rows,) and `slopes` (parameters, rows).
+
+    A single row stands for all rows, as NumPy broadcasts. The derivatives are those with respect to the fit coordinates
+    of a model's parameters.
+    """
 
     __slots__ = ("slopes", "value")
     __array_ufunc__ = None  # so that array * Differentiated comes here
@@ -64,54 +68,80 @@ class Differentiated:
         return Differentiated(power * self.value, exponent * power * self.slopes)
 
     def __getitem__(self, rows: Any) -> Differentiated:
-        """The rows picked by an index array or slice; a single row that stands for all stays one."""
+        """The rows that an index array or slice selects; a single row that stands for all stays one."""
         if len(self.value) == 1:
             return self
         return Differentiated(self.value[rows], self.slopes[:, rows])
 
     def spread(self, rows: int) -> Differentiated:
-        """The same with that many rows, where it is a single one that stands for all."""
+        """The same with that many rows, where a single row stands for all."""
         return Differentiated(np.broadcast_to(self.value, rows), np.broadcast_to(self.slopes, (len(self.slopes), rows)))
 
 
 def exp(x: Differentiated) -> Differentiated:
-    """e^x."""
+    """e^x, with the derivative e^x x′."""
     value = np.exp(x.value)
     return Differentiated(value, value * x.slopes)
 
 
 def log(x: Differentiated) -> Differentiated:
-    """The natural logarithm."""
+    """The natural logarithm of a positive x, with the derivative x′/x."""
     return Differentiated(np.log(x.value), x.slopes / x.value)
 
 
 def cbrt(x: Differentiated) -> Differentiated:
-    """The real cube root, of positive values."""
+    """The real cube root y of a positive x, with the derivative y x′/(3x)."""
     value = np.cbrt(x.value)
     return Differentiated(value, x.slopes * (value / (3 * x.value)))
 
 
 def chain(value: Array, *terms: tuple[Array, Differentiated]) -> Differentiated:
-    """A function's `value` from its partial derivatives: slopes = Σ ∂f/∂x · x.slopes over the pairs (∂f/∂x, x)."""
+    """A function f of several variables by the chain rule, f′ = Σ ∂f/∂x · x′.
+
+    Parameters
+    ----------
+    value
+        f at the variables' values, shape (rows,).
+    *terms
+        For each variable, the partial derivative ∂f/∂x, shape (rows,), and the variable x.
+
+    Returns
+    -------
+    Differentiated
+        f with its derivatives, in the unit of `value`.
+    """
     slopes = sum(partial * x.slopes for partial, x in terms)
     return Differentiated(value, np.asarray(slopes))
 
 
 def where(condition: NDArray[np.bool_], yes: Differentiated, no: Differentiated | float) -> Differentiated:
-    """Row by row the one or the other."""
+    """`yes` in the rows where `condition` (rows,) holds, `no` in the others."""
     if not isinstance(no, Differentiated):
         return Differentiated(np.where(condition, yes.value, no), np.where(condition, yes.slopes, 0.0))
     return Differentiated(np.where(condition, yes.value, no.value), np.where(condition, yes.slopes, no.slopes))
 
 
 def constant(value: Array | float, parameters: int) -> Differentiated:
-    """A number that no parameter changes."""
+    """A number whose derivatives with respect to so many parameters are 0."""
     rows = np.atleast_1d(np.asarray(value))
     return Differentiated(rows, np.zeros((parameters, 1)))
 
 
 def variables(values: Sequence[float], slopes: Sequence[float]) -> list[Differentiated]:
-    """One single-row variable a parameter, each with its derivative with respect to its own fit coordinate."""
+    """The independent variables of a model.
+
+    Parameters
+    ----------
+    values
+        Each parameter's value in its unit.
+    slopes
+        Each value's derivative with respect to its own fit coordinate: 1, or the value where that is its logarithm.
+
+    Returns
+    -------
+    list of Differentiated
+        One variable of a single row for each parameter; its derivatives with respect to the others are 0.
+    """
     return [
         Differentiated(np.array([value]), row[:, None])
         for value, row in zip(values, np.diag(np.asarray(slopes, dtype=float)), strict=True)
@@ -119,7 +149,22 @@ def variables(values: Sequence[float], slopes: Sequence[float]) -> list[Differen
 
 
 def sum_rows(x: Differentiated, owner: NDArray[np.intp], rows: int) -> Differentiated:
-    """Row r of the answer is the sum of x's rows whose `owner` is r."""
+    """Sums over groups of rows.
+
+    Parameters
+    ----------
+    x
+        The terms, shape (terms,), or a single row that stands for all of them.
+    owner
+        Which row of the result each term belongs to, shape (terms,).
+    rows
+        How many rows the result has.
+
+    Returns
+    -------
+    Differentiated
+        Shape (rows,); 0 in a row that no term belongs to.
+    """
     x = x.spread(len(owner))
     value = np.bincount(owner, x.value, rows)
     return Differentiated(value, np.stack([np.bincount(owner, slope, rows) for slope in x.slopes]))

@@ -145,7 +145,18 @@ class Parameter:
         return fit if self.scale == "linear" else float(np.exp(fit))
 
     def log_prior(self, fit: float) -> float:
-        """The logarithm of the prior's density at a fit coordinate; −∞ outside the bounds."""
+        """The logarithm of the prior's density, truncated to the bounds and normalised there.
+
+        Parameters
+        ----------
+        fit
+            Fit coordinate: the value in `unit`, or its natural logarithm.
+
+        Returns
+        -------
+        float
+            Natural logarithm of the density per unit of the fit coordinate; −∞ outside the bounds.
+        """
         low, high = self.bounds
         if not low <= fit <= high:
             return -np.inf
@@ -162,7 +173,18 @@ class Parameter:
         return float(np.log(sd * np.sqrt(2 * np.pi) * inside))
 
     def quantile(self, probability: float) -> float:
-        """The prior's quantile on the fit coordinate."""
+        """The prior's quantile.
+
+        Parameters
+        ----------
+        probability
+            From 0 to 1.
+
+        Returns
+        -------
+        float
+            Fit coordinate below which the prior has that probability; within the bounds.
+        """
         low, high = self.bounds
         if isinstance(self.prior, Uniform):
             return low + probability * (high - low)
@@ -217,7 +239,9 @@ class Mechanism:
         """Its parameters for recordings of one kind; bounds may depend on the campaign."""
         return ()
 
-    def parameters_beside(self, others: Collection[str], conditions: Conditions, kind: Kind) -> tuple[Parameter, ...]:
+    def parameters_beside(
+        self, others: Collection[Mechanism], conditions: Conditions, kind: Kind
+    ) -> tuple[Parameter, ...]:
         """Its parameters in a model that these other mechanisms are in too, which may show more of it."""
         return self.parameters(conditions, kind)
 

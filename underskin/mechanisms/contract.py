@@ -75,8 +75,10 @@ def check(mechanism: Mechanism, others: Sequence[Mechanism] = ()) -> None:
     for kind in mechanism.kinds:
         parameters: Any = _parameters(mechanism, kind)
         _require("parameters", parameters, isinstance(parameters, tuple), "must be a tuple of Parameter")
-        for entry in parameters:
+        for place, entry in enumerate(parameters):
             _check_parameter(mechanism, entry)
+            if entry.name in {other.name for other in parameters[:place]}:
+                raise InvalidInput(_field(entry, "name"), entry.name, "must be that of one parameter")
             if entry.name in taken:
                 raise InvalidInput(_field(entry, "name"), entry.name, f"is taken by {taken[entry.name]}")
             if entry.acts_on == "gain_spread" and spreads:
@@ -115,6 +117,9 @@ def _check_hooks(mechanism: Mechanism) -> None:
         _require("stage", mechanism.stage.name, good, f"must be {stages}, since {name} is overridden")
     if not own and mechanism.moves_predictions:
         raise InvalidInput("law", None, f"must be in one of the hooks {', '.join(HOOKS)}; none is overridden")
+    curves = bool({"indentation", "compression"} & set(mechanism.kinds))
+    allowed = "must hold indentation or compression where on_curve is overridden, and only there"
+    _require("kinds", mechanism.kinds, curves == ("on_curve" in own), allowed)
     moves = any(name != "pickup" for name in own)
     _require("moves_predictions", mechanism.moves_predictions, mechanism.moves_predictions is moves, f"must be {moves}")
 

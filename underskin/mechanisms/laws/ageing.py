@@ -87,13 +87,13 @@ class Ageing(Mechanism):
         left = 1.0 - values["saturation"]
         power = values["saturation"] / left
         age = log(1.0 + left * (design.load_cycles / values["onset"]))
-        # (1 − e^(−p x))/p = x · fall(p x)
-        lost = age * _fall(power * age) / (np.log(10.0) * _fall(np.log(10.0) * power))
-        return _alive(1.0 - values["loss"] * lost)
+        # (1 − e^(−p x))/p = x · mean_decay(p x)
+        lost = age * _mean_decay(power * age) / (np.log(10.0) * _mean_decay(np.log(10.0) * power))
+        return _positive(1.0 - values["loss"] * lost)
 
 
-def _fall(x: Differentiated) -> Differentiated:
-    """(1 − e^(−x))/x."""
+def _mean_decay(x: Differentiated) -> Differentiated:
+    """(1 − e^(−x))/x, the mean of e^(−t) over 0 to x."""
     safe = np.where(x.value < _SMALL, 1.0, x.value)
     value = -np.expm1(-safe) / safe
     slope = (np.exp(-safe) - value) / safe
@@ -101,8 +101,8 @@ def _fall(x: Differentiated) -> Differentiated:
     return chain(np.where(x.value < _SMALL, near[0], value), (np.where(x.value < _SMALL, near[1], slope), x))
 
 
-def _alive(factor: Differentiated) -> Differentiated:
-    """The factor, or below _LEAST what falls on to 0 from there, as steeply at first."""
-    dying = _LEAST * np.exp(np.minimum(factor.value / _LEAST - 1, 0.0))
-    alive = factor.value > _LEAST
-    return chain(np.where(alive, factor.value, dying), (np.where(alive, 1.0, dying / _LEAST), factor))
+def _positive(factor: Differentiated) -> Differentiated:
+    """The factor, or below _LEAST an exponential that continues it with the same slope and tends to 0."""
+    tail = _LEAST * np.exp(np.minimum(factor.value / _LEAST - 1, 0.0))
+    unchanged = factor.value > _LEAST
+    return chain(np.where(unchanged, factor.value, tail), (np.where(unchanged, 1.0, tail / _LEAST), factor))

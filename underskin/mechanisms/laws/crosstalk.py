@@ -8,7 +8,7 @@ from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.recordings.conditions import Conditions
 from underskin.units import to_si
 
-_FELT_WITHIN = 3.0  # thicknesses; further off a bonded layer passes on less than a thousandth
+_LARGEST_DISTANCE = 3.0  # thicknesses; beyond it a bonded layer transmits less than a thousandth of the stress
 
 
 class Crosstalk(Mechanism):
@@ -53,12 +53,12 @@ class Crosstalk(Mechanism):
         )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
-        """A neighbour that feels something is needed."""
+        """A neighbour under stress is needed."""
         if len(conditions.skin.sensors) < 2:
             return "the skin has one sensor, and so no neighbours"
         design = FrfDesign.of(conditions, (), neighbours=True)
         nearest = np.hypot(design.point_x, design.point_y)[design.neighbour_point].min(initial=np.inf)
-        if nearest > _FELT_WITHIN * to_si("thickness_mm", conditions.skin.thickness_mm or 0.0):
+        if nearest > _LARGEST_DISTANCE * to_si("thickness_mm", conditions.skin.thickness_mm or 0.0):
             return "no recording presses within three thicknesses of a sensor's neighbour (position_mm)"
         return None
 

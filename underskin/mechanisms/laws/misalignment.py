@@ -37,12 +37,14 @@ class Misalignment(Mechanism):
     figure = ("preload_n", "position_mm")
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The offset's two components, or its length where its direction cannot be told."""
+        """The offset's two components, or its length where its direction cannot be determined."""
         return self.parameters_beside((), conditions, kind)
 
-    def parameters_beside(self, others: Collection[str], conditions: Conditions, kind: Kind) -> tuple[Parameter, ...]:
+    def parameters_beside(
+        self, others: Collection[Mechanism], conditions: Conditions, kind: Kind
+    ) -> tuple[Parameter, ...]:
         """The same; the charge of neighbours, which lie in known directions, tells the direction too."""
-        directed = offsets(conditions).any() or "crosstalk" in others
+        directed = offsets(conditions).any() or any(other.needs_neighbours for other in others)
         shown, low = ({"offset_x": 0.6, "offset_y": 0.3}, -_LARGEST_MM) if directed else ({"offset": 0.7}, 0.0)
         return tuple(
             Parameter(

@@ -90,8 +90,7 @@ def parameters_together(
     mechanisms: Sequence[Mechanism], conditions: Conditions, kind: Kind
 ) -> dict[str, tuple[Parameter, ...]]:
     """The parameters of each mechanism by its name, as they are where all of these act together."""
-    names = [mechanism.name for mechanism in mechanisms]
-    return {mechanism.name: mechanism.parameters_beside(names, conditions, kind) for mechanism in mechanisms}
+    return {mechanism.name: mechanism.parameters_beside(mechanisms, conditions, kind) for mechanism in mechanisms}
 
 
 def kind_of(conditions: Conditions) -> Kind:

@@ -7,12 +7,14 @@ layer both parts are those of contact_curves.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from underskin.mechanisms.autodiff import Differentiated, cbrt, chain
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.physics.contact_curves import REACH, ContactCurves, Rows
+from underskin.physics.contact_curves import REACH, ContactCurves, CurveGrid, Rows
+from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
 
@@ -23,6 +25,12 @@ class Pressed:
     a_over_h: Differentiated
     cbrt_load: Differentiated  # L^(1/3) to enter the table with
     sphere_share: Differentiated | None  # of the load, in the sphere's part of the pressure; None: all of it
+
+
+@lru_cache(maxsize=8)  # most steps of a fit change neither the Poisson ratio nor the glue line
+def layer_curves(grid: CurveGrid, layer: Layer) -> ContactCurves:
+    """The contact curves of one layer at the wave numbers of a grid."""
+    return grid.curves(layer)
 
 
 def press(contacts: Contacts, curves: ContactCurves | None) -> Pressed:

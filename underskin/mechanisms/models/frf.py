@@ -17,15 +17,13 @@ from underskin.errors import InvalidInput
 from underskin.mechanisms.autodiff import Array, Differentiated, chain, constant, sum_rows
 from underskin.mechanisms.base import Mechanism, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
-from underskin.mechanisms.models.contact_stage import press, stiffness
+from underskin.mechanisms.models.contact_stage import layer_curves, press, stiffness
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign, Indices, largest_offset
 from underskin.mechanisms.models.nuisances import FRF_NUISANCES
 from underskin.mechanisms.models.off_centre_response import PROFILE_END, offset_sigma
 from underskin.mechanisms.models.pickup import Pickup, together
 from underskin.mechanisms.models.sigma_curves import layer_of, sigma_curves
-from underskin.physics.contact_curves import ContactCurves
-from underskin.physics.elastic_layer import Layer
 from underskin.recordings.conditions import Conditions
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_si
@@ -58,7 +56,6 @@ class FrfModel:
         reached = min(PROFILE_END, stretch * largest_offset(design, further) / self._thickness)
         self._sigma = offset_sigma(table, self._sensor_radius / self._thickness, stretch, reached)
         self._needs_stiffness = any(mechanism.needs_stiffness for mechanism in mechanisms)
-        self._last_layer: tuple[Layer, ContactCurves] | None = None
         pickups = [mechanism.pickup(conditions, design) for mechanism in self._mechanisms]
         self.pickup: Pickup | None = together([pickup for pickup in pickups if pickup is not None])
         self._force, self._increments = _force_nodes(self._mechanisms, design)
@@ -117,7 +114,9 @@ class FrfModel:
         """
         design = self.design
         rho = self._sensor_radius / contacts.thickness
-        layer = self._layer_curves(contacts) if contacts.layered or self._needs_stiffness else None
+        layer = None
+        if contacts.layered or self._needs_stiffness:
+            layer = layer_curves(self._sigma.contact_grid, layer_of(contacts))
         pressed = press(contacts, layer if contacts.layered else None)
         if layer is not None and self._needs_stiffness:
             contacts.stiffness = stiffness(contacts, pressed, layer)
@@ -133,13 +132,6 @@ class FrfModel:
             sigma.append(chain(value, (by_offset, offset), *zip(partial, at_points, strict=True)))
             inside &= curves.inside[contact]
         return sigma, inside
-
-    def _layer_curves(self, contacts: Contacts) -> ContactCurves:
-        """The contact curves of the layer at hand; those of the last layer are kept."""
-        layer = layer_of(contacts)
-        if self._last_layer is None or self._last_layer[0] != layer:
-            self._last_layer = layer, self._sigma.contact_grid.curves(layer)
-        return self._last_layer[1]
 
     def _offset(self, own: dict[str, Values], position: Sequence[Differentiated]) -> Differentiated:
         """The distance of each point's contact from its sensor's centre [m]."""

@@ -15,6 +15,7 @@ from underskin.errors import InvalidInput
 from underskin.mechanisms.autodiff import Differentiated, constant, where
 from underskin.mechanisms.base import Mechanism, Parameter, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
+from underskin.mechanisms.models.contact_stage import layer_curves
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.models.indentation_law import Sphere, in_contact
 from underskin.mechanisms.models.nuisances import (
@@ -63,13 +64,12 @@ class IndentationModel:
         self._radius = to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in recordings])
         self._displacement = to_si("displacement_mm", np.concatenate([entry.displacement_mm for entry in recordings]))
         self._time = times_of(recordings)
-        self._last_layer: tuple[Layer, ContactCurves] | None = None
 
     def predict(self, fit: Floats) -> Prediction:
         """All samples at one point of the fit coordinates (parameters,)."""
         own, nuisances, _ = self._composition.values(np.asarray(fit, dtype=float), 1)
         curve = self._curve(own, nuisances)
-        spheres = Sphere(curve, self._radius, self._layer_curves(curve) if curve.layered else None)
+        spheres = Sphere(curve, self._radius, _curves(curve) if curve.layered else None)
         travel = self._travel(nuisances)
         if curve.relaxation is None:
             answer, inside = self._elastic(spheres, travel)
@@ -130,12 +130,6 @@ class IndentationModel:
         force, _, inside = on(spheres, where(~ahead, travel, 0.0), presses)
         return where(touched, force, 0.0), inside
 
-    def _layer_curves(self, curve: Curve) -> ContactCurves:
-        layer = Layer(float(curve.poisson_ratio.value[0]))
-        if self._last_layer is None or self._last_layer[0] != layer:
-            self._last_layer = layer, _grid().curves(layer)
-        return self._last_layer[1]
-
 
 def declared_modulus(youngs_modulus_mpa: float | None) -> float:
     """What the parameter youngs_modulus multiplies [Pa]: the declared modulus, or 1 MPa."""
@@ -154,6 +148,11 @@ def _since(found: NDArray[np.bool_], first: NDArray[np.bool_]) -> NDArray[np.boo
     total = np.cumsum(found)
     before = np.maximum.accumulate(np.where(first, total - found, 0))
     return np.asarray(total > before)
+
+
+def _curves(curve: Curve) -> ContactCurves:
+    """Of the layer that the curve was recorded on."""
+    return layer_curves(_grid(), Layer(float(curve.poisson_ratio.value[0])))
 
 
 @cache
