@@ -1,4 +1,4 @@
-"""The tables that answer, and the hash that names each."""
+"""The tables that ship, and the hash that names each."""
 
 from typing import Any
 
@@ -43,7 +43,7 @@ class Tables(BaseModel):
 
 @router.get("/tables", operation_id="tables", summary="The tables in use")
 async def tables(request: Request, table: Table) -> Tables:
-    """The tables that answers come from, with domain and origin."""
+    """The tables of σ and influence that answers are computed from, and the contact table, which is reference data."""
     folder = request.app.state.settings.tables
     return Tables(tables=[_entry(table), _entry(influence_table(folder)), _entry(contact_table(folder))])
 
