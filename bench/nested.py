@@ -18,8 +18,8 @@ from tests.nested_sampling import Posterior, Sampled, nested
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.explanation import Explanation, Workbench
 from underskin.diagnosis.inference.optimizer import Fitter
-from underskin.diagnosis.noise.noise_priors import NO_POSITION
 from underskin.diagnosis.selection.search import log_prior
+from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
 from underskin.surrogate.sigma_table import load_table
 
 HIDDEN: dict[str, Effects] = {
@@ -111,7 +111,7 @@ def _sampled(bench: Workbench, explained: Explanation) -> Sampled:
     if explained.placed == 0:
         return without
     beside = nested(Posterior(placed, explained.point))
-    parts = np.add(np.log([NO_POSITION, 1 - NO_POSITION]), [without.log_evidence, beside.log_evidence])
+    parts = np.add(np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER]), [without.log_evidence, beside.log_evidence])
     total = float(np.logaddexp.reduce(parts))
     error = float(np.hypot(*(np.exp(parts - total) * [without.error, beside.error])))
     return Sampled(total, error, without.likelihoods + beside.likelihoods)

@@ -11,9 +11,10 @@ import pytest
 from tests.diagnosis_campaigns import Made, campaign
 from tests.mechanism_campaigns import indentation_campaign
 from underskin.diagnosis.data.dataset import lines
+from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.inference.explanation import Explanation, Workbench
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.planning.optimal_design import DECIDED, plan
+from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import Limits
 from underskin.diagnosis.selection.search import Answer, Search, search
 from underskin.formatting import in_percent
@@ -72,7 +73,7 @@ def test_the_sentence_names_all_that_it_separates(narrow: Left) -> None:
 
 def test_where_the_campaign_s_own_settings_tell_nothing_others_are_tried(twins: Left) -> None:
     """At one dynamic force a moving edge and a finite amplitude are the same; another one tells them apart."""
-    assert twins.search.answers[0].probability < DECIDED
+    assert twins.search.answers[0].probability < EXPLAINED
     planned = twins.plan()
     assert planned["probability_of_deciding"] > planned["without_it"]
     assert "beyond what this campaign did" in planned["statement"]
@@ -168,7 +169,7 @@ def test_a_plan_decides_as_often_as_it_promises(narrow: Left, table: SigmaTable)
             assert again is not None
             assert before is not None
             log_posterior[number] += again.log_evidence - before.log_evidence
-        decided += bool(np.exp(log_posterior[truth] - np.logaddexp.reduce(log_posterior)) >= DECIDED)
+        decided += bool(np.exp(log_posterior[truth] - np.logaddexp.reduce(log_posterior)) >= EXPLAINED)
     promised = planned["probability_of_deciding"]
     assert promised > planned["without_it"] + 0.1
     assert abs(decided / DRAWS - promised) < 3 * np.sqrt(promised * (1 - promised) / DRAWS) + 0.05

@@ -17,10 +17,11 @@ from underskin.diagnosis.inference.hypothesis import Hypothesis, Point
 from underskin.diagnosis.inference.likelihood import Curvature
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.inference.position_curvature import curvature
-from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, NO_POSITION, POSITION
+from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR
 from underskin.mechanisms.models.composed import Model, compose
 from underskin.mechanisms.models.composition import parameters_together
 from underskin.mechanisms.registry import CATALOGUE
+from underskin.recordings.usual_scatter import NO_POSITION_SCATTER, POSITION_RANGE
 from underskin.surrogate.sigma_table import SigmaTable
 
 _QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7, 0.9), 3: (0.2, 0.5, 0.8)}
@@ -110,7 +111,7 @@ class Workbench:
         """
         plain = self.hypothesis(names, False)
         fitters = [Fitter(plain), Fitter(replace(plain, placed=True))]
-        weights = np.log([NO_POSITION, 1 - NO_POSITION])
+        weights = np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER])
         found: list[tuple[float, Evidence]] = []
         starts: list[Evaluated] = []
         if parent is None or parent.placed < _DECIDED:
@@ -151,7 +152,7 @@ class Workbench:
         slopes = at.prediction.position_slopes
         if slopes is None:
             return False
-        p = POSITION[1]
+        p = POSITION_RANGE[1]
         size = np.abs(at.prediction.value) ** 2 + 1e-300
         first = (np.abs(slopes) ** 2).sum(axis=0) / size
         second = self.curvature.square[at_recording(self, at)]

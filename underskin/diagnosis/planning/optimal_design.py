@@ -6,7 +6,7 @@ response, with the covariance S + J Σ Jᵀ: S the scatter of gains, of position
 of its own parameters (d33 among them, so that a common factor tells nothing). Recordings are added one by one, repeats
 allowed, the one first that raises the expected probability of deciding most; of equal ones that whose sphere is mounted
 already. That probability is simulated: truth drawn from the posterior, recordings from its prediction, and the
-posterior updated: the chance that the true explanation then holds at least 0.8.
+posterior updated: the chance that the true explanation then could be stated without its rivals (`EXPLAINED`).
 """
 
 import itertools
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.data.axes import WORDS
-from underskin.diagnosis.data.names import in_words
+from underskin.diagnosis.data.names import EXPLAINED, in_words
 from underskin.diagnosis.inference.explanation import Workbench
 from underskin.diagnosis.planning.rig_limits import Limits, candidates, inferred, wider
 from underskin.diagnosis.selection.search import Answer, Search
@@ -28,7 +28,6 @@ from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.conditions import Conditions, FrfConditions
 from underskin.units import Floats
 
-DECIDED = 0.8
 SEED = 20180206
 _SIMULATIONS = 2000
 _ENOUGH = 0.95
@@ -51,7 +50,7 @@ def plan(bench: Workbench, search: Search, limits: Limits) -> dict[str, Any]:
             found = _planned(bench, surviving, rig, bool(beyond))
             if found:
                 return found
-    return {} if surviving[0].probability >= DECIDED else _nothing_to_plan(surviving)
+    return {} if surviving[0].probability >= EXPLAINED else _nothing_to_plan(surviving)
 
 
 def _planned(bench: Workbench, surviving: Sequence[Answer], limits: Limits, beyond: bool) -> dict[str, Any]:
@@ -152,7 +151,7 @@ class _Outlook:
     prior: Floats  # (rivals,)
 
     def deciding(self, chosen: Sequence[int]) -> float:
-        """The simulated chance that the true explanation holds `DECIDED` after these recordings."""
+        """The simulated chance that the true explanation holds `EXPLAINED` after these recordings."""
         random = np.random.default_rng(SEED)
         truth = random.choice(len(self.prior), size=_SIMULATIONS, p=self.prior)
         noise = random.normal(size=(_SIMULATIONS, len(chosen)))
@@ -168,7 +167,7 @@ class _Outlook:
             log_posterior[:, rival] = -0.5 * (white**2).sum(axis=0) - np.log(np.diag(root)).sum()
         log_posterior += np.log(self.prior)
         log_posterior -= np.logaddexp.reduce(log_posterior, axis=1)[:, None]
-        return float((np.exp(log_posterior[np.arange(_SIMULATIONS), truth]) >= DECIDED).mean())
+        return float((np.exp(log_posterior[np.arange(_SIMULATIONS), truth]) >= EXPLAINED).mean())
 
     @property
     def promising(self) -> list[int]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from underskin.diagnosis.data.names import NOTHING_MISSING
+from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, Workbench, own_places
 from underskin.diagnosis.localisation.effect_size import Effect
 from underskin.diagnosis.localisation.permutation_test import AxisResult, reaches_all_along
@@ -17,7 +17,7 @@ from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.fit_warnings import doubts
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
 from underskin.diagnosis.reporting.numbers import parameter, place_of, probability, rounded
-from underskin.diagnosis.reporting.statements import EXPLAINED, answer_statement, location_statement, why_not
+from underskin.diagnosis.reporting.statements import answer_statement, location_statement, why_not
 from underskin.diagnosis.selection.search import Answer, Search
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import Confounding

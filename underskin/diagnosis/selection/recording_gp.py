@@ -16,9 +16,10 @@ from scipy.special import logsumexp
 from underskin.diagnosis.data.axes import order, preload_before, recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, Workbench
 from underskin.diagnosis.inference.optimizer import Evaluated
-from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, NO_POSITION, POSITION_PRIOR
+from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, normalised
 from underskin.mechanisms.base import Normal, Parameter
+from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
 from underskin.units import Floats
 
 _LENGTHS = (0.15, 0.4, 1.2)  # of a recording's axis, over its range
@@ -181,8 +182,8 @@ def relative_place_slopes(at: Evaluated) -> Floats:
 def _shares(positions: Floats) -> dict[float, float]:
     """The shares of no scatter of position, and of each of these."""
     shares = np.exp([POSITION_PRIOR.log_density(float(np.log(position))) for position in positions])
-    shares *= (1 - NO_POSITION) / shares.sum()
-    return {0.0: NO_POSITION, **dict(zip(positions.tolist(), shares.tolist(), strict=True))}
+    shares *= (1 - NO_POSITION_SCATTER) / shares.sum()
+    return {0.0: NO_POSITION_SCATTER, **dict(zip(positions.tolist(), shares.tolist(), strict=True))}
 
 
 def _prior_sd(entry: Parameter) -> float:

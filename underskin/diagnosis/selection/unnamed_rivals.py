@@ -16,9 +16,10 @@ from underskin.diagnosis.inference.explanation import Explanation, Workbench
 from underskin.diagnosis.inference.hypothesis import Hypothesis
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.noise.correlated_error import UNNAMED
-from underskin.diagnosis.noise.noise_priors import GAIN, POSITION, UNUSUAL_GAIN, UNUSUAL_POSITION
+from underskin.diagnosis.noise.noise_priors import UNUSUAL_GAIN, UNUSUAL_POSITION
 from underskin.diagnosis.selection.frequency_gp import over_lines
 from underskin.diagnosis.selection.recording_gp import over_recordings
+from underskin.recordings.usual_scatter import GAIN_RANGE, POSITION_RANGE
 
 _KINDS = {"recordings": 0.45, "lines": 0.4, "both": 0.05, "scatter": 0.1}
 
@@ -55,10 +56,10 @@ def _unusual_scatter(explanation: Explanation) -> dict[str, float]:
     levels = explanation.best.at.marginal.levels
     usual = explanation.best.fitter.hypothesis
     found = {}
-    if levels.gain > GAIN[1]:
+    if levels.gain > GAIN_RANGE[1]:
         wider = replace(usual, gain=UNUSUAL_GAIN)
         found["scatter of gain"] = _refitted(wider, explanation, 0, UNUSUAL_GAIN.low)
-    if levels.position > POSITION[1]:
+    if levels.position > POSITION_RANGE[1]:
         wider = replace(usual, position=UNUSUAL_POSITION)
         found["scatter of position"] = _refitted(wider, explanation, 2, UNUSUAL_POSITION.low)
     return {name: log_evidence - explanation.log_evidence for name, log_evidence in found.items()}

@@ -22,14 +22,15 @@ from underskin.diagnosis.noise.correlated_error import TYPICAL
 from underskin.diagnosis.noise.noise_levels import NoiseLevels
 from underskin.diagnosis.selection.search import Answer
 from underskin.mechanisms.base import Normal, Parameter, Unsupported
+from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.registry import CATALOGUE
+from underskin.recordings.usual_scatter import USUAL_GAIN
 from underskin.units import Floats
 
 _LEAST_CHI2 = 9.0
 _TWINS = 0.98
 _ENDS = (0.1, 0.9)  # of a shape's usual range
 _OPEN = 0.1  # of the leader's probability: a rival beyond that is not told from it
-_GAIN = 0.022
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def confounding(bench: Workbench) -> list[Confounding]:
     lines = bench.lines
     ratio = TYPICAL if lines.curves else 0.0
     moments = Moments(lines, prediction, np.zeros(lines.recordings), bench.curvature, 0.0, ratio)
-    information, _ = Marginal(lines, moments, NoiseLevels(_GAIN, 1.0, 0.0, 0.01)).normal_equations()
+    information, _ = Marginal(lines, moments, NoiseLevels(USUAL_GAIN, 1.0, 0.0, SENSOR_SPREAD)).normal_equations()
     return _told(owners, information, fitter.parameters)
 
 
