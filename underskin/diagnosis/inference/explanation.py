@@ -46,19 +46,19 @@ class Explanation:
     @classmethod
     def of(cls, names: Sequence[str], each: Sequence[tuple[float, Evidence]]) -> Self:
         """From the fits, the log prior of each beside it."""
-        weights = np.array([prior + found.log_evidence for prior, found in each])
+        weights = np.array([prior + fit.log_evidence for prior, fit in each])
         total = float(np.logaddexp.reduce(weights))
         best = each[int(np.argmax(weights))][1]
-        scattered = [found.fitter.hypothesis.placed for _, found in each]
+        scattered = [fit.fitter.hypothesis.placed for _, fit in each]
         placed = float(np.exp(weights[scattered] - total).sum())
         return cls(tuple(name for name in CATALOGUE if name in names), total, best, placed, tuple(each))
 
     def integrated(self) -> Self:
         """With the evidence of each fit that counts over all values of what the lines leave loose."""
-        least = max(prior + found.log_evidence for prior, found in self.each) - _COUNTS
+        least = max(prior + fit.log_evidence for prior, fit in self.each) - _COUNTS
         return self.of(
             self.names,
-            [(prior, integrated(found) if prior + found.log_evidence > least else found) for prior, found in self.each],
+            [(prior, integrated(fit) if prior + fit.log_evidence > least else fit) for prior, fit in self.each],
         )
 
     @property
@@ -112,7 +112,7 @@ class Workbench:
         plain = self.hypothesis(names, False)
         fitters = [Fitter(plain), Fitter(replace(plain, placed=True))]
         weights = np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER])
-        found: list[tuple[float, Evidence]] = []
+        fits: list[tuple[float, Evidence]] = []
         starts: list[Evaluated] = []
         if parent is None or parent.placed < _DECIDED:
             starts = [fitters[0].improve(at.point) for at in self._starts(fitters[0], names, parent)]
@@ -121,26 +121,26 @@ class Workbench:
                 return None
             if parent is None and not self._position_matters(best):
                 weights[0] = 0.0
-            found.append((weights[0], around(fitters[0], best)))
+            fits.append((weights[0], around(fitters[0], best)))
         if (parent is None and weights[0] < 0) or (parent is not None and parent.placed > 1 - _DECIDED):
             beside = starts or self._starts(fitters[1], names, parent)
             best = min((fitters[1].improve(_placed_start(fitters[1], at)) for at in beside), key=lambda at: at.cost)
             if not self._gains(best, parent, 1):
                 return None
-            found.append((weights[1], around(fitters[1], best)))
-        return Explanation.of(names, found)
+            fits.append((weights[1], around(fitters[1], best)))
+        return Explanation.of(names, fits)
 
-    def refit(self, found: Explanation) -> Explanation | None:
+    def refit(self, explanation: Explanation) -> Explanation | None:
         """A set that was fitted to more recordings, fitted to these, from where it stood; its evidence is a bell's.
 
         None where the set has other parameters here. Raises Unsupported.
         """
-        placed = found.best.fitter.hypothesis.placed
-        fitter = Fitter(self.hypothesis(found.names, placed))
-        if [entry.name for entry in fitter.parameters] != [entry.name for entry in found.model.parameters]:
+        placed = explanation.best.fitter.hypothesis.placed
+        fitter = Fitter(self.hypothesis(explanation.names, placed))
+        if [entry.name for entry in fitter.parameters] != [entry.name for entry in explanation.model.parameters]:
             return None
-        best = around(fitter, fitter.improve(replace(found.point, bend=fitter.no_bend)))
-        return Explanation.of(found.names, [(0.0, best)])
+        best = around(fitter, fitter.improve(replace(explanation.point, bend=fitter.no_bend)))
+        return Explanation.of(explanation.names, [(0.0, best)])
 
     @staticmethod
     def _gains(at: Evaluated, parent: Explanation | None, placed: int) -> bool:

@@ -47,9 +47,9 @@ def plan(bench: Workbench, search: Search, limits: Limits) -> dict[str, Any]:
     if not bench.lines.curves:
         within = inferred(bench.lines.campaign, limits)
         for beyond, rig in enumerate([within] if limits.given else [within, wider(bench.lines.campaign, within)]):
-            found = _planned(bench, surviving, rig, bool(beyond))
-            if found:
-                return found
+            planned = _planned(bench, surviving, rig, bool(beyond))
+            if planned:
+                return planned
     return {} if surviving[0].probability >= EXPLAINED else _nothing_to_plan(surviving)
 
 
@@ -77,21 +77,21 @@ def _planned(bench: Workbench, surviving: Sequence[Answer], limits: Limits, beyo
 def _nothing_to_plan(surviving: Sequence[Answer]) -> dict[str, Any]:
     """Why no recording is planned, and on which axes the rivals would differ."""
     names = [list(answer.names) for answer in surviving]
-    told = f"No recording within these limits tells {_together([in_words(entry) for entry in names])} apart."
+    statement = f"No recording within these limits tells {_together([in_words(entry) for entry in names])} apart."
     axes = [
         {axis for name in entry for axis in CATALOGUE[name].axes} for entry in names if set(entry) <= set(CATALOGUE)
     ]
     apart = {axis for own in axes for axis in own if any(axis not in other for other in axes)}
     if apart:
         words = sorted(WORDS[axis][0] if axis in WORDS else axis for axis in apart)
-        told += f" They differ in what they depend on: vary the {_together(words)} more widely than here."
+        statement += f" They differ in what they depend on: vary the {_together(words)} more widely than here."
     return {
         "recordings": [],
         "separates": names,
         "probability_of_deciding": 0.0,
         "without_it": 0.0,
         "minutes": 0.0,
-        "statement": told,
+        "statement": statement,
     }
 
 
@@ -172,11 +172,11 @@ class _Outlook:
     @property
     def promising(self) -> list[int]:
         """Candidates at the ends of what separates each pair of rivals: only these are worth a simulation."""
-        found: list[int] = []
+        ends: list[int] = []
         for first, second in itertools.combinations(range(len(self.prior)), 2):
             order = np.argsort(self.responses[first] - self.responses[second], kind="stable").tolist()
-            found += [*order[:2], *order[-2:]]
-        return list(dict.fromkeys(found))
+            ends += [*order[:2], *order[-2:]]
+        return list(dict.fromkeys(ends))
 
 
 def _choose(outlook: _Outlook, candidates: Sequence[FrfConditions], limits: Limits) -> tuple[list[int], float]:
@@ -191,17 +191,17 @@ def _choose(outlook: _Outlook, candidates: Sequence[FrfConditions], limits: Limi
         for step in steps:
             new = {candidates[index].indenter_radius_mm for index in step} - mounted
             rated.append((round(outlook.deciding([*chosen, *step]), 3), -len(new), tuple(-index for index in step)))
-        chance, _, picked = max(rated)
+        chance, _, step = max(rated)
         if chance < best + _LEAST_GAIN:
             break
-        chosen += [-index for index in picked]
+        chosen += [-index for index in step]
         best = chance
         steps = [(index,) for index in promising]
     return chosen, best
 
 
 def _described(candidates: Sequence[FrfConditions], chosen: Sequence[int]) -> list[dict[str, Any]]:
-    found = []
+    documents = []
     for index in sorted(set(chosen)):
         entry = candidates[index]
         described: Mapping[str, Any] = {
@@ -213,8 +213,8 @@ def _described(candidates: Sequence[FrfConditions], chosen: Sequence[int]) -> li
             "dwell_s": entry.dwell_s,
             "repeats": list(chosen).count(index),
         }
-        found.append({name: value for name, value in described.items() if value is not None})
-    return found
+        documents.append({name: value for name, value in described.items() if value is not None})
+    return documents
 
 
 def _statement(

@@ -15,7 +15,7 @@ from underskin.mechanisms.registry import CATALOGUE
 
 
 def explains_percent(
-    search: Search, bench: Workbench, explanation: Explanation, name: str, whole: cross_validation.Prediction
+    search: Search, bench: Workbench, explanation: Explanation, name: str, whole: cross_validation.PredictionScore
 ) -> float | None:
     """How much of the misfit beyond noise, without the mechanism, it takes away [%].
 

@@ -104,13 +104,13 @@ def _told(owners: Sequence[str], information: Floats, nuisances: Sequence[Parame
     left = own - shared @ np.linalg.solve(beside, shared.T)
     chi2 = np.maximum(np.diag(left), 0.0)
     first = {name: owners.index(name) for name in owners}  # a mechanism's first signature is the typical one
-    found = []
+    confounded = []
     for name, index in first.items():
         if own[index, index] < _LEAST_CHI2:
-            found.append(Confounding(name, "noise", "at a typical strength it stays within the noise here"))
+            confounded.append(Confounding(name, "noise", "at a typical strength it stays within the noise here"))
         elif chi2[index] < _LEAST_CHI2:
             reason = "at a typical strength, d33, E and h within their tolerances take up what it does here"
-            found.append(Confounding(name, "d33", reason))
+            confounded.append(Confounding(name, "d33", reason))
     visible = [name for name in first if chi2[first[name]] >= _LEAST_CHI2]
     for one, other in itertools.combinations(visible, 2):
         for typical_one, shaped in ((one, other), (other, one)):
@@ -120,9 +120,9 @@ def _told(owners: Sequence[str], information: Floats, nuisances: Sequence[Parame
             apart = (1 - cosine**2) * np.minimum(chi2[place], chi2[rivals])
             if (np.abs(cosine) > _TWINS).any() or (apart < _LEAST_CHI2).any():
                 reason = f"what {typical_one} typically does to these recordings, {shaped} can do as well"
-                found.append(Confounding(one, other, reason))
+                confounded.append(Confounding(one, other, reason))
                 break
-    return found
+    return confounded
 
 
 def left_open(confounded: Sequence[Confounding], answers: Sequence[Answer]) -> list[Confounding]:
@@ -139,15 +139,15 @@ def left_open(confounded: Sequence[Confounding], answers: Sequence[Answer]) -> l
         gone, come = named - set(rival), set(rival) - named
         if len(gone) == len(come) == 1:
             swapped[frozenset(gone | come)] = (*gone, *come)
-    found = []
+    open_ones = []
     for entry in confounded:
         both = {entry.mechanism, entry.confounded_with}
         if not both & named or frozenset(both) in swapped:
-            found.append(entry)
+            open_ones.append(entry)
             swapped.pop(frozenset(both), None)
     for one, other in sorted(swapped.values()):
-        found.append(Confounding(one, other, f"{other} explains these recordings about as well as {one}"))
-    return found
+        open_ones.append(Confounding(one, other, f"{other} explains these recordings about as well as {one}"))
+    return open_ones
 
 
 def _sets(answers: Sequence[Answer]) -> list[tuple[str, ...]]:
