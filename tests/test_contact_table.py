@@ -11,6 +11,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from tablegen.contact_column import press_spheres
+from tablegen.contact_interpolation import ContactInterpolation
 from tests import felupe_contact
 from tests.oracle import NEEDS_ORACLE
 from underskin import TableError
@@ -18,10 +19,9 @@ from underskin.physics import hertz, linear_layer
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import normal_stress
 from underskin.physics.sphere_contact import SphereOnLayer
-from underskin.surrogate.contact_table import ContactTable, load_contact
 from underskin.surrogate.sigma_table import load_table, tables_folder
 
-TABLE = load_contact()
+TABLE = ContactInterpolation(tables_folder() / "contact.h5")
 RHO = [0.2, 0.6, 1.0]
 
 
@@ -126,7 +126,7 @@ def test_a_table_that_lacks_a_dataset_is_refused(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         del file["stress/sigma_error"]
     with pytest.raises(TableError, match="was altered"):
-        ContactTable(path)
+        ContactInterpolation(path)
 
 
 def test_the_shipped_tables_are_small() -> None:

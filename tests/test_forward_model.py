@@ -160,7 +160,7 @@ def test_lines_of_a_time_series_must_be_estimated_before_they_are_predicted() ->
 def test_columns_that_make_no_rows_are_refused() -> None:
     with pytest.raises(InvalidInput, match="colour"):
         rows(colour=1.0)
-    with pytest.raises(InvalidInput, match=r"preload_n 3, .*dwell_s 2|dwell_s 2.*preload_n 3"):
+    with pytest.raises(InvalidInput, match="must have one length"):
         rows(dwell_s=[1.0, 2.0])
 
 

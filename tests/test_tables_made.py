@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tablegen import contact_table, influence_table, sigma_table
+from tablegen.contact_interpolation import ContactInterpolation
 from tablegen.sweep import sources_hash
-from underskin.surrogate.contact_table import ContactTable
 from underskin.surrogate.sigma_table import tables_folder
 
 MADE_BY = {"sigma.h5": sigma_table, "influence.h5": influence_table, "contact.h5": contact_table}
@@ -52,7 +52,7 @@ def test_influence_solved_anew() -> None:
 
 def test_contact_solved_anew() -> None:
     """The table holds a spline through the solved edges, at other spheres: within its own error."""
-    table = ContactTable(tables_folder() / "contact.h5")
+    table = ContactInterpolation(tables_folder() / "contact.h5")
     _, cbrt_load, rho = contact_table.DEFAULT_AXES
     edge = float(contact_table.DEFAULT_EDGES[len(contact_table.DEFAULT_EDGES) // 2])
     solved = contact_table.solve_piece(edge, rho, cbrt_load[1:], contact_table.ORDER)

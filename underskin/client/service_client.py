@@ -157,7 +157,7 @@ class Client:
         return self._request("POST", "/v1/design", fields)
 
     def tables(self) -> tuple[TableEntry, ...]:
-        """The tables that answers come from."""
+        """The tables of the service: σ and influence, which answers are computed from, and contact, reference data."""
         document = self._request("GET", "/v1/tables")
         return tuple(
             TableEntry(**{**entry, "axes": tuple(TableAxis(**axis) for axis in entry["axes"])})

@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 from scipy.stats import t as student
 
+from underskin.recordings.usual_scatter import NO_POSITION_SCATTER, POSITION_RANGE, USUAL_GAIN
 from underskin.units import Floats
 
 GAINS = np.geomspace(2e-3, 0.8, 36)
 SPREADS = np.concatenate([[0.0], np.geomspace(2e-3, 1.5, 36)])
-POSITIONS = np.array([0.0, 0.05e-3, 0.1e-3, 0.15e-3, 0.2e-3, 0.25e-3, 0.3e-3])  # [m]
-_GAIN_MEDIAN, _GAIN_FACTOR = 0.022, 2.0
+POSITIONS = np.array([0.0, POSITION_RANGE[0], 0.1e-3, 0.15e-3, 0.2e-3, 0.25e-3, POSITION_RANGE[1]])  # [m]
+_GAIN_FACTOR = 2.0  # of the log-normal prior about USUAL_GAIN
 _NO_SPREAD, _SPREAD_SCALE = 0.6, 0.05
-_NO_POSITION_SCATTER = 0.7
 _LEVEL = 0.95
 
 
@@ -143,14 +143,14 @@ def prior_scatter() -> Scatter:
 
 def _prior(spreads: Floats) -> Floats:
     """Prior weight of each node, the cells of the grid included (positions, gains, spreads)."""
-    gain = np.exp(-0.5 * (np.log(GAINS / _GAIN_MEDIAN) / np.log(_GAIN_FACTOR)) ** 2)
+    gain = np.exp(-0.5 * (np.log(GAINS / USUAL_GAIN) / np.log(_GAIN_FACTOR)) ** 2)
     spread = np.ones(1)
     if len(spreads) > 1:
         spread = np.gradient(spreads) / (1 + (spreads / _SPREAD_SCALE) ** 2)
         spread *= (1 - _NO_SPREAD) / spread[1:].sum()
         spread[0] = _NO_SPREAD
-    position = np.full(len(POSITIONS), (1 - _NO_POSITION_SCATTER) / (len(POSITIONS) - 1))
-    position[0] = _NO_POSITION_SCATTER
+    position = np.full(len(POSITIONS), (1 - NO_POSITION_SCATTER) / (len(POSITIONS) - 1))
+    position[0] = NO_POSITION_SCATTER
     return position[:, None, None] * gain[:, None] * spread
 
 

@@ -32,10 +32,10 @@ def sigma(table: SigmaTable, given: Mapping[str, Floats], model: Model) -> Answe
     """σ from `a_over_h`, `rt_over_h` and `load_parameter`; raises InvalidInput."""
     a, rho, load = (non_negative(name, given[name]) for name in ("a_over_h", "rt_over_h", "load_parameter"))
     if model == "layer":
-        found, domain = table.sigma(a, rho, load), _table_domain(table)
+        answer, domain = table.sigma(a, rho, load), _table_domain(table)
     else:
-        found, domain = half_space.sigma_in_domain(a, rho), f"a/h and rT/h 0 to {half_space.DOMAIN_END:g}"
-    return Answer({"sigma": found.sigma, "rel_error": found.rel_error}, found.inside, domain)
+        answer, domain = half_space.sigma_in_domain(a, rho), f"a/h and rT/h 0 to {half_space.DOMAIN_END:g}"
+    return Answer({"sigma": answer.sigma, "rel_error": answer.rel_error}, answer.inside, domain)
 
 
 def frf(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Answer:

@@ -27,22 +27,22 @@ class Pressed:
     poisson_ratio: float
 
 
-def usable(level: Floats, noise: Floats, sigma: Floats, felt: Transmission) -> NDArray[np.bool_]:
+def usable(level: Floats, noise: Floats, sigma: Floats, transmitted: Transmission) -> NDArray[np.bool_]:
     """The rows inside the table's domain, at an offset that it reaches, with a line in the band and below 1 C/N."""
-    return felt.inside & np.isfinite(sigma) & (np.hypot(level, noise) < _MOST_CHARGE)
+    return transmitted.inside & np.isfinite(sigma) & (np.hypot(level, noise) < _MOST_CHARGE)
 
 
 def reasons(
-    recorded: Sequence[FrfRecording], skin: SkinDescription, felt: Transmission, level: Floats, table: SigmaTable
+    recorded: Sequence[FrfRecording], skin: SkinDescription, transmitted: Transmission, level: Floats, table: SigmaTable
 ) -> Iterator[str]:
     """Of each recording that is not `usable` why; `level` is its averaged FRF [C/N], NaN without a line in the band."""
     for row, recording in enumerate(recorded):
-        if skin.poisson_ratio != INCOMPRESSIBLE or not felt.inside[row]:
+        if skin.poisson_ratio != INCOMPRESSIBLE or not transmitted.inside[row]:
             assert skin.youngs_modulus_mpa is not None
             pressed = Pressed(
                 recording.preload_n, recording.indenter_radius_mm, skin.youngs_modulus_mpa, skin.poisson_ratio
             )
-            yield beyond(pressed, [float(part[row]) for part in _numbers(felt)], table)
+            yield beyond(pressed, [float(part[row]) for part in _numbers(transmitted)], table)
         elif not np.isfinite(level[row]):
             yield "it has no line in the band"
         elif not abs(level[row]) < _MOST_CHARGE:
@@ -51,8 +51,12 @@ def reasons(
             yield "its position is farther from the sensor than the table reaches, or its lines scatter beyond measure"
 
 
-def _numbers(felt: Transmission) -> tuple[Floats, Floats, Floats]:
-    return felt.a_over_h, np.broadcast_to(felt.rt_over_h, felt.a_over_h.shape), felt.load_parameter
+def _numbers(transmitted: Transmission) -> tuple[Floats, Floats, Floats]:
+    return (
+        transmitted.a_over_h,
+        np.broadcast_to(transmitted.rt_over_h, transmitted.a_over_h.shape),
+        transmitted.load_parameter,
+    )
 
 
 def beyond(pressed: Pressed, numbers: Sequence[float], table: SigmaTable) -> str:

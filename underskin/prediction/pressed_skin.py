@@ -38,7 +38,25 @@ class Transmission:
 
 
 def transmission(table: SigmaTable, skin: Skin, indenter: Indenter, preload: ArrayLike) -> Transmission:
-    """σ and what leads to it for each row; rows with ν ≠ 0.5 are outside, since the table is incompressible."""
+    """Contact radius, σ and mean stress of a skin pressed by a sphere, by the base model.
+
+    Parameters
+    ----------
+    table
+        The σ table.
+    skin, indenter
+        In SI, scalars or columns that broadcast.
+    preload
+        F [N], (rows,) or one.
+
+    Returns
+    -------
+    Transmission
+        NaN in σ, error and stress where a row is outside the table; rows with ν ≠ 0.5 are outside, since the table is
+        of an incompressible elastomer.
+
+    Source: Seminara, Sensors 18 (2018) 459, equations 7 to 16.
+    """
     columns = np.broadcast_arrays(
         skin.thickness,
         skin.youngs_modulus,
@@ -68,10 +86,20 @@ def transmission(table: SigmaTable, skin: Skin, indenter: Indenter, preload: Arr
 def frf_gradient(
     table: SigmaTable, skin: Skin, indenter: Indenter, preload: ArrayLike, d33: ArrayLike
 ) -> dict[str, Floats]:
-    """∂FRF/∂ each of thickness, youngs_modulus, sensor_radius, indenter_radius, preload and d33, in SI.
+    """The derivatives of FRF = d33 · (3/2) ρ² σ(α, ρ, L), α = a/h ∝ (F R/E)^(1/3)/h, ρ = rT/h, L = F/(R² E).
 
-    FRF = d33 · (3/2) ρ² σ(α, ρ, L) with α = a/h, ρ = rT/h, and by Hertz α ∝ (F R/E)^(1/3)/h, L = F/(R² E). NaN where
-    the row is outside the table.
+    Parameters
+    ----------
+    table, skin, indenter, preload
+        As for `transmission`.
+    d33
+        [C/N], (rows,) or one.
+
+    Returns
+    -------
+    dict
+        ∂FRF/∂ each of thickness, youngs_modulus, sensor_radius, indenter_radius, preload and d33, in SI, (rows,); NaN
+        where the row is outside the table.
     """
     reached = transmission(table, skin, indenter, preload)
     rho = reached.rt_over_h

@@ -52,7 +52,7 @@ class Resolution:
 
 @dataclass(frozen=True)
 class Design:
-    """What is found: the contact, γ above the sensor, response and γ against the offset [m], sweeps, resolution."""
+    """A skin under one contact: γ above the sensor, response and γ against the offset [m], sweeps, resolution."""
 
     contact: Transmission
     gamma: float
@@ -64,9 +64,26 @@ class Design:
 
 
 def design(table: SigmaTable, skin: Skin, indenter: Indenter, preload: float, pitch: float, dip: float) -> Design:
-    """One skin under one contact, in SI; `pitch` of the array [m], `dip` over the reading above a sensor [-].
+    """How much of a load reaches the sensors of a skin, and how finely its array locates it.
 
-    What lies outside the table's domain is NaN.
+    Parameters
+    ----------
+    table
+        The σ table.
+    skin, indenter
+        One skin and sphere, in SI.
+    preload
+        F [N].
+    pitch
+        Distance between the centres of neighbouring sensors [m].
+    dip
+        By how much a sensor between two others must read less than both for two loads to show as two, over the reading
+        above a sensor [-].
+
+    Returns
+    -------
+    Design
+        NaN in what lies outside the table's domain.
     """
     contact = transmission(table, skin, indenter, preload)
     point = tuple(float(part) for part in (contact.a_over_h, contact.rt_over_h, contact.load_parameter))
@@ -86,18 +103,30 @@ def design(table: SigmaTable, skin: Skin, indenter: Indenter, preload: float, pi
 
 
 def _sweeps(table: SigmaTable, point: tuple[float, ...]) -> tuple[Sweep, ...]:
-    found = []
+    sweeps = []
     for place, (axis, (low, high)) in enumerate(table.domain.items()):
         # σ turns fastest near L = 0, where it grows like its cube root.
         values = low + (high - low) * np.linspace(0, 1, _SWEEP) ** (3 if axis == "load_parameter" else 1)
         columns = [values if number == place else np.full(_SWEEP, own) for number, own in enumerate(point)]
         gamma = table.sigma(0.0, columns[1], 0.0).sigma
-        found.append(Sweep(axis, values, table.sigma(*columns).sigma, gamma))
-    return tuple(found)
+        sweeps.append(Sweep(axis, values, table.sigma(*columns).sigma, gamma))
+    return tuple(sweeps)
 
 
 def resolution(offset: Floats, response: Floats, pitch: float, nearest: float, dip: float) -> Resolution:
-    """From a response at offsets [m] from 0 on, taken as 0 beyond; contacts nearer than `nearest` would overlap."""
+    """The resolution of an array from a sensor's response to the place of the load.
+
+    Parameters
+    ----------
+    offset, response
+        (n,) distance of the load from the sensor's centre [m], from 0 on, and σ there [-]; 0 beyond the last.
+    pitch
+        Of the array [m].
+    nearest
+        Smallest distance of two contacts [m], below which they would overlap.
+    dip
+        As for `design`.
+    """
     if not bool(np.isfinite(response).all()):
         return Resolution(*[float("nan")] * 5)
     last = int(np.flatnonzero(response < float(response[0]) / 2)[0])  # the reach is many times the width

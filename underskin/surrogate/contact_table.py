@@ -1,67 +1,22 @@
-"""The finite-strain contact of a sphere with the layer, from the finite-element table.
+"""The finite-strain contact of a sphere with the layer: reference data that ships beside the tables that answer.
 
 A rigid frictionless sphere of radius R is pressed with the force F into an incompressible neo-Hookean layer bonded to a
-rigid base; L = F/(R² E). Splines of degree 5 in ln(R/h), L^(1/3) and rT/h. Rows outside the domain are NaN.
+rigid base; L = F/(R² E). The library verifies and lists the file and computes nothing from it.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import NdBSpline, make_interp_spline
-
-from underskin.physics import hertz
 from underskin.surrogate.hdf5_format import CONTACT_SCHEMA
 from underskin.surrogate.sigma_table import tables_folder
 from underskin.surrogate.table_file import Table
 from underskin.units import Floats
 
 CONTACT_TABLE = "contact.h5"
-_DEGREE = 5
-_RATIOS = ("contact_radius", "indentation", "stiffness")
-_STRESSES = ("sigma", "sigma_increment")
-_CONTACT_FIELDS = (
-    *("a_over_h", "indentation_over_h", "stiffness"),
-    *("a_error", "indentation_error", "stiffness_error"),
-)
-_STRESS_FIELDS = (*_STRESSES, "sigma_error", "sigma_increment_error")
-
-
-@dataclass(frozen=True)
-class PressedContact:
-    """What presses: equal shapes, NaN outside the table.
-
-    `a_over_h`, `indentation_over_h`; `stiffness` = dF/dδ over E h; the errors are relative.
-    """
-
-    a_over_h: Floats
-    indentation_over_h: Floats
-    stiffness: Floats
-    a_error: Floats
-    indentation_error: Floats
-    stiffness_error: Floats
-    inside: NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class ContactStress:
-    """What a centred sensor bears: equal shapes, NaN outside the table.
-
-    `sigma`: mean stress 3Fσ/(2πh²); `sigma_increment`: d(Fσ)/dF at fixed R, the contact's edge moving with the force;
-    the errors are absolute.
-    """
-
-    sigma: Floats
-    sigma_increment: Floats
-    sigma_error: Floats
-    sigma_increment_error: Floats
-    inside: NDArray[np.bool_]
 
 
 class ContactTable(Table):
-    """A verified table of contacts; see the module."""
+    """A verified table of contacts: its axes, domain and origin."""
 
     schema = CONTACT_SCHEMA
 
@@ -71,10 +26,6 @@ class ContactTable(Table):
             data["contact/cbrt_load_parameter"],
             data["stress/rt_over_h"],
         )
-        self._contact = _Splines(self._spline_axes[:2], [data[f"contact/{name}"] for name in _RATIOS])
-        self._contact_errors = [data[f"contact/{name}_error"] for name in _RATIOS]
-        self._stress = _Splines(self._spline_axes, [data[f"stress/{name}"] for name in _STRESSES])
-        self._stress_errors = [data[f"stress/{name}_error"] for name in _STRESSES]
 
     @property
     def domain(self) -> dict[str, tuple[float, float]]:
@@ -86,72 +37,7 @@ class ContactTable(Table):
             "rt_over_h": (float(rho[0]), float(rho[-1])),
         }
 
-    def contact(self, indenter_radius_over_h: ArrayLike, load_parameter: ArrayLike) -> PressedContact:
-        """Contact radius, indentation and tangent stiffness; the arguments broadcast."""
-        radius, load = np.broadcast_arrays(
-            np.asarray(indenter_radius_over_h, dtype=float), np.asarray(load_parameter, dtype=float)
-        )
-        points, inside = self._points(radius, load)
-        ratio_a, ratio_depth, ratio_stiffness = self._contact(points)
-        errors = _largest_around(self._spline_axes[:2], self._contact_errors, points)
-        with np.errstate(invalid="ignore"):
-            a = hertz.contact_radius_over_indenter_radius(load) * radius
-        found = (ratio_a * a, ratio_depth * a**2 / radius, ratio_stiffness * 2 * a / 0.75, *errors)
-        known = dict(zip(_CONTACT_FIELDS, (np.where(inside, values, np.nan) for values in found), strict=True))
-        return PressedContact(**known, inside=inside)
-
-    def stress(
-        self, indenter_radius_over_h: ArrayLike, load_parameter: ArrayLike, rt_over_h: ArrayLike
-    ) -> ContactStress:
-        """σ of the force and of its increment on a centred sensor; the arguments broadcast."""
-        columns = np.broadcast_arrays(
-            *(np.asarray(x, dtype=float) for x in (indenter_radius_over_h, load_parameter, rt_over_h))
-        )
-        points, inside = self._points(*columns)
-        found = (*self._stress(points), *_largest_around(self._spline_axes, self._stress_errors, points))
-        known = dict(zip(_STRESS_FIELDS, (np.where(inside, values, np.nan) for values in found), strict=True))
-        return ContactStress(**known, inside=inside)
-
-    @property
-    def _spline_axes(self) -> tuple[Floats, ...]:
-        return np.log(self.axes[0]), self.axes[1], self.axes[2]
-
-    def _points(self, radius: Floats, load: Floats, *others: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-        """Spline coordinates (…, axes) and which rows are inside; outside rows are moved inside."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            points = np.stack([np.log(radius), np.cbrt(load), *others], axis=-1)
-        axes = self._spline_axes[: points.shape[-1]]
-        low, high = np.array([axis[0] for axis in axes]), np.array([axis[-1] for axis in axes])
-        inside: NDArray[np.bool_] = np.all((points >= low) & (points <= high), axis=-1)
-        points[~inside] = low
-        return points, inside
-
-
-class _Splines:
-    """Several functions on one grid."""
-
-    def __init__(self, axes: Sequence[Floats], functions: Sequence[Floats]) -> None:
-        knots = tuple(np.asarray(make_interp_spline(axis, axis, k=_DEGREE).t) for axis in axes)
-        self._splines = [NdBSpline(knots, _coefficients(axes, values), _DEGREE) for values in functions]
-
-    def __call__(self, points: Floats) -> list[Floats]:
-        return [np.asarray(spline(points)) for spline in self._splines]
-
 
 def load_contact(path: Path | None = None) -> ContactTable:
     """The contact table at `path`, or the default one; raises TableError with the reason."""
     return ContactTable(path or tables_folder() / CONTACT_TABLE)
-
-
-def _coefficients(axes: Sequence[Floats], values: Floats) -> Floats:
-    for number, nodes in enumerate(axes):
-        values = np.moveaxis(np.asarray(make_interp_spline(nodes, values, k=_DEGREE, axis=number).c), 0, number)
-    return np.ascontiguousarray(values)
-
-
-def _largest_around(axes: Sequence[Floats], errors: Sequence[Floats], points: Floats) -> list[Floats]:
-    """The largest of each error at the corners of the points' cells."""
-    cells = [np.searchsorted(axis[1:-1], points[..., number], side="right") for number, axis in enumerate(axes)]
-    corners = np.stack(np.meshgrid(*[[0, 1]] * len(axes), indexing="ij"), axis=-1).reshape(-1, len(axes))
-    at = [tuple(cell + step for cell, step in zip(cells, corner, strict=True)) for corner in corners]
-    return [np.max([values[corner] for corner in at], axis=0) for values in errors]

@@ -129,9 +129,9 @@ _REMEDY = "Restore it from the distribution, or make it anew: `underskin tablege
 
 def _verified(path: Path, file: h5py.File, schema: str) -> TableFile:
     attributes = dict(file.attrs)
-    found = attributes.get("schema")
-    if found != schema:
-        raise TableError(f"table {path} has schema {found!r}; this version reads {schema!r}. {_REMEDY}")
+    stored_schema = attributes.get("schema")
+    if stored_schema != schema:
+        raise TableError(f"table {path} has schema {stored_schema!r}; this version reads {schema!r}. {_REMEDY}")
     data: dict[str, Floats] = {}
     for group_name, group in file.items():
         for name, dataset in group.items():

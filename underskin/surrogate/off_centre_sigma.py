@@ -30,7 +30,13 @@ class PositionedSigma:
     _curve: CubicSpline
 
     def scattered(self, scatter_over_h: float) -> tuple[Floats, Floats]:
-        """Mean and variance of σ(e + δ)/σ(e), δ normal in x and y with this standard deviation (rows,)."""
+        """Mean and variance (rows,) of σ(e + δ)/σ(e), where δ is normal in x and in y.
+
+        Parameters
+        ----------
+        scatter_over_h
+            Standard deviation of δ in each direction, over the thickness.
+        """
         nodes, weights = np.polynomial.hermite_e.hermegauss(_SCATTER_NODES)
         weights = weights / weights.sum()
         x = self._offset_over_h[:, None, None] + scatter_over_h * nodes[:, None]
@@ -49,7 +55,19 @@ def positioned_sigma(
     offset_over_h: Floats,
     largest_scatter_over_h: float,
 ) -> PositionedSigma:
-    """σ(e) of contacts (rows) on one skin, ready for scatter up to the largest given."""
+    """σ of contacts beside the centre of a sensor, σ(e) = (1/πρ²) ∫_disc profile(|e + s|) d²s.
+
+    Parameters
+    ----------
+    table
+        The σ table.
+    a_over_h, load_parameter, offset_over_h
+        (rows,) contact radius over thickness, L, and distance of the contact from the sensor's centre over thickness.
+    rt_over_h
+        Sensor radius over thickness, one for all rows.
+    largest_scatter_over_h
+        Up to which standard deviation of the position, over the thickness, `scattered` will be asked for.
+    """
     farthest, largest_disc = table.profile_reach, table.domain["rt_over_h"][1]
     disc_known = rt_over_h <= largest_disc
     rt_over_h = min(rt_over_h, largest_disc)

@@ -23,7 +23,7 @@ SIGMA_TABLE = "sigma.h5"
 
 
 class SigmaTable(Table):
-    """A verified table of σ, ready to answer; see the module."""
+    """A verified table of the transmission factor σ(a/h, rT/h, L) and of the stress profile on the base."""
 
     schema = SIGMA_SCHEMA
 
@@ -53,7 +53,20 @@ class SigmaTable(Table):
         return float(self._profile_axes[1][-1])
 
     def sigma(self, a_over_h: ArrayLike, rt_over_h: ArrayLike, load_parameter: ArrayLike = 0.0) -> Sigma:
-        """σ with its error; the arguments broadcast. Raises nothing: rows outside the domain are NaN."""
+        """The transmission factor: charge = d33 · (3/2) (rT/h)² · σ · F.
+
+        Parameters
+        ----------
+        a_over_h, rt_over_h
+            Contact radius and sensor radius over the thickness [-].
+        load_parameter
+            L = F/(R² E) [-]; 0 is the linear layer. The arguments broadcast.
+
+        Returns
+        -------
+        Sigma
+            σ, the bound on its relative error, and which rows are inside; NaN where not.
+        """
         points, inside, shape = _points(self.axes, a_over_h, rt_over_h, load_parameter)
         sigma = self._sigma(points)
         rel_error = self._cell_error[_cells(self.axes, points)]
@@ -76,9 +89,18 @@ class SigmaTable(Table):
     def gradient(
         self, a_over_h: ArrayLike, rt_over_h: ArrayLike, load_parameter: ArrayLike = 0.0
     ) -> tuple[Floats, Floats, Floats]:
-        """∂σ/∂(a/h), ∂σ/∂(rT/h) and ∂σ/∂L, NaN outside the domain.
+        """The derivatives of σ.
 
-        ∂σ/∂L is infinite at L = 0, where σ grows like L^(1/3).
+        Parameters
+        ----------
+        a_over_h, rt_over_h, load_parameter
+            As for `sigma`.
+
+        Returns
+        -------
+        tuple
+            ∂σ/∂(a/h), ∂σ/∂(rT/h) and ∂σ/∂L, NaN outside the domain. ∂σ/∂L is infinite at L = 0, where σ grows like
+            L^(1/3).
         """
         points, inside, shape = _points(self.axes, a_over_h, rt_over_h, load_parameter)
         slopes = [self._sigma(points, nu=order) for order in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
@@ -88,9 +110,19 @@ class SigmaTable(Table):
         return da, drho, dload
 
     def profile(self, r_over_h: ArrayLike, a_over_h: ArrayLike, load_parameter: ArrayLike = 0.0) -> Floats:
-        """The stress on the base at r/h from the contact's axis, in σ's scale: T3 = −(3F/2πh²) · profile.
+        """The normal stress on the base: T3 = −(3F/2πh²) · profile. A sensor averages it over its disc.
 
-        A sensor beside the axis averages it over its disc. NaN outside the domain.
+        Parameters
+        ----------
+        r_over_h
+            Distance from the contact's axis over the thickness [-].
+        a_over_h, load_parameter
+            As for `sigma`; the arguments broadcast.
+
+        Returns
+        -------
+        array
+            In σ's scale, NaN outside the domain.
         """
         points, inside, shape = _points(self._profile_axes, a_over_h, r_over_h, load_parameter)
         return np.where(inside, self._profile(points), np.nan).reshape(shape)

@@ -8,9 +8,9 @@ from sqlalchemy import Connection
 
 from service.store import diagnoses
 from service.store.tables import AnyRow
+from underskin.diagnosis.data.names import EXPLAINED
 from underskin.formatting import in_percent
 
-_SURE = 0.8  # least probability that is stated without its rivals, as a report does
 _WORTH_NAMING = 0.02  # probability of a rival, as in a report
 _MOST_RIVALS = 3
 _SAYS = {
@@ -60,7 +60,7 @@ def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSu
     probability = report["probability"]
     if report["verdict"] in ("no_mismatch", "unexplained"):
         tag = f"{tag}, {in_percent(probability)}"
-    sure = report["verdict"] == "no_mismatch" and probability >= _SURE
+    sure = report["verdict"] == "no_mismatch" and probability >= EXPLAINED
     mood: Literal["good", "look"] = "good" if sure or adopted else "look"
     return VerdictSummary(row.id, f"{tag}, adopted" if adopted else tag, mood, _beside(report), at)
 
@@ -74,7 +74,7 @@ def _beside(report: Mapping[str, Any]) -> str:
         for entry in report.get("alternatives", ())[:_MOST_RIVALS]
         if entry["probability"] > _WORTH_NAMING
     ]
-    if probability >= _SURE or verdict == "unexplained":
+    if probability >= EXPLAINED or verdict == "unexplained":
         return " ".join(leader)
     if verdict == "no_mismatch":
         return f"not ruled out: {', '.join(rivals)}" if rivals else ""

@@ -1,4 +1,4 @@
-"""The tables that answers come from: what each holds, over which range, how wrong it may be, and how it was made."""
+"""The tables that ship: what each holds, over which range, how wrong it may be, and how it was made."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -36,7 +36,7 @@ _HELD = {
     "contact": (
         CONTACT_TABLE,
         "Contact of a sphere",
-        "A sphere that sinks deep: how wide it touches, how far it sinks in, and σ with that contact.",
+        "Reference data, no answer uses it. A sphere that sinks deep: how wide it touches, how deep, and σ with it.",
     ),
 }
 # Words of an axis, and what it is in lab units on the paper's prototype: symbol, factor, unit.

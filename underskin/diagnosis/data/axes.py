@@ -32,22 +32,22 @@ def recording_axes(campaign: Campaign) -> dict[str, Floats]:
     [mm], `recorded_at` is in hours from the first. An axis that a recording lacks is left out.
     """
     entries = campaign.recordings
-    found: dict[str, Floats] = {}
+    columns_by_axis: dict[str, Floats] = {}
     for name in (*_LOGARITHMIC, *_FROM_ZERO):
         values = [getattr(entry, name, None) for entry in entries]
         if None in values:
             continue
         column = np.array(values, dtype=float)
-        found[name] = (np.log(column) if name in _LOGARITHMIC else np.log1p(column))[:, None]
-    pressed = [entry for entry in entries if isinstance(entry, FrfRecording)]
-    if pressed:
-        found["position_mm"] = 1e3 * offsets(campaign)
-        places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-        found["sensor"] = np.array([places[entry.sensor] for entry in pressed])
+        columns_by_axis[name] = (np.log(column) if name in _LOGARITHMIC else np.log1p(column))[:, None]
+    frf = [entry for entry in entries if isinstance(entry, FrfRecording)]
+    if frf:
+        columns_by_axis["position_mm"] = 1e3 * offsets(campaign)
+        centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
+        columns_by_axis["sensor"] = np.array([centres[entry.sensor] for entry in frf])
     times = [entry.recorded_at for entry in entries]
     if None not in times:
-        found["recorded_at"] = hours(times)[:, None]
-    return {name: column for name, column in found.items() if np.ptp(column, axis=0).max() > 1e-9}
+        columns_by_axis["recorded_at"] = hours(times)[:, None]
+    return {name: column for name, column in columns_by_axis.items() if np.ptp(column, axis=0).max() > 1e-9}
 
 
 def order(campaign: Campaign) -> Floats:

@@ -74,7 +74,7 @@ class Lines:
         return None if self.smooth is None else Whitening(self.smooth, self.deviation, self.recording)
 
     def collapsed(self) -> "Lines":
-        """One line a recording: the weighted mean; see the module."""
+        """One line a recording, the weighted mean of its lines; what the lines scatter about it goes into `scatter`."""
         weight = self.deviation**-2
         total = np.add.reduceat(weight, self.first)
         mean = np.add.reduceat(weight * self.value, self.first).astype(np.complex128) / total

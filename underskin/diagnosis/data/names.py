@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from underskin.mechanisms.base import Kind
 
+EXPLAINED = 0.8  # least probability of an answer that is stated without its rivals
 NOTHING_MISSING, NONE_OF_THESE = "nothing_missing", "none_of_these"
 SIMPLEST: Mapping[Kind, str] = {  # what the model to which nothing is added is called, of each kind of recording
     "frf": "the paper's model",

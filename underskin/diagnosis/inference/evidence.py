@@ -37,44 +37,44 @@ def laplace(fitter: Fitter, at: Evaluated) -> Evidence:
     return integrated(around(fitter, at))
 
 
-def integrated(found: Evidence) -> Evidence:
+def integrated(evidence: Evidence) -> Evidence:
     """Over all values of a parameter that the lines leave loose, where there is one, and of the positioning scatter."""
-    whole = _over_loose(found)
-    return _over_position(whole) if whole.fitter.hypothesis.placed else whole
+    over_loose = _over_loose(evidence)
+    return _over_position(over_loose) if over_loose.fitter.hypothesis.placed else over_loose
 
 
-def _over_loose(found: Evidence) -> Evidence:
+def _over_loose(evidence: Evidence) -> Evidence:
     """With log ∫ Z(x) p(x) dx over the loosest parameter x, walking from its most probable value both ways.
 
     Where the walk comes upon a point more probable than that, all begins again from there.
     """
-    place = _loosest(found)
+    place = _loosest(evidence)
     if place is None:
-        return found
-    fitter, at = found.fitter, found.at
+        return evidence
+    fitter, at = evidence.fitter, evidence.at
     held = Fitter(fitter.hypothesis, held=place)
     low, high = fitter.low[place], fitter.high[place]
-    deviation = float(np.sqrt(np.diag(found.covariance)[fitter.places.index(place)]))
+    deviation = float(np.sqrt(np.diag(evidence.covariance)[fitter.places.index(place)]))
 
     def held_at(near: Evidence, value: float) -> Evidence:
         return _held_at(held, near.at, place, value)
 
     stride = min(deviation, (high - low) / _FEWEST_STRIDES)
-    total, walked = _integral(held_at, found, float(at.point.fit[place]), stride, (low, high))
+    total, walked = _integral(held_at, evidence, float(at.point.fit[place]), stride, (low, high))
     best = min(walked, key=lambda entry: entry.at.cost - held.parameters[place].log_prior(entry.at.point.fit[place]))
     better = fitter.settle(fitter.evaluate(best.at.point), 1)
     if better.cost < at.cost - _TRUSTED:
         return _over_loose(around(fitter, better))
-    return replace(found, log_evidence=total)
+    return replace(evidence, log_evidence=total)
 
 
-def _loosest(found: Evidence) -> int | None:
+def _loosest(evidence: Evidence) -> int | None:
     """The place of the mechanisms' logarithmic parameter whose standard deviation is the largest, where that counts."""
-    own = own_parameters(found.fitter.hypothesis)
+    own = own_parameters(evidence.fitter.hypothesis)
     deviations = {
         place: float(np.sqrt(variance))
-        for place, variance in zip(found.fitter.places, np.diag(found.covariance), strict=True)
-        if place < own and found.fitter.parameters[place].scale == "log"
+        for place, variance in zip(evidence.fitter.places, np.diag(evidence.covariance), strict=True)
+        if place < own and evidence.fitter.parameters[place].scale == "log"
     }
     place = max(deviations, key=lambda place: deviations[place], default=None)
     return place if place is not None and deviations[place] > _LOOSE else None
@@ -85,18 +85,18 @@ def _held_at(held: Fitter, near: Evaluated, place: int, value: float) -> Evidenc
     fit = near.point.fit.copy()
     fit[place] = value
     begin = replace(held.settle(held.evaluate(replace(near.point, fit=fit)), 1), growth=near.growth)
-    found = around(held, begin)
-    return replace(found, log_evidence=found.log_evidence + held.parameters[place].log_prior(value))
+    evidence = around(held, begin)
+    return replace(evidence, log_evidence=evidence.log_evidence + held.parameters[place].log_prior(value))
 
 
-def _over_position(found: Evidence) -> Evidence:
+def _over_position(evidence: Evidence) -> Evidence:
     """With the integral over log p in place of the bell's, p the positioning scatter."""
-    fitter, at = found.fitter, found.at
+    fitter, at = evidence.fitter, evidence.at
     bounds = fitter.covariance[POSITION].low, fitter.covariance[POSITION].high
     stride = _stride(fitter.covariance_equations(at)[1][POSITION, POSITION])
-    total, _ = _integral(_at_position, found, float(at.point.covariance[POSITION]), stride, bounds)
-    bell = around_mean(fitter, at) + around_levels(fitter, at)
-    return replace(found, log_evidence=found.log_evidence + total - bell)
+    total, _ = _integral(_at_position, evidence, float(at.point.covariance[POSITION]), stride, bounds)
+    quadratic = around_mean(fitter, at) + around_levels(fitter, at)
+    return replace(evidence, log_evidence=evidence.log_evidence + total - quadratic)
 
 
 def _at_position(near: Evidence, value: float) -> Evidence:
@@ -112,16 +112,16 @@ def _over_gain(fitter: Fitter, at: Evaluated) -> float:
     """What the integral over the noise levels but the position's adds: a sum over the gain's, the others following."""
     hessian = fitter.covariance_equations(at)[1]
     others = [place for place in range(len(hessian)) if place not in (GAIN, POSITION)]
-    bell = hessian[np.ix_(others, others)]
+    curvature = hessian[np.ix_(others, others)]
     stride = _stride(hessian[GAIN, GAIN])
     steps = stride * np.arange(-_GAIN_STRIDES, _GAIN_STRIDES + 1)
     covariances = np.repeat(at.point.covariance[None], len(steps), axis=0)
     covariances[:, GAIN] += steps
-    covariances[:, others] -= np.outer(steps, np.linalg.solve(bell, hessian[others, GAIN]))
+    covariances[:, others] -= np.outer(steps, np.linalg.solve(curvature, hessian[others, GAIN]))
     entry = fitter.covariance[GAIN]
     within = (covariances[:, GAIN] >= entry.low) & (covariances[:, GAIN] <= entry.high)
     gains = at.cost - fitter.costs(at, covariances[within])
-    return float(np.logaddexp.reduce(gains) + np.log(stride) + log_volume(bell))
+    return float(np.logaddexp.reduce(gains) + np.log(stride) + log_volume(curvature))
 
 
 def _stride(curvature: float) -> float:
@@ -141,17 +141,17 @@ def _integral(
     Each point counts for half the way to the next; the last before a bound for the way to the bound.
     """
     low, high = bounds
-    found = {begin: held_at(near, begin)}
+    evidence_at = {begin: held_at(near, begin)}
     for way in (-stride, stride):
         last, value = begin, begin + way
         while low <= value <= high:
-            found[value] = held_at(found[last], value)
-            if found[value].log_evidence < max(entry.log_evidence for entry in found.values()) - _GONE:
+            evidence_at[value] = held_at(evidence_at[last], value)
+            if evidence_at[value].log_evidence < max(entry.log_evidence for entry in evidence_at.values()) - _GONE:
                 break
             last, value = value, value + way
-    values = np.array(sorted(found))
+    values = np.array(sorted(evidence_at))
     below, above = values[0] - low, high - values[-1]
     edges = [values[0] - (below if below < stride else stride / 2), *((values[1:] + values[:-1]) / 2)]
     edges.append(values[-1] + (above if above < stride else stride / 2))
-    logs = [found[value].log_evidence for value in values.tolist()]
-    return float(np.logaddexp.reduce(logs + np.log(np.maximum(np.diff(edges), 1e-300)))), list(found.values())
+    logs = [evidence_at[value].log_evidence for value in values.tolist()]
+    return float(np.logaddexp.reduce(logs + np.log(np.maximum(np.diff(edges), 1e-300)))), list(evidence_at.values())

@@ -17,10 +17,11 @@ from underskin.diagnosis.inference.hypothesis import Hypothesis, Point
 from underskin.diagnosis.inference.likelihood import Curvature
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.inference.position_curvature import curvature
-from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, NO_POSITION, POSITION
+from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR
 from underskin.mechanisms.models.composed import Model, compose
 from underskin.mechanisms.models.composition import parameters_together
 from underskin.mechanisms.registry import CATALOGUE
+from underskin.recordings.usual_scatter import NO_POSITION_SCATTER, POSITION_RANGE
 from underskin.surrogate.sigma_table import SigmaTable
 
 _QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7, 0.9), 3: (0.2, 0.5, 0.8)}
@@ -45,19 +46,19 @@ class Explanation:
     @classmethod
     def of(cls, names: Sequence[str], each: Sequence[tuple[float, Evidence]]) -> Self:
         """From the fits, the log prior of each beside it."""
-        weights = np.array([prior + found.log_evidence for prior, found in each])
+        weights = np.array([prior + fit.log_evidence for prior, fit in each])
         total = float(np.logaddexp.reduce(weights))
         best = each[int(np.argmax(weights))][1]
-        scattered = [found.fitter.hypothesis.placed for _, found in each]
+        scattered = [fit.fitter.hypothesis.placed for _, fit in each]
         placed = float(np.exp(weights[scattered] - total).sum())
         return cls(tuple(name for name in CATALOGUE if name in names), total, best, placed, tuple(each))
 
     def integrated(self) -> Self:
         """With the evidence of each fit that counts over all values of what the lines leave loose."""
-        least = max(prior + found.log_evidence for prior, found in self.each) - _COUNTS
+        least = max(prior + fit.log_evidence for prior, fit in self.each) - _COUNTS
         return self.of(
             self.names,
-            [(prior, integrated(found) if prior + found.log_evidence > least else found) for prior, found in self.each],
+            [(prior, integrated(fit) if prior + fit.log_evidence > least else fit) for prior, fit in self.each],
         )
 
     @property
@@ -85,8 +86,8 @@ def own_places(names: Sequence[str], lines: Lines) -> dict[str, slice]:
     return places
 
 
-class Workbench:
-    """The lines of one campaign, whole and collapsed, and what fitting any set to them needs."""
+class FittingProblem:
+    """Recordings of one kind and their noise, to which hypotheses are fitted: all rows, and a mean a recording."""
 
     def __init__(self, lines: Lines, table: SigmaTable) -> None:
         """Collapse, and work out how σ bends; curves are not collapsed and have no place."""
@@ -110,8 +111,8 @@ class Workbench:
         """
         plain = self.hypothesis(names, False)
         fitters = [Fitter(plain), Fitter(replace(plain, placed=True))]
-        weights = np.log([NO_POSITION, 1 - NO_POSITION])
-        found: list[tuple[float, Evidence]] = []
+        weights = np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER])
+        fits: list[tuple[float, Evidence]] = []
         starts: list[Evaluated] = []
         if parent is None or parent.placed < _DECIDED:
             starts = [fitters[0].improve(at.point) for at in self._starts(fitters[0], names, parent)]
@@ -120,26 +121,26 @@ class Workbench:
                 return None
             if parent is None and not self._position_matters(best):
                 weights[0] = 0.0
-            found.append((weights[0], around(fitters[0], best)))
+            fits.append((weights[0], around(fitters[0], best)))
         if (parent is None and weights[0] < 0) or (parent is not None and parent.placed > 1 - _DECIDED):
             beside = starts or self._starts(fitters[1], names, parent)
             best = min((fitters[1].improve(_placed_start(fitters[1], at)) for at in beside), key=lambda at: at.cost)
             if not self._gains(best, parent, 1):
                 return None
-            found.append((weights[1], around(fitters[1], best)))
-        return Explanation.of(names, found)
+            fits.append((weights[1], around(fitters[1], best)))
+        return Explanation.of(names, fits)
 
-    def refit(self, found: Explanation) -> Explanation | None:
+    def refit(self, explanation: Explanation) -> Explanation | None:
         """A set that was fitted to more recordings, fitted to these, from where it stood; its evidence is a bell's.
 
         None where the set has other parameters here. Raises Unsupported.
         """
-        placed = found.best.fitter.hypothesis.placed
-        fitter = Fitter(self.hypothesis(found.names, placed))
-        if [entry.name for entry in fitter.parameters] != [entry.name for entry in found.model.parameters]:
+        placed = explanation.best.fitter.hypothesis.placed
+        fitter = Fitter(self.hypothesis(explanation.names, placed))
+        if [entry.name for entry in fitter.parameters] != [entry.name for entry in explanation.model.parameters]:
             return None
-        best = around(fitter, fitter.improve(replace(found.point, bend=fitter.no_bend)))
-        return Explanation.of(found.names, [(0.0, best)])
+        best = around(fitter, fitter.improve(replace(explanation.point, bend=fitter.no_bend)))
+        return Explanation.of(explanation.names, [(0.0, best)])
 
     @staticmethod
     def _gains(at: Evaluated, parent: Explanation | None, placed: int) -> bool:
@@ -151,7 +152,7 @@ class Workbench:
         slopes = at.prediction.position_slopes
         if slopes is None:
             return False
-        p = POSITION[1]
+        p = POSITION_RANGE[1]
         size = np.abs(at.prediction.value) ** 2 + 1e-300
         first = (np.abs(slopes) ** 2).sum(axis=0) / size
         second = self.curvature.square[at_recording(self, at)]
@@ -190,9 +191,11 @@ def _is_lowest(index: tuple[int, ...], tried: dict[tuple[int, ...], Evaluated]) 
     return all(tried[index].cost <= tried[other].cost for other in around if other in tried)
 
 
-def at_recording(bench: Workbench, at: Evaluated) -> np.ndarray:
+def at_recording(problem: FittingProblem, at: Evaluated) -> np.ndarray:
     """The recording of each row of an evaluated prediction."""
-    return bench.lines.recording if len(at.prediction.value) == len(bench.lines.value) else bench.collapsed.recording
+    return (
+        problem.lines.recording if len(at.prediction.value) == len(problem.lines.value) else problem.collapsed.recording
+    )
 
 
 def _placed_start(fitter: Fitter, at: Evaluated) -> Point:

@@ -22,6 +22,7 @@ from underskin.units import Floats
 
 GAIN, POSITION = 0, 2  # places among the covariance's parameters, the latter where there is positioning scatter
 
+_LARGEST_STEP = 0.7  # of a Newton step in a noise level's logarithm: a factor of 2
 _STEP = 0.05  # of the finite differences in the covariance's logarithms
 _FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
 _BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
@@ -165,7 +166,7 @@ class Evaluator:
             step = -vectors @ ((vectors.T @ gradient) / np.maximum(np.abs(eigenvalues), 1.0))
             outwards = ((at.point.covariance <= low) & (step < 0)) | ((at.point.covariance >= high) & (step > 0))
             step = np.where(outwards, 0.0, step)
-            step *= min(1.0, 0.7 / max(np.abs(step).max(), 1e-12))
+            step *= min(1.0, _LARGEST_STEP / max(np.abs(step).max(), 1e-12))
             for _ in range(4):
                 point = self.moved(at.point, np.clip(at.point.covariance + step, low, high))
                 tried = self._weigh(point, at.prediction, at.moments)

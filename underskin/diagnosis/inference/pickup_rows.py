@@ -26,6 +26,6 @@ class PickedRows:
 
     def over_recordings(self, products: Floats) -> Floats:
         """Sums over the picked rows of each recording: (…, picked rows) to (…, recordings)."""
-        found = np.zeros((*products.shape[:-1], self._recordings))
-        found[..., self._owner[self._first]] = np.add.reduceat(products, self._first, axis=-1)
-        return found
+        sums = np.zeros((*products.shape[:-1], self._recordings))
+        sums[..., self._owner[self._first]] = np.add.reduceat(products, self._first, axis=-1)
+        return sums

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-GAIN = (0.01, 0.05)
+from underskin.recordings.usual_scatter import GAIN_RANGE, POSITION_RANGE
+
 GAIN_FALL = (0.35, 0.12)  # sd of the logarithm below and above
-POSITION = (0.05e-3, 0.3e-3)  # [m]
-POSITION_FALL = (0.15, 0.15)
-NO_POSITION = 0.7
+POSITION_FALL = (0.15, 0.15)  # the same of positions
 
 
 @dataclass(frozen=True)
@@ -60,8 +59,8 @@ class Bell:
         return float(-0.5 * ((x - self.mean) / self.sd) ** 2 - np.log(self.sd * np.sqrt(2 * np.pi)))
 
 
-GAIN_PRIOR = Plateau.of(GAIN, GAIN_FALL)
-POSITION_PRIOR = Plateau.of(POSITION, POSITION_FALL)
+GAIN_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
+POSITION_PRIOR = Plateau.of(POSITION_RANGE, POSITION_FALL)
 # No rig's: something that nobody named moves the recordings
 UNUSUAL_GAIN = Plateau.of((0.08, 0.5), (0.12, 0.12))
 UNUSUAL_POSITION = Plateau.of((0.4e-3, 2e-3), (0.15, 0.15))

@@ -6,7 +6,7 @@ response, with the covariance S + J Σ Jᵀ: S the scatter of gains, of position
 of its own parameters (d33 among them, so that a common factor tells nothing). Recordings are added one by one, repeats
 allowed, the one first that raises the expected probability of deciding most; of equal ones that whose sphere is mounted
 already. That probability is simulated: truth drawn from the posterior, recordings from its prediction, and the
-posterior updated: the chance that the true explanation then holds at least 0.8.
+posterior updated: the chance that the true explanation then could be stated without its rivals (`EXPLAINED`).
 """
 
 import itertools
@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.data.axes import WORDS
-from underskin.diagnosis.data.names import in_words
-from underskin.diagnosis.inference.explanation import Workbench
+from underskin.diagnosis.data.names import EXPLAINED, in_words
+from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.planning.rig_limits import Limits, candidates, inferred, wider
 from underskin.diagnosis.selection.search import Answer, Search
 from underskin.formatting import in_percent
@@ -28,7 +28,6 @@ from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.conditions import Conditions, FrfConditions
 from underskin.units import Floats
 
-DECIDED = 0.8
 SEED = 20180206
 _SIMULATIONS = 2000
 _ENOUGH = 0.95
@@ -37,7 +36,7 @@ _SURVIVES = 0.02
 _RIVALS = 4
 
 
-def plan(bench: Workbench, search: Search, limits: Limits) -> dict[str, Any]:
+def plan(problem: FittingProblem, search: Search, limits: Limits) -> dict[str, Any]:
     """The recordings to make, in lab units, what they cost, and the chance that they decide; empty if all is decided.
 
     Where several answers remain and no recording can be planned, the document says why, with no recordings in it.
@@ -45,19 +44,19 @@ def plan(bench: Workbench, search: Search, limits: Limits) -> dict[str, Any]:
     surviving = [answer for answer in search.answers if answer.probability > _SURVIVES][:_RIVALS]
     if len(surviving) < 2:
         return {}
-    if not bench.lines.curves:
-        within = inferred(bench.lines.campaign, limits)
-        for beyond, rig in enumerate([within] if limits.given else [within, wider(bench.lines.campaign, within)]):
-            found = _planned(bench, surviving, rig, bool(beyond))
-            if found:
-                return found
-    return {} if surviving[0].probability >= DECIDED else _nothing_to_plan(surviving)
+    if not problem.lines.curves:
+        within = inferred(problem.lines.campaign, limits)
+        for beyond, rig in enumerate([within] if limits.given else [within, wider(problem.lines.campaign, within)]):
+            planned = _planned(problem, surviving, rig, bool(beyond))
+            if planned:
+                return planned
+    return {} if surviving[0].probability >= EXPLAINED else _nothing_to_plan(surviving)
 
 
-def _planned(bench: Workbench, surviving: Sequence[Answer], limits: Limits, beyond: bool) -> dict[str, Any]:
+def _planned(problem: FittingProblem, surviving: Sequence[Answer], limits: Limits, beyond: bool) -> dict[str, Any]:
     """The best recordings within these limits; empty where none brings anything."""
-    allowed = candidates(bench.lines.campaign, limits)
-    rivals, outlook, allowed = _outlook(bench, surviving, allowed)
+    allowed = candidates(problem.lines.campaign, limits)
+    rivals, outlook, allowed = _outlook(problem, surviving, allowed)
     if len(rivals) < 2 or not allowed:
         return {}
     chosen, chance = _choose(outlook, allowed, limits)
@@ -78,21 +77,21 @@ def _planned(bench: Workbench, surviving: Sequence[Answer], limits: Limits, beyo
 def _nothing_to_plan(surviving: Sequence[Answer]) -> dict[str, Any]:
     """Why no recording is planned, and on which axes the rivals would differ."""
     names = [list(answer.names) for answer in surviving]
-    told = f"No recording within these limits tells {_together([in_words(entry) for entry in names])} apart."
+    statement = f"No recording within these limits tells {_together([in_words(entry) for entry in names])} apart."
     axes = [
         {axis for name in entry for axis in CATALOGUE[name].axes} for entry in names if set(entry) <= set(CATALOGUE)
     ]
     apart = {axis for own in axes for axis in own if any(axis not in other for other in axes)}
     if apart:
         words = sorted(WORDS[axis][0] if axis in WORDS else axis for axis in apart)
-        told += f" They differ in what they depend on: vary the {_together(words)} more widely than here."
+        statement += f" They differ in what they depend on: vary the {_together(words)} more widely than here."
     return {
         "recordings": [],
         "separates": names,
         "probability_of_deciding": 0.0,
         "without_it": 0.0,
         "minutes": 0.0,
-        "statement": told,
+        "statement": statement,
     }
 
 
@@ -101,11 +100,11 @@ def _together(words: Sequence[str]) -> str:
 
 
 def _outlook(
-    bench: Workbench, surviving: Sequence[Answer], allowed: Sequence[FrfConditions]
+    problem: FittingProblem, surviving: Sequence[Answer], allowed: Sequence[FrfConditions]
 ) -> tuple[list[Answer], "_Outlook", list[FrfConditions]]:
     """The rivals whose laws can be predicted there, what they predict, and the candidates that all tables hold."""
     # The campaign's own recordings go along, so that each model has the parameters that it was fitted with.
-    campaign = bench.collapsed.campaign
+    campaign = problem.collapsed.campaign
     together = Conditions(campaign.name, campaign.skin, (*campaign.recordings, *allowed))
     own = len(campaign.recordings)
     inside = np.ones(len(allowed), dtype=bool)
@@ -114,7 +113,7 @@ def _outlook(
         if answer.explanation is None:
             continue
         try:
-            model = compose(answer.explanation.names, together, bench.table, "frf")
+            model = compose(answer.explanation.names, together, problem.table, "frf")
         except Unsupported:
             continue
         if len(model.parameters) != len(answer.explanation.point.fit):
@@ -124,7 +123,7 @@ def _outlook(
         rivals.append(answer)
         predictions.append(prediction)
     kept = own + np.flatnonzero(inside)
-    line = float(np.median(np.add.reduceat(bench.lines.deviation**-2.0, bench.lines.first)) ** -0.5)
+    line = float(np.median(np.add.reduceat(problem.lines.deviation**-2.0, problem.lines.first)) ** -0.5)
     responses, unknown, scatter = [], [], []
     for answer, prediction in zip(rivals, predictions, strict=True):
         explanation = answer.explanation
@@ -152,7 +151,7 @@ class _Outlook:
     prior: Floats  # (rivals,)
 
     def deciding(self, chosen: Sequence[int]) -> float:
-        """The simulated chance that the true explanation holds `DECIDED` after these recordings."""
+        """The simulated chance that the true explanation holds `EXPLAINED` after these recordings."""
         random = np.random.default_rng(SEED)
         truth = random.choice(len(self.prior), size=_SIMULATIONS, p=self.prior)
         noise = random.normal(size=(_SIMULATIONS, len(chosen)))
@@ -168,16 +167,16 @@ class _Outlook:
             log_posterior[:, rival] = -0.5 * (white**2).sum(axis=0) - np.log(np.diag(root)).sum()
         log_posterior += np.log(self.prior)
         log_posterior -= np.logaddexp.reduce(log_posterior, axis=1)[:, None]
-        return float((np.exp(log_posterior[np.arange(_SIMULATIONS), truth]) >= DECIDED).mean())
+        return float((np.exp(log_posterior[np.arange(_SIMULATIONS), truth]) >= EXPLAINED).mean())
 
     @property
     def promising(self) -> list[int]:
         """Candidates at the ends of what separates each pair of rivals: only these are worth a simulation."""
-        found: list[int] = []
+        ends: list[int] = []
         for first, second in itertools.combinations(range(len(self.prior)), 2):
             order = np.argsort(self.responses[first] - self.responses[second], kind="stable").tolist()
-            found += [*order[:2], *order[-2:]]
-        return list(dict.fromkeys(found))
+            ends += [*order[:2], *order[-2:]]
+        return list(dict.fromkeys(ends))
 
 
 def _choose(outlook: _Outlook, candidates: Sequence[FrfConditions], limits: Limits) -> tuple[list[int], float]:
@@ -192,17 +191,17 @@ def _choose(outlook: _Outlook, candidates: Sequence[FrfConditions], limits: Limi
         for step in steps:
             new = {candidates[index].indenter_radius_mm for index in step} - mounted
             rated.append((round(outlook.deciding([*chosen, *step]), 3), -len(new), tuple(-index for index in step)))
-        chance, _, picked = max(rated)
+        chance, _, step = max(rated)
         if chance < best + _LEAST_GAIN:
             break
-        chosen += [-index for index in picked]
+        chosen += [-index for index in step]
         best = chance
         steps = [(index,) for index in promising]
     return chosen, best
 
 
 def _described(candidates: Sequence[FrfConditions], chosen: Sequence[int]) -> list[dict[str, Any]]:
-    found = []
+    documents = []
     for index in sorted(set(chosen)):
         entry = candidates[index]
         described: Mapping[str, Any] = {
@@ -214,8 +213,8 @@ def _described(candidates: Sequence[FrfConditions], chosen: Sequence[int]) -> li
             "dwell_s": entry.dwell_s,
             "repeats": list(chosen).count(index),
         }
-        found.append({name: value for name, value in described.items() if value is not None})
-    return found
+        documents.append({name: value for name, value in described.items() if value is not None})
+    return documents
 
 
 def _statement(

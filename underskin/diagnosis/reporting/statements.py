@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.data.axes import WORDS
-from underskin.diagnosis.data.names import SIMPLEST, in_words
+from underskin.diagnosis.data.names import EXPLAINED, SIMPLEST, in_words
 from underskin.diagnosis.localisation.effect_size import Effect
 from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT, AxisResult
 from underskin.diagnosis.selection.search import Answer
@@ -14,7 +14,6 @@ from underskin.formatting import in_digits, in_percent
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE
 
-EXPLAINED = 0.8  # least probability of an answer that is stated without its rivals
 _WORTH_NAMING = 0.02
 _UNTHOUGHT_AT_MOST = 0.016  # of none_of_these, where no process shows
 _IN_PERCENT = 90.0  # beyond it an effect is said as a factor

@@ -12,13 +12,14 @@ import numpy as np
 from scipy.special import logsumexp
 
 from underskin.diagnosis.inference.evidence import laplace
-from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import Hypothesis
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.noise.correlated_error import UNNAMED
-from underskin.diagnosis.noise.noise_priors import GAIN, POSITION, UNUSUAL_GAIN, UNUSUAL_POSITION
+from underskin.diagnosis.noise.noise_priors import UNUSUAL_GAIN, UNUSUAL_POSITION
 from underskin.diagnosis.selection.frequency_gp import over_lines
 from underskin.diagnosis.selection.recording_gp import over_recordings
+from underskin.recordings.usual_scatter import GAIN_RANGE, POSITION_RANGE
 
 _KINDS = {"recordings": 0.45, "lines": 0.4, "both": 0.05, "scatter": 0.1}
 
@@ -31,13 +32,13 @@ class Discrepancy:
     axes: dict[str, float]  # log evidence gained; "frequency_hz" for lines
 
 
-def discrepancy(bench: Workbench, explanation: Explanation) -> Discrepancy:
+def discrepancy(problem: FittingProblem, explanation: Explanation) -> Discrepancy:
     """What a process gains on top of an explanation."""
-    if bench.lines.curves:
-        return _along_curves(bench, explanation)
+    if problem.lines.curves:
+        return _along_curves(problem, explanation)
     over = {
-        "recordings": over_recordings(bench, explanation),
-        "lines": over_lines(bench, explanation),
+        "recordings": over_recordings(problem, explanation),
+        "lines": over_lines(problem, explanation),
         "scatter": _unusual_scatter(explanation),
     }
     gained = {
@@ -55,10 +56,10 @@ def _unusual_scatter(explanation: Explanation) -> dict[str, float]:
     levels = explanation.best.at.marginal.levels
     usual = explanation.best.fitter.hypothesis
     found = {}
-    if levels.gain > GAIN[1]:
+    if levels.gain > GAIN_RANGE[1]:
         wider = replace(usual, gain=UNUSUAL_GAIN)
         found["scatter of gain"] = _refitted(wider, explanation, 0, UNUSUAL_GAIN.low)
-    if levels.position > POSITION[1]:
+    if levels.position > POSITION_RANGE[1]:
         wider = replace(usual, position=UNUSUAL_POSITION)
         found["scatter of position"] = _refitted(wider, explanation, 2, UNUSUAL_POSITION.low)
     return {name: log_evidence - explanation.log_evidence for name, log_evidence in found.items()}
@@ -72,9 +73,9 @@ def _refitted(hypothesis: Hypothesis, explanation: Explanation, place: int, leas
     return laplace(fitter, fitter.improve(replace(explanation.point, covariance=covariance))).log_evidence
 
 
-def _along_curves(bench: Workbench, explanation: Explanation) -> Discrepancy:
+def _along_curves(problem: FittingProblem, explanation: Explanation) -> Discrepancy:
     """The smooth error that every hypothesis has of curves, large: everything is fitted again beneath it."""
     found = _refitted(
-        replace(bench.hypothesis(explanation.names, placed=False), smooth=UNNAMED), explanation, 2, UNNAMED.low
+        replace(problem.hypothesis(explanation.names, placed=False), smooth=UNNAMED), explanation, 2, UNNAMED.low
     )
     return Discrepancy(found, {"displacement_mm": found - explanation.log_evidence})

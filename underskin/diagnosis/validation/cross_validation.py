@@ -6,21 +6,21 @@ rmse = 100 √(Σ|y − m|²/Σ|m|²) over all groups together; the noise floor 
 a new recording: gain, positioning and line scatter, and the sensors' gains where the sensor was not seen.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.selection.search import log_prior
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Unsupported
-from underskin.mechanisms.models.composed import Prediction as Predicted
-from underskin.mechanisms.models.composed import compose
-from underskin.recordings.campaign import frf_recordings
+from underskin.mechanisms.models.composed import Prediction, compose
+from underskin.recordings.conditions import frf_of
 
 _FURTHEST = 0.6  # of a curve's highest force
 _LEAST_AFTER = 6  # samples beyond the highest force that make a hold or a way back
@@ -30,8 +30,8 @@ _BEHIND = 15.0  # nats
 
 
 @dataclass(frozen=True)
-class Prediction:
-    """Sums over held-out rows under one way of predicting them."""
+class PredictionScore:
+    """Sums over held-out rows under one way of predicting them: how far off, how large, and what noise would give."""
 
     square: float = 0.0  # Σ|y − m|²
     size: float = 0.0  # Σ|m|²
@@ -40,8 +40,8 @@ class Prediction:
     recordings: int = 0
     pickup: float = 0.0  # that part of `noise` which is mains pick-up
 
-    def __add__(self, other: "Prediction") -> "Prediction":
-        return Prediction(
+    def __add__(self, other: "PredictionScore") -> "PredictionScore":
+        return PredictionScore(
             self.square + other.square,
             self.size + other.size,
             self.noise + other.noise,
@@ -67,35 +67,32 @@ class HeldOut:
 
     group: str
     chosen: tuple[str, ...]
-    before: Prediction
-    after: Prediction
+    before: PredictionScore
+    after: PredictionScore
 
 
 def groups(lines: Lines) -> dict[str, NDArray[np.bool_]]:
     """The rows of each group that can be left out, with enough recordings remaining."""
-    found: dict[str, NDArray[np.bool_]] = {}
     if lines.curves:
         return _parts_of_curves(lines)
-    entries = frf_recordings(lines.campaign)
-
-    def add(name: str, column: Sequence[float | str | None], last: Callable[[list[float | str]], float | str]) -> None:
-        if None in column or len(set(column)) < 2:
-            return
-        chosen = last(sorted(set(column)))  # type: ignore[arg-type]
-        rows = np.array([value == chosen for value in column])[lines.recording]
-        found[f"{name} {chosen}"] = rows
-
-    add("preload_n", [entry.preload_n for entry in entries], max)
-    add("indenter_radius_mm", [entry.indenter_radius_mm for entry in entries], max)
-    add("sensor", [entry.sensor for entry in entries], lambda values: values[-1])
-    days = [None if entry.recorded_at is None else str(entry.recorded_at)[:10] for entry in entries]
-    add("recorded_at", days, max)
+    entries = frf_of(lines.campaign)
+    columns: dict[str, list[Any]] = {
+        "preload_n": [entry.preload_n for entry in entries],
+        "indenter_radius_mm": [entry.indenter_radius_mm for entry in entries],
+        "sensor": [entry.sensor for entry in entries],
+        "recorded_at": [None if entry.recorded_at is None else str(entry.recorded_at)[:10] for entry in entries],
+    }
+    rows_by_group = {
+        f"{name} {largest}": np.array([value == largest for value in column])[lines.recording]
+        for name, column in columns.items()
+        if None not in column and (largest := max(column)) != min(column)
+    }
     edge = float(np.quantile(np.unique(lines.frequency), 0.75))
     if len(np.unique(lines.frequency)) >= 8:
-        found[f"frequency_hz above {edge:.4g}"] = lines.frequency > edge
+        rows_by_group[f"frequency_hz above {edge:.4g}"] = lines.frequency > edge
     return {
         name: rows
-        for name, rows in found.items()
+        for name, rows in rows_by_group.items()
         if len(np.unique(lines.recording[~rows])) >= _LEAST_KEPT and rows.any()
     }
 
@@ -114,13 +111,15 @@ def _parts_of_curves(lines: Lines) -> dict[str, NDArray[np.bool_]]:
     return {f"force_n above {_FURTHEST:.0%}": force > _FURTHEST * highest}
 
 
-def hold_out(bench: Workbench, ranked: Sequence[Explanation], nothing: Explanation, supported: int) -> list[HeldOut]:
+def hold_out(
+    problem: FittingProblem, ranked: Sequence[Explanation], nothing: Explanation, supported: int
+) -> list[HeldOut]:
     """Predict each group from the rest; `ranked` are the sets found on everything, the best first."""
     weights = [entry.log_evidence + log_prior(len(entry.names), supported) for entry in ranked]
     rivals = [entry for entry, w in zip(ranked, weights, strict=True) if w > weights[0] - _BEHIND][:_BEST]
-    found = []
-    for name, rows in groups(bench.lines).items():
-        smaller = Workbench(bench.lines.part(~rows), bench.table)
+    held_out = []
+    for name, rows in groups(problem.lines).items():
+        smaller = FittingProblem(problem.lines.part(~rows), problem.table)
         fits: dict[tuple[str, ...], Explanation] = {}
         for entry in (nothing, *rivals):
             if entry.names in fits:
@@ -134,24 +133,26 @@ def hold_out(bench: Workbench, ranked: Sequence[Explanation], nothing: Explanati
         if nothing.names not in fits:
             continue
         chosen = max(fits.values(), key=lambda entry: entry.log_evidence + log_prior(len(entry.names), supported))
-        before, after = (_predict(smaller, fits[names], bench, rows) for names in (nothing.names, chosen.names))
-        found.append(HeldOut(name, chosen.names, before, after))
-    return found
+        before, after = (_predict(smaller, fits[names], problem, rows) for names in (nothing.names, chosen.names))
+        held_out.append(HeldOut(name, chosen.names, before, after))
+    return held_out
 
 
-def _predict(smaller: Workbench, explanation: Explanation, bench: Workbench, rows: NDArray[np.bool_]) -> Prediction:
+def _predict(
+    smaller: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: NDArray[np.bool_]
+) -> PredictionScore:
     """Some of the rows from a fit to others; sensors that were seen keep the gain that was found for them."""
-    left = bench.lines.part(rows)
-    model = compose(explanation.names, bench.lines.campaign, bench.table, bench.kind)
+    left = problem.lines.part(rows)
+    model = compose(explanation.names, problem.lines.campaign, problem.table, problem.kind)
     point, levels = explanation.point, explanation.best.at.marginal.levels
     whole = model.predict(point.fit)
     prediction, pickup_variance = _some(whole, rows), whole.pickup_variance
     seen = np.isin(left.sensor, smaller.lines.sensor)
     gains = np.zeros(max(int(left.sensor.max()), int(smaller.lines.sensor.max())) + 1)
-    found = explanation.best.at.marginal.sensor_gains
-    gains[: len(found)] = found
+    fitted_gains = explanation.best.at.marginal.sensor_gains
+    gains[: len(fitted_gains)] = fitted_gains
     # A contact on an extremum of σ feels positioning scatter in second order, as in the likelihood
-    p2, curvature, recording = levels.position**2, bench.curvature, bench.lines.recording[rows]
+    p2, curvature, recording = levels.position**2, problem.curvature, problem.lines.recording[rows]
     value = prediction.value * np.exp(gains[left.sensor])[left.recording]
     value = value * np.exp(0.5 * p2 * curvature.laplacian)[recording]
     scatter = levels.gain**2 + np.where(seen, 0.0, levels.spread**2)
@@ -171,23 +172,23 @@ def _predict(smaller: Workbench, explanation: Explanation, bench: Workbench, row
     size = np.add.reduceat(np.abs(value) ** 2, first)
     score = -0.5 * (each / expected + np.log(2 * np.pi * expected / size))
     square_sum, size_sum, noise_sum, score_sum = (float(column.sum()) for column in (square, size, noise, score))
-    return Prediction(square_sum, size_sum, noise_sum, score_sum, len(first), float(picked_up.sum()))
+    return PredictionScore(square_sum, size_sum, noise_sum, score_sum, len(first), float(picked_up.sum()))
 
 
-def total(found: Sequence[HeldOut]) -> tuple[Prediction, Prediction]:
+def total(held_out: Sequence[HeldOut]) -> tuple[PredictionScore, PredictionScore]:
     """Before and after, over all groups."""
-    before, after = Prediction(), Prediction()
-    for entry in found:
+    before, after = PredictionScore(), PredictionScore()
+    for entry in held_out:
         before, after = before + entry.before, after + entry.after
     return before, after
 
 
-def in_sample(bench: Workbench, explanation: Explanation) -> Prediction:
+def in_sample(problem: FittingProblem, explanation: Explanation) -> PredictionScore:
     """The recordings that the explanation was fitted to."""
-    return _predict(bench, explanation, bench, np.ones(len(bench.lines.value), dtype=bool))
+    return _predict(problem, explanation, problem, np.ones(len(problem.lines.value), dtype=bool))
 
 
-def _some(whole: Predicted, rows: NDArray[np.bool_]) -> Predicted:
+def _some(whole: Prediction, rows: NDArray[np.bool_]) -> Prediction:
     return replace(
         whole,
         value=whole.value[rows],

@@ -14,21 +14,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.diagnosis.inference.explanation import Workbench
+from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.inference.likelihood import Marginal, Moments
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.noise.correlated_error import TYPICAL
 from underskin.diagnosis.noise.noise_levels import NoiseLevels
 from underskin.diagnosis.selection.search import Answer
 from underskin.mechanisms.base import Normal, Parameter, Unsupported
+from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.registry import CATALOGUE
+from underskin.recordings.usual_scatter import USUAL_GAIN
 from underskin.units import Floats
 
 _LEAST_CHI2 = 9.0
 _TWINS = 0.98
 _ENDS = (0.1, 0.9)  # of a shape's usual range
 _OPEN = 0.1  # of the leader's probability: a rival beyond that is not told from it
-_GAIN = 0.022
 
 
 @dataclass(frozen=True)
@@ -40,19 +41,19 @@ class Confounding:
     reason: str
 
 
-def confounding(bench: Workbench) -> list[Confounding]:
+def confounding(problem: FittingProblem) -> list[Confounding]:
     """What cannot be told apart here; mechanisms that the campaign does not support at all are not listed."""
-    fitter = Fitter(bench.hypothesis((), placed=False, whole=True))
+    fitter = Fitter(problem.hypothesis((), placed=False, whole=True))
     base = fitter.evaluate(fitter.start(np.zeros(0)))
     owners, signatures = [], []
     for name, mechanism in CATALOGUE.items():
-        if bench.kind not in mechanism.kinds:
+        if problem.kind not in mechanism.kinds:
             continue
-        parameters = mechanism.parameters(bench.lines.campaign, bench.kind)
+        parameters = mechanism.parameters(problem.lines.campaign, problem.kind)
         if any(entry.moves_covariance for entry in parameters):
             continue
         try:
-            hypothesis = bench.hypothesis((name,), placed=False, whole=True)
+            hypothesis = problem.hypothesis((name,), placed=False, whole=True)
         except Unsupported:
             continue
         for own in _shapes(parameters):
@@ -62,10 +63,10 @@ def confounding(bench: Workbench) -> list[Confounding]:
         return []
     slopes = np.concatenate([base.prediction.slopes, np.array(signatures) - base.prediction.value])
     prediction = replace(base.prediction, slopes=slopes)
-    lines = bench.lines
+    lines = problem.lines
     ratio = TYPICAL if lines.curves else 0.0
-    moments = Moments(lines, prediction, np.zeros(lines.recordings), bench.curvature, 0.0, ratio)
-    information, _ = Marginal(lines, moments, NoiseLevels(_GAIN, 1.0, 0.0, 0.01)).normal_equations()
+    moments = Moments(lines, prediction, np.zeros(lines.recordings), problem.curvature, 0.0, ratio)
+    information, _ = Marginal(lines, moments, NoiseLevels(USUAL_GAIN, 1.0, 0.0, SENSOR_SPREAD)).normal_equations()
     return _told(owners, information, fitter.parameters)
 
 
@@ -91,13 +92,13 @@ def _told(owners: Sequence[str], information: Floats, nuisances: Sequence[Parame
     left = own - shared @ np.linalg.solve(beside, shared.T)
     chi2 = np.maximum(np.diag(left), 0.0)
     first = {name: owners.index(name) for name in owners}  # a mechanism's first signature is the typical one
-    found = []
+    confounded = []
     for name, index in first.items():
         if own[index, index] < _LEAST_CHI2:
-            found.append(Confounding(name, "noise", "at a typical strength it stays within the noise here"))
+            confounded.append(Confounding(name, "noise", "at a typical strength it stays within the noise here"))
         elif chi2[index] < _LEAST_CHI2:
             reason = "at a typical strength, d33, E and h within their tolerances take up what it does here"
-            found.append(Confounding(name, "d33", reason))
+            confounded.append(Confounding(name, "d33", reason))
     visible = [name for name in first if chi2[first[name]] >= _LEAST_CHI2]
     for one, other in itertools.combinations(visible, 2):
         for typical_one, shaped in ((one, other), (other, one)):
@@ -107,9 +108,9 @@ def _told(owners: Sequence[str], information: Floats, nuisances: Sequence[Parame
             apart = (1 - cosine**2) * np.minimum(chi2[place], chi2[rivals])
             if (np.abs(cosine) > _TWINS).any() or (apart < _LEAST_CHI2).any():
                 reason = f"what {typical_one} typically does to these recordings, {shaped} can do as well"
-                found.append(Confounding(one, other, reason))
+                confounded.append(Confounding(one, other, reason))
                 break
-    return found
+    return confounded
 
 
 def left_open(confounded: Sequence[Confounding], answers: Sequence[Answer]) -> list[Confounding]:
@@ -126,15 +127,15 @@ def left_open(confounded: Sequence[Confounding], answers: Sequence[Answer]) -> l
         gone, come = named - set(rival), set(rival) - named
         if len(gone) == len(come) == 1:
             swapped[frozenset(gone | come)] = (*gone, *come)
-    found = []
+    open_ones = []
     for entry in confounded:
         both = {entry.mechanism, entry.confounded_with}
         if not both & named or frozenset(both) in swapped:
-            found.append(entry)
+            open_ones.append(entry)
             swapped.pop(frozenset(both), None)
     for one, other in sorted(swapped.values()):
-        found.append(Confounding(one, other, f"{other} explains these recordings about as well as {one}"))
-    return found
+        open_ones.append(Confounding(one, other, f"{other} explains these recordings about as well as {one}"))
+    return open_ones
 
 
 def _sets(answers: Sequence[Answer]) -> list[tuple[str, ...]]:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.inference.explanation import Workbench
+from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.selection.search import SHOWS
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, CompressionRecording, Recording
@@ -21,7 +21,9 @@ from underskin.surrogate.sigma_table import SigmaTable
 _BEGINNING = 0.1  # of each curve's displacement
 
 
-def without_seating(campaign: Campaign, names: Sequence[str], table: SigmaTable) -> tuple[Workbench, Finding] | None:
+def without_seating(
+    campaign: Campaign, names: Sequence[str], table: SigmaTable
+) -> tuple[FittingProblem, Finding] | None:
     """The rest of the curves and the finding, where the rest speaks no more for the stiffening among `names`.
 
     A law that needs a curve's whole history, such as relaxation, cannot be fitted to the rest: nothing is tried.
@@ -34,8 +36,9 @@ def without_seating(campaign: Campaign, names: Sequence[str], table: SigmaTable)
     rows = curve_lines(_without_beginning(campaign), "compression")
     if rows.recordings < len(campaign.recordings):
         return None
-    bench = Workbench(rows, table)
-    stiffer, plain = bench.explain(tuple(names)), bench.explain(tuple(name for name in names if name not in imitated))
+    problem = FittingProblem(rows, table)
+    stiffer = problem.explain(tuple(names))
+    plain = problem.explain(tuple(name for name in names if name not in imitated))
     assert stiffer is not None
     assert plain is not None
     if stiffer.log_evidence - plain.log_evidence > SHOWS:
@@ -44,7 +47,7 @@ def without_seating(campaign: Campaign, names: Sequence[str], table: SigmaTable)
         f"only the first {100 * _BEGINNING:.0f} % of the displacement speaks for {' and '.join(imitated)}: a platen "
         "that is tilted, or an uneven end, seats like that. It was left out; a small preload before zeroing avoids it"
     )
-    return bench, Finding("seating", "", "displacement_mm", text)
+    return problem, Finding("seating", "", "displacement_mm", text)
 
 
 def _is_pressed(entry: Recording) -> bool:

@@ -19,7 +19,7 @@ SENSOR_SPREAD = 0.01  # sd of the logarithms of the sensors' gains, without `sen
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a model says of every row, with its derivatives with respect to the fit coordinates."""
+    """A model's prediction of every row, with its derivatives with respect to the fit coordinates."""
 
     value: Array  # (rows,) complex FRF [C/N], or force [N]
     slopes: Array  # (parameters, rows)
@@ -33,10 +33,10 @@ class Prediction:
     @property
     def pickup_variance(self) -> Floats:
         """Of real and of imaginary part (rows,) [(C/N)²]."""
-        found = np.zeros(len(self.value))
+        variance = np.zeros(len(self.value))
         if self.pickup is not None and self.picked is not None:
-            found[self.picked] = self.pickup**2
-        return found
+            variance[self.picked] = self.pickup**2
+        return variance
 
 
 class Composition:

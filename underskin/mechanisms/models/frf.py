@@ -1,4 +1,4 @@
-"""The FRF of a campaign's recordings under a set of mechanisms.
+"""The FRF of recordings under a set of mechanisms.
 
 Base model: Hertz' radius on a half space, the contact edge still, σ of the bonded finite-strain layer averaged over the
 sensor's disc at its offset; FRF = d33 · (3/2) ρ² σ (Seminara 2018, equations 7 to 16). The stages, in this order:
@@ -33,7 +33,10 @@ _POSITION = 2  # two more variables: the contact's x and y
 
 
 class FrfModel:
-    """See the module; `predict` gives all lines of all recordings, one recording after another."""
+    """The FRF under given conditions by the base model and a set of mechanisms.
+
+    Rows are all lines of all recordings, one recording after another.
+    """
 
     def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions, table: SigmaTable) -> None:
         """Work out everything that no parameter changes."""
@@ -62,7 +65,23 @@ class FrfModel:
         self.valid = self._declared_inside(table)[design.point][design.recording]
 
     def predict(self, fit: Floats) -> Prediction:
-        """All rows at one point of the fit coordinates (parameters,); NaN nowhere."""
+        """The FRF on every row with its derivatives.
+
+        Parameters
+        ----------
+        fit
+            (parameters,) fit coordinates, in the order of `parameters`.
+
+        Returns
+        -------
+        Prediction
+            In C/N; finite everywhere, also where `inside` is False.
+
+        Raises
+        ------
+        InvalidInput
+            Where `fit` has another length.
+        """
         own, nuisances, position = self._composition.values(np.asarray(fit, dtype=float), _POSITION)
         contacts = self._contacts(own, nuisances)
         sigma, inside = self._sigma_at_points(contacts, own, position)

@@ -143,10 +143,10 @@ def times_of(recordings: Sequence[CurveConditions]) -> Floats:
     )
 
 
-def _since(found: NDArray[np.bool_], first: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _since(marked: NDArray[np.bool_], first: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """From the first row where it is `found` on, in each recording."""
-    total = np.cumsum(found)
-    before = np.maximum.accumulate(np.where(first, total - found, 0))
+    total = np.cumsum(marked)
+    before = np.maximum.accumulate(np.where(first, total - marked, 0))
     return np.asarray(total > before)
 
 

@@ -71,12 +71,12 @@ class Sphere:
 
     def at_radius(self, a: Differentiated) -> ContactAt:
         """The equilibrium at contact radii a (rows,) > 0 [m]."""
-        found = self._on_half_space(a) if self.layer is None else self._on_layer(a, self.layer)
+        equilibrium = self._on_half_space(a) if self.layer is None else self._on_layer(a, self.layer)
         if self.curve.yeoh is None:
-            return found
+            return equilibrium
         strain = _STRAIN * a / self.radius
         ratio = stiffened(1.0 - strain, self.curve.yeoh) / (3.0 * strain)
-        return replace(found, force=found.force * ratio, stiffness=found.stiffness * ratio)
+        return replace(equilibrium, force=equilibrium.force * ratio, stiffness=equilibrium.stiffness * ratio)
 
     def pull_off(self) -> tuple[Floats, Floats]:
         """The radius and travel (rows,) below which there is no stable contact; 0 without adhesion."""
@@ -115,10 +115,10 @@ class Sphere:
         variables = len(self.curve.modulus.slopes)
         seed = np.zeros((variables, len(a)))
         seed[-1] = 1.0
-        found = self.at_radius(Differentiated(a, seed))
-        total = self._total(found)
+        contact = self.at_radius(Differentiated(a, seed))
+        total = self._total(contact)
         given = np.zeros_like(seed) + travel.slopes
-        return found.moved((given - total.slopes) / total.slopes[-1]).where(held, travel), inside
+        return contact.moved((given - total.slopes) / total.slopes[-1]).where(held, travel), inside
 
     def _solved(self, target: Floats, least: Floats, most: Floats) -> Floats:
         """a between `least` and `most` with that travel: Newton's steps, halved where they leave what brackets it."""
