@@ -5,9 +5,9 @@ import os
 import numpy as np
 
 from bench.figures import Figure
+from tablegen import linear_layer
 from tablegen.sigma import Nodes, solve_column
 from tests.oracle import linear_layer_values
-from underskin.physics import linear_layer
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 FRESH_POINTS = 50

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from rig.experiment import parse as experiment
+from rig.description import parse as experiment
 from rig.recorded import campaign, record_lines
 from underskin.recordings.campaign import Campaign, parse
 

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from rig.description import parse
 from rig.effects import EFFECTS, FRF, UNCATALOGUED
 from rig.errors import RigError
-from rig.experiment import SCHEMA, parse
+from rig.experiment import SCHEMA
 from rig.recorded import RecordedLines, record_lines
 from rig.strengths import drawn_parameters, evenly_in_log, of_frf
 

@@ -5,15 +5,16 @@ from typing import Any
 
 import numpy as np
 
+from rig.description import parse
 from rig.draw import SHARES
 from rig.effects import EFFECTS, INDENTATION, UNCATALOGUED
-from rig.elastomer import Curve, record_curves
+from rig.elastomer import RecordedCurve, record_curves
 from rig.errors import RigError
-from rig.experiment import SCHEMA, Experiment, parse
+from rig.experiment import SCHEMA, Experiment
 from rig.strengths import drawn_parameters, evenly_in_log, of_curves
 
 
-def drawn_curves(seed: int, number: int, kind: str, what: str | None = None) -> tuple[Experiment, list[Curve]]:
+def drawn_curves(seed: int, number: int, kind: str, what: str | None = None) -> tuple[Experiment, list[RecordedCurve]]:
     """Random experiment `number` of a seed, carried out; `what` it hides is drawn too where not given."""
     random = np.random.default_rng([seed, number, 23])
     hidden = str(random.choice(list(SHARES), p=list(SHARES.values()))) if what is None else what

@@ -19,7 +19,7 @@ from rig.effects import COMPRESSION, INDENTATION, Values
 from rig.errors import RigError
 from rig.experiment import Experiment
 from rig.layer import Floats, Layer
-from rig.pressed import stiffening
+from rig.layer_contacts import stiffening
 
 _APPROACH = 0.08  # of the largest indentation, before contact
 _RADII = 3000
@@ -29,14 +29,14 @@ Law = Callable[[Floats, bool], Floats]  # force for unit modulus at displacement
 
 
 @dataclass(frozen=True)
-class Curve:
+class RecordedCurve:
     """One recording: what is written down of it, and `force_n` before noise."""
 
     entry: dict[str, Any]
     exact_force_n: Floats
 
 
-def record_curves(experiment: Experiment) -> list[Curve]:
+def record_curves(experiment: Experiment) -> list[RecordedCurve]:
     """Carry out an experiment of kind indentation or compression."""
     curves = experiment.curves
     assert curves is not None
@@ -54,7 +54,7 @@ def record_curves(experiment: Experiment) -> list[Curve]:
     return [_curve(experiment, number, shape, speed) for number, (shape, speed) in enumerate(made)]
 
 
-def _curve(experiment: Experiment, number: int, shape: dict[str, float], speed: float) -> Curve:
+def _curve(experiment: Experiment, number: int, shape: dict[str, float], speed: float) -> RecordedCurve:
     curves, on = experiment.curves, experiment.effects
     assert curves is not None
     random = np.random.default_rng([experiment.seed, 5, number])
@@ -77,7 +77,7 @@ def _curve(experiment: Experiment, number: int, shape: dict[str, float], speed: 
     entry |= {"displacement_mm": measured.tolist(), "force_n": noisy.tolist()}
     if curves.times:
         entry["time_s"] = time.tolist()
-    return Curve(entry, force)
+    return RecordedCurve(entry, force)
 
 
 def _course(experiment: Experiment, shape: Mapping[str, float], speed: float) -> tuple[Floats, Floats]:
@@ -198,7 +198,7 @@ def _ripple(on: Mapping[str, Values], pressed: Floats) -> Floats:
     return amplitude * np.sin(2 * np.pi * pressed / pitch)
 
 
-def campaign_of_curves(experiment: Experiment, curves: list[Curve]) -> dict[str, Any]:
+def campaign_of_curves(experiment: Experiment, curves: list[RecordedCurve]) -> dict[str, Any]:
     """The campaign (`campaign/1`) of the curves."""
     assert experiment.curves is not None
     skin: dict[str, Any] = {

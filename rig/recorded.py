@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from rig import effects
-from rig.bench import Bench
 from rig.effects import Values
 from rig.experiment import Experiment, Noise
 from rig.layer import Floats
 from rig.linear_filters import Complexes
 from rig.plan import recordings
+from rig.true_response import TrueResponse
 
 _MAINS_WIDTH_HZ = 1.5
 _HARMONICS = ((1, 1.0), (3, 1 / 3))
@@ -23,9 +23,9 @@ _HARMONICS = ((1, 1.0), (3, 1 / 3))
 
 @dataclass(frozen=True)
 class RecordedLines:
-    """`bench` is what truly was; `exact` its lines, `measured` those with everything (rows, lines) [pC/N]."""
+    """`response` is what truly was; `exact` its lines, `measured` those with everything (rows, lines) [pC/N]."""
 
-    bench: Bench
+    response: TrueResponse
     frequency_hz: Floats
     exact: Complexes
     measured: Complexes
@@ -34,14 +34,14 @@ class RecordedLines:
     coherence: Floats | None
 
 
-def make_bench(experiment: Experiment) -> Bench:
-    """The experiment's bench with its scatter of position and of sensors drawn."""
+def make_response(experiment: Experiment) -> TrueResponse:
+    """The experiment's response with its scatter of position and of sensors drawn."""
     plan = recordings(experiment)
     random = np.random.default_rng([experiment.seed, 1])
     missed = experiment.noise.position_mm * random.normal(size=(len(plan.preload_n), 2))
     spread = effects.of(experiment.effects, "sensor_spread", "sd")
     gains = np.exp(spread * random.normal(size=len(experiment.skin.sensors)))
-    return Bench(experiment, plan, missed, gains)
+    return TrueResponse(experiment, plan, missed, gains)
 
 
 def recording_gains(experiment: Experiment, rows: int) -> Floats:
@@ -52,19 +52,19 @@ def recording_gains(experiment: Experiment, rows: int) -> Floats:
 def record_lines(experiment: Experiment) -> RecordedLines:
     """Carry out an experiment that records FRF lines."""
     assert experiment.lines is not None
-    bench = make_bench(experiment)
+    response = make_response(experiment)
     grid = np.geomspace(experiment.lines.low_hz, experiment.lines.high_hz, experiment.lines.count)
     frequency = np.unique(np.round(grid, 4))
-    exact = bench.lines(frequency)
+    exact = response.lines(frequency)
     random = np.random.default_rng([experiment.seed, 3])
     actual = exact * recording_gains(experiment, len(exact))[:, None]
     variance = line_noise(experiment.noise, frequency) ** 2 * np.abs(actual) ** 2 + experiment.noise.floor_pc_per_n**2
     noise = random.normal(size=(2, *exact.shape)) * np.sqrt(variance)
-    pickup = mains_pickup(experiment.effects, bench.plan.dynamic_n, frequency, random)
+    pickup = mains_pickup(experiment.effects, response.plan.dynamic_n, frequency, random)
     size = np.maximum(np.abs(actual) ** 2, 1e-300)
     coherence = 1 / (1 + 2 * experiment.noise.averages * variance / size) if experiment.noise.coherence else None
     return RecordedLines(
-        bench, frequency, exact, actual + noise[0] + 1j * noise[1] + pickup, variance, pickup, coherence
+        response, frequency, exact, actual + noise[0] + 1j * noise[1] + pickup, variance, pickup, coherence
     )
 
 
@@ -90,14 +90,14 @@ def mains_pickup(
 
 def campaign(recorded: RecordedLines) -> dict[str, Any]:
     """The campaign (`campaign/1`) of recorded lines: what the lab knows, and no more."""
-    entries = recording_headers(recorded.bench)
+    entries = recording_headers(recorded.response)
     for row, entry in enumerate(entries):
         entry["frequency_hz"] = recorded.frequency_hz.tolist()
         entry["frf_re_pc_per_n"] = _rounded(recorded.measured[row].real)
         entry["frf_im_pc_per_n"] = _rounded(recorded.measured[row].imag)
         if recorded.coherence is not None:
             entry["coherence"] = np.round(recorded.coherence[row], 8).tolist()
-    return campaign_document(recorded.bench.experiment, entries)
+    return campaign_document(recorded.response.experiment, entries)
 
 
 def _rounded(values: Floats) -> list[float]:
@@ -124,9 +124,9 @@ def skin_document(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def recording_headers(bench: Bench) -> list[dict[str, Any]]:
+def recording_headers(response: TrueResponse) -> list[dict[str, Any]]:
     """What the lab writes down of each recording, in order."""
-    plan, skin, times = bench.plan, bench.experiment.skin, bench.plan.recorded_at
+    plan, skin, times = response.plan, response.experiment.skin, response.plan.recorded_at
     moved = bool(np.any(plan.offset_mm != 0))
     entries = []
     for row, number in enumerate(plan.sensor):

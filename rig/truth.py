@@ -2,12 +2,12 @@
 
 from typing import Any
 
-from rig.bench import Bench
 from rig.effects import UNCATALOGUED
-from rig.elastomer import Curve
+from rig.elastomer import RecordedCurve
 from rig.experiment import Experiment
 from rig.identifiable import THRESHOLD, visibility
 from rig.recorded import RecordedLines
+from rig.true_response import TrueResponse
 from rig.visible_curves import chi2_gain
 
 SCHEMA = "truth/1"
@@ -33,13 +33,13 @@ def truth_of(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def truth_of_bench(bench: Bench) -> dict[str, Any]:
+def truth_of_response(response: TrueResponse) -> dict[str, Any]:
     """The same with the sensors' true gains."""
-    gains = [round(float(gain), 6) for gain in bench.sensor_gains]
-    return {**truth_of(bench.experiment), "sensor_gains": gains}
+    gains = [round(float(gain), 6) for gain in response.sensor_gains]
+    return {**truth_of(response.experiment), "sensor_gains": gains}
 
 
-def truth_of_curves(experiment: Experiment, curves: list[Curve]) -> dict[str, Any]:
+def truth_of_curves(experiment: Experiment, curves: list[RecordedCurve]) -> dict[str, Any]:
     """The same with whether the effects show in the curves at all."""
     gain = chi2_gain(experiment, curves)
     return {
@@ -55,10 +55,10 @@ def truth_of_lines(recorded: RecordedLines) -> dict[str, Any]:
     Where nothing is missing there is nothing to show, and `identifiable` is true.
     """
     seen = visibility(recorded)
-    on = tuple(recorded.bench.on)
+    on = tuple(recorded.response.on)
     each = {name: visibility(recorded, tuple(other for other in on if other != name)).chi2_gain for name in on}
     return {
-        **truth_of_bench(recorded.bench),
+        **truth_of_response(recorded.response),
         "identifiable": seen.identifiable if on else True,
         "every_effect_identifiable": all(gain > THRESHOLD for gain in each.values()),
         "chi2_gain_of_truth": round(seen.chi2_gain, 2),

@@ -9,14 +9,14 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from rig.effects import INDENTATION
-from rig.elastomer import Curve
+from rig.elastomer import RecordedCurve
 from rig.experiment import Experiment
 from rig.layer import Floats
 
 _MODULUS = 0.02
 
 
-def chi2_gain(experiment: Experiment, recorded: list[Curve]) -> float:
+def chi2_gain(experiment: Experiment, recorded: list[RecordedCurve]) -> float:
     """How much χ² the truth gains over the base model."""
     curves = experiment.curves
     assert curves is not None
@@ -46,7 +46,7 @@ def chi2_gain(experiment: Experiment, recorded: list[Curve]) -> float:
     return float(base - true)
 
 
-def _base(kind: str, curve: Curve, displacement: Floats, modulus: float) -> Floats:
+def _base(kind: str, curve: RecordedCurve, displacement: Floats, modulus: float) -> Floats:
     if kind == INDENTATION:
         depth = np.maximum(displacement, 0)
         return np.asarray(4 / 3 * modulus / 0.75 * np.sqrt(curve.entry["indenter_radius_mm"]) * depth**1.5)

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 from threadpoolctl import threadpool_limits
 
+from tablegen import linear_layer
 from tablegen.base_stress import BaseStress, disc_averages
 from tablegen.contact import ContactLayer, Pressed
 from tablegen.contact_mesh import contact_mesh
@@ -20,7 +21,7 @@ from tablegen.discretisation import discretise
 from tablegen.neo_hookean import SHEAR_MODULUS, YOUNGS_MODULUS
 from tablegen.newton import State
 from underskin.errors import SolverError
-from underskin.physics import hertz, linear_layer
+from underskin.physics import hertz
 from underskin.physics.hankel_transform import normal_stress, punch_transform
 from underskin.units import Floats
 

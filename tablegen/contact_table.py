@@ -24,13 +24,14 @@ from tablegen import (
     contact_mesh,
     discretisation,
     faces,
+    linear_layer,
     neo_hookean,
     newton,
 )
 from tablegen.contact_column import solve_contact_column
 from tablegen.contact_mesh import RIM
 from tablegen.sweep import Arrays, run_pieces, sources_hash
-from underskin.physics import hankel_transform, hertz, linear_layer
+from underskin.physics import hankel_transform, hertz
 from underskin.surrogate.hdf5_format import CONTACT_SCHEMA, Dataset, data_hash, write_table
 from underskin.surrogate.influence_table import interpolation_weights
 from underskin.units import Floats

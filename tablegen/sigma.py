@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tablegen import linear_layer
 from tablegen.base_stress import BaseStress, disc_averages
 from tablegen.discretisation import discretise
 from tablegen.faces import hertz_load
@@ -18,7 +19,6 @@ from tablegen.mesh import layer_mesh
 from tablegen.neo_hookean import YOUNGS_MODULUS
 from tablegen.newton import Layer, State
 from underskin.errors import SolverError
-from underskin.physics import linear_layer
 from underskin.physics.hertz import peak_pressure_over_modulus
 from underskin.units import Floats
 

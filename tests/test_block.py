@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from tablegen import deep_layer
-from tablegen.block import Block, solve
-from underskin.physics import half_space, linear_layer
+from docs.paper import deep_layer
+from docs.paper.block import Block, solve
+from tablegen import linear_layer
+from underskin.physics import half_space
 
 A = 0.289
 RHO = np.array([0.0, 0.2, 0.6])

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tablegen import linear_layer
 from tablegen.base_stress import BaseStress
 from tablegen.contact import ContactLayer
 from tablegen.contact_column import Sphere, press_spheres
@@ -14,7 +15,6 @@ from tablegen.contact_mesh import contact_mesh
 from tablegen.discretisation import discretise
 from tests.oracle import NEEDS_ORACLE
 from underskin import SolverError
-from underskin.physics import linear_layer
 
 RHO = np.array([0.0, 0.2, 0.6, 1.0, 3.0])
 

@@ -22,8 +22,8 @@ from proof.real import recorded
 from proof.results import PARTS
 from proof.statistics import calibration, share
 from proof.text import document
+from rig.description import parse as parse_experiment
 from rig.draw import CATALOGUED, UNKNOWN, drawn
-from rig.experiment import parse as parse_experiment
 from rig.strengths import of_frf
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import FrfRecording, parse

@@ -5,6 +5,7 @@ import pytest
 
 import tablegen.mesh
 import tablegen.newton
+from tablegen import linear_layer
 from tablegen.base_stress import BaseStress
 from tablegen.discretisation import discretise
 from tablegen.faces import hertz_load
@@ -12,7 +13,6 @@ from tablegen.mesh import layer_mesh
 from tablegen.newton import Layer
 from tablegen.sigma import Nodes, peak_pressures, solve_column
 from underskin import SolverError
-from underskin.physics import linear_layer
 
 RHO = np.array([0.0, 0.1, 0.2, 0.6, 1.0, 2.0, 3.0])
 R = np.linspace(0, 8, 17)

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tablegen import deep_layer
-from tablegen.block import Block, solve
+from docs.paper import deep_layer
+from docs.paper.block import Block, solve
 from underskin.physics import half_space
 from underskin.units import Floats
 

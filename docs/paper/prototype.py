@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from underskin.physics import half_space, hertz, linear_layer
+from tablegen import linear_layer
+from underskin.physics import half_space, hertz
 from underskin.physics.skin import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
 from underskin.surrogate.sigma_table import SigmaTable

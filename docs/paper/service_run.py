@@ -16,8 +16,9 @@ import httpx
 import numpy as np
 
 from docs.paper.prototype import MODULUS_MPA, RHO, SENSOR_RADIUS_MM, SKIN, THICKNESS_MM
+from tablegen import linear_layer
 from tablegen.sigma import Nodes, solve_column
-from underskin.physics import charge_response, hertz, linear_layer
+from underskin.physics import charge_response, hertz
 from underskin.physics.skin import Indenter
 from underskin.units import Floats
 

@@ -3,18 +3,15 @@
 import math
 from collections.abc import Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 from rig.errors import RigError
-
-if TYPE_CHECKING:
-    from rig.experiment import Design, Skin
+from rig.experiment import DeclaredSkin, RecordingDesign
 
 _LEAST_D33 = 0.05  # pC/N; a polymer without poling has as much
 _FELT_WITHIN = 8.0  # thicknesses; further off less than a millionth of the stress arrives
 
 
-def check_skin(skin: "Skin") -> None:
+def check_skin(skin: DeclaredSkin) -> None:
     """A d33 that shows, and sensors beside each other; raises RigError."""
     size = abs(skin.d33_pc_per_n)
     if size < _LEAST_D33:
@@ -30,7 +27,7 @@ def check_skin(skin: "Skin") -> None:
             raise RigError("skin.sensors", f"{first} and {second}, {apart:g} mm apart", allowed)
 
 
-def check_presses(design: "Design", skin: "Skin") -> None:
+def check_presses(design: RecordingDesign, skin: DeclaredSkin) -> None:
     """Spheres that stay down, on the skin, where the sensor feels them; raises RigError."""
     lowest = min(design.preloads_n)
     for index, force in enumerate(design.dynamic_forces_n):
@@ -46,7 +43,7 @@ def check_presses(design: "Design", skin: "Skin") -> None:
         _check_on_skin(field, offset, skin, design.sensors)
 
 
-def _check_on_skin(field: str, offset: Sequence[float], skin: "Skin", sensors: Sequence[str]) -> None:
+def _check_on_skin(field: str, offset: Sequence[float], skin: DeclaredSkin, sensors: Sequence[str]) -> None:
     """The array lies in the middle of the skin, whose length runs along x."""
     for axis, extent, name in ((0, skin.length_mm, "length_mm"), (1, skin.width_mm, "width_mm")):
         if extent is None:

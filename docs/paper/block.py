@@ -7,7 +7,7 @@ modulus 1, find u and p so that for all v that respect the base and the planes o
 
     ∫ 2 ε(u):ε(v) − p div v − q div u = −∫_top pressure · v_z
 
-in Taylor–Hood elements Q_k/Q_(k−1) on a tensor grid (`tablegen.block_grid`), where every matrix is a sum of
+in Taylor–Hood elements Q_k/Q_(k−1) on a tensor grid (`block_grid.py`), where every matrix is a sum of
 Kronecker products of one-dimensional ones; the three-dimensional matrix is never formed. MINRES solves it,
 preconditioned by the inverse of each diagonal block of the elasticity operator (fast diagonalisation) and of
 the pressure's mass matrix. Source: Elman, Silvester, Wathen, Finite Elements and Fast Iterative Solvers,
@@ -22,7 +22,7 @@ from scipy.linalg import eigh
 from scipy.sparse.linalg import LinearOperator, minres
 from threadpoolctl import threadpool_limits
 
-from tablegen.block_grid import Axis, graded_nodes, polar_points
+from docs.paper.block_grid import Axis, graded_nodes, polar_points
 from underskin.errors import SolverError
 from underskin.units import Floats
 

@@ -23,7 +23,7 @@ _STIFFENING_STEPS = 40
 
 
 @dataclass(frozen=True)
-class Pressed:
+class LayerContacts:
     """Spheres of `radius` on a layer under `force` for `dwell` seconds, arrays (rows,)."""
 
     thickness: float
@@ -33,23 +33,23 @@ class Pressed:
     force: Floats
     dwell: Floats
 
-    def at(self, force: Floats) -> "Pressed":
-        """The same under another force; kept."""
+    def at(self, force: Floats) -> "LayerContacts":
+        """The same contacts under another force (rows,); cached."""
         key = force.tobytes()
         if key not in self._others:
-            self._others[key] = Pressed(self.thickness, self.modulus, self.on, self.radius, force, self.dwell)
+            self._others[key] = LayerContacts(self.thickness, self.modulus, self.on, self.radius, force, self.dwell)
         return self._others[key]
 
     @cached_property
-    def _others(self) -> dict[bytes, "Pressed"]:
+    def _others(self) -> dict[bytes, "LayerContacts"]:
         return {}
 
     @cached_property
     def layer(self) -> Layer:
         """ν and glue line."""
         nu = effects.of(self.on, "compressible_layer", "poisson_ratio") or 0.5
-        slips = "interface_slip" in self.on
-        return Layer(nu, effects.of(self.on, "interface_slip", "glue_stiffness") if slips else math.inf)
+        slipping = "interface_slip" in self.on
+        return Layer(nu, effects.of(self.on, "interface_slip", "glue_stiffness") if slipping else math.inf)
 
     @cached_property
     def contact_radius(self) -> Floats:
