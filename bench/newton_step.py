@@ -19,7 +19,7 @@ from bench.figures import Figure, interleaved, ratio, seconds
 from tablegen.discretisation import discretise
 from tablegen.faces import hertz_load
 from tablegen.mesh import layer_mesh
-from tablegen.newton import Layer
+from tablegen.newton import NonlinearLayer
 from tests.felupe_layer import BULK_MODULUS, FelupeLayer, Floats, quadratic_mesh
 
 CONTACT_RADIUS = 0.3
@@ -51,7 +51,7 @@ def measure() -> list[Figure]:
 def _contestants(order: int, refinement: int) -> tuple[dict[str, Step], int]:
     """A step of each code on one grid of points, and the number of free displacements, equal for all."""
     mesh = layer_mesh(CONTACT_RADIUS, refinement)
-    layer = Layer(discretise(mesh, order))
+    layer = NonlinearLayer(discretise(mesh, order))
     load = PEAK_PRESSURE * hertz_load(layer.discretisation, CONTACT_RADIUS)
     r, z = (_subdivided(np.unique(coordinates), order) for coordinates in mesh.p)
     mixed = FelupeLayer(CONTACT_RADIUS, quadratic_mesh(z[::2], r[::2]))

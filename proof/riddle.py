@@ -25,7 +25,7 @@ _FREQUENCY = np.round(np.geomspace(1, 130, 15), 3)
 
 
 @dataclass(frozen=True)
-class Pressed:
+class ArrayRecording:
     """One recording: sensor by number, sphere, preload, the d33 that it gives, and whether it is of the latest runs."""
 
     sensor: int
@@ -41,13 +41,15 @@ def worlds() -> dict[str, dict[str, Any]]:
     In it the last twelve sensors are pressed with both preloads on the same days. If age did it, both give 14 pC/N; if
     the preload did it, 14 and 22.
     """
-    array = [Pressed(n, 4.0, 3.0, HIGHER) for n in range(AT_HIGHER)]
-    array += [Pressed(n, 4.0, 1.0, LOWER, late=True) for n in range(AT_LOWER)]
+    array = [ArrayRecording(n, 4.0, 3.0, HIGHER) for n in range(AT_HIGHER)]
+    array += [ArrayRecording(n, 4.0, 1.0, LOWER, late=True) for n in range(AT_LOWER)]
     again = [(n, preload) for n in range(AT_LOWER) for preload in (3.0, 1.0)]
-    aged = [Pressed(n, 4.0, preload, LOWER, late=True) for n, preload in again]
-    preloaded = [Pressed(n, 4.0, preload, HIGHER if preload == 3.0 else LOWER, late=True) for n, preload in again]
+    aged = [ArrayRecording(n, 4.0, preload, LOWER, late=True) for n, preload in again]
+    preloaded = [
+        ArrayRecording(n, 4.0, preload, HIGHER if preload == 3.0 else LOWER, late=True) for n, preload in again
+    ]
     prototype = [
-        Pressed(0, radius, preload, LOWER)
+        ArrayRecording(0, radius, preload, LOWER)
         for _ in range(3)
         for radius in (4.0, 10.0)
         for preload in (0.5, 1.0, 2.0, 3.0)
@@ -60,7 +62,7 @@ def worlds() -> dict[str, dict[str, Any]]:
     }
 
 
-def _campaign(name: str, rows: Iterable[Pressed]) -> dict[str, Any]:
+def _campaign(name: str, rows: Iterable[ArrayRecording]) -> dict[str, Any]:
     rows = list(rows)
     table = load_table()
     skin = Skin.from_lab(thickness_mm=THICKNESS_MM, youngs_modulus_mpa=MODULUS_MPA, sensor_radius_mm=SENSOR_RADIUS_MM)

@@ -12,13 +12,13 @@ from service.dependencies import in_thread
 from service.more_tables import influence_table
 from service.stress_models import StressAnswer
 from underskin.array_stress.answer import answer
-from underskin.array_stress.request import StressRequest, read_request
+from underskin.array_stress.request import LoadCase, read_request
 from underskin.surrogate.influence_table import InfluenceTable
 
 router = APIRouter(prefix="/v1", tags=["stress"])
 
 
-def columns(table: InfluenceTable, request: StressRequest) -> Columns:
+def columns(table: InfluenceTable, request: LoadCase) -> Columns:
     """Charge and stress on each sensor."""
     found = answer(table, request)
     return Columns(

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from tablegen import linear_layer
 from tablegen.base_stress import BaseStress, disc_averages
-from tablegen.contact import ContactLayer, Pressed
+from tablegen.contact import ContactLayer, PressedState
 from tablegen.contact_mesh import contact_mesh
 from tablegen.discretisation import discretise
 from tablegen.neo_hookean import SHEAR_MODULUS, YOUNGS_MODULUS
@@ -30,7 +30,7 @@ _PLANE_STRAIN = YOUNGS_MODULUS / 0.75  # E' = E/(1 − ν²)
 
 
 @dataclass(frozen=True)
-class Sphere:
+class SphereSolution:
     """What one sphere does to the layer; lengths in thicknesses, forces in G h².
 
     `sigma`, `sigma_increment`: σ of the force and of its increment, for each sensor radius.
@@ -79,13 +79,13 @@ def solve_contact_column(a: float, rho: Floats, cbrt_load: Floats, order: int) -
     return resampled[:, 0] / cbrt_load, resampled[:, 1:], max(abs(sphere.force_error) for sphere in spheres)
 
 
-def press_spheres(a: float, radii: Floats, rho: Floats, order: int) -> list[Sphere]:
+def press_spheres(a: float, radii: Floats, rho: Floats, order: int) -> list[SphereSolution]:
     """Spheres of these radii (descending, in thicknesses), each touching up to the material radius `a` (a/h)."""
     column = _Column(a, rho, order)
     return [column.advance(float(radius)) for radius in radii]
 
 
-def _follow(a: float, rho: Floats, targets: Floats, order: int) -> Iterator[Sphere]:
+def _follow(a: float, rho: Floats, targets: Floats, order: int) -> Iterator[SphereSolution]:
     """Spheres whose x is near each target, and the last one's at or beyond it."""
     column = _Column(a, rho, order)
     ratio = 1.0 + a  # of the force over Hertz's for a: a first guess
@@ -113,7 +113,7 @@ class _Column:
         self.a, self.rho = a, rho
         self.now, self.strain = self.layer.untouched(), 0.0
 
-    def advance(self, radius: float) -> Sphere:
+    def advance(self, radius: float) -> SphereSolution:
         """To the next sphere, in smaller steps where Newton's method needs them."""
         goal = self.a / radius
         step = goal - self.strain
@@ -130,13 +130,13 @@ class _Column:
             self.strain = strain
         return self._sphere(radius)
 
-    def _scaled(self, strain: float) -> Pressed:
+    def _scaled(self, strain: float) -> PressedState:
         """The present state in proportion to a/R, which it follows nearly."""
         now, factor = self.now, strain / self.strain if self.strain else 0.0
         state = State(now.state.displacement * factor, now.state.pressure * factor)
-        return Pressed(state, now.multiplier * factor, now.indentation * factor)
+        return PressedState(state, now.multiplier * factor, now.indentation * factor)
 
-    def _sphere(self, radius: float) -> Sphere:
+    def _sphere(self, radius: float) -> SphereSolution:
         layer, base, now = self.layer, self.base, self.now
         stress = base.at_points(layer.internal_force(now.state))
         gained = base.at_points(layer.increment(now, radius))
@@ -146,7 +146,7 @@ class _Column:
         # F = 2π force and σ = (2π/3) · mean stress/F, for a mean over the disc; 2π cancels.
         static = stress / (3 * force) - linear_layer.sigma(contact_radius, 0.0, base.points)
         moving = gained / (3 * stiffness) - _punch(contact_radius, 0.0, base.points)
-        return Sphere(
+        return SphereSolution(
             radius=radius,
             force=2 * np.pi * force * SHEAR_MODULUS,
             contact_radius=contact_radius,

@@ -36,7 +36,7 @@ _SHEAR = np.diag([2.0, 1.0, 1.0, 2.0, 2.0]) + np.eye(5)[[0, 2, 1, 3, 4]] * np.ar
 
 
 @dataclass(frozen=True)
-class Influence:
+class SolvedInfluence:
     """γ_n and γ_t for each sensor radius and distance, (rho, r)."""
 
     normal: Floats
@@ -61,7 +61,7 @@ class _Glued(Discretisation):
         return self.scalars_on(lambda x: x[1] == 0.0)
 
 
-def solve_influence(poisson_ratio: float, slip: float, rho: Floats, r: Floats, order: int) -> Influence:
+def solve_influence(poisson_ratio: float, slip: float, rho: Floats, r: Floats, order: int) -> SolvedInfluence:
     """γ_n and γ_t for sensor radii `rho` at distances `r`, both in thicknesses; 0 ≤ ν ≤ 0.5, 0 ≤ slip ≤ 1."""
     with threadpool_limits(1):  # the same bits whatever the number of cores
         mesh = influence_mesh()
@@ -69,7 +69,7 @@ def solve_influence(poisson_ratio: float, slip: float, rho: Floats, r: Floats, o
         surface = _displaced_by(d, poisson_ratio, slip, _lifts(d, rho))
     values, numbers = shapes_along(d, r, 1)
     radial, axial = (np.einsum("pn,pnl->lp", values, surface[2 * numbers + c]) for c in (0, 1))
-    return Influence(axial / 3, radial / 3)
+    return SolvedInfluence(axial / 3, radial / 3)
 
 
 def influence_mesh() -> MeshQuad:

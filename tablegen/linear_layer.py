@@ -1,6 +1,7 @@
-"""The exact linear skin: an incompressible layer of unit thickness bonded to a rigid base, laterally unbounded.
+"""The exact linear solution: an incompressible layer of unit thickness, bonded to a rigid base, laterally unbounded.
 
-Source: Love's function with a Hankel transform (PHYSICS, section 3). In this limit σ depends on a/h and ρ alone.
+`underskin.physics.elastic_layer` holds the layer of any Poisson ratio; this is its limit in closed form, from which the
+tables are made. Source: Love's function with a Hankel transform (PHYSICS, section 3). σ depends on a/h and ρ alone.
 """
 
 import numpy as np
@@ -11,7 +12,7 @@ from underskin.units import Floats
 
 
 def transmission(k: Floats) -> Floats:
-    """M(k) = 2 (cosh k + k sinh k) / (1 + 2k² + cosh 2k), written so that nothing overflows."""
+    """Normal transmission M(k) = 2 (cosh k + k sinh k)/(1 + 2k² + cosh 2k), in a form that does not overflow."""
     decay = np.exp(-k)
     cosh = (1 + decay**2) / 2
     sinh = (1 - decay**2) / 2
@@ -19,10 +20,25 @@ def transmission(k: Floats) -> Floats:
 
 
 def sigma(a: ArrayLike, rho: ArrayLike, offset: ArrayLike = 0.0) -> Floats:
-    """σ(a/h, ρ) under the Hertz pressure, `offset` r̂/h beside the sensor; ρ = 0 is the point sensor."""
+    """Transmission factor σ(a/h, ρ) under the Hertz pressure.
+
+    Parameters
+    ----------
+    a : array_like
+        Contact radius a/h [-].
+    rho : array_like
+        ρ = rT/h [-]; 0 is a point sensor.
+    offset : array_like
+        Distance r̂/h of the load from the centre of the sensor [-].
+
+    Returns
+    -------
+    ndarray
+        [-], of the broadcast shape.
+    """
     return normal_stress(transmission, hertz_transform, a, rho, offset)
 
 
 def gamma_n(offset: ArrayLike, rho: ArrayLike) -> Floats:
-    """γ_n(r̂/h, ρ): the same for a normal point force."""
+    """Stress factor γ_n(r̂/h, ρ) of a normal point force; parameters and result as in `sigma`."""
     return normal_stress(transmission, np.ones_like, 0.0, rho, offset)

@@ -32,7 +32,7 @@ class State:
     pressure: Floats
 
 
-class Layer:
+class NonlinearLayer:
     """A discretised layer; solves for its deformation under nodal loads."""
 
     def __init__(self, discretisation: Discretisation) -> None:

@@ -17,7 +17,7 @@ from tablegen.discretisation import discretise
 from tablegen.faces import hertz_load
 from tablegen.mesh import layer_mesh
 from tablegen.neo_hookean import YOUNGS_MODULUS
-from tablegen.newton import Layer, State
+from tablegen.newton import NonlinearLayer, State
 from underskin.errors import SolverError
 from underskin.physics.hertz import peak_pressure_over_modulus
 from underskin.units import Floats
@@ -55,7 +55,7 @@ def solve_column(a: float, nodes: Nodes, order: int, refinement: int = 1) -> Col
 
 
 def _solve_column(a: float, nodes: Nodes, order: int, refinement: int) -> Column:
-    layer = Layer(discretise(layer_mesh(a, refinement), order))
+    layer = NonlinearLayer(discretise(layer_mesh(a, refinement), order))
     load = hertz_load(layer.discretisation, a)
     base = BaseStress(layer.discretisation)
     share = a**2  # t / (q0 a²) is in σ's scale: t = (3F/2πh²) σ with F = (2/3) π a² q0
@@ -85,7 +85,7 @@ def peak_pressures(cbrt_load: Floats) -> Floats:
     return YOUNGS_MODULUS * peak_pressure_over_modulus(cbrt_load**3)
 
 
-def _follow(layer: Layer, load: Floats, cbrt_load: Floats, record: Callable[[int, State], None]) -> None:
+def _follow(layer: NonlinearLayer, load: Floats, cbrt_load: Floats, record: Callable[[int, State], None]) -> None:
     """Load continuation from rest (cbrt_load[0] = 0) through every load, halving the step where it fails."""
     peaks = peak_pressures(cbrt_load)
     before, reached = (0.0, layer.rest()), (0.0, layer.rest())

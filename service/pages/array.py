@@ -14,7 +14,7 @@ from service.pages.skin_values import start
 from service.store import campaigns, skins
 from service.store.engine import Database
 from underskin import InvalidInput, UnderskinError
-from underskin.array_stress.answer import StressAnswer, answer
+from underskin.array_stress.answer import ArrayStress, answer
 from underskin.array_stress.request import read_request
 from underskin.recordings.readers import text
 from underskin.surrogate.sigma_table import SigmaTable
@@ -85,14 +85,14 @@ def refused(error: UnderskinError, lines: Sequence[int] = ()) -> str:
     return said(error, _LABELS, lines, "or tick “Take unlikely magnitudes as they are”")
 
 
-def answered(request: Request, document: Mapping[str, Any]) -> StressAnswer:
+def answered(request: Request, document: Mapping[str, Any]) -> ArrayStress:
     """What `POST /v1/stress` answers; raises UnderskinError."""
     table = influence_table(request.app.state.settings.tables)
     with np.errstate(all="ignore"):  # what overflows is out of reach
         return answer(table, read_request(document))
 
 
-def charge_columns(found: StressAnswer) -> dict[str, list[Any]]:
+def charge_columns(found: ArrayStress) -> dict[str, list[Any]]:
     """Charge and stress on each sensor."""
     return {"sensor": list(found.sensors), **{name: column.tolist() for name, column in found.columns.items()}}
 

@@ -11,7 +11,7 @@ from service.pages.array import Described, answered, charge_columns, described, 
 from service.pages.figures import csv_answer, drawn
 from service.pages.html import page
 from underskin import InvalidInput, UnderskinError
-from underskin.array_stress.answer import StressAnswer
+from underskin.array_stress.answer import ArrayStress
 
 router = APIRouter(prefix="/loads")
 
@@ -29,7 +29,7 @@ def view(request: Request, store: Store, table: Table, skin: Skin = None, loads:
     array = described(store, table, request.query_params, skin)
     error: str | None = None
     document: dict[str, Any] = {}
-    found: StressAnswer | None = None
+    found: ArrayStress | None = None
     try:
         document = _document(array, loads)
         found = answered(request, document)
@@ -54,7 +54,7 @@ def charge_csv(request: Request, store: Store, table: Table, skin: Skin = None, 
     return csv_answer("charge", charge_columns(found))
 
 
-def _figure(request: Request, document: Mapping[str, Any], found: StressAnswer) -> Any:
+def _figure(request: Request, document: Mapping[str, Any], found: ArrayStress) -> Any:
     from underskin.figures import loaded_array
 
     columns = found.columns

@@ -22,7 +22,7 @@ from service.store.engine import Database
 from service.uploads import Upload, received
 from underskin import InvalidInput, UnderskinError
 from underskin.array_stress import pressure_map
-from underskin.array_stress.answer import StressAnswer
+from underskin.array_stress.answer import ArrayStress
 from underskin.recordings.readers import text
 
 router = APIRouter(prefix="/loads/map")
@@ -61,7 +61,7 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
     described = array.described(store, request.app.state.table, given, given.get(_SKIN))
     error: str | None = None
     document: dict[str, Any] = {}
-    found: StressAnswer | None = None
+    found: ArrayStress | None = None
     try:
         if len(content) > _LARGEST_BYTES:
             raise InvalidInput("pressure_map", name, f"must have at most {_LARGEST_BYTES / 1e6:g} MB: make it coarser")
@@ -84,7 +84,7 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
     )
 
 
-def _figures(document: Mapping[str, Any], found: StressAnswer) -> list[Drawn]:
+def _figures(document: Mapping[str, Any], found: ArrayStress) -> list[Drawn]:
     from underskin.figures import loaded_array, pressure_on_array
 
     columns, held = found.columns, document["pressure_map"]

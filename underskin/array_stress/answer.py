@@ -10,12 +10,12 @@ from underskin.array_stress.load_integration import (
     Load,
     array_stress,
     charge,
+    combined,
     contact_load,
     map_points,
     pressure_map_loads,
-    together,
 )
-from underskin.array_stress.request import StressRequest
+from underskin.array_stress.request import LoadCase
 from underskin.array_stress.validation import findings, refuse_beside_skin, refuse_coarse, refuse_many, refuse_overlap
 from underskin.errors import InvalidInput
 from underskin.physics.contact_pressure import MOST_A_OVER_H, SpherePressure, sphere_pressures
@@ -25,7 +25,7 @@ from underskin.units import Finding, Floats, checked, to_lab, to_si
 
 
 @dataclass(frozen=True)
-class StressAnswer:
+class ArrayStress:
     """One entry a sensor; NaN where no load is within the table's reach, or numbers overflow (not `inside`).
 
     `contact_radius_mm`: one entry a contact; empty for a map.
@@ -39,7 +39,7 @@ class StressAnswer:
     findings: list[Finding]
 
 
-def answer(table: InfluenceTable, request: StressRequest) -> StressAnswer:
+def answer(table: InfluenceTable, request: LoadCase) -> ArrayStress:
     """Charge and mean stress on every sensor.
 
     InvalidInput for a skin outside the table, for loads beside the skin, over one another or too wide, and for too much
@@ -53,9 +53,9 @@ def answer(table: InfluenceTable, request: StressRequest) -> StressAnswer:
     sensors = to_si("x_mm", [[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
     pressures = _pressures(request, thickness)
     loads = [_contacts_load(request, pressures, thickness)] if request.contacts else _map_loads(request, thickness)
-    found = array_stress(influence, thickness, sensors, loads)
-    inside = found.inside & np.isfinite(found.stress)
-    stress, error = (np.where(inside, values, np.nan) for values in (found.stress, found.error))
+    total = array_stress(influence, thickness, sensors, loads)
+    inside = total.inside & np.isfinite(total.stress)
+    stress, error = (np.where(inside, values, np.nan) for values in (total.stress, total.error))
     columns = {
         "x_mm": to_lab("x_mm", sensors[:, 0]),
         "y_mm": to_lab("y_mm", sensors[:, 1]),
@@ -63,7 +63,7 @@ def answer(table: InfluenceTable, request: StressRequest) -> StressAnswer:
         "charge_error_pc": to_lab("charge_error_pc", np.abs(charge(error, d33, radius))),
         "mean_stress_mpa": to_lab("mean_stress_mpa", 0.0 - stress),
     }
-    return StressAnswer(
+    return ArrayStress(
         columns=columns,
         sensors=tuple(sensor.id for sensor in request.sensors),
         inside=inside,
@@ -73,7 +73,7 @@ def answer(table: InfluenceTable, request: StressRequest) -> StressAnswer:
     )
 
 
-def _influence(table: InfluenceTable, request: StressRequest, rt_over_h: float) -> Influence:
+def _influence(table: InfluenceTable, request: LoadCase, rt_over_h: float) -> Influence:
     """The skin's influence; InvalidInput where the table has none."""
     low, high = table.domain["poisson_ratio"]
     if not low <= request.poisson_ratio <= high:
@@ -88,7 +88,7 @@ def _influence(table: InfluenceTable, request: StressRequest, rt_over_h: float) 
     return influence
 
 
-def _pressures(request: StressRequest, thickness: float) -> list[SpherePressure]:
+def _pressures(request: LoadCase, thickness: float) -> list[SpherePressure]:
     """Pressures of the contacts; InvalidInput for those too wide for a linear layer."""
     if not request.contacts:
         return []
@@ -97,7 +97,7 @@ def _pressures(request: StressRequest, thickness: float) -> list[SpherePressure]
     radii = to_si("indenter_radius_mm", [contact.indenter_radius_mm for contact in request.contacts])
     forces = to_si("normal_force_n", [contact.normal_force_n for contact in request.contacts])
     layer = Layer(request.poisson_ratio, slip(glue))
-    found = []
+    pressures = []
     for index, pressure in enumerate(sphere_pressures(layer, thickness, modulus, radii, forces)):
         if pressure is None or pressure.radius >= radii[index]:
             allowed = (
@@ -105,30 +105,30 @@ def _pressures(request: StressRequest, thickness: float) -> list[SpherePressure]
                 "is the modulus in MPa?"
             )
             raise InvalidInput(f"contacts[{index}].normal_force_n", request.contacts[index].normal_force_n, allowed)
-        found.append(pressure)
-    return found
+        pressures.append(pressure)
+    return pressures
 
 
-def _contacts_load(request: StressRequest, pressures: list[SpherePressure], thickness: float) -> Load:
-    places = to_si("x_mm", [[contact.x_mm, contact.y_mm] for contact in request.contacts])
+def _contacts_load(request: LoadCase, pressures: list[SpherePressure], thickness: float) -> Load:
+    positions = to_si("x_mm", [[contact.x_mm, contact.y_mm] for contact in request.contacts])
     radii = np.array([pressure.radius for pressure in pressures])
-    refuse_beside_skin(request, places, radii[:, None], "contacts[{}]".format)
-    refuse_overlap(places, radii)
-    load = together(
+    refuse_beside_skin(request, positions, radii[:, None], "contacts[{}]".format)
+    refuse_overlap(positions, radii)
+    load = combined(
         [
             contact_load(place, (*contact.tangential_force_n, contact.normal_force_n), pressure, thickness)
-            for place, contact, pressure in zip(places, request.contacts, pressures, strict=True)
+            for place, contact, pressure in zip(positions, request.contacts, pressures, strict=True)
         ]
     )
-    refuse_many(request, len(load.places))
+    refuse_many(request, len(load.positions))
     return load
 
 
-def _map_loads(request: StressRequest, thickness: float) -> Iterable[Load]:
-    found = request.pressure_map
-    assert found is not None
-    x, y = to_si("x_mm", found.x_mm), to_si("x_mm", found.y_mm)
-    pressure = to_si("pressure_mpa", found.pressure_mpa)
+def _map_loads(request: LoadCase, thickness: float) -> Iterable[Load]:
+    given = request.pressure_map
+    assert given is not None
+    x, y = to_si("x_mm", given.x_mm), to_si("x_mm", given.y_mm)
+    pressure = to_si("pressure_mpa", given.pressure_mpa)
     refuse_coarse(x, y, thickness)
     row, column = np.nonzero(pressure)
     half = np.array([x[1] - x[0], y[1] - y[0]]) / 2

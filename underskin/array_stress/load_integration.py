@@ -21,9 +21,9 @@ _POINTS_AT_ONCE = 1 << 16  # of a map, which may make more than memory holds
 
 @dataclass(frozen=True)
 class Load:
-    """Point forces (F1, F2, F3) [N], (points, 3), at places (points, 2) [m]."""
+    """Point forces (F1, F2, F3) [N], (points, 3), at positions (points, 2) [m]."""
 
-    places: Floats
+    positions: Floats
     forces: Floats
 
 
@@ -39,9 +39,9 @@ def contact_load(place: Floats, force: Sequence[float], pressure: SpherePressure
     count = 12 + 12 * wide
     angle = 2 * np.pi * (np.arange(count) + 0.5) / count
     r = pressure.radius * np.sqrt(1 - t**2)
-    places = np.stack([np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle))], axis=-1).reshape(-1, 2)
+    positions = np.stack([np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle))], axis=-1).reshape(-1, 2)
     share = np.repeat(pressure.ring_share(t) * weight / count, count)
-    return Load(places + place, np.outer(share, force))
+    return Load(positions + place, np.outer(share, force))
 
 
 def pressure_map_loads(x: Floats, y: Floats, pressure: Floats, thickness: float) -> Iterator[Load]:
@@ -53,13 +53,13 @@ def pressure_map_loads(x: Floats, y: Floats, pressure: Floats, thickness: float)
     at_once = max(1, _POINTS_AT_ONCE // (along.size * across.size))
     for start in range(0, max(1, every_row.size), at_once):
         row, column = (every[start : start + at_once] for every in (every_row, every_column))
-        places = np.empty((row.size, along.size, across.size, 2))
-        places[..., 0] = x[column, None, None] + width * across
-        places[..., 1] = y[row, None, None] + height * along[:, None]
+        positions = np.empty((row.size, along.size, across.size, 2))
+        positions[..., 0] = x[column, None, None] + width * across
+        positions[..., 1] = y[row, None, None] + height * along[:, None]
         force = pressure[row, column, None, None] * width * height * np.outer(along_share, across_share)
         forces = np.zeros((force.size, 3))
         forces[:, 2] = force.ravel()
-        yield Load(places.reshape(-1, 2), forces)
+        yield Load(positions.reshape(-1, 2), forces)
 
 
 def map_points(x: Floats, y: Floats, pressure: Floats, thickness: float) -> int:
@@ -68,16 +68,16 @@ def map_points(x: Floats, y: Floats, pressure: Floats, thickness: float) -> int:
     return int(np.count_nonzero(pressure)) * width[0] * width[1] * height[0] * height[1]
 
 
-def together(loads: Sequence[Load]) -> Load:
+def combined(loads: Sequence[Load]) -> Load:
     """Several loads as one."""
-    return Load(np.concatenate([load.places for load in loads]), np.concatenate([load.forces for load in loads]))
+    return Load(np.concatenate([load.positions for load in loads]), np.concatenate([load.forces for load in loads]))
 
 
 def array_stress(influence: Influence, thickness: float, sensors: Floats, loads: Iterable[Load]) -> SensorStress:
     """Mean stress on sensors (sensors, 2) [m] under all loads."""
     stress, error, inside = np.zeros(len(sensors)), np.zeros(len(sensors)), np.zeros(len(sensors), dtype=bool)
     for load in loads:
-        part = influence.stress(thickness, sensors, load.places, load.forces)
+        part = influence.stress(thickness, sensors, load.positions, load.forces)
         stress, error, inside = stress + part.stress, error + part.error, inside | part.inside
     return SensorStress(stress, error, inside)
 
@@ -98,5 +98,5 @@ def _cell_rule(size: float) -> tuple[Floats, Floats]:
     points, parts = _rule_of(size)
     node, weight = np.polynomial.legendre.leggauss(points)
     start = (np.arange(parts) - parts / 2) / parts
-    places = (start[:, None] + (1 + node) / 2 / parts).ravel()
-    return places, np.tile(weight / 2 / parts, parts)
+    positions = (start[:, None] + (1 + node) / 2 / parts).ravel()
+    return positions, np.tile(weight / 2 / parts, parts)

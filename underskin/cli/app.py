@@ -36,7 +36,7 @@ app = typer.Typer(
 )
 
 
-class Model(StrEnum):
+class Body(StrEnum):
     """Which body carries the stress to the sensor."""
 
     LAYER = "layer"
@@ -69,7 +69,7 @@ def sigma(
     a_over_h: Annotated[_Given, _column("Contact radius over thickness.")] = None,
     rt_over_h: Annotated[_Given, _column("Sensor radius over thickness; 0 is a point sensor.")] = None,
     load_parameter: Annotated[_Given, _column("L = F/(R² E), 0 if left out: the linear layer.")] = None,
-    model: Annotated[Model, typer.Option(help="The layer on a rigid base, or the half space.")] = Model.LAYER,
+    model: Annotated[Body, typer.Option(help="The layer on a rigid base, or the half space.")] = Body.LAYER,
     input_file: Input = None,
     csv: Csv = False,
 ) -> None:
@@ -189,7 +189,7 @@ def _answer(
     table = load_table()
     answer = compute(table, gathered)
     everything = {**gathered, **answer.columns}
-    columns.say(answer.findings)
+    columns.write_findings(answer.findings)
     if as_csv:
         columns.write_csv(everything, answer.inside, count)
     else:
