@@ -10,7 +10,7 @@ With n = ∇g, the force on the surface is λ n; ∇²g = (1 − n ⊗ n)/|x −
 
 At equilibrium the increment for dδ at a fixed edge is that of a moving one too: the pressure at the edge is 0, so that
 what the contact gains or loses there as the edge moves is of second order. Hence dF/dδ, and the increment of the stress
-on the base over that of the force, from one more solve (PHYSICS, 6). Lengths in thicknesses, stresses in G.
+on the base over that of the force, from one more solve. Lengths in thicknesses, stresses in G.
 """
 
 from dataclasses import dataclass

@@ -1,9 +1,9 @@
 """One column of the contact table: one material contact edge, pressed by ever smaller spheres up to the largest load.
 
 The mesh belongs to the edge, so each column has one, and every sphere starts from the one before. Its radius is chosen
-so that x = L^(1/3) falls near every other of the wanted values; they are reached by interpolation along the column,
-where a/h stays and all that changes is the strain, in which everything is smooth. What is kept is over its value by
-Hertz at the same force and sphere (PHYSICS, section 1).
+so that x = L^(1/3) falls near every other of the nodes; the nodes themselves are reached by interpolation along the
+column, where a/h is constant and the strain alone varies, in which all quantities are smooth. Quantities are stored as
+ratios to Hertz theory at the same force and sphere (`underskin.physics.hertz`).
 """
 
 from collections.abc import Iterator
@@ -31,10 +31,16 @@ _PLANE_STRAIN = YOUNGS_MODULUS / 0.75  # E' = E/(1 − ν²)
 
 @dataclass(frozen=True)
 class SphereSolution:
-    """What one sphere does to the layer; lengths in thicknesses, forces in G h².
+    """The solution for one sphere; lengths in thicknesses, forces in G h².
 
-    `sigma`, `sigma_increment`: σ of the force and of its increment, for each sensor radius.
-    `force_error`: force on the base over that on the sphere, minus 1. `lowest_pressure`: over the highest.
+    Attributes
+    ----------
+    sigma, sigma_increment : ndarray, (rho,)
+        σ of the force and of its increment, for each sensor radius.
+    force_error : float
+        Force on the base over that on the sphere, minus 1.
+    lowest_pressure : float
+        Lowest over highest pressure in the contact.
     """
 
     radius: float
@@ -53,7 +59,7 @@ class SphereSolution:
         return float(np.cbrt(hertz.load_parameter(self.force, self.radius, YOUNGS_MODULUS)))
 
     def over_hertz(self) -> Floats:
-        """Contact radius, indentation, stiffness over Hertz at this force, then σ and its increment."""
+        """Contact radius, indentation and stiffness over their Hertz values at this force, then σ and its increment."""
         a = float(hertz.contact_radius(self.force, self.radius, YOUNGS_MODULUS))
         ratios = (
             self.contact_radius / a,
@@ -64,9 +70,32 @@ class SphereSolution:
 
 
 def solve_contact_column(a: float, rho: Floats, cbrt_load: Floats, order: int) -> tuple[Floats, Floats, float]:
-    """R/h at each x of `cbrt_load` (ascending, > 0), `over_hertz` there (x, quantities), and the largest force error.
+    """Solve one column of the contact table.
 
-    Raises SolverError that names the point.
+    Parameters
+    ----------
+    a : float
+        Material contact edge a/h before pressing.
+    rho : ndarray, (rho,)
+        Sensor radii rT/h.
+    cbrt_load : ndarray, (x,)
+        x = L^(1/3), ascending, above 0.
+    order : int
+        Order of the displacement elements.
+
+    Returns
+    -------
+    radius : ndarray, (x,)
+        R/h.
+    values : ndarray, (x, quantities)
+        As `SphereSolution.over_hertz`.
+    force_error : float
+        The largest over the column.
+
+    Raises
+    ------
+    SolverError
+        Names the point where Newton's method did not converge.
     """
     with threadpool_limits(1):  # the same bits whatever the number of cores
         targets = np.concatenate([[cbrt_load[0] / 2], cbrt_load[:-1:2], [cbrt_load[-1]]])

@@ -23,7 +23,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Discretisation:
-    """Everything about mesh and element that a solve needs; build it with `discretise`."""
+    """Mesh, elements and shape functions as arrays; build it with `discretise`."""
 
     basis: Basis
     order: int

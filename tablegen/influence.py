@@ -1,4 +1,4 @@
-"""Influence functions by reciprocity: the layer with a unit lift over the sensor's disc on its base (PHYSICS, 4).
+"""Influence functions by reciprocity: the layer with a unit lift over the sensor's disc on its base (Betti).
 
 By Betti's theorem the mean stress on a sensor under a point force on the surface is minus that force's work on the
 displacement u of the surface when the base is lifted by 1 over the sensor's disc and by 0 beside it:
@@ -62,7 +62,21 @@ class _Glued(Discretisation):
 
 
 def solve_influence(poisson_ratio: float, slip: float, rho: Floats, r: Floats, order: int) -> SolvedInfluence:
-    """γ_n and γ_t for sensor radii `rho` at distances `r`, both in thicknesses; 0 ≤ ν ≤ 0.5, 0 ≤ slip ≤ 1."""
+    """Influence functions γ_n and γ_t of a point force on the surface, by finite elements.
+
+    Parameters
+    ----------
+    poisson_ratio : float
+        ν, 0 to 0.5.
+    slip : float
+        1/(1 + κ), 0 (bonded) to 1 (frictionless).
+    rho : ndarray, (rho,)
+        Sensor radii rT/h.
+    r : ndarray, (r,)
+        Distances r̂/h.
+    order : int
+        Order of the displacement elements.
+    """
     with threadpool_limits(1):  # the same bits whatever the number of cores
         mesh = influence_mesh()
         d = _Glued(**vars(discretise(mesh, order)), bonded=slip == 0)

@@ -1,7 +1,7 @@
 """The exact linear solution: an incompressible layer of unit thickness, bonded to a rigid base, laterally unbounded.
 
 `underskin.physics.elastic_layer` holds the layer of any Poisson ratio; this is its limit in closed form, from which the
-tables are made. Source: Love's function with a Hankel transform (PHYSICS, section 3). σ depends on a/h and ρ alone.
+tables are made. Source: Sneddon, Fourier Transforms (1951), ch. 10: Love's function with a Hankel transform.
 """
 
 import numpy as np

@@ -37,7 +37,7 @@ class Nodes:
 
 @dataclass(frozen=True)
 class Column:
-    """What one contact radius gives: changes against the linear limit, and how good the linear limit is."""
+    """The solution for one contact radius: changes against the linear limit, and the error of the linear limit."""
 
     sigma_change: Floats  # (rho, cbrt_load)
     profile_change: Floats  # (r, cbrt_load)
@@ -46,9 +46,23 @@ class Column:
 
 
 def solve_column(a: float, nodes: Nodes, order: int, refinement: int = 1) -> Column:
-    """Solve the layer for the contact radius `a` (a/h > 0) at every load of `nodes`.
+    """Solve the layer for one contact radius at every load.
 
-    Raises SolverError that names a/h and L when a load cannot be reached even with small steps.
+    Parameters
+    ----------
+    a : float
+        Contact radius a/h, above 0.
+    nodes : Nodes
+        The axes of the table.
+    order : int
+        Order of the displacement elements.
+    refinement : int
+        Every element of the mesh is split into `refinement`² equal ones.
+
+    Raises
+    ------
+    SolverError
+        Names a/h and L where a load cannot be reached even with small steps.
     """
     with threadpool_limits(1):  # the same bits whatever the number of cores
         return _solve_column(a, nodes, order, refinement)
@@ -81,7 +95,7 @@ def _solve_column(a: float, nodes: Nodes, order: int, refinement: int) -> Column
 
 
 def peak_pressures(cbrt_load: Floats) -> Floats:
-    """q0/G for x = L^(1/3)."""
+    """Peak pressure of Hertz theory over the shear modulus, q0/G, for x = L^(1/3) (loads,)."""
     return YOUNGS_MODULUS * peak_pressure_over_modulus(cbrt_load**3)
 
 

@@ -111,9 +111,7 @@ def _about_sensors(request: LoadCase) -> Iterator[Finding]:
     if len(positions) < 2:
         return
     # The first of the two is the sensor itself.
-    distances, nearest = (
-        np.asarray(part) for part in cKDTree(positions).query(positions, k=2)
-    )  # the first is the sensor itself
+    distances, nearest = (np.asarray(part) for part in cKDTree(positions).query(positions, k=2))
     distance = distances[:, 1]
     first = int(np.argmin(distance))
     other = next(int(i) for i in nearest[first] if i != first)

@@ -6,7 +6,7 @@ T3 = −(3/2π)(F/h²) · s, whose average over a disc of radius ρ, its centre 
     s(e, ρ) = (1/3) ∫₀^∞ p̂(k) M(k) [2 J1(kρ)/(kρ)] J0(k e) k dk
 
 with M the transmission of the body: 1 at k = 0, falling like (1 + k) e^(−k) or 2 (1 + k) e^(−k), so that the
-integral ends at k = 44 for double precision. Source: PHYSICS, section 3; Sneddon, Fourier Transforms (1951), ch. 10.
+integral ends at k = 44 for double precision. Source: Sneddon, Fourier Transforms (1951), ch. 10.
 """
 
 from collections.abc import Callable
