@@ -55,13 +55,13 @@ class Supposition:
 
     def effects(self, place: Floats) -> dict[str, Values]:
         """The effects at a place."""
-        found: dict[str, Values] = {name: dict(values) for name, values in self.fixed.items()}
+        result: dict[str, Values] = {name: dict(values) for name, values in self.fixed.items()}
         for coordinate, at in zip(self.coordinates, place, strict=True):
-            found[coordinate.effect][coordinate.parameter] = coordinate.value(float(at))
-        if "misalignment" in found:
-            size, angle = (float(found["misalignment"].pop(name)) for name in ("size", "angle"))
-            found["misalignment"] = {"x_mm": size * math.cos(angle), "y_mm": size * math.sin(angle)}
-        return found
+            result[coordinate.effect][coordinate.parameter] = coordinate.value(float(at))
+        if "misalignment" in result:
+            size, angle = (float(result["misalignment"].pop(name)) for name in ("size", "angle"))
+            result["misalignment"] = {"x_mm": size * math.cos(angle), "y_mm": size * math.sin(angle)}
+        return result
 
     def place_of(self, effects: Mapping[str, Values]) -> Floats | None:
         """Where these effects are, None where this supposition does not hold them."""
@@ -87,11 +87,11 @@ class Supposition:
 
 def suppositions(names: Sequence[str], ranges: Ranges) -> list[Supposition]:
     """All laws and signs of a set of effects."""
-    found = []
+    result = []
     for parts in product(*(list(_alone(name, ranges.get(name, {}))) for name in names)):
         fixed = {name: values for name, (values, _) in zip(names, parts, strict=True)}
-        found.append(Supposition(fixed, tuple(entry for _, coordinates in parts for entry in coordinates)))
-    return found
+        result.append(Supposition(fixed, tuple(entry for _, coordinates in parts for entry in coordinates)))
+    return result
 
 
 def _alone(name: str, ranges: Mapping[str, tuple[float, float]]) -> Iterator[tuple[Values, tuple[Coordinate, ...]]]:

@@ -28,10 +28,10 @@ _BLOW_LINES = 120
 
 @dataclass(frozen=True)
 class Recorded:
-    """A campaign made of real recordings, and what the diagnosis was told besides the numbers themselves."""
+    """A campaign made of real recordings, and what the diagnosis knew besides the numbers themselves."""
 
     name: str
-    told: str
+    stated: str
     make: Callable[[Path], dict[str, Any]]
 
 
@@ -121,13 +121,13 @@ def _afm(name: str, folder: Path) -> dict[str, Any]:
     time, height, force, segment = rows[(rows[:, 3] == approach) | (rows[:, 3] == approach + 1)].T
     free = float(np.median(force[: len(force) // 100]))
     depth_mm = -1e3 * (height + (force - free) / _STIFFNESS_N_PER_M[name])
-    kept = force - free > 0.02 * (force.max() - free)  # in contact
-    kept |= segment == approach + 1
+    used = force - free > 0.02 * (force.max() - free)  # in contact
+    used |= segment == approach + 1
     held = segment == approach + 1
     # As many samples of the hold as of the approach, which is much shorter
-    kept &= ~held | (np.arange(len(held)) % max(1, int(held.sum() / (kept & ~held).sum())) == 0)
+    used &= ~held | (np.arange(len(held)) % max(1, int(held.sum() / (used & ~held).sum())) == 0)
     geometry = {"indenter_radius_mm": _NOMINAL_TIP_MM}
-    curve = _curve(name, "indentation", geometry, depth_mm[kept], force[kept] - free, time[kept])
+    curve = _curve(name, "indentation", geometry, depth_mm[used], force[used] - free, time[used])
     return _document(name, {}, [curve])
 
 

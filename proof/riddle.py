@@ -69,10 +69,10 @@ def _campaign(name: str, rows: Iterable[ArrayRecording]) -> dict[str, Any]:
     random = np.random.default_rng(len(rows))
     recordings = []
     for number, row in enumerate(rows):
-        felt = transmission(
+        response = transmission(
             table, skin, Indenter.from_lab(indenter_radius_mm=row.indenter_mm), np.array([row.preload_n])
         )
-        level = row.d33_pc_per_n * float(charge_response.gain(felt.sigma, float(skin.rt_over_h))[0])
+        level = row.d33_pc_per_n * float(charge_response.gain(response.sigma, float(skin.rt_over_h))[0])
         level *= float(np.exp(_GAIN * random.normal()))
         noise = _LINE * level * random.normal(size=(2, len(_FREQUENCY)))
         recordings.append(

@@ -31,8 +31,8 @@ class Share:
             return float("nan"), float("nan")
         squared = _95**2 / self.count
         middle = (self.value + squared / 2) / (1 + squared)
-        reach = _95 * np.sqrt(self.value * (1 - self.value) / self.count + squared / (4 * self.count)) / (1 + squared)
-        return float(max(middle - reach, 0.0)), float(min(middle + reach, 1.0))
+        half = _95 * np.sqrt(self.value * (1 - self.value) / self.count + squared / (4 * self.count)) / (1 + squared)
+        return float(max(middle - half, 0.0)), float(min(middle + half, 1.0))
 
 
 def share(right: Sequence[bool]) -> Share:

@@ -32,8 +32,8 @@ def _rivals(report: Result) -> str:
 
 def _moduli(fit: Result | None) -> str:
     """Young's modulus of the base model and of the explanation, where curves tell it."""
-    found = [fit[part].get("youngs_modulus") for part in ("before", "after")] if fit else []
-    return " → ".join(_number(entry["value"]) for entry in found if entry) or "–"
+    moduli = [fit[part].get("youngs_modulus") for part in ("before", "after")] if fit else []
+    return " → ".join(_number(entry["value"]) for entry in moduli if entry) or "–"
 
 
 def recordings(result: Result) -> str:
@@ -46,8 +46,8 @@ def recordings(result: Result) -> str:
         rows.append([entry["name"], f"{report['verdict']} {report['probability']:.2f}", _named(report), _rivals(report),
                      _moduli(fit),
                      " → ".join(_number(value) for value in errors[:2]) + f" ({_number(errors[2])})"])  # fmt: skip
-    told = table(
-        ["campaign", "what the diagnosis was told"], [[entry["name"], entry["told"]] for entry in result["campaigns"]]
+    stated = table(
+        ["campaign", "what the diagnosis was told"], [[entry["name"], entry["stated"]] for entry in result["campaigns"]]
     )
     where = "\n".join(f"- **{entry['name']}**: {_said(entry['report'])}" for entry in result["campaigns"])
     header = [
@@ -61,7 +61,7 @@ Public measurements of other labs, each started from the simplest model with the
 found in them was kept from the diagnosis. The held-out part is the highest force of each curve, extrapolated from
 the rest.
 
-{told}
+{stated}
 {table(header, rows)}
 ![Held-out error of real recordings](figures/proof-recordings.svg)
 
@@ -75,8 +75,8 @@ What each report says, in its own words:
 def _said(report: Result) -> str:
     """A report's statement without the laws, and where it locates the misfit."""
     sentences = report["statement"].split(". ")
-    kept = sentences if report["verdict"] == "unexplained" else sentences[:1]
-    return f"{'. '.join(kept).rstrip('.')}. {report['location']['statement']}"
+    chosen = sentences if report["verdict"] == "unexplained" else sentences[:1]
+    return f"{'. '.join(chosen).rstrip('.')}. {report['location']['statement']}"
 
 
 def _findings(result: Result) -> str:

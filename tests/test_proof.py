@@ -1,4 +1,4 @@
-"""The proof's own tools: judging, statistics, kept work, the ideal diagnoser, and the page from a small run."""
+"""The proof's own tools: judging, statistics, stored results, the ideal diagnoser, and the page from a small run."""
 
 import json
 import os
@@ -17,10 +17,10 @@ from proof.commands import prove
 from proof.ideal import diagnosed
 from proof.ideal_laws import suppositions
 from proof.judge import QUIET, Judged, judge
-from proof.kept import Work, kept, of_each, reports, sources
 from proof.real import recorded
 from proof.results import PARTS
 from proof.statistics import calibration, share
+from proof.stored import Work, of_each, reports, sources, stored
 from proof.text import document
 from rig.description import parse as parse_experiment
 from rig.draw import CATALOGUED, UNKNOWN, drawn
@@ -117,7 +117,7 @@ def test_work_is_kept_and_found_again(tmp_path: Path) -> None:
             made.append(item)
             return {"twice": 2 * item}
 
-        return kept(tmp_path, str(item), count)
+        return stored(tmp_path, str(item), count)
 
     for _ in range(2):
         assert of_each(Work(tmp_path), [1, 2], make, lambda _: None) == [{"twice": 2}, {"twice": 4}]
