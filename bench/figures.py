@@ -27,11 +27,11 @@ class Figure:
 
 def interleaved(contestants: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, list[float]]:
     """Each contestant's measurements, taken in turns, so that a disturbance of the machine meets all alike."""
-    found: dict[str, list[float]] = {name: [] for name in contestants}
+    measured: dict[str, list[float]] = {name: [] for name in contestants}
     for _ in range(rounds):
         for name, measure in contestants.items():
-            found[name].append(measure())
-    return found
+            measured[name].append(measure())
+    return measured
 
 
 def ratio(numerator: list[float], denominator: list[float]) -> float:

@@ -65,8 +65,8 @@ def measure() -> list[Figure]:
     """For each campaign the ratio of processor times and the largest difference of the rivals' evidences."""
     figures = []
     with threadpool_limits(1):
-        found = {name: _compared(effects) for name, effects in HIDDEN.items()}
-    for name, entry in found.items():
+        results = {name: _compared(effects) for name, effects in HIDDEN.items()}
+    for name, entry in results.items():
         apart = max(abs(entry.laplace[index] - entry.sampled[index]) for index in entry.rivals)
         error = max(entry.errors[index] for index in entry.rivals)
         figures += [
@@ -77,8 +77,8 @@ def measure() -> list[Figure]:
             Figure(f"{name} hidden: their log evidences, largest difference", apart, "nats"),
             Figure(f"{name} hidden: the sampler's own standard error, largest", error, "nats"),
         ]
-    same = sum(entry.same_winner for entry in found.values())
-    return [*figures, Figure("campaigns with the same winner", same, f"of {len(found)}", float(len(found)))]
+    same = sum(entry.same_winner for entry in results.values())
+    return [*figures, Figure("campaigns with the same winner", same, f"of {len(results)}", float(len(results)))]
 
 
 def _compared(effects: Effects) -> Compared:
@@ -100,8 +100,8 @@ def _compared(effects: Effects) -> Compared:
 
 
 def _explained(bench: Workbench) -> list[Explanation]:
-    found = [bench.explain(names) for names in HYPOTHESES]
-    return [entry.integrated() for entry in found if entry is not None]  # without a parent none is left out
+    results = [bench.explain(names) for names in HYPOTHESES]
+    return [entry.integrated() for entry in results if entry is not None]  # without a parent none is left out
 
 
 def _sampled(bench: Workbench, explained: Explanation) -> Sampled:

@@ -56,10 +56,10 @@ def _rate(server: servers.Server, path: str, script: str) -> float:
     report = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     if "Non-2xx" in report or "Socket errors" in report:
         raise RuntimeError(report)
-    found = re.search(r"Requests/sec:\s+([\d.]+)", report)
-    if found is None:
+    match = re.search(r"Requests/sec:\s+([\d.]+)", report)
+    if match is None:
         raise RuntimeError(report)
-    return float(found[1])
+    return float(match[1])
 
 
 def _check_same_answers(ours: servers.Server, umbridge: servers.Server, tesseract: servers.Server) -> None:

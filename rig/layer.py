@@ -7,7 +7,7 @@ S = −p. `Layer.transmission` M(k) is the pressure on the base over that on the
 deflection of the surface over that of the half space of the same ν. Source: the state-space method, Bahar, J. Eng.
 Mech. Div. ASCE 98 (1972); Small and Booker, Int. J. Numer. Methods Eng. 20 (1984), for the finite-layer form.
 
-Stresses on the base are summed as a Fourier–Bessel series on a disc so wide that its rim is not felt.
+Stresses on the base are summed as a Fourier–Bessel series on a disc so wide that its rim has no influence.
 """
 
 import math
@@ -96,6 +96,6 @@ def base_stress(spectrum: Floats, rt_over_h: float, offset_over_h: Floats) -> Fl
 
     `spectrum` (rows, WAVENUMBERS), `offset_over_h` (rows,) or (rows, sensors). Beyond the disc's rim it is 0.
     """
-    felt = spectrum * (SERIES * disc_mean(WAVENUMBERS * rt_over_h))
+    weighted = spectrum * (SERIES * disc_mean(WAVENUMBERS * rt_over_h))
     waves = j0(np.multiply.outer(offset_over_h, WAVENUMBERS))
-    return np.where(offset_over_h + rt_over_h < RIM, np.einsum("rk,r...k->r...", felt, waves), 0.0)
+    return np.where(offset_over_h + rt_over_h < RIM, np.einsum("rk,r...k->r...", weighted, waves), 0.0)

@@ -22,7 +22,7 @@ from skfem import MeshQuad
 from threadpoolctl import threadpool_limits
 
 from tablegen.discretisation import Discretisation, Indices, discretise
-from tablegen.faces import shapes_along
+from tablegen.faces import gauss_rule, shapes_along
 from tablegen.newton import factorise
 from underskin.units import Floats
 
@@ -99,7 +99,7 @@ def influence_mesh() -> MeshQuad:
 def _lifts(d: _Glued, rho: Floats) -> Floats:
     """Base displacements (displacements, rho): the lift by 2/ρ² over each disc, projected on the traces."""
     columns = np.unique(d.basis.mesh.p[0])
-    points, weight = _rule(columns, d.order + 1)
+    points, weight = gauss_rule(columns, d.order + 1)
     shapes = _base_shapes(d, points)
     mass = shapes.T @ (weight[:, None] * shapes)
     moments = np.zeros((d.base.size, rho.size))
@@ -107,7 +107,7 @@ def _lifts(d: _Glued, rho: Floats) -> Floats:
         if radius == 0:
             moments[:, number] = _base_shapes(d, np.zeros(1))[0]
         else:
-            points, weight = _rule(np.append(columns[columns < radius], radius), d.order + 1)
+            points, weight = gauss_rule(np.append(columns[columns < radius], radius), d.order + 1)
             moments[:, number] = weight @ _base_shapes(d, points) * 2 / radius**2
     lifted = np.zeros((d.size, rho.size))
     lifted[2 * d.base + 1] = np.linalg.solve(mass, moments)
@@ -148,7 +148,7 @@ def _displaced_by(d: _Glued, poisson_ratio: float, slip: float, lifted: Floats) 
 
 def _base_springs(d: _Glued) -> Floats:
     """∫ u_r v_r r dr over the base as element matrices."""
-    points, weight = _rule(np.unique(d.basis.mesh.p[0]), d.order + 1)
+    points, weight = gauss_rule(np.unique(d.basis.mesh.p[0]), d.order + 1)
     values, numbers = shapes_along(d, points, 0)
     corner = d.basis.mesh.p[:, d.basis.mesh.t].min(axis=1)
     on_base = np.flatnonzero(corner[1] == 0.0)
@@ -167,11 +167,3 @@ def _base_shapes(d: _Glued, r: Floats) -> Floats:
     every = np.zeros((r.size, int(d.basis.N)))
     np.put_along_axis(every, numbers, values, axis=1)
     return every[:, d.base]
-
-
-def _rule(edges: Floats, points: int) -> tuple[Floats, Floats]:
-    """Gauss–Legendre radii and weights (dr · r) on every interval."""
-    x, w = np.polynomial.legendre.leggauss(points)
-    half = np.diff(edges)[:, None] / 2
-    r = edges[:-1, None] + half * (1 + x)
-    return r.ravel(), (half * w * r).ravel()

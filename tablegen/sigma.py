@@ -2,7 +2,8 @@
 
 At each L the finite-element solution gives the *change* of the stress on the base against its own linear limit, divided
 by the load; the table adds it to the exact linear solution. Both share mesh and element, so most of their error
-cancels; the linear limit's own error against the exact solution is kept beside it, that the exact part cannot hide it.
+cancels; the error of the linear limit against the exact solution is stored beside it, so that the exact part does not
+hide it.
 """
 
 from collections.abc import Callable

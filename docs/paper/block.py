@@ -218,11 +218,11 @@ class _FastInverse:
         self.modes = []
         values = []
         for direction, axis in enumerate(axes):
-            kept = np.flatnonzero(free.any(axis=tuple(set(_DIRECTIONS) - {direction})))
-            square = np.ix_(kept, kept)
+            free_rows = np.flatnonzero(free.any(axis=tuple(set(_DIRECTIONS) - {direction})))
+            square = np.ix_(free_rows, free_rows)
             value, vector = eigh(axis.stiffness[square], axis.mass[square])
-            modes = np.zeros((free.shape[direction], kept.size))
-            modes[kept] = vector
+            modes = np.zeros((free.shape[direction], free_rows.size))
+            modes[free_rows] = vector
             self.modes.append(modes)
             values.append((2 if direction == a else 1) * value)
         self.values = values[0][:, None, None] + values[1][:, None] + values[2]

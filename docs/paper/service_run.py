@@ -55,8 +55,8 @@ def run_array() -> ArrayRun:
             "indenter_radius_mm": INDENTER_RADIUS_MM,
             "preload_n": preload.tolist(),
         }
-        felt = _post(client, "/v1/frf", {**skin, "d33_pc_per_n": np.repeat(D33_PC_PER_N, SENSORS).tolist()})
-        frf = np.array(felt["frf_pc_per_n"])
+        response = _post(client, "/v1/frf", {**skin, "d33_pc_per_n": np.repeat(D33_PC_PER_N, SENSORS).tolist()})
+        frf = np.array(response["frf_pc_per_n"])
         answer = _post(client, "/v1/d33", {**skin, "frf_pc_per_n": frf.tolist()})
         of_fresh = _post(client, "/v1/d33", {**skin, "frf_pc_per_n": np.repeat(fresh, SENSORS).tolist()})
     d33 = np.array(answer["d33_pc_per_n"])
@@ -66,7 +66,7 @@ def run_array() -> ArrayRun:
         d33_from_service=d33[first],
         frf_from_fresh_solve=fresh,
         d33_from_fresh_solve=np.array(of_fresh["d33_pc_per_n"])[first],
-        status=sorted(set(answer["status"]) | set(felt["status"]) | set(of_fresh["status"])),
+        status=sorted(set(answer["status"]) | set(response["status"]) | set(of_fresh["status"])),
         largest_spread=max(float(np.ptp(group) / group.mean()) for group in groups),
     )
 

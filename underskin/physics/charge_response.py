@@ -161,6 +161,6 @@ def d33(
     uncertainty : ndarray
         [C/N], of the broadcast shape.
     """
-    seen = gain(sigma, rt_over_h)
-    value = np.asarray(frf, dtype=float) / seen
-    return value, np.hypot(np.asarray(frf_uncertainty, dtype=float) / seen, value * np.asarray(rel_error))
+    share = gain(sigma, rt_over_h)
+    value = np.asarray(frf, dtype=float) / share
+    return value, np.hypot(np.asarray(frf_uncertainty, dtype=float) / share, value * np.asarray(rel_error))

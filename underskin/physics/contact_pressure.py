@@ -83,12 +83,12 @@ def sphere_pressures(
     """
     plane_modulus = youngs_modulus / (1 - layer.poisson_ratio**2)
     load = forces * indenter_radii / (plane_modulus * thickness**3)
-    different, place = np.unique(load, return_inverse=True)
+    different, row = np.unique(load, return_inverse=True)
     alpha = _grid().curves(layer).at_load(different, np.zeros_like(different)).alpha.value
     known = np.isfinite(alpha)
     shapes = iter(ContactEquation(alpha[known]).solve(layer).sphere_shape[0] if known.any() else ())
-    found = [SpherePressure(float(a) * thickness, next(shapes)) if a == a else None for a in alpha]
-    return [found[i] for i in place]
+    pressures = [SpherePressure(float(a) * thickness, next(shapes)) if a == a else None for a in alpha]
+    return [pressures[i] for i in row]
 
 
 @cache

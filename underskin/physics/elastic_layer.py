@@ -183,7 +183,7 @@ def sigma(layer: Layer, a: ArrayLike, rho: ArrayLike, offset: ArrayLike = 0.0) -
 
 
 def _scaled_hyperbolic(k: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """k, kept off 0, with e^(−k), e^(−k) cosh k and e^(−k) sinh k."""
+    """k, at least `_SMALLEST_K`, with e^(−k), e^(−k) cosh k and e^(−k) sinh k."""
     k = np.maximum(k, _SMALLEST_K)
     decay = np.exp(-k)
     return k, decay, (1 + decay**2) / 2, -np.expm1(-2 * k) / 2
