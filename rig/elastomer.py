@@ -23,14 +23,14 @@ from rig.layer_contacts import stiffening
 
 _APPROACH = 0.08  # of the largest indentation, before contact
 _RADII = 3000
-_LEAST_LOADING = 8  # samples; fewer tell no law from another
+_LEAST_LOADING = 8  # samples; with fewer no law can be identified
 
 Law = Callable[[Floats, bool], Floats]  # force for unit modulus at displacements, while drawn back or not
 
 
 @dataclass(frozen=True)
 class RecordedCurve:
-    """One recording: what is written down of it, and `force_n` before noise."""
+    """One recording: its entry in the campaign, and its force [N] before noise."""
 
     entry: dict[str, Any]
     exact_force_n: Floats

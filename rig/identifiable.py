@@ -1,9 +1,9 @@
-"""Whether an effect shows at all: how much χ² the true model gains over the base model on the recordings themselves.
+"""Visibility of effects: the gain in χ² of the true model over the base model on the recordings themselves.
 
 Both are fitted by generalised least squares with the rig's own noise levels: line noise, and for each recording a gain
 error along the model's response and an error of position along its derivatives. Both have d33 free, and E, h (2 %, 1 %)
-and the sensors' gains (1 %) near what is declared, or near what they truly are. Mains are known by their charge, not by
-their phase in each recording: they belong to the covariance, and what they add to its log determinant counts too.
+and the sensors' gains (1 %) near their declared or true values. Of mains the charge is known and the phase in each
+recording is not: they are part of the covariance, and their share of its log determinant is included.
 """
 
 from dataclasses import dataclass, replace
@@ -37,7 +37,7 @@ class Visibility:
 
 
 def visibility(recorded: RecordedLines, known: tuple[str, ...] = ()) -> Visibility:
-    """The visibility of what was switched on, to somebody whose model has the effects `known`, as they are."""
+    """Visibility of the effects against a model that has only the effects `known`, at their true values."""
     response = recorded.response
     aimed = replace(response, missed_mm=np.zeros_like(response.missed_mm))
     effects = {name: values for name, values in response.on.items() if name in known}
@@ -93,7 +93,7 @@ class _Fit:
         self.mains = np.stack([size, 1j * size]) if "mains_pickup" in response.on else np.zeros((0, *size.shape))
 
     def best(self, design: _Design) -> tuple[float, Complexes]:
-        """The least χ², priors and what mains add to log|C| included, and the response there."""
+        """The least χ², with priors and the share of mains in log|C|, and the response there."""
         columns, deviations = design
         amount = np.zeros(len(columns))
         amount[0] = 1.0
@@ -107,10 +107,10 @@ class _Fit:
             chi2 = float(gram[-1, -1] + penalty @ amount**2)
             step = np.linalg.solve(gram[:-1, :-1] + np.diag(penalty), gram[:-1, -1] - penalty * amount)
             amount = amount + step
-        return chi2 + self._more_determinant(along), np.tensordot(amount, columns, 1)
+        return chi2 + self._mains_determinant(along), np.tensordot(amount, columns, 1)
 
-    def _more_determinant(self, along: Complexes) -> float:
-        """What mains add to log|C|."""
+    def _mains_determinant(self, along: Complexes) -> float:
+        """The share of mains in log|C|."""
         low_rank = _parts(along / np.sqrt(self.variance))
         inner = np.einsum("arl,brl->rab", low_rank, low_rank) + np.eye(len(along))
         without = len(along) - len(self.mains)

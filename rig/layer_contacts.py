@@ -46,7 +46,7 @@ class LayerContacts:
 
     @cached_property
     def layer(self) -> Layer:
-        """ν and glue line."""
+        """Poisson ratio and glue line of the layer."""
         nu = effects.of(self.on, "compressible_layer", "poisson_ratio") or 0.5
         slipping = "interface_slip" in self.on
         return Layer(nu, effects.of(self.on, "interface_slip", "glue_stiffness") if slipping else math.inf)
@@ -62,7 +62,7 @@ class LayerContacts:
 
     @cached_property
     def effective_modulus(self) -> Floats:
-        """E in force, (rows,)."""
+        """Effective Young's modulus of each contact (rows,) [MPa]."""
         return self._relaxed * self._stiffening(self.contact_radius)
 
     @cached_property

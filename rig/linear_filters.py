@@ -1,4 +1,4 @@
-"""What lies between the force cell and the recorded charge: filters rational in s = iω, e^(+iωt).
+"""Linear filters between force cell and recorded charge, rational in s = iω, e^(+iωt).
 
 One definition serves both routes: `response` for FRF lines, `apply` for time series (first-order hold).
 """
@@ -35,8 +35,8 @@ def response(chain: Sequence[Filter], frequency_hz: Floats) -> Complexes:
 def apply(chain: Sequence[Filter], signal: Floats, step_s: float) -> Floats:
     """The signal, sampled every `step_s`, after the filters; at rest before.
 
-    Straight lines between the samples weaken a smooth signal by (ωΔt)²/12, which what comes through with inertia is
-    given back beforehand: errors are of order (ωΔt)⁴.
+    Linear interpolation between the samples weakens a smooth signal by (ωΔt)²/12; this is compensated before terms with
+    inertia, so errors are of order (ωΔt)⁴.
     """
     for terms in chain:
         sharpened = signal.copy()

@@ -1,7 +1,7 @@
 """An experiment's folder: campaign.json, truth.json and, where asked for, the raw recordings with their description.
 
 `recordings.tdms` has a group a recording: load cell and charge amplifier in volts, as LabVIEW writes them; `rig.yaml`
-(`rig/1`) says what the channels are. The amplifier turns the charge round, as charge amplifiers do.
+(`rig/1`) says what the channels are. The amplifier inverts the sign of the charge, as charge amplifiers do.
 """
 
 import json

@@ -1,7 +1,7 @@
-"""An experiment carried out: FRF lines with the rig's noise, and what is true of them.
+"""FRF lines of an experiment, with the rig's noise.
 
-Each recording has a gain of its own, e^N(0, gain²), an error of position, and on each part of a line noise of variance
-rel² |G|² + floor². γ² = 1/(1 + 2 n v), v the variance over |G|².
+Each recording has a gain factor e^N(0, gain²), an error of position, and on each part of a line noise of variance
+rel² |G|² + floor². Coherence γ² = 1/(1 + 2 n v), v the variance over |G|².
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ _HARMONICS = ((1, 1.0), (3, 1 / 3))
 
 @dataclass(frozen=True)
 class RecordedLines:
-    """`response` is what truly was; `exact` its lines, `measured` those with everything (rows, lines) [pC/N]."""
+    """`response` is the true one; `exact` its lines, `measured` the lines with noise and mains (rows, lines) [pC/N]."""
 
     response: TrueResponse
     frequency_hz: Floats
@@ -35,7 +35,7 @@ class RecordedLines:
 
 
 def make_response(experiment: Experiment) -> TrueResponse:
-    """The experiment's response with its scatter of position and of sensors drawn."""
+    """The true response of an experiment, with its scatter of positions and of sensors drawn."""
     plan = recordings(experiment)
     random = np.random.default_rng([experiment.seed, 1])
     missed = experiment.noise.position_mm * random.normal(size=(len(plan.preload_n), 2))
@@ -69,7 +69,7 @@ def record_lines(experiment: Experiment) -> RecordedLines:
 
 
 def line_noise(noise: Noise, frequency_hz: Floats) -> Floats:
-    """rel of each line."""
+    """Relative noise rel of each line (lines,)."""
     low, high = frequency_hz[0], frequency_hz[-1]
     return noise.line * (1 + noise.low * low / frequency_hz + noise.high * (frequency_hz / high) ** 2)
 
@@ -77,7 +77,7 @@ def line_noise(noise: Noise, frequency_hz: Floats) -> Floats:
 def mains_pickup(
     on: dict[str, Values], dynamic_n: Floats, frequency_hz: Floats, random: np.random.Generator
 ) -> Complexes:
-    """The error that mains leave on the lines near them, its phase anew in each recording (rows, lines) [pC/N]."""
+    """Mains pick-up on the lines near its frequency, with a random phase in each recording (rows, lines) [pC/N]."""
     if "mains_pickup" not in on:
         return np.zeros((len(dynamic_n), len(frequency_hz)), dtype=complex)
     charge, mains = (effects.of(on, "mains_pickup", name) for name in ("charge_pc", "mains_hz"))
@@ -89,7 +89,7 @@ def mains_pickup(
 
 
 def campaign(recorded: RecordedLines) -> dict[str, Any]:
-    """The campaign (`campaign/1`) of recorded lines: what the lab knows, and no more."""
+    """The campaign (`campaign/1`) of recorded lines, with what the lab knows."""
     entries = recording_headers(recorded.response)
     for row, entry in enumerate(entries):
         entry["frequency_hz"] = recorded.frequency_hz.tolist()
@@ -110,7 +110,7 @@ def campaign_document(experiment: Experiment, entries: list[dict[str, Any]]) -> 
 
 
 def skin_document(experiment: Experiment) -> dict[str, Any]:
-    """The skin as the lab declares it; d33 is not known to it."""
+    """The skin as the lab declares it, without d33."""
     skin = experiment.skin
     known = {name: getattr(skin, name) for name in ("id", "width_mm", "length_mm") if getattr(skin, name) is not None}
     return {
@@ -125,7 +125,7 @@ def skin_document(experiment: Experiment) -> dict[str, Any]:
 
 
 def recording_headers(response: TrueResponse) -> list[dict[str, Any]]:
-    """What the lab writes down of each recording, in order."""
+    """Id and conditions of each recording, in order."""
     plan, skin, times = response.plan, response.experiment.skin, response.plan.recorded_at
     moved = bool(np.any(plan.offset_mm != 0))
     entries = []

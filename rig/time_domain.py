@@ -2,8 +2,7 @@
 
 The shaker's force about the preload is made on a grid `_FINER` times finer than the converter's; tip and electronics
 are integrated there (`linear_filters.apply`), the charge of a moving edge follows the curve Fσ(F) at every instant.
-Noise is white plus 1/f; the converter filters what it could not tell from lower frequencies, rounds to its steps and
-stops at its range.
+Noise is white plus 1/f; the converter has an anti-aliasing filter, rounds to its steps and saturates at its range.
 """
 
 from dataclasses import dataclass
@@ -89,11 +88,11 @@ def _stepped_sine(drive: Drive, rate: float) -> Floats:
 
 
 def _charge(response: TrueResponse, row: int, force: Floats) -> Floats:
-    """Charge under the force about the preload, before the electronics: straight, or along the moving edge's curve."""
-    straight = response.level[row] * force
+    """Charge under the force about the preload, before the electronics: linear, or along the curve of a moving edge."""
+    linear_charge = response.level[row] * force
     mobility = effects.of(response.on, "amplitude_nonlinearity", "mobility")
     if not mobility:
-        return straight
+        return linear_charge
     preload = response.plan.preload_n[row]
     reach = min(float(np.abs(force).max()) / preload, 0.999)
     held = response.sigma()[row]
@@ -106,15 +105,15 @@ def _charge(response: TrueResponse, row: int, force: Floats) -> Floats:
 
 
 def _mains(response: TrueResponse, time: Floats, random: np.random.Generator) -> Floats:
-    """Mains and a third of it at the third harmonic, the phase of the recording's own."""
+    """Mains with a third of the amplitude at the third harmonic, and a random phase."""
     charge, mains = (effects.of(response.on, "mains_pickup", name) for name in ("charge_pc", "mains_hz"))
     phase = 2 * np.pi * mains * time + 2 * np.pi * random.random()
     return charge * (np.sin(phase) + np.sin(3 * phase) / 3)
 
 
 def _sampled(signal: Floats, rate: float) -> Floats:
-    """The signal at the converter's rate without the run-in, through the filter that keeps what is beyond half of that
-    rate from folding back: where a sweep begins anew the force jumps."""
+    """The signal at the converter's rate, anti-aliased, without the run-in."""
+    # The force jumps at the start of each sweep.
     return resample_poly(signal, 1, _FINER, padtype="line")[round(_RUN_IN_S * rate / _FINER) :]
 
 
@@ -127,6 +126,6 @@ def coloured_noise(samples: int, drive: Drive, random: np.random.Generator) -> F
 
 
 def converted(signal: Floats, end: float, bits: int) -> Floats:
-    """The signal in steps of 2 end / 2^bits, held at the ends of the range."""
+    """The signal in steps of 2 end / 2^bits, saturated at the ends of the range."""
     step = 2 * end / 2**bits
     return np.clip(np.round(signal / step) * step, -end, end - step)

@@ -1,4 +1,4 @@
-"""Whether an effect shows in force–displacement curves: χ² of the base model's best fit less that of the truth.
+"""Visibility of effects in force–displacement curves: χ² of the base model's best fit less that of the truth.
 
 Base models: indentation F = (4/3) E/(1 − ν²) √R (u − z)^(3/2), compression F = E A (u − z)/H, with a zero z for each
 curve and one E, within 2 % of the declared one where there is one. Noise is the rig's own, that of displacement
@@ -17,7 +17,7 @@ _MODULUS = 0.02
 
 
 def chi2_gain(experiment: Experiment, recorded: list[RecordedCurve]) -> float:
-    """How much χ² the truth gains over the base model."""
+    """The gain in χ² of the truth over the base model."""
     curves = experiment.curves
     assert curves is not None
     displacement = [np.array(curve.entry["displacement_mm"]) for curve in recorded]
