@@ -1,8 +1,8 @@
-"""Evidences by Laplace's method from many starts, as a diagnosis works them out, against nested sampling (dynesty).
+"""Evidences by the Laplace approximation, as in a diagnosis, against nested sampling (dynesty).
 
-Both weigh the same hypotheses on the same lines, with the same priors and the same code for one likelihood, which
-works out derivatives that nested sampling has no use for. Positioning scatter counts in both as the mean of with and
-without it.
+Both compare the same hypotheses on the same lines, with the same priors and the same code for the likelihood, which
+also calculates derivatives that nested sampling does not use. In both, the evidence is the mean with and without
+positioning scatter.
 """
 
 import time

@@ -1,4 +1,4 @@
-"""What was tried for the solver: pressures eliminated or kept, and SuperLU's orderings, on one Newton step's matrix."""
+"""Alternatives to the solver, on one Newton step: pressures eliminated or not, and SuperLU's orderings."""
 
 from collections.abc import Callable
 from functools import partial
@@ -20,7 +20,7 @@ ORDERINGS = ("COLAMD", "MMD_ATA")
 
 
 def measure() -> list[Figure]:
-    """Seconds for the way taken, and how many times longer the others take."""
+    """Seconds for the chosen solver, and the ratios of the others."""
     layer = NonlinearLayer(discretise(layer_mesh(CONTACT_RADIUS), ORDER))
     condensed, saddle = layer.condensed_matrix(layer.rest()), _saddle_matrix(layer)
     tries: dict[str, Callable[[], object]] = {"taken": partial(factorise, condensed)}

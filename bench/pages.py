@@ -1,4 +1,4 @@
-"""The pages with a thousand campaigns kept: the server's time, their weight, and how long a browser stands still."""
+"""The pages with a thousand stored campaigns: server time, weight, and the time that the main thread is busy."""
 
 import re
 import tempfile
@@ -97,7 +97,7 @@ def _weight(client: httpx.Client, path: str) -> int:
 
 
 def _stands_still(address: str, campaign_id: str) -> float:
-    """The longest task [ms] while the figures are drawn, once the library is loaded."""
+    """The longest task [ms] while the figures are drawn, after the library has loaded."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1280, "height": 900})

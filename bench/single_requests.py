@@ -63,7 +63,7 @@ def _rate(server: servers.Server, path: str, script: str) -> float:
 
 
 def _check_same_answers(ours: servers.Server, umbridge: servers.Server, tesseract: servers.Server) -> None:
-    """All must give the same σ: a server that is fast because it does less would be no peer."""
+    """All servers must give the same σ, or the comparison would not be fair."""
     evaluation = {"name": "sigma", "input": [_POINT], "config": {}}
     names = ("a_over_h", "rt_over_h", "load_parameter")
     inputs = dict(zip(names, _POINT, strict=True))

@@ -1,4 +1,4 @@
-"""The store: a campaign of the paper's array posted, kept and inverted; lists and histories with much kept.
+"""The store: a campaign of the paper's array posted, stored and inverted; lists and histories of a full store.
 
 The full store, 1,000,000 recordings of 60 lines, is made with UNDERSKIN_SOAK=1 (about 10 minutes); otherwise 50,000.
 """
@@ -24,7 +24,7 @@ ROUNDS = 3
 
 
 def measure() -> list[Figure]:
-    """Time from the first byte of a POST to d33 in hand; time to list, and memory, with much kept."""
+    """Time from the first byte of a POST to its d33; time to list, and memory, with a full store."""
     with tempfile.TemporaryDirectory() as folder, servers.underskin(Path(folder)) as server:
         inverted = [_posted_and_inverted(server, campaign(lines=400)) for _ in range(ROUNDS)]
         before = server.resident_mb()

@@ -104,7 +104,7 @@ def make_contact_table(
 
 
 def solve_piece(a: float, rho: Floats, cbrt_load: Floats, order: int) -> Arrays:
-    """`solve_contact_column` as a dictionary of arrays, which travels to workers and to the disk."""
+    """`solve_contact_column` as a dictionary of arrays, which can be sent to workers and stored."""
     radius, values, force_error = solve_contact_column(a, rho, cbrt_load, order)
     return {"radius": radius, "values": values, "force_error": np.array(force_error)}
 

@@ -74,7 +74,7 @@ def make_influence_table(
 
 
 def solve_piece(poisson_ratio: float, slip: float, rho: Floats, r: Floats, order: int) -> Arrays:
-    """`solve_influence` as a dictionary of arrays, which travels to workers and to the disk."""
+    """`solve_influence` as a dictionary of arrays, which can be sent to workers and stored."""
     solved = solve_influence(poisson_ratio, slip, rho, r, order)
     return {"normal": solved.normal, "tangential": solved.tangential}
 

@@ -77,7 +77,7 @@ def make_sigma_table(path: Path, nodes: Nodes = DEFAULT_NODES, scheduler: str | 
 
 
 def solve_piece(a: float, nodes: Nodes, order: int) -> Arrays:
-    """`solve_column` as a dictionary of arrays, which travels to workers and to the disk."""
+    """`solve_column` as a dictionary of arrays, which can be sent to workers and stored."""
     column = solve_column(a, nodes, order)
     return {name: np.asarray(getattr(column, name)) for name in Column.__dataclass_fields__}
 

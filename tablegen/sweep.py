@@ -35,7 +35,7 @@ Piece = Callable[[], Arrays]
 
 
 def sources_hash(modules: Sequence[ModuleType]) -> str:
-    """SHA-256 of what the modules compute that decide a table's numbers (see underskin.source_digest)."""
+    """SHA-256 of the sources that decide a table's numbers (`underskin.source_digest`)."""
     return source_digest({module.__name__: inspect.getsource(module) for module in modules})
 
 

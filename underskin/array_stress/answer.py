@@ -26,9 +26,16 @@ from underskin.units import Finding, Floats, checked, to_lab, to_si
 
 @dataclass(frozen=True)
 class ArrayStress:
-    """One entry a sensor; NaN where no load is within the table's reach, or numbers overflow (not `inside`).
+    """Charge and stress of every sensor.
 
-    `contact_radius_mm`: one entry a contact; empty for a map.
+    Attributes
+    ----------
+    columns : mapping
+        Lab-unit columns by field name, each (sensors,); NaN where a sensor is not `inside`.
+    inside : ndarray of bool, (sensors,)
+        False where no load is within the table's range, or numbers overflow.
+    contact_radius_mm : ndarray, (contacts,)
+        Empty for a map.
     """
 
     columns: Mapping[str, Floats]
@@ -42,8 +49,10 @@ class ArrayStress:
 def answer(table: InfluenceTable, request: LoadCase) -> ArrayStress:
     """Charge and mean stress on every sensor.
 
-    InvalidInput for a skin outside the table, for loads beside the skin, over one another or too wide, and for too much
-    at once.
+    Raises
+    ------
+    InvalidInput
+        For a skin outside the table, for loads beside the skin, overlapping or too wide, and for too large a request.
     """
     thickness, radius, d33 = (
         float(checked(name, getattr(request, name), units_checked=True))
@@ -74,7 +83,7 @@ def answer(table: InfluenceTable, request: LoadCase) -> ArrayStress:
 
 
 def _influence(table: InfluenceTable, request: LoadCase, rt_over_h: float) -> Influence:
-    """The skin's influence; InvalidInput where the table has none."""
+    """The influence functions of the skin; InvalidInput where the table has none."""
     low, high = table.domain["poisson_ratio"]
     if not low <= request.poisson_ratio <= high:
         allowed = f"must be {low:g} to {high:g}: the table of influences holds no other"

@@ -43,7 +43,7 @@ def parse(content: bytes, name: str) -> dict[str, Any]:
 
 
 def _lines(content: bytes, name: str) -> tuple[list[Line], str]:
-    """The lines that hold something, and the decimal sign."""
+    """The non-empty lines, and the decimal mark."""
     try:
         document = text.decode(content, name)
     except FileError as error:

@@ -1,7 +1,7 @@
 """Figures of arrays, FRFs, histories and designs: the same in pages, reports and notebooks.
 
-Built from columns in lab units; colours that colour-blind people tell apart, and what a colour says, a marker, a dash
-or the text under the pointer says too.
+They are built from columns in lab units. Colours can be told apart by colour-blind readers, and what a colour shows is
+also shown by a marker, a dash or the text under the pointer.
 """
 
 from underskin.figures.array import Quantity, array_map, frf_versus_preload, response_per_sensor

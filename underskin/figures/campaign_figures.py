@@ -59,7 +59,7 @@ def figures(campaign: Campaign, inversion: Inversion) -> "tuple[go.Figure, go.Fi
 
 
 def page(campaign: Campaign, inversion: Inversion) -> str:
-    """An HTML page with the figures one under the other; the script that draws them is inside, once."""
+    """An HTML page with the figures one below the other; it contains plotly's script once."""
     parts = [
         figure.to_html(full_html=False, include_plotlyjs=number == 0, div_id=f"figure-{number}")
         for number, figure in enumerate(figures(campaign, inversion))

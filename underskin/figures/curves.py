@@ -22,7 +22,7 @@ class ForceCurve:
 
 
 def force_curves(curves: Sequence[ForceCurve]) -> go.Figure:
-    """Each recording's curve, thinned evenly where it has more samples than a figure shows."""
+    """Each recording's curve, thinned evenly if it has more samples than a figure shows."""
     figure = go.Figure()
     for number, curve in enumerate(curves):
         count = len(curve.force_n)

@@ -46,7 +46,7 @@ def d33_history(sensors: Sequence[SensorPoints]) -> go.Figure:
 def array_history(
     times: Sequence[str], low_pc_per_n: ArrayLike, median_pc_per_n: ArrayLike, high_pc_per_n: ArrayLike
 ) -> go.Figure:
-    """The median over the sensors at each time, and from the lowest to the highest sensor as a band."""
+    """Median over the sensors at each time, with the range from the lowest to the highest sensor as a band."""
     figure = go.Figure()
     band = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
     figure.add_scatter(x=list(times), y=np.asarray(high_pc_per_n), showlegend=False, **band)
