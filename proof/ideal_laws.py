@@ -1,4 +1,4 @@
-"""What the ideal diagnoser may suppose: each effect by the rig's own law, within the range it draws from."""
+"""The hypotheses of the ideal diagnoser: each effect by the rig's own law, within the range it is drawn from."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,7 +16,7 @@ _MAINS_HZ = (50.0, 60.0)
 
 @dataclass(frozen=True)
 class Coordinate:
-    """A parameter, even in its logarithm between two values; `sign` −1 turns its sign, of a factor its logarithm's."""
+    """A parameter, uniform in its logarithm; `sign` −1 inverts its sign, or that of a factor's logarithm."""
 
     effect: str
     parameter: str
@@ -64,12 +64,12 @@ class Supposition:
         return result
 
     def place_of(self, effects: Mapping[str, Values]) -> Floats | None:
-        """Where these effects are, None where this supposition does not hold them."""
+        """The coordinates of these effects; None where this hypothesis does not contain them."""
         place = self.place_of_shared(effects)
         return place if set(effects) == set(self.fixed) and not np.isnan(place).any() else None
 
     def place_of_shared(self, effects: Mapping[str, Values]) -> Floats:
-        """Where those of these effects are that this supposition holds as they are; nan elsewhere."""
+        """The coordinates of those effects that this hypothesis shares with the given ones; nan elsewhere."""
         known = {name: dict(values) for name, values in effects.items()}
         if "misalignment" in known:
             x, y = (float(known["misalignment"][name]) for name in ("x_mm", "y_mm"))

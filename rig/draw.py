@@ -44,7 +44,7 @@ _NEEDS_WIDE = {
 
 
 def drawn(seed: int, number: int, what: str | None = None) -> dict[str, Any]:
-    """The description of random experiment `number` of a seed; `what` it hides is drawn too where not given."""
+    """Description of random experiment `number` of a seed; if `what` it hides is not given, it is drawn too."""
     random = np.random.default_rng([seed, number, 17])
     hidden = str(random.choice(list(SHARES), p=list(SHARES.values()))) if what is None else what
     for _ in range(200):
@@ -71,7 +71,7 @@ def _feasible(description: Mapping[str, Any]) -> bool:
 
 
 def record(description: Mapping[str, Any]) -> RecordedLines:
-    """Carry out a description."""
+    """Record the experiment of a description."""
     return record_lines(parse(description))
 
 

@@ -15,7 +15,7 @@ from rig.strengths import drawn_parameters, evenly_in_log, of_curves
 
 
 def drawn_curves(seed: int, number: int, kind: str, what: str | None = None) -> tuple[Experiment, list[RecordedCurve]]:
-    """Random experiment `number` of a seed, carried out; `what` it hides is drawn too where not given."""
+    """Draw and record random experiment `number` of a seed; if `what` it hides is not given, it is drawn too."""
     random = np.random.default_rng([seed, number, 23])
     hidden = str(random.choice(list(SHARES), p=list(SHARES.values()))) if what is None else what
     for _ in range(200):

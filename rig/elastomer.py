@@ -81,7 +81,7 @@ def _curve(experiment: Experiment, number: int, shape: dict[str, float], speed: 
 
 
 def _course(experiment: Experiment, shape: Mapping[str, float], speed: float) -> tuple[Floats, Floats]:
-    """Times and displacements: there, a hold, and back; in tension then as far to the other side."""
+    """Times and displacements: loading, hold, unloading; in tension then the same to the other side."""
     curves = experiment.curves
     assert curves is not None
     largest = curves.largest_displacement_mm
@@ -137,7 +137,7 @@ def _with_relaxation(on: Mapping[str, Values], law: Law, time: Floats, pressed: 
 
 
 def _sphere(experiment: Experiment, radius: float) -> Law:
-    """Force of a sphere for E = 1, from curves over the contact radius; with adhesion it holds on when drawn back."""
+    """Force of a sphere for E = 1, from curves over the contact radius; with adhesion it sticks on the way back."""
     on = experiment.effects
     nu = effects.of(on, "compressible_layer", "poisson_ratio") or 0.5
     modulus = experiment.skin.youngs_modulus_mpa

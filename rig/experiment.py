@@ -29,7 +29,7 @@ class DeclaredSkin:
 
 @dataclass(frozen=True)
 class RecordingDesign:
-    """What is recorded: every combination of the lists; dwell times and dynamic forces are dealt out at random."""
+    """The recordings: every combination of the lists; dwell times and dynamic forces are assigned at random."""
 
     indenters_mm: tuple[float, ...] = (4.0,)
     preloads_n: tuple[float, ...] = (1.0,)
@@ -74,7 +74,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class Noise:
-    """Gain and position scatter a recording; noise of FRF lines: rel² |G|² + floor² on each part.
+    """Gain and position scatter of a recording, and noise of FRF lines: variance rel² |G|² + floor² of each part.
 
     rel = `line` · (1 + `low` (low end)/f + `high` (f/(high end))²).
     """

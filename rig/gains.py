@@ -50,7 +50,20 @@ def sensitivity(
 
 
 def under_stress(values: Values, stress: Floats) -> Floats:
-    """d33 under a static mean stress [MPa], over that at rest (effect preload_dependent_d33)."""
+    """d33 under static stress over that at rest (effect preload_dependent_d33).
+
+    Parameters
+    ----------
+    values : mapping
+        Law and parameters of the effect.
+    stress : ndarray
+        Static mean stress [MPa].
+
+    Returns
+    -------
+    ndarray
+        Of the shape of `stress`.
+    """
     beta = float(values["beta_per_mpa"])
     if values["law"] == "linear":
         return 1 + beta * stress

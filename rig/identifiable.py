@@ -25,7 +25,15 @@ _ROUNDS = 4
 
 @dataclass(frozen=True)
 class Visibility:
-    """χ² of the base model less that of the true one; the base model's rms misfit of the response before noise."""
+    """Result of `visibility`.
+
+    Attributes
+    ----------
+    chi2_gain : float
+        χ² of the base model less that of the true one.
+    base_misfit_percent : float
+        rms misfit of the base model to the response before noise.
+    """
 
     chi2_gain: float
     base_misfit_percent: float

@@ -24,7 +24,19 @@ _STIFFENING_STEPS = 40
 
 @dataclass(frozen=True)
 class LayerContacts:
-    """Spheres of `radius` on a layer under `force` for `dwell` seconds, arrays (rows,)."""
+    """Spheres pressed into a layer.
+
+    Attributes
+    ----------
+    thickness : float
+        h [mm].
+    modulus : float
+        Young's modulus at rest [MPa].
+    on : mapping
+        Effects that are switched on, with their parameters.
+    radius, force, dwell : ndarray, (rows,)
+        Radius of the sphere [mm], preload [N], time under preload [s].
+    """
 
     thickness: float
     modulus: float
@@ -53,7 +65,7 @@ class LayerContacts:
 
     @cached_property
     def contact_radius(self) -> Floats:
-        """a; with stiffening, the fixed point of a and E(a/R)."""
+        """Contact radius a (rows,) [mm]; with stiffening, the fixed point of a and E(a/R)."""
         a = self._radius_at(self._relaxed)
         if "strain_stiffening" in self.on:
             for _ in range(_STIFFENING_STEPS):
@@ -76,12 +88,20 @@ class LayerContacts:
 
     @cached_property
     def stiffness(self) -> Floats:
-        """dF/dδ of the layer's contact, edge held [N/mm], against an oscillation too fast to relax."""
+        """Contact stiffness dF/dδ (rows,) [N/mm] with the edge held, against an oscillation too fast to relax."""
         alpha = self.contact_radius / self.thickness
         return self._curves.stiffness(alpha, self.modulus * self._stiffening(self.contact_radius)) * self.thickness
 
     def sigma(self, rt: float, offset: Floats) -> Floats:
-        """σ on sensors of radius rt at the offsets (rows,) or (rows, sensors)."""
+        """Transmission factor σ of sensors.
+
+        Parameters
+        ----------
+        rt : float
+            Sensor radius [mm].
+        offset : ndarray, (rows,) or (rows, sensors)
+            Distance of the sensors from the axis of the load [mm].
+        """
         return base_stress(self.spectrum, rt / self.thickness, offset / self.thickness)
 
     @property
@@ -130,7 +150,7 @@ class LayerContacts:
 
 
 def stiffening(values: Values, strain: Floats) -> Floats:
-    """E over that at rest; raises RigError where the limited law's strain is reached."""
+    """Young's modulus over that at rest, under a strain (rows,); RigError at the locking strain of the limited law."""
     grown = float(values["coefficient"]) * strain
     if values["law"] == "linear":
         return 1 + grown

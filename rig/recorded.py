@@ -45,7 +45,7 @@ def make_response(experiment: Experiment) -> TrueResponse:
 
 
 def recording_gains(experiment: Experiment, rows: int) -> Floats:
-    """The gain error of each recording."""
+    """Gain factor of each recording (rows,), log-normal."""
     return np.exp(experiment.noise.gain * np.random.default_rng([experiment.seed, 2]).normal(size=rows))
 
 

@@ -64,7 +64,19 @@ def _recording(response: TrueResponse, row: int, gain: float) -> TimeSeries:
 
 
 def shaker(drive: Drive, rate: float, random: np.random.Generator) -> Floats:
-    """The shaker's force over its peak amplitude, run-in first; random excitation has the rms of such a sine."""
+    """Force of the shaker over its peak amplitude, with the run-in; random excitation has the rms of such a sine.
+
+    Parameters
+    ----------
+    drive : Drive
+    rate : float
+        Samples per second.
+    random : numpy Generator
+
+    Returns
+    -------
+    ndarray, (samples,)
+    """
     if drive.kind == "stepped_sine":
         return _stepped_sine(drive, rate)
     samples = round((_RUN_IN_S + drive.duration_s) * rate)
@@ -118,7 +130,7 @@ def _sampled(signal: Floats, rate: float) -> Floats:
 
 
 def coloured_noise(samples: int, drive: Drive, random: np.random.Generator) -> Floats:
-    """White noise of the drive's rms, and 1/f noise as strong at the corner."""
+    """White noise of the drive's rms [pC] plus 1/f noise, equal to it at the corner frequency; (samples,)."""
     frequency = np.fft.rfftfreq(samples, 1 / drive.sample_rate_hz)
     frequency[0] = frequency[1]
     spectrum = np.fft.rfft(random.normal(size=samples)) * np.sqrt(1 + drive.flicker_corner_hz / frequency)

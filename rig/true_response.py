@@ -1,7 +1,8 @@
 """Charge over force of every recording before noise, at the true positions and with the true gains.
 
-level = d33 · gain · (3/2) ρ² · σ_eff [pC/N]; on a line at f it goes through the resonance of the tip, sensor, cable
-and amplifier (`linear_filters`) and the delay. σ_eff is σ with a held edge, plus what moving edges add.
+level = d33 · gain · (3/2) ρ² · σ_eff [pC/N]. A line at frequency f is multiplied by the responses of tip resonance,
+sensor, cable and amplifier (`linear_filters`) and by the delay. σ_eff is σ with the contact edge held, plus the effect
+of moving edges.
 """
 
 from dataclasses import dataclass, replace
@@ -150,7 +151,7 @@ class TrueResponse:
 
     @cached_property
     def level(self) -> Floats:
-        """Charge over force at a frequency where nothing else acts (rows,) [pC/N]."""
+        """Charge over force at a frequency where no filter acts (rows,) [pC/N]."""
         skin = self.experiment.skin
         rho = skin.sensor_radius_mm / self.thickness
         return skin.d33_pc_per_n * self.gain * 1.5 * rho**2 * self.effective_sigma
@@ -168,7 +169,17 @@ class TrueResponse:
         return mechanical + linear_filters.electrical(self.on, float(self.plan.preload_n[row]))
 
     def lines(self, frequency_hz: Floats) -> Complexes:
-        """The FRF before noise and mains (rows, lines) [pC/N]."""
+        """The FRF before noise and mains.
+
+        Parameters
+        ----------
+        frequency_hz : ndarray, (lines,)
+
+        Returns
+        -------
+        ndarray of complex, (rows, lines)
+            [pC/N]
+        """
         late = np.exp(-2j * np.pi * frequency_hz * 1e-6 * effects.of(self.on, "timing_delay", "delay_us"))
         shapes = np.empty((len(self.contacts.force), len(frequency_hz)), dtype=complex)
         chain, shape = None, np.ones(len(frequency_hz), dtype=complex)

@@ -23,7 +23,7 @@ _WIDE = 3.0  # largest magnitude over the median, from which on the axis is loga
 
 
 def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | None) -> go.Figure:
-    """Median magnitude and phase, lowest coherence of each condition; the band covers the magnitudes of its recordings."""
+    """Median magnitude and phase and lowest coherence of each condition, with the range of its magnitudes as a band."""
     traces: list[Trace] = []
     for number, spread in enumerate(spreads):
         colour, dash = _look(spread, spreads)
