@@ -13,7 +13,7 @@ from rig.experiment import (
     DeclaredSkin,
     Drive,
     Experiment,
-    FrfLines,
+    LineGrid,
     Noise,
     RecordingDesign,
 )
@@ -50,7 +50,7 @@ def parse(document: Any) -> Experiment:
     for name in ("lines", "drive", "design") if kind != FRF else ("curves",):
         if name in given:
             raise RigError(name, given[name], f"not for recordings of kind {kind}")
-    lines = _part(FrfLines, "lines", given["lines"]) if "lines" in given else None
+    lines = _part(LineGrid, "lines", given["lines"]) if "lines" in given else None
     drive = _part(Drive, "drive", given["drive"]) if "drive" in given else None
     curves = _part(CurveDesign, "curves", given.get("curves", {})) if kind != FRF else None
     if kind == FRF and (lines is None) == (drive is None):

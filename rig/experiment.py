@@ -46,7 +46,7 @@ class RecordingDesign:
 
 
 @dataclass(frozen=True)
-class FrfLines:
+class LineGrid:
     """FRF lines, evenly spaced in the logarithm of the frequency."""
 
     low_hz: float
@@ -118,7 +118,7 @@ class Experiment:
     kind: str
     skin: DeclaredSkin
     design: RecordingDesign
-    lines: FrfLines | None
+    lines: LineGrid | None
     drive: Drive | None
     curves: CurveDesign | None
     noise: Noise

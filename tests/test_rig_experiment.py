@@ -12,7 +12,7 @@ from rig.commands import rig as command
 from rig.description import parse
 from rig.effects import KNOWN
 from rig.errors import RigError
-from rig.experiment import CurveDesign, DeclaredSkin, Drive, FrfLines, Noise, RecordingDesign
+from rig.experiment import CurveDesign, DeclaredSkin, Drive, LineGrid, Noise, RecordingDesign
 from rig.reading import document
 from rig.recorded import record_lines
 from tests.rig_experiments import PARAMETERS, described
@@ -121,7 +121,7 @@ def test_everything_is_documented() -> None:
         assert effect.law in row
         assert all(f"`{word}`" in row for word in (*effect.parameters, *effect.laws))
         assert ", ".join(effect.kinds) in row
-    for part in (DeclaredSkin, RecordingDesign, FrfLines, Drive, Noise, CurveDesign):
+    for part in (DeclaredSkin, RecordingDesign, LineGrid, Drive, Noise, CurveDesign):
         for entry in fields(part):
             assert re.search(rf"\b{entry.name}\b", text), f"{part.__name__}.{entry.name}"
 

@@ -34,7 +34,7 @@ Axes = tuple[Axis, Axis, Axis]
 
 
 @dataclass(frozen=True)
-class Block:
+class FiniteBlock:
     """Full length (along x), full width (along y) and depth of the base, in units of h; `depth` ≥ 1.
 
     `bonded`: the base holds the block; otherwise it only carries it, without friction.
@@ -61,7 +61,7 @@ class Solution:
     iterations: int
 
 
-def solve(block: Block, a: float, rho: Floats, order: int = 5) -> Solution:
+def solve(block: FiniteBlock, a: float, rho: Floats, order: int = 5) -> Solution:
     """σ of the block under the Hertz pressure of radius `a` (a/h) for sensors of radii `rho` (rT/h, array).
 
     `order` is that of the displacements, at least 4. Raises SolverError if the iteration does not converge.
@@ -76,7 +76,7 @@ def solve(block: Block, a: float, rho: Floats, order: int = 5) -> Solution:
     return Solution(np.array(sigma), force, problem.unknowns, iterations)
 
 
-def _grid(block: Block, a: float, order: int) -> Axes:
+def _grid(block: FiniteBlock, a: float, order: int) -> Axes:
     """Fine at the contact and, less so, where free walls meet the base; a node on the sensors' plane."""
     fine, corner = a / 2, 0.2
     x, y = (graded_nodes(edge / 2, fine, corner) for edge in (block.length, block.width))
