@@ -30,11 +30,11 @@ def judge_open(work: Work, campaigns: Path, progress: Callable[[str], None]) -> 
 def report_sealed(work: Work, campaigns: Path, folder: Path, progress: Callable[[str], None]) -> dict[str, Any]:
     """Write the report of each sealed campaign into the folder, under the campaign's file name."""
     cases = _cases(campaigns / "sealed", work)
-    made = reports(work, cases, progress)
+    results = reports(work, cases, progress)
     folder.mkdir(parents=True, exist_ok=True)
-    for case, report in zip(cases, made, strict=True):
+    for case, report in zip(cases, results, strict=True):
         write_report(report, folder / f"{case.name}.json")
-    return {"verdicts": [report["verdict"] for report in made]}
+    return {"verdicts": [report["verdict"] for report in results]}
 
 
 def _cases(folder: Path, work: Work) -> Sequence[FileCase]:

@@ -31,10 +31,10 @@ def judge_quiet(work: Work, progress: Callable[[str], None]) -> dict[str, Any]:
 
 def _judge(work: Work, cases: list[DrawnCase], progress: Callable[[str], None]) -> dict[str, Any]:
     truths = of_each(work, cases, partial(truth, work, sources("rig")), progress)
-    made = reports(work, cases, progress)
+    results = reports(work, cases, progress)
     return {
         "judged": [
-            asdict(judge(case.name, report, known)) for case, report, known in zip(cases, made, truths, strict=True)
+            asdict(judge(case.name, report, known)) for case, report, known in zip(cases, results, truths, strict=True)
         ]
     }
 

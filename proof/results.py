@@ -33,13 +33,13 @@ def _sealed(work: Work, progress: Tell) -> dict[str, Any]:
 
 
 def _recordings(work: Work, progress: Tell) -> dict[str, Any]:
-    made = list(real.recorded())[: work.count]
+    entries = list(real.recorded())[: work.count]
     place = folder("UNDERSKIN_RECORDINGS")
-    reported = reports(work, [MadeCase(entry.name, entry.make(place)) for entry in made], progress)
+    reported = reports(work, [MadeCase(entry.name, entry.make(place)) for entry in entries], progress)
     return {
         "campaigns": [
             {"name": entry.name, "stated": entry.stated, "report": report}
-            for entry, report in zip(made, reported, strict=True)
+            for entry, report in zip(entries, reported, strict=True)
         ]
     }
 

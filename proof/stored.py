@@ -54,12 +54,12 @@ def stored(folder: Path, key: str, make: Callable[[], dict[str, Any]]) -> dict[s
     path = folder / f"{key}.json"
     if path.exists():
         return dict(json.loads(path.read_text(encoding="utf-8")))
-    made = make()
+    result = make()
     folder.mkdir(parents=True, exist_ok=True)
     unfinished = folder / f".{key}.{os.getpid()}"
-    unfinished.write_text(json.dumps(made, ensure_ascii=False), encoding="utf-8")
+    unfinished.write_text(json.dumps(result, ensure_ascii=False), encoding="utf-8")
     unfinished.replace(path)
-    return made
+    return result
 
 
 def of_each(

@@ -129,12 +129,12 @@ class SphereContact:
             raise RigError("contact radius", f"more than {WIDEST} h", "choose a lower preload, or a stiffer layer")
         low = np.log(self._least(radius, modulus, adhesion))
         high = np.full(np.shape(force), np.log(WIDEST))
-        held = self.force(np.exp(low), radius, modulus, adhesion) <= force
+        sticks = self.force(np.exp(low), radius, modulus, adhesion) <= force
         for _ in range(48):
             middle = (low + high) / 2
             under = self.force(np.exp(middle), radius, modulus, adhesion) < force
             low, high = np.where(under, middle, low), np.where(under, high, middle)
-        return np.where(held, np.exp((low + high) / 2), np.nan)
+        return np.where(sticks, np.exp((low + high) / 2), np.nan)
 
     def _least(self, radius: Floats, modulus: Floats, adhesion: float | Floats) -> Floats:
         """The radius at pull-off under force control, where F is least: the rising branch begins there."""

@@ -44,17 +44,17 @@ _COUNTS = {
 def parse(document: Any) -> Experiment:
     """The experiment of a description; raises RigError that names the field, the value and what is allowed."""
     known = ("schema", "name", "seed", "kind", "skin", "design", "lines", "drive", "curves", "noise", "effects")
-    given = checks.mapping("experiment", document, known)
-    checks.one_of("schema", given.get("schema"), (SCHEMA,))
-    kind = checks.one_of("kind", given.get("kind", FRF), (FRF, INDENTATION, COMPRESSION))
+    entries = checks.mapping("experiment", document, known)
+    checks.one_of("schema", entries.get("schema"), (SCHEMA,))
+    kind = checks.one_of("kind", entries.get("kind", FRF), (FRF, INDENTATION, COMPRESSION))
     for name in ("lines", "drive", "design") if kind != FRF else ("curves",):
-        if name in given:
-            raise RigError(name, given[name], f"not for recordings of kind {kind}")
-    lines = _part(LineGrid, "lines", given["lines"]) if "lines" in given else None
-    drive = _part(Drive, "drive", given["drive"]) if "drive" in given else None
-    curves = _part(CurveDesign, "curves", given.get("curves", {})) if kind != FRF else None
+        if name in entries:
+            raise RigError(name, entries[name], f"not for recordings of kind {kind}")
+    lines = _part(LineGrid, "lines", entries["lines"]) if "lines" in entries else None
+    drive = _part(Drive, "drive", entries["drive"]) if "drive" in entries else None
+    curves = _part(CurveDesign, "curves", entries.get("curves", {})) if kind != FRF else None
     if kind == FRF and (lines is None) == (drive is None):
-        raise RigError("lines", given.get("lines"), "give either lines (FRF) or drive (time series)")
+        raise RigError("lines", entries.get("lines"), "give either lines (FRF) or drive (time series)")
     for band, part in (("lines", lines), ("drive", drive)):
         if part is not None and not part.low_hz < part.high_hz:
             raise RigError(f"{band}.high_hz", part.high_hz, f"must be above low_hz, {part.low_hz:g} Hz")
@@ -64,25 +64,25 @@ def parse(document: Any) -> Experiment:
         checks.number(
             "drive.samples (duration_s · sample_rate_hz)", drive.duration_s * drive.sample_rate_hz, 256, 2**24
         )
-    skin = _skin(given.get("skin"))
-    design = _part(RecordingDesign, "design", given.get("design", {}))
+    skin = _skin(entries.get("skin"))
+    design = _part(RecordingDesign, "design", entries.get("design", {}))
     for index, name in enumerate(design.sensors):
         checks.one_of(f"design.sensors[{index}]", name, [sensor[0] for sensor in skin.sensors])
     if kind == FRF:
         feasibility.check_skin(skin)
         feasibility.check_presses(design, skin)
     return Experiment(
-        name=checks.text("name", given.get("name")),
-        seed=checks.whole("seed", given.get("seed", 0), 0, 2**63 - 1),
+        name=checks.text("name", entries.get("name")),
+        seed=checks.whole("seed", entries.get("seed", 0), 0, 2**63 - 1),
         kind=kind,
         skin=skin,
         design=design,
         lines=lines,
         drive=drive,
         curves=curves,
-        noise=_part(Noise, "noise", given.get("noise", {})),
-        effects=effects.checked(kind, given.get("effects", {})),
-        document=given,
+        noise=_part(Noise, "noise", entries.get("noise", {})),
+        effects=effects.checked(kind, entries.get("effects", {})),
+        document=entries,
     )
 
 

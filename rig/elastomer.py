@@ -48,10 +48,10 @@ def record_curves(experiment: Experiment) -> list[RecordedCurve]:
             for height in curves.heights_mm
             for diameter in curves.diameters_mm
         ]
-    made = [
+    pairs = [
         (shape, speed) for _ in range(curves.repeats) for shape in shapes for speed in curves.speeds_mm_per_s
     ]  # fmt: skip
-    return [_curve(experiment, number, shape, speed) for number, (shape, speed) in enumerate(made)]
+    return [_curve(experiment, number, shape, speed) for number, (shape, speed) in enumerate(pairs)]
 
 
 def _curve(experiment: Experiment, number: int, shape: dict[str, float], speed: float) -> RecordedCurve:

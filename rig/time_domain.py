@@ -107,13 +107,13 @@ def _charge(response: TrueResponse, row: int, force: Floats) -> Floats:
         return linear_charge
     preload = response.plan.preload_n[row]
     reach = min(float(np.abs(force).max()) / preload, 0.999)
-    held = response.sigma()[row]
+    at_rest = response.sigma()[row]
     factor = np.maximum(1 + reach * _CURVE, 1e-6)
-    curve = [(f * response.sigma(f)[row] - held) * preload for f in factor]
+    curve = [(f * response.sigma(f)[row] - at_rest) * preload for f in factor]
     moved = CubicSpline(reach * preload * _CURVE, curve)(np.maximum(force, -reach * preload))
     linear = response.level[row] / response.effective_sigma[row]
-    still = response.effective_sigma[row] - mobility * (response.first_harmonic[row] - held)
-    return linear * (still * force + mobility * (moved - held * force))
+    still = response.effective_sigma[row] - mobility * (response.first_harmonic[row] - at_rest)
+    return linear * (still * force + mobility * (moved - at_rest * force))
 
 
 def _mains(response: TrueResponse, time: Floats, random: np.random.Generator) -> Floats:

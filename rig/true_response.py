@@ -128,14 +128,16 @@ class TrueResponse:
     @cached_property
     def effective_sigma(self) -> Floats:
         """σ_eff of each recording."""
-        held = self.sigma()
-        result = held
+        at_rest = self.sigma()
+        result = at_rest
         if "moving_contact_edge" in self.on:
             up, down = 1 + _SMALL_CHANGE, 1 - _SMALL_CHANGE
             moving = (up * self.sigma(up) - down * self.sigma(down)) / (up - down)
-            result = result + effects.of(self.on, "moving_contact_edge", "mobile_fraction") * (moving - held)
+            result = result + effects.of(self.on, "moving_contact_edge", "mobile_fraction") * (moving - at_rest)
         if "amplitude_nonlinearity" in self.on:
-            result = result + effects.of(self.on, "amplitude_nonlinearity", "mobility") * (self.first_harmonic - held)
+            result = result + effects.of(self.on, "amplitude_nonlinearity", "mobility") * (
+                self.first_harmonic - at_rest
+            )
         return result
 
     @cached_property

@@ -134,10 +134,10 @@ def _contacts_load(request: LoadCase, pressures: list[SpherePressure], thickness
 
 
 def _map_loads(request: LoadCase, thickness: float) -> Iterable[Load]:
-    given = request.pressure_map
-    assert given is not None
-    x, y = to_si("x_mm", given.x_mm), to_si("x_mm", given.y_mm)
-    pressure = to_si("pressure_mpa", given.pressure_mpa)
+    pressure_map = request.pressure_map
+    assert pressure_map is not None
+    x, y = to_si("x_mm", pressure_map.x_mm), to_si("x_mm", pressure_map.y_mm)
+    pressure = to_si("pressure_mpa", pressure_map.pressure_mpa)
     refuse_coarse(x, y, thickness)
     row, column = np.nonzero(pressure)
     half = np.array([x[1] - x[0], y[1] - y[0]]) / 2

@@ -50,18 +50,18 @@ def _contacts(name: str, value: Any, units_checked: bool) -> tuple[LabContact, .
 
 
 def _pressure_map(name: str, value: Any, units_checked: bool) -> PressureMap:
-    given = field.build(PressureMap, name, value, units_checked)
-    for axis, positions in (("x_mm", given.x_mm), ("y_mm", given.y_mm)):
+    result = field.build(PressureMap, name, value, units_checked)
+    for axis, positions in (("x_mm", result.x_mm), ("y_mm", result.y_mm)):
         steps = np.diff(positions)
         if positions.size < 2 or np.ptp(steps) > _EVEN * steps[0]:
             raise InvalidInput(f"{name}.{axis}", shown(positions.tolist()), "must be two or more evenly spaced places")
-    shape = (given.y_mm.size, given.x_mm.size)
-    if given.pressure_mpa.shape != shape:
-        rows, columns = given.pressure_mpa.shape
+    shape = (result.y_mm.size, result.x_mm.size)
+    if result.pressure_mpa.shape != shape:
+        rows, columns = result.pressure_mpa.shape
         allowed = f"must have a row for each y_mm ({shape[0]}) and a column for each x_mm ({shape[1]})"
         raise InvalidInput(f"{name}.pressure_mpa", f"{rows} rows, {columns} columns", allowed)
-    _refuse_pull(f"{name}.pressure_mpa", given.pressure_mpa)
-    return given
+    _refuse_pull(f"{name}.pressure_mpa", result.pressure_mpa)
+    return result
 
 
 def _refuse_pull(name: str, pressure: Floats) -> None:
@@ -122,9 +122,9 @@ def _map_in_file(path: str) -> dict[str, Any]:
 
 def read_request(document: Any) -> LoadCase:
     """The request that a JSON document makes; raises InvalidInput at the first field that cannot be used."""
-    given = dict(field.mapping("body", document))
-    units_checked = field.flag("units_checked", given.pop("units_checked", False), False)
-    values, refused = field.check_fields(LoadCase, given, units_checked=units_checked)
+    fields = dict(field.mapping("body", document))
+    units_checked = field.flag("units_checked", fields.pop("units_checked", False), False)
+    values, refused = field.check_fields(LoadCase, fields, units_checked=units_checked)
     if refused:
         raise refused[0]
     request = LoadCase(**values)

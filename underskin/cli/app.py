@@ -75,11 +75,11 @@ def sigma(
 ) -> None:
     """The stress transmission σ, from dimensionless numbers."""
 
-    given = {"a_over_h": a_over_h, "rt_over_h": rt_over_h, "load_parameter": load_parameter}
+    options = {"a_over_h": a_over_h, "rt_over_h": rt_over_h, "load_parameter": load_parameter}
     from underskin.prediction import answers
 
     _answer(
-        given,
+        options,
         {"load_parameter": 0.0},
         input_file,
         csv,
@@ -102,7 +102,7 @@ def frf(
 ) -> None:
     """The FRF, charge over force, that a skin should show under a sphere."""
 
-    given = {
+    options = {
         "thickness_mm": thickness_mm,
         "youngs_modulus_mpa": youngs_modulus_mpa,
         "sensor_radius_mm": sensor_radius_mm,
@@ -114,7 +114,7 @@ def frf(
     from underskin.prediction import answers
 
     _answer(
-        given,
+        options,
         {"poisson_ratio": 0.5},
         input_file,
         csv,
@@ -147,7 +147,7 @@ def d33(
 
     Files also tell the elastomer's modulus, where it was recorded on the same bench (compression, indentation).
     """
-    given = {
+    options = {
         "thickness_mm": thickness_mm,
         "youngs_modulus_mpa": youngs_modulus_mpa,
         "sensor_radius_mm": sensor_radius_mm,
@@ -158,7 +158,7 @@ def d33(
         "frf_uncertainty_pc_per_n": frf_uncertainty_pc_per_n,
     }
     if files:
-        for_columns = [f"--{name.replace('_', '-')}" for name, values in given.items() if values]
+        for_columns = [f"--{name.replace('_', '-')}" for name, values in options.items() if values]
         for_columns += [name for name, used in (("--input", input_file), ("--units-checked", units_checked)) if used]
         invert_files.refuse(for_columns, "is for columns; files say it themselves")
         invert_files.invert_files(files, rig, band, figures, together, csv)
@@ -170,11 +170,11 @@ def d33(
     defaults = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": math.nan}
     from underskin.prediction import answers
 
-    _answer(given, defaults, input_file, csv, lambda table, columns: answers.d33(table, columns, units_checked))
+    _answer(options, defaults, input_file, csv, lambda table, columns: answers.d33(table, columns, units_checked))
 
 
 def _answer(
-    given: Mapping[str, _Given],
+    options: Mapping[str, _Given],
     defaults: Mapping[str, float],
     input_file: str | None,
     as_csv: bool,
@@ -184,7 +184,7 @@ def _answer(
     from underskin.cli import columns
     from underskin.surrogate.sigma_table import load_table
 
-    gathered = columns.gather(given, defaults, input_file)
+    gathered = columns.gather(options, defaults, input_file)
     count = columns.rows(gathered)
     table = load_table()
     answer = compute(table, gathered)

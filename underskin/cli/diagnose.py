@@ -92,8 +92,8 @@ def _refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_
         raise typer.BadParameter("give files or --campaign", param_hint="FILES")
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        given = [(file.stem, str(file)) for file in files] + [(name, f"--campaign {name}") for name in campaigns]
-        clashing = " and ".join(source for name, source in given if name == twice[0])
+        sources = [(file.stem, str(file)) for file in files] + [(name, f"--campaign {name}") for name in campaigns]
+        clashing = " and ".join(source for name, source in sources if name == twice[0])
         problem = (
             f"reports are named like their campaigns: {clashing} would all become {twice[0]}.json. "
             "Rename files, or run once for each, with an --output-dir of its own"
@@ -111,16 +111,16 @@ def _of_files(
         for file in files:
             yield _one(file, output_dir, html)
         return
-    left = list(files)
-    while left:
-        for file, outcome in _of_pool(left, output_dir, html, min(workers, len(left)), scheduler):
-            left.remove(file)
+    remaining = list(files)
+    while remaining:
+        for file, outcome in _of_pool(remaining, output_dir, html, min(workers, len(remaining)), scheduler):
+            remaining.remove(file)
             yield outcome
         # A process that dies ends the pool: the files that may have caused it are diagnosed alone, one by one
-        suspects = left[:workers]
+        suspects = remaining[:workers]
         for file in suspects:
             alone = dict(_of_pool([file], output_dir, html, 1, scheduler))
-            left.remove(file)
+            remaining.remove(file)
             yield alone.get(file, _Outcome(str(file), f"{file}: the process that worked it out was killed; memory?"))
 
 

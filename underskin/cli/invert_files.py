@@ -74,8 +74,10 @@ def invert_files(
         validation.name("together", together, False)
     band_hz = None if band is None else _band(band)
     description = None if rig is None else _rig_description(rig)
-    named = [(str(file), file.name) for file in files] if together is None else [(together, together.replace("/", "-"))]
-    pages = {} if figures is None else _pages(named, figures)
+    batches = (
+        [(str(file), file.name) for file in files] if together is None else [(together, together.replace("/", "-"))]
+    )
+    pages = {} if figures is None else _pages(batches, figures)
     from underskin.cli import campaign_table
     from underskin.surrogate.sigma_table import load_table
 
@@ -150,10 +152,10 @@ def _band(text: str) -> _BandHz:
     return low, high
 
 
-def _pages(named: Iterable[tuple[str, str]], folder: Path) -> dict[str, Path]:
+def _pages(batches: Iterable[tuple[str, str]], folder: Path) -> dict[str, Path]:
     """The page of each file's figures, by its name; raises InvalidInput where two would have the same page."""
     pages: dict[str, Path] = {}
-    for name, short in named:
+    for name, short in batches:
         page = folder / f"{short}.html"
         if page in pages.values():
             raise InvalidInput("figures", str(page), f"would hold two files' figures; {name} needs a run of its own")

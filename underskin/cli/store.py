@@ -99,9 +99,9 @@ def _sent(client: "Client", files: Sequence[Path], terms: Mapping[str, Any]) -> 
 
 def _content_key(files: Sequence[Path], terms: Mapping[str, Any]) -> str:
     """A key that is the same for the same files and options, so that what is imported twice is stored once."""
-    sent = [*files] if terms["rig"] is None else [*files, terms["rig"]]
+    inputs = [*files] if terms["rig"] is None else [*files, terms["rig"]]
     digests = []
-    for file in sent:
+    for file in inputs:
         with file.open("rb") as opened:
             digests.append((file.name, hashlib.file_digest(opened, "sha256").hexdigest()))
     options = [terms["skin"], terms["all_or_nothing"], terms["together"], terms["rig"] is None]

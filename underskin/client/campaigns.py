@@ -72,8 +72,8 @@ class Campaigns:
 
         def send() -> Document:
             with ExitStack() as opened:
-                named = [("file", Path(file)) for file in files] + ([] if rig is None else [("rig", Path(rig))])
-                parts = [(name, (path.name, opened.enter_context(path.open("rb")))) for name, path in named]
+                sources = [("file", Path(file)) for file in files] + ([] if rig is None else [("rig", Path(rig))])
+                parts = [(name, (path.name, opened.enter_context(path.open("rb")))) for name, path in sources]
                 answer, received = self._session.answered(
                     "POST", "/v1/campaigns", **query, headers=headers, files=parts
                 )
