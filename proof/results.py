@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from proof import concealed, own_rig, real, riddle
+from proof import concealed, own_rig, paper_array, real
 from proof.cases import DrawnCase, MadeCase
 from proof.stored import Work, of_each, reports, sources, stored
 from underskin.errors import InvalidInput
@@ -44,8 +44,8 @@ def _recordings(work: Work, progress: Tell) -> dict[str, Any]:
     }
 
 
-def _riddle(work: Work, progress: Tell) -> dict[str, Any]:
-    cases = [MadeCase(name, document) for name, document in riddle.worlds().items()]
+def _paper(work: Work, progress: Tell) -> dict[str, Any]:
+    cases = [MadeCase(name, document) for name, document in paper_array.worlds().items()]
     return {
         "campaigns": [
             {"name": case.name, "report": report}
@@ -78,7 +78,7 @@ PARTS: dict[str, Part] = {
     "open": _open,
     "sealed": _sealed,
     "recordings": _recordings,
-    "riddle": _riddle,
+    "paper": _paper,
     "mixture": own_rig.judge_mixture,
     "ceiling": _ceiling,
     "quiet": own_rig.judge_quiet,

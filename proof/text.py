@@ -11,7 +11,7 @@ from proof.concealed import judged_of
 from proof.judge import QUIET, Judged, shown
 from proof.markdown import table
 from proof.statistics import Share, bootstrap, calibration, share
-from proof.text_real import recordings, riddle
+from proof.text_real import paper_array, recordings
 from rig.identifiable import THRESHOLD
 from underskin.units import Floats
 
@@ -41,7 +41,7 @@ def document(parts: Mapping[str, Result]) -> str:
         "mixture": lambda result: _mixture(result, parts.get("ceiling")),
         "quiet": _quiet,
         "recordings": recordings,
-        "riddle": riddle,
+        "paper": paper_array,
     }
     written = [section(parts[name]) for name, section in sections.items() if name in parts]
     state = table(

@@ -1,4 +1,4 @@
-"""The page's sections on real recordings and on the paper's riddle."""
+"""The page's sections on real recordings and on the paper's array."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -37,7 +37,7 @@ def _moduli(fit: Result | None) -> str:
 
 
 def recordings(result: Result) -> str:
-    """What came out of real recordings."""
+    """Diagnoses of real recordings."""
     rows = []
     for entry in result["campaigns"]:
         report, fit = entry["report"], entry["report"]["fit"]
@@ -80,7 +80,7 @@ def _said(report: Result) -> str:
 
 
 def _findings(result: Result) -> str:
-    """What the sources argue, beside what came out."""
+    """The statements of the sources beside the diagnoses."""
     reports = {entry["name"]: entry["report"] for entry in result["campaigns"]}
 
     def naming(prefix: str, mechanism: str) -> str:
@@ -113,8 +113,8 @@ def _findings(result: Result) -> str:
     return table(["what the source shows", "what the reports say", "in"], rows)
 
 
-def riddle(result: Result) -> str:
-    """What came out of the paper's riddle."""
+def paper_array(result: Result) -> str:
+    """Diagnoses of the paper's array."""
     rows = [
         [entry["name"], f"{entry['report']['verdict']} {entry['report']['probability']:.2f}", _named(entry["report"]),
          _rivals(entry["report"])]
@@ -125,7 +125,7 @@ def riddle(result: Result) -> str:
     undecidable = [entry["axis"] for entry in array["location"]["axes"] if entry["p_value"] is None]
     planned = (array["next_experiment"] or {}).get("statement", "none, since one set holds most of the probability")
     return f"""\
-## The paper's own riddle
+## The paper's array
 
 The paper reports 14 pC/N over two indenters, and on the array 14 pC/N at 1 N (12 sensors) and 22 pC/N at 3 N (41
 sensors), and ties the lower value to the latest runs. The recordings behind these numbers are not public, so they

@@ -11,7 +11,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from proof import figures, own_rig, riddle
+from proof import figures, own_rig, paper_array
 from proof.cases import DrawnCase, FileCase, MadeCase
 from proof.commands import prove
 from proof.ideal import diagnosed
@@ -242,15 +242,15 @@ def test_what_was_judged_survives_being_kept(tmp_path: Path) -> None:
     assert FileCase(path).name == "x"
 
 
-def test_the_riddles_campaigns_say_what_the_paper_says() -> None:
-    array = parse(riddle.worlds()["array"])
+def test_the_paper_s_campaigns_say_what_the_paper_says() -> None:
+    array = parse(paper_array.worlds()["array"])
     preloads = [entry.preload_n for entry in array.recordings if isinstance(entry, FrfRecording)]
-    assert (preloads.count(3.0), preloads.count(1.0)) == (riddle.AT_HIGHER, riddle.AT_LOWER)
+    assert (preloads.count(3.0), preloads.count(1.0)) == (paper_array.AT_HIGHER, paper_array.AT_LOWER)
 
 
-def test_the_riddle_is_left_open_and_what_would_settle_it_is_planned() -> None:
+def test_the_paper_s_question_is_left_open_and_what_would_settle_it_is_planned() -> None:
     """Preload and age go together on the array: both are named, neither is guessed, and the plan takes them apart."""
-    made = riddle.worlds()
+    made = paper_array.worlds()
     array = diagnosis_report(parse(made["array"]), load_table())
     rivals = {"preload_dependent_d33", "ageing"}
     assert array["verdict"] == "ambiguous"
@@ -264,9 +264,9 @@ def test_the_riddle_is_left_open_and_what_would_settle_it_is_planned() -> None:
     assert all(entry["position_mm"] == [0.0, 0.0] for entry in planned["recordings"])
 
 
-def test_what_would_settle_the_riddle_does() -> None:
+def test_what_would_settle_the_paper_s_question_does() -> None:
     """Both preloads on late sensors: what did it is named."""
-    made = riddle.worlds()
+    made = paper_array.worlds()
     aged = diagnosis_report(parse(made["array, then both preloads: age did it"]), load_table())
     assert {entry["name"] for entry in aged["mechanisms"]} == {"ageing"}
 

@@ -1,4 +1,4 @@
-"""The paper's own riddle: 14 pC/N over two indenters, but on the array 14 pC/N at 1 N and 22 pC/N at 3 N.
+"""The paper's contradictory d33: 14 pC/N over two indenters, but on the array 14 pC/N at 1 N and 22 pC/N at 3 N.
 
 Its d33 values are turned back into the recordings that give them under the base model, with the design that it reports.
 What it does not report is assumed here and said on the page: 5 % scatter of recordings, 1 % line noise, 200 load cycles
