@@ -37,7 +37,7 @@ def measure() -> list[Figure]:
         for order, refinement in SIZES:
             steps, size = _contestants(order, refinement)
             for step in steps.values():
-                step()  # what is made once and kept is not part of a step
+                step()  # set-up, which is done once, is not part of a step
             times = interleaved({name: partial(seconds, step) for name, step in steps.items()}, ROUNDS)
             at = f"Newton step, {size:,} displacements"
             figures += [

@@ -32,7 +32,7 @@ def prove(
     written: list[Path] = []
     for name in part or PARTS:
         work_out(name, work, partial(_tell, name))
-        written = write_page(stored_parts(work), docs_dir)  # after each part: a run that is stopped leaves what it has
+        written = write_page(stored_parts(work), docs_dir)  # after each part, so that a stopped run leaves a page
     for path in written:
         typer.echo(str(path))
 

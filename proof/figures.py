@@ -38,7 +38,9 @@ def _calibration(axes: Axes, judged: Sequence[Judged]) -> None:
     result = calibration([entry.probability for entry in judged], [entry.right for entry in judged])
     middle, value = np.array(result.stated), np.array(result.right)
     axes.plot([0, 1], [0, 1], "k:", linewidth=0.8)
-    errors = np.maximum([value - np.array(result.low), np.array(result.high) - value], 0)  # rounding aside, they are
+    errors = np.maximum(
+        [value - np.array(result.low), np.array(result.high) - value], 0
+    )  # not negative, but for rounding
     axes.errorbar(middle, value, errors, fmt="o", capsize=3)
     for x, y, count in zip(middle, value, result.count, strict=True):
         axes.annotate(str(count), (x, y), textcoords="offset points", xytext=(5, -11), fontsize=7)

@@ -239,7 +239,7 @@ def _integrated(supposed: Supposition, likelihood: Likelihood, start: Floats) ->
         for j in range(i):
             both = loss(best + inward[i] * np.eye(size)[i] + inward[j] * np.eye(size)[j]) - least
             hessian[i, j] = hessian[j, i] = (both - single[i] - single[j]) / (inward[i] * inward[j])
-    hessian = np.where(np.isfinite(hessian), hessian, np.diag(inward**-2.0))  # where the rig's reach ends, a cliff
+    hessian = np.where(np.isfinite(hessian), hessian, np.diag(inward**-2.0))  # infinite outside the rig's range
     values = np.maximum(np.linalg.eigvalsh(hessian), 2 * np.pi)
     return Tried(supposed, -least, -least + 0.5 * float((np.log(2 * np.pi) - np.log(values)).sum()))
 

@@ -100,6 +100,6 @@ def _diagnosed(document: dict[str, Any]) -> dict[str, Any]:
     try:
         campaign, refused = from_dict(document)
         return diagnosis_report(campaign, load_table(), refused=refused)
-    except Exception as error:  # a diagnosis that fails is a wrong answer, and no reason to lose the others
+    except Exception as error:  # a failed diagnosis counts as a wrong answer; the others go on
         failed = {"verdict": FAILED, "probability": 0.0, "statement": repr(error), "mechanisms": [{"name": FAILED}]}
         return {**failed, "alternatives": [], "fit": None}

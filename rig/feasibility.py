@@ -7,8 +7,8 @@ from itertools import combinations
 from rig.errors import RigError
 from rig.experiment import DeclaredSkin, RecordingDesign
 
-_LEAST_D33 = 0.05  # pC/N; a polymer without poling has as much
-_INFLUENCE = 8.0  # thicknesses; further off less than a millionth of the stress arrives
+_LEAST_D33 = 0.05  # pC/N; even an unpoled polymer has as much
+_INFLUENCE = 8.0  # thicknesses; beyond, less than a millionth of the stress remains
 
 
 def check_skin(skin: DeclaredSkin) -> None:

@@ -115,7 +115,7 @@ class FiniteStrainLayer:
         angle, weight = np.polynomial.legendre.leggauss(16)
         for element in np.flatnonzero(edges[:-1] < a * (1 - 1e-9)):
             low, high = edges[element], edges[element + 1]
-            # r = a sin θ takes the root at the edge away.
+            # r = a sin θ removes the square root at the edge.
             ends = np.arcsin(np.minimum(np.array([low, high]) / a, 1.0))
             theta = ends.mean() + np.diff(ends) / 2 * angle
             r = a * np.sin(theta)

@@ -136,7 +136,7 @@ def _displaced_by(d: _Glued, poisson_ratio: float, slip: float, lifted: Floats) 
 
     u = lifted.copy()
     u[d.free] = factors.solve(-assembled(stiffness @ lifted[d.numbers])[d.free])
-    if incompressible:  # the volume's defect pushes again, until nothing is left of it
+    if incompressible:  # the remaining volume defect is corrected by each further solve
         defect = constraint @ u[d.numbers]
         for _ in range(_SOLVES_PER_FACTORISATION - 1):
             step = np.zeros_like(u)

@@ -31,7 +31,7 @@ _NOT_IN_IMAGE = ("prove",)
 app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
-    rich_markup_mode="markdown",  # or [mm] is taken for a style
+    rich_markup_mode="markdown",  # in rich markup, [mm] would be a style
     help="Stress, FRF and d33 of piezoelectric electronic skin.",
 )
 
@@ -263,13 +263,13 @@ def main() -> None:
     """Run the command line; an error is one line on stderr and exit status 2."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal may know no σ
+            stream.reconfigure(errors="replace")  # some terminals cannot print σ
     _add_commands_of_other_packages()
     try:
         sys.exit(_run(app, sys.argv[1:], "underskin"))
     except (typer.TyperException, UnderskinError) as error:
         message = error.format_message() if isinstance(error, typer.TyperException) else str(error)
-        if message:  # empty where the help was shown instead
+        if message:  # empty if the help was shown
             typer.echo(f"underskin: {message}", err=True)
         sys.exit(2)
     except typer.Abort:

@@ -44,7 +44,7 @@ def import_files(
     batches = [(str(file), [file]) for file in files] if together is None else [(together, files)]
     terms = {"skin": skin, "rig": rig, "all_or_nothing": all_or_nothing, "together": together}
     console = Console(stderr=True)
-    # The bar may take what is written to a terminal, to stay below it, but not what goes into a pipe.
+    # In a terminal, the bar redirects the output to stay below it; a pipe must get the output itself.
     bar = Progress(console=console, disable=not console.is_terminal, redirect_stdout=sys.stdout.isatty())
     with connect(url, key) as client, bar:
         for name, batch in bar.track(batches, description="importing"):

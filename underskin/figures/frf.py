@@ -17,8 +17,8 @@ Trace = dict[str, Any]
 _AXES = ("", "2", "3")  # of the panels
 _UNITS = (" pC/N", "°", "")
 _HEIGHT = 640
-_BRIGHTEST = 0.85  # of Viridis, that still shows on white
-_LEAST_PHASE = 10.0  # ° to each side, so that noise looks like noise
+_BRIGHTEST = 0.85  # of Viridis; lighter colours are invisible on white
+_LEAST_PHASE = 10.0  # ° to each side, so that noise is not magnified
 _WIDE = 3.0  # largest magnitude over the median, from which on the axis is logarithmic
 
 

@@ -65,7 +65,7 @@ def array_history(
 def _finished(figure: go.Figure, title: str, times: Sequence[str]) -> go.Figure:
     figure.update_xaxes(title="recorded", type="date")
     moments = sorted(datetime.fromisoformat(time) for time in times)
-    if moments and moments[-1] - moments[0] < _DAY:  # else the axis of a single campaign would count milliseconds
+    if moments and moments[-1] - moments[0] < _DAY:  # otherwise the axis of a single campaign would show milliseconds
         figure.update_xaxes(range=[moments[0] - _DAY, moments[-1] + _DAY])
     figure.update_yaxes(title="d33 [pC/N]")
     return styled(figure, title)

@@ -28,7 +28,7 @@ REACH = 4.0  # largest a/h
 _NODES = 28
 _TABLE: Floats = REACH / 128 * np.arange(1.0, 129.0)  # of a/h, for first guesses
 _SMALLEST = 1e-12
-_TOLERANCE = 1e-7  # of the last step; the error that is left is about its square
+_TOLERANCE = 1e-7  # of the last step; the remaining error is about its square
 _ITERATIONS = 60
 
 # Sums of terms: factor, exponent of α, the curve among A, G, B, V, S, and whether U multiplies it.

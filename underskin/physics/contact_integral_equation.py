@@ -22,7 +22,7 @@ from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
 _END = 18.0  # where 1 − K has fallen below 1e-13
-_FIRST_PANELS = (0.0, 0.02, 0.15, 0.7)  # a nearly frictionless base bends K close to k = 0
+_FIRST_PANELS = (0.0, 0.02, 0.15, 0.7)  # on a nearly frictionless base, K changes rapidly near k = 0
 
 
 @dataclass(frozen=True)
