@@ -50,7 +50,7 @@ def main(names: list[str]) -> None:
 
 
 def machine() -> dict[str, str | int]:
-    """What it was measured on."""
+    """The machine and the package versions of a measurement."""
     processor = next(
         line.split(":")[1].strip()
         for line in Path("/proc/cpuinfo").read_text().splitlines()
@@ -67,7 +67,7 @@ def machine() -> dict[str, str | int]:
 
 
 def idle_percent() -> int:
-    """How much of all cores nobody used during three seconds: other work disturbs even ratios."""
+    """Idle share of all cores over three seconds; other work disturbs even ratios."""
     idle, total = _processor_times()
     time.sleep(3)
     later_idle, later_total = _processor_times()

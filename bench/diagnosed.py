@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from rig.experiment import parse as experiment
+from rig.description import parse as experiment
 from rig.recorded import campaign, record_lines
 from underskin.recordings.campaign import Campaign, parse
 
@@ -12,7 +12,7 @@ Effects = Mapping[str, Mapping[str, float | str]]
 def recorded(
     effects: Effects, *, columns: int, preloads_n: Sequence[float], lines: int, position_mm: float = 0.0
 ) -> Campaign:
-    """2 × `columns` × preloads recordings of so many `lines`; beside the centre where the place scatters by so much."""
+    """2 × `columns` × preloads recordings of `lines` lines each, beside the sensor's centre if positions scatter."""
     document = {
         "schema": "experiment/1",
         "name": "bench",

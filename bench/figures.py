@@ -1,4 +1,4 @@
-"""What a benchmark reports, and how contestants are measured side by side."""
+"""Results of a benchmark, and measurements of contestants side by side."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -9,7 +9,7 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Figure:
-    """One measured value; `target` bounds it from the side that `better` names, None where nothing is asked."""
+    """One measured value; `target` bounds it from the side that `better` names, None where there is no target."""
 
     name: str
     value: float
@@ -26,12 +26,12 @@ class Figure:
 
 
 def interleaved(contestants: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, list[float]]:
-    """Each contestant's measurements, taken in turns, so that a disturbance of the machine meets all alike."""
-    found: dict[str, list[float]] = {name: [] for name in contestants}
+    """Measurements of each contestant, taken in turns, so that disturbances of the machine affect all alike."""
+    measured: dict[str, list[float]] = {name: [] for name in contestants}
     for _ in range(rounds):
         for name, measure in contestants.items():
-            found[name].append(measure())
-    return found
+            measured[name].append(measure())
+    return measured
 
 
 def ratio(numerator: list[float], denominator: list[float]) -> float:

@@ -1,8 +1,8 @@
-"""Evidences by Laplace's method from many starts, as a diagnosis works them out, against nested sampling (dynesty).
+"""Evidences by the Laplace approximation, as in a diagnosis, against nested sampling (dynesty).
 
-Both weigh the same hypotheses on the same lines, with the same priors and the same code for one likelihood, which
-works out derivatives that nested sampling has no use for. Positioning scatter counts in both as the mean of with and
-without it.
+Both compare the same hypotheses on the same lines, with the same priors and the same code for the likelihood, which
+also calculates derivatives that nested sampling does not use. In both, the evidence is the mean with and without
+positioning scatter.
 """
 
 import time
@@ -65,8 +65,8 @@ def measure() -> list[Figure]:
     """For each campaign the ratio of processor times and the largest difference of the rivals' evidences."""
     figures = []
     with threadpool_limits(1):
-        found = {name: _compared(effects) for name, effects in HIDDEN.items()}
-    for name, entry in found.items():
+        results = {name: _compared(effects) for name, effects in HIDDEN.items()}
+    for name, entry in results.items():
         apart = max(abs(entry.laplace[index] - entry.sampled[index]) for index in entry.rivals)
         error = max(entry.errors[index] for index in entry.rivals)
         figures += [
@@ -77,8 +77,8 @@ def measure() -> list[Figure]:
             Figure(f"{name} hidden: their log evidences, largest difference", apart, "nats"),
             Figure(f"{name} hidden: the sampler's own standard error, largest", error, "nats"),
         ]
-    same = sum(entry.same_winner for entry in found.values())
-    return [*figures, Figure("campaigns with the same winner", same, f"of {len(found)}", float(len(found)))]
+    same = sum(entry.same_winner for entry in results.values())
+    return [*figures, Figure("campaigns with the same winner", same, f"of {len(results)}", float(len(results)))]
 
 
 def _compared(effects: Effects) -> Compared:
@@ -100,8 +100,8 @@ def _compared(effects: Effects) -> Compared:
 
 
 def _explained(problem: FittingProblem) -> list[Explanation]:
-    found = [problem.explain(names) for names in HYPOTHESES]
-    return [entry.integrated() for entry in found if entry is not None]  # without a parent none is left out
+    results = [problem.explain(names) for names in HYPOTHESES]
+    return [entry.integrated() for entry in results if entry is not None]  # without a parent none is left out
 
 
 def _sampled(problem: FittingProblem, explained: Explanation) -> Sampled:

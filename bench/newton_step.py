@@ -19,7 +19,7 @@ from bench.figures import Figure, interleaved, ratio, seconds
 from tablegen.discretisation import discretise
 from tablegen.faces import hertz_load
 from tablegen.mesh import layer_mesh
-from tablegen.newton import Layer
+from tablegen.newton import NonlinearLayer
 from tests.felupe_layer import BULK_MODULUS, FelupeLayer, Floats, quadratic_mesh
 
 CONTACT_RADIUS = 0.3
@@ -37,7 +37,7 @@ def measure() -> list[Figure]:
         for order, refinement in SIZES:
             steps, size = _contestants(order, refinement)
             for step in steps.values():
-                step()  # what is made once and kept is not part of a step
+                step()  # set-up, which is done once, is not part of a step
             times = interleaved({name: partial(seconds, step) for name, step in steps.items()}, ROUNDS)
             at = f"Newton step, {size:,} displacements"
             figures += [
@@ -51,7 +51,7 @@ def measure() -> list[Figure]:
 def _contestants(order: int, refinement: int) -> tuple[dict[str, Step], int]:
     """A step of each code on one grid of points, and the number of free displacements, equal for all."""
     mesh = layer_mesh(CONTACT_RADIUS, refinement)
-    layer = Layer(discretise(mesh, order))
+    layer = NonlinearLayer(discretise(mesh, order))
     load = PEAK_PRESSURE * hertz_load(layer.discretisation, CONTACT_RADIUS)
     r, z = (_subdivided(np.unique(coordinates), order) for coordinates in mesh.p)
     mixed = FelupeLayer(CONTACT_RADIUS, quadratic_mesh(z[::2], r[::2]))

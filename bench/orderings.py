@@ -1,4 +1,4 @@
-"""What was tried for the solver: pressures eliminated or kept, and SuperLU's orderings, on one Newton step's matrix."""
+"""Alternatives to the solver, on one Newton step: pressures eliminated or not, and SuperLU's orderings."""
 
 from collections.abc import Callable
 from functools import partial
@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from bench.figures import Figure, interleaved, ratio, seconds
 from tablegen.discretisation import discretise
 from tablegen.mesh import layer_mesh
-from tablegen.newton import Layer, factorise
+from tablegen.newton import NonlinearLayer, factorise
 
 CONTACT_RADIUS = 0.3
 ORDER = 4
@@ -20,8 +20,8 @@ ORDERINGS = ("COLAMD", "MMD_ATA")
 
 
 def measure() -> list[Figure]:
-    """Seconds for the way taken, and how many times longer the others take."""
-    layer = Layer(discretise(layer_mesh(CONTACT_RADIUS), ORDER))
+    """Seconds for the chosen solver, and the ratios of the others."""
+    layer = NonlinearLayer(discretise(layer_mesh(CONTACT_RADIUS), ORDER))
     condensed, saddle = layer.condensed_matrix(layer.rest()), _saddle_matrix(layer)
     tries: dict[str, Callable[[], object]] = {"taken": partial(factorise, condensed)}
     for ordering in ORDERINGS:
@@ -35,7 +35,7 @@ def measure() -> list[Figure]:
     return [taken, *(Figure(name, ratio(times[name], times["taken"]), "× that") for name in tries if name != "taken")]
 
 
-def _saddle_matrix(layer: Layer) -> csc_matrix:
+def _saddle_matrix(layer: NonlinearLayer) -> csc_matrix:
     """[[K, Cᵀ], [C, 0]] with every element's pressures as unknowns of their own."""
     d = layer.discretisation
     stiffness, constraint = layer.element_matrices(layer.rest())

@@ -56,14 +56,14 @@ contacts' positions, under three mechanisms; processor time on one core.""",
 
 
 def keep(part: str, machine: Mapping[str, object], figures: Sequence[Figure]) -> None:
-    """Put one part's figures in the place of its last ones."""
+    """Store the results of one part in the place of its previous ones."""
     results = _results()
     results[part] = {"machine": dict(machine), "figures": [asdict(figure) for figure in figures]}
     RESULTS.write_text(json.dumps(results, indent=1, ensure_ascii=False, sort_keys=True) + "\n")
 
 
 def write() -> None:
-    """Write the page from all that was kept."""
+    """Write the page from all stored results."""
     text = _INTRODUCTION
     results = _results()
     for part, title in _SECTIONS.items():

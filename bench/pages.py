@@ -1,4 +1,4 @@
-"""The pages with a thousand campaigns kept: the server's time, their weight, and how long a browser stands still."""
+"""The pages with a thousand stored campaigns: server time, weight, and the time that the main thread is busy."""
 
 import re
 import tempfile
@@ -41,14 +41,14 @@ def measure() -> list[Figure]:
             view = _first_view(client)
             paths["A diagnosis"] = _diagnosed(client)
             paths["Upload"] = "/upload"
-            found = [Figure("First view: start, style and scripts", view, "s", 1.0, "lower")]
+            figures = [Figure("First view: start, style and scripts", view, "s", 1.0, "lower")]
             for name, path in paths.items():
                 times = [_milliseconds(client, path) for _ in range(ROUNDS + 1)]
-                found.append(Figure(f"{name}, first time", times[0], "ms", 300.0, "lower"))
-                found.append(Figure(name, median(times[1:]), "ms", 300.0, "lower"))
+                figures.append(Figure(f"{name}, first time", times[0], "ms", 300.0, "lower"))
+                figures.append(Figure(name, median(times[1:]), "ms", 300.0, "lower"))
             heaviest = max(_weight(client, path) for path in paths.values())
-        found.append(Figure("Weight of the heaviest page", heaviest / 1e3, "kB", 150.0, "lower"))
-        found.append(
+        figures.append(Figure("Weight of the heaviest page", heaviest / 1e3, "kB", 150.0, "lower"))
+        figures.append(
             Figure(
                 f"Longest busy spell of the main thread, {RECORDINGS} recordings drawn",
                 _stands_still(address, whole),
@@ -57,7 +57,7 @@ def measure() -> list[Figure]:
                 "lower",
             )
         )
-    return found
+    return figures
 
 
 def _diagnosed(client: httpx.Client) -> str:
@@ -97,7 +97,7 @@ def _weight(client: httpx.Client, path: str) -> int:
 
 
 def _stands_still(address: str, campaign_id: str) -> float:
-    """The longest task [ms] while the figures are drawn, once the library is loaded."""
+    """The longest task [ms] while the figures are drawn, after the library has loaded."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1280, "height": 900})

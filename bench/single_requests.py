@@ -56,14 +56,14 @@ def _rate(server: servers.Server, path: str, script: str) -> float:
     report = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     if "Non-2xx" in report or "Socket errors" in report:
         raise RuntimeError(report)
-    found = re.search(r"Requests/sec:\s+([\d.]+)", report)
-    if found is None:
+    match = re.search(r"Requests/sec:\s+([\d.]+)", report)
+    if match is None:
         raise RuntimeError(report)
-    return float(found[1])
+    return float(match[1])
 
 
 def _check_same_answers(ours: servers.Server, umbridge: servers.Server, tesseract: servers.Server) -> None:
-    """All must give the same σ: a server that is fast because it does less would be no peer."""
+    """All servers must give the same σ, or the comparison would not be fair."""
     evaluation = {"name": "sigma", "input": [_POINT], "config": {}}
     names = ("a_over_h", "rt_over_h", "load_parameter")
     inputs = dict(zip(names, _POINT, strict=True))

@@ -1,4 +1,4 @@
-"""The store: a campaign of the paper's array posted, kept and inverted; lists and histories with much kept.
+"""The store: a campaign of the paper's array posted, stored and inverted; lists and histories of a full store.
 
 The full store, 1,000,000 recordings of 60 lines, is made with UNDERSKIN_SOAK=1 (about 10 minutes); otherwise 50,000.
 """
@@ -24,22 +24,22 @@ ROUNDS = 3
 
 
 def measure() -> list[Figure]:
-    """Time from the first byte of a POST to d33 in hand; time to list, and memory, with much kept."""
+    """Time from the first byte of a POST to its d33; time to list, and memory, with a full store."""
     with tempfile.TemporaryDirectory() as folder, servers.underskin(Path(folder)) as server:
         inverted = [_posted_and_inverted(server, campaign(lines=400)) for _ in range(ROUNDS)]
         before = server.resident_mb()
         count = max(1, KEPT // RECORDINGS)
         for number in range(count):
             server.post(f"/v1/campaigns?skin=palm-{number % SKINS}", campaign(lines=60, seed=number))
-        kept = f"with {count * RECORDINGS:,} recordings of 60 lines kept"
+        stored = f"with {count * RECORDINGS:,} recordings of 60 lines kept"
         latest = median(_milliseconds(server, "/v1/campaigns?skin=palm-3&limit=1") for _ in range(9))
         history = median(_milliseconds(server, "/v1/skins/palm-3/history") for _ in range(9))
         grown = server.resident_mb() - before
     return [
         Figure(f"Campaign of {RECORDINGS} × 400 lines posted, kept, inverted", median(inverted), "s", 3.0, "lower"),
-        Figure(f"A skin's latest campaign, {kept}", latest, "ms", 100.0, "lower"),
-        Figure(f"A skin's history, {kept}", history, "ms", 100.0, "lower"),
-        Figure(f"Memory grown, {kept}", grown, "MB"),
+        Figure(f"A skin's latest campaign, {stored}", latest, "ms", 100.0, "lower"),
+        Figure(f"A skin's history, {stored}", history, "ms", 100.0, "lower"),
+        Figure(f"Memory grown, {stored}", grown, "MB"),
     ]
 
 
@@ -81,8 +81,8 @@ def campaign(lines: int, sensors: int = SENSORS, preloads: int = len(PRELOADS), 
 
 def _posted_and_inverted(server: servers.Server, document: dict[str, Any]) -> float:
     start = time.perf_counter()
-    kept = server.post("/v1/campaigns?skin=first", document)
-    if server.get(f"/v1/campaigns/{kept['id']}/d33")["status"] != "ok":
+    stored = server.post("/v1/campaigns?skin=first", document)
+    if server.get(f"/v1/campaigns/{stored['id']}/d33")["status"] != "ok":
         raise RuntimeError("no d33 from the campaign")
     return time.perf_counter() - start
 

@@ -1,4 +1,4 @@
-"""What is diagnosed: a campaign in a file, or one that the virtual rig draws. Both are small and go to any process."""
+"""Campaigns to diagnose: from a file, drawn by the virtual rig, or made; small, so that any process can get them."""
 
 import json
 from dataclasses import dataclass

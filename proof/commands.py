@@ -11,19 +11,19 @@ import typer
 def prove(
     part: Annotated[
         list[str] | None,
-        typer.Argument(help="open, sealed, recordings, riddle, mixture, ceiling, quiet; default: all of them."),
+        typer.Argument(help="open, sealed, recordings, paper, mixture, ceiling, quiet; default: all of them."),
     ] = None,
     count: Annotated[int | None, typer.Option(min=1, help="Campaigns of each part at most; default: all.")] = None,
     workers: Annotated[int, typer.Option(min=0, help="Processes; 0 is one for each core.")] = 0,
-    work_dir: Annotated[Path, typer.Option(help="Where results are kept, so that a stopped run goes on.")] = Path(
+    work_dir: Annotated[Path, typer.Option(help="Where results are stored, so that a stopped run resumes.")] = Path(
         "build/proof"
     ),
     docs_dir: Annotated[Path, typer.Option(help="Where proof.md and its figures are written.")] = Path("docs"),
 ) -> None:
-    """Judge the diagnosis, part by part, and write docs/proof.md from every part that is kept."""
-    from proof.kept import Work
+    """Judge the diagnosis, part by part, and write docs/proof.md from every stored part."""
     from proof.page import write_page
-    from proof.results import PARTS, kept_parts, work_out
+    from proof.results import PARTS, stored_parts, work_out
+    from proof.stored import Work
 
     for name in part or ():
         if name not in PARTS:
@@ -32,7 +32,7 @@ def prove(
     written: list[Path] = []
     for name in part or PARTS:
         work_out(name, work, partial(_tell, name))
-        written = write_page(kept_parts(work), docs_dir)  # after each part: a run that is stopped leaves what it has
+        written = write_page(stored_parts(work), docs_dir)  # after each part, so that a stopped run leaves a page
     for path in written:
         typer.echo(str(path))
 

@@ -12,29 +12,29 @@ from typing import Any
 
 from proof.cases import FileCase
 from proof.judge import Judged, judge
-from proof.kept import Work, reports
+from proof.stored import Work, reports
 from underskin.cli.diagnose import write_report
 
 
-def judge_open(work: Work, campaigns: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+def judge_open(work: Work, campaigns: Path, progress: Callable[[str], None]) -> dict[str, Any]:
     """Every open campaign beside its truth."""
     truths = json.loads((campaigns / "open-truth.json").read_text(encoding="utf-8"))
     cases = _cases(campaigns / "open", work)
     judged = [
         judge(case.name, report, truths[case.name])
-        for case, report in zip(cases, reports(work, cases, tell), strict=True)
+        for case, report in zip(cases, reports(work, cases, progress), strict=True)
     ]
     return {"judged": [asdict(entry) for entry in judged]}
 
 
-def report_sealed(work: Work, campaigns: Path, folder: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+def report_sealed(work: Work, campaigns: Path, folder: Path, progress: Callable[[str], None]) -> dict[str, Any]:
     """Write the report of each sealed campaign into the folder, under the campaign's file name."""
     cases = _cases(campaigns / "sealed", work)
-    made = reports(work, cases, tell)
+    results = reports(work, cases, progress)
     folder.mkdir(parents=True, exist_ok=True)
-    for case, report in zip(cases, made, strict=True):
+    for case, report in zip(cases, results, strict=True):
         write_report(report, folder / f"{case.name}.json")
-    return {"verdicts": [report["verdict"] for report in made]}
+    return {"verdicts": [report["verdict"] for report in results]}
 
 
 def _cases(folder: Path, work: Work) -> Sequence[FileCase]:
@@ -42,7 +42,7 @@ def _cases(folder: Path, work: Work) -> Sequence[FileCase]:
 
 
 def judged_of(result: Mapping[str, Any]) -> list[Judged]:
-    """What was judged, from a result that was kept."""
+    """The judged reports of a stored result."""
     return [
         Judged(**{**entry, "truth": tuple(entry["truth"]), "answer": tuple(entry["answer"]),
                   "held_out": entry["held_out"] and tuple(entry["held_out"])})

@@ -35,12 +35,14 @@ def calibration_and_size(judged: Sequence[Judged], path: Path) -> Path:
 
 
 def _calibration(axes: Axes, judged: Sequence[Judged]) -> None:
-    found = calibration([entry.probability for entry in judged], [entry.right for entry in judged])
-    middle, value = np.array(found.stated), np.array(found.right)
+    result = calibration([entry.probability for entry in judged], [entry.right for entry in judged])
+    middle, value = np.array(result.stated), np.array(result.right)
     axes.plot([0, 1], [0, 1], "k:", linewidth=0.8)
-    reach = np.maximum([value - np.array(found.low), np.array(found.high) - value], 0)  # rounding aside, they are
-    axes.errorbar(middle, value, reach, fmt="o", capsize=3)
-    for x, y, count in zip(middle, value, found.count, strict=True):
+    errors = np.maximum(
+        [value - np.array(result.low), np.array(result.high) - value], 0
+    )  # not negative, but for rounding
+    axes.errorbar(middle, value, errors, fmt="o", capsize=3)
+    for x, y, count in zip(middle, value, result.count, strict=True):
         axes.annotate(str(count), (x, y), textcoords="offset points", xytext=(5, -11), fontsize=7)
     axes.set(title="calibration, ten equal bins", xlabel="stated probability", ylabel="share that was right")
 
@@ -57,8 +59,8 @@ def _sizes(axes: Axes, judged: Sequence[Judged]) -> None:
         if shares:
             value = np.array([entry.value for entry in shares])
             low_end, high_end = np.array([entry.interval for entry in shares]).T
-            reach = np.maximum([value - low_end, high_end - value], 0)
-            axes.errorbar(places, value, reach, fmt=style, capsize=2, label=kind, markersize=4)
+            errors = np.maximum([value - low_end, high_end - value], 0)
+            axes.errorbar(places, value, errors, fmt=style, capsize=2, label=kind, markersize=4)
     names = [f"{low:g}–{high:g}" if np.isfinite(high) else f"> {low:g}" for low, high in pairwise(SIZES)]
     axes.set_xticks(range(len(names)), names, rotation=35)
     axes.set(
@@ -97,18 +99,18 @@ def confusion(judged: Sequence[Judged], path: Path) -> Path:
 
 def before_and_after(campaigns: Sequence[Mapping[str, Any]], path: Path) -> Path:
     """Held-out error of the base model and of the explanation, beside the noise floor, for real recordings."""
-    kept = [entry for entry in campaigns if _held_out(entry)]
+    entries = [entry for entry in campaigns if _held_out(entry)]
     with mpl.rc_context(fname=_STYLE):
-        figure = Figure(figsize=(7.6, 0.9 + 0.25 * len(kept)), layout="constrained")
+        figure = Figure(figsize=(7.6, 0.9 + 0.25 * len(entries)), layout="constrained")
         axes = figure.subplots()
-        for place, entry in enumerate(reversed(kept)):
+        for place, entry in enumerate(reversed(entries)):
             fit = entry["report"]["fit"]
             values = fit["before"]["heldout_rmse_percent"], fit["after"]["heldout_rmse_percent"]
             axes.plot(values, [place, place], "-", color="0.7", zorder=1)
             marks = zip((*values, fit["noise_floor_percent"]), ("o", "o", "|"), ("C3", "C0", "k"), strict=True)
             for value, marker, colour in marks:
                 axes.plot([value], [place], marker, color=colour, markersize=9 if marker == "|" else 6)
-        axes.set_yticks(range(len(kept)), [entry["name"] for entry in reversed(kept)])
+        axes.set_yticks(range(len(entries)), [entry["name"] for entry in reversed(entries)])
         axes.set(
             xscale="log", xlabel="error on held-out data, percent: red base model, blue explained, bar noise floor"
         )

@@ -1,14 +1,14 @@
 """The ceiling: a diagnoser that owns the rig's equations, noise levels, parameter ranges and shares of what is hidden.
 
 Its likelihood: each recording's amplitude has its gain scatter and, to second order in the mean and first in the
-variance, its scatter of position; lines have the rig's own noise; d33 is even in its logarithm from 8 to 30 pC/N;
-E, h and the sensors' gains are what is declared. It supposes nothing, every effect of the catalogue, every one
-that is not in it, and where two effects were drawn every pair that shares one with them. Each supposition is evaluated
-on a coarse grid, from the true values of what it shares with the truth; the six best, the three best that are not the
-true answer, and the true one are maximised (Nelder–Mead) and integrated by Laplace's method. So it is told where the
-true answer lies and never overlooks it: no diagnosis can hope to be better.
+variance, its scatter of position; lines have the rig's own noise; d33 is uniform in its logarithm from 8 to 30 pC/N;
+E, h and the sensors' gains are as declared. Its hypotheses are: nothing, every effect of the catalogue, every one
+that is not in it, and where two effects were drawn every pair that shares one with them. Each hypothesis is evaluated
+on a coarse grid, from the true values of the parameters that it shares with the truth; the six best, the three best
+with a wrong answer, and the true one are maximised (Nelder–Mead) and integrated by the Laplace approximation. It knows
+where the true answer lies and never overlooks it: it is an upper bound for any diagnosis.
 
-What the truth gains in χ² over every other answer, both at their best, says whether anybody could name it here.
+The gain in χ² of the truth over every other answer, both at their maximum, says whether the truth can be identified.
 """
 
 from collections.abc import Mapping
@@ -42,7 +42,7 @@ _PICKUP_WIDTH_HZ = 1.5
 
 @dataclass(frozen=True)
 class _Amplitudes:
-    """What lines say of each recording's amplitude, given the shape: estimate, its variance, and what is left of χ²."""
+    """The amplitude of each recording given the shape: estimate and variance (rows,), and the remainder of ln p."""
 
     estimate: Floats
     variance: Floats
@@ -54,7 +54,7 @@ class Likelihood:
 
     def __init__(self, recorded: RecordedLines) -> None:
         self.recorded = recorded
-        self.noise = recorded.bench.experiment.noise
+        self.noise = recorded.response.experiment.noise
 
     def __call__(self, effects: dict[str, Values]) -> float:
         """The logarithm, −∞ where the rig cannot carry the effects out."""
@@ -64,10 +64,14 @@ class Likelihood:
             return -np.inf
 
     def _log(self, effects: dict[str, Values]) -> float:
-        bench = self.recorded.bench
-        experiment = replace(bench.experiment, effects=effects, skin=replace(bench.experiment.skin, d33_pc_per_n=1.0))
-        nowhere = np.zeros_like(bench.missed_mm)
-        plain = replace(bench, experiment=experiment, missed_mm=nowhere, sensor_gains=np.ones_like(bench.sensor_gains))
+        response = self.recorded.response
+        experiment = replace(
+            response.experiment, effects=effects, skin=replace(response.experiment.skin, d33_pc_per_n=1.0)
+        )
+        nowhere = np.zeros_like(response.missed_mm)
+        plain = replace(
+            response, experiment=experiment, missed_mm=nowhere, sensor_gains=np.ones_like(response.sensor_gains)
+        )
         mean, variance = plain.level, np.zeros(len(nowhere))
         shape = plain.lines(self.recorded.frequency_hz) / mean[:, None]
         if self.noise.position_mm:
@@ -76,28 +80,28 @@ class Likelihood:
                 mean = mean + (up + down - 2 * plain.level) / 6
                 variance = variance + ((up - down) / (2 * _NODE)) ** 2 + ((up + down - 2 * plain.level) ** 2) / 18
         scatter = variance + self.noise.gain**2 * (mean**2 + variance)
-        found = self._amplitudes(shape, effects)
+        amplitudes = self._amplitudes(shape, effects)
         spread = of(effects, "sensor_spread", "sd")
         if not spread:
-            return found.rest + float(
-                logsumexp(self._at(_SCALES, mean, scatter, found).sum(axis=0)) - np.log(len(_SCALES))
+            return amplitudes.rest + float(
+                logsumexp(self._at(_SCALES, mean, scatter, amplitudes).sum(axis=0)) - np.log(len(_SCALES))
             )
-        sensors, index = np.unique(bench.plan.sensor, return_inverse=True)
+        sensors, index = np.unique(response.plan.sensor, return_inverse=True)
         each = np.zeros((len(sensors), len(_WIDE)))
-        np.add.at(each, index, self._at(_WIDE, mean, scatter, found))
+        np.add.at(each, index, self._at(_WIDE, mean, scatter, amplitudes))
         top = each.max(axis=1, keepdims=True)
         coarse = _SCALES[::10]
         weight = np.exp(-0.5 * ((_WIDE - coarse[:, None]) / spread) ** 2) * (
             (_WIDE[1] - _WIDE[0]) / (spread * _ROOT_2PI)
         )
         whole = np.log(np.maximum(np.exp(each - top) @ weight.T, 1e-300)) + top
-        return found.rest + float(logsumexp(whole.sum(axis=0)) - np.log(len(coarse)))
+        return amplitudes.rest + float(logsumexp(whole.sum(axis=0)) - np.log(len(coarse)))
 
-    def _at(self, scales: Floats, mean: Floats, scatter: Floats, found: _Amplitudes) -> Floats:
+    def _at(self, scales: Floats, mean: Floats, scatter: Floats, amplitudes: _Amplitudes) -> Floats:
         """ln p of each recording at each ln d33."""
         d33 = np.exp(scales)
-        variance = scatter[:, None] * d33**2 + found.variance[:, None]
-        return -0.5 * (np.log(variance) + (found.estimate[:, None] - mean[:, None] * d33) ** 2 / variance)
+        variance = scatter[:, None] * d33**2 + amplitudes.variance[:, None]
+        return -0.5 * (np.log(variance) + (amplitudes.estimate[:, None] - mean[:, None] * d33) ** 2 / variance)
 
     def _amplitudes(self, shape: np.ndarray, effects: dict[str, Values]) -> _Amplitudes:
         y, weight = self.recorded.measured, 1 / self.recorded.line_variance
@@ -107,7 +111,7 @@ class Likelihood:
         if "mains_pickup" in effects:
             frequency, mains = self.recorded.frequency_hz, of(effects, "mains_pickup", "mains_hz")
             p = sum(k / (1 + ((frequency - n * mains) / _PICKUP_WIDTH_HZ) ** 2) for n, k in ((1, 1.0), (3, 1 / 3)))
-            half = 0.5 * (of(effects, "mains_pickup", "charge_pc") / self.recorded.bench.plan.dynamic_n) ** 2
+            half = 0.5 * (of(effects, "mains_pickup", "charge_pc") / self.recorded.response.plan.dynamic_n) ** 2
             pp, ps, py = (weight * p * p).sum(axis=1), (weight * p * shape).sum(axis=1), (weight * p * y).sum(axis=1)
             inner = pp + 1 / half
             ss, sy, yy = ss - np.abs(ps) ** 2 / inner, sy - ps.conj() * py / inner, yy - np.abs(py) ** 2 / inner
@@ -118,7 +122,7 @@ class Likelihood:
 
 @dataclass(frozen=True)
 class Tried:
-    """A supposition that was maximised: ln p at its best, and ln ∫ p over the unit cube."""
+    """A hypothesis at its maximum: ln p there, and ln ∫ p over the unit cube."""
 
     supposed: Supposition
     log_likelihood: float
@@ -130,17 +134,17 @@ def diagnosed(case: DrawnCase) -> dict[str, Any]:
     the truth is more than that of any other answer; None where nothing is hidden."""
     description = drawn(case.seed, case.number, case.what)
     recorded = record(description)
-    truth: dict[str, Values] = {name: dict(values) for name, values in recorded.bench.on.items()}
+    truth: dict[str, Values] = {name: dict(values) for name, values in recorded.response.on.items()}
     likelihood = Likelihood(recorded)
     sets = _sets(tuple(truth))
     ranges = of_frf(description)
     laws = {names: suppositions(names, ranges) for names in sets}
     supposed = [entry for entries in laws.values() for entry in entries if _starts_at(entry, truth)]
     coarse = [(entry, *_best_of(entry, likelihood, truth)) for entry in supposed]
-    coarse.sort(key=lambda found: -found[2])
+    coarse.sort(key=lambda entry: -entry[2])
     hidden = _answer(tuple(sorted(truth)))
-    rivals = [found for found in coarse if _answer(found[0].names) != hidden]
-    chosen = {id(found): found for found in (*coarse[:_REFINED], *rivals[:_RIVALS])}
+    rivals = [entry for entry in coarse if _answer(entry[0].names) != hidden]
+    chosen = {id(entry): entry for entry in (*coarse[:_REFINED], *rivals[:_RIVALS])}
     starts = [(entry, place) for entry, place, _ in chosen.values()]
     starts += [(entry, place) for entry, *_ in coarse if (place := entry.place_of(truth)) is not None]
     tried = [_integrated(entry, likelihood, place) for entry, place in starts]
@@ -149,8 +153,8 @@ def diagnosed(case: DrawnCase) -> dict[str, Any]:
         names = entry.supposed.names
         evidence[names] = max(evidence.get(names, -np.inf), entry.log_evidence)
     weight: dict[tuple[str, ...], list[float]] = {}
-    for names, found in evidence.items():
-        weight.setdefault(_answer(names), []).append(found - np.log(len(laws[names])) + sets[names])
+    for names, value in evidence.items():
+        weight.setdefault(_answer(names), []).append(value - np.log(len(laws[names])) + sets[names])
     total = {answer: float(logsumexp(values)) for answer, values in weight.items()}
     leader = max(total, key=lambda answer: total[answer])
     return {
@@ -221,11 +225,11 @@ def _integrated(supposed: Supposition, likelihood: Likelihood, start: Floats) ->
     simplex = np.vstack(
         [start, *(start + np.where(start[k] > 0.5, -0.04, 0.04) * np.eye(size)[k] for k in range(size))]
     )
-    found = minimize(
+    minimum = minimize(
         loss, start, method="Nelder-Mead",
         options={"initial_simplex": simplex, "maxfev": 45 * size, "xatol": 1e-4, "fatol": 0.05},
     )  # fmt: skip
-    best, least = np.asarray(found.x), float(found.fun)
+    best, least = np.asarray(minimum.x), float(minimum.fun)
     steps = np.array([_step(loss, best, least, axis) for axis in np.eye(size)])
     inward = np.where(best > 0.5, -1.0, 1.0) * steps
     hessian = np.empty((size, size))
@@ -235,7 +239,7 @@ def _integrated(supposed: Supposition, likelihood: Likelihood, start: Floats) ->
         for j in range(i):
             both = loss(best + inward[i] * np.eye(size)[i] + inward[j] * np.eye(size)[j]) - least
             hessian[i, j] = hessian[j, i] = (both - single[i] - single[j]) / (inward[i] * inward[j])
-    hessian = np.where(np.isfinite(hessian), hessian, np.diag(inward**-2.0))  # where the rig's reach ends, a cliff
+    hessian = np.where(np.isfinite(hessian), hessian, np.diag(inward**-2.0))  # infinite outside the rig's range
     values = np.maximum(np.linalg.eigvalsh(hessian), 2 * np.pi)
     return Tried(supposed, -least, -least + 0.5 * float((np.log(2 * np.pi) - np.log(values)).sum()))
 

@@ -1,4 +1,4 @@
-"""What the ideal diagnoser may suppose: each effect by the rig's own law, within the range it draws from."""
+"""The hypotheses of the ideal diagnoser: each effect by the rig's own law, within the range it is drawn from."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,7 +16,7 @@ _MAINS_HZ = (50.0, 60.0)
 
 @dataclass(frozen=True)
 class Coordinate:
-    """A parameter, even in its logarithm between two values; `sign` −1 turns its sign, of a factor its logarithm's."""
+    """A parameter, uniform in its logarithm; `sign` −1 inverts its sign, or that of a factor's logarithm."""
 
     effect: str
     parameter: str
@@ -55,21 +55,21 @@ class Supposition:
 
     def effects(self, place: Floats) -> dict[str, Values]:
         """The effects at a place."""
-        found: dict[str, Values] = {name: dict(values) for name, values in self.fixed.items()}
+        result: dict[str, Values] = {name: dict(values) for name, values in self.fixed.items()}
         for coordinate, at in zip(self.coordinates, place, strict=True):
-            found[coordinate.effect][coordinate.parameter] = coordinate.value(float(at))
-        if "misalignment" in found:
-            size, angle = (float(found["misalignment"].pop(name)) for name in ("size", "angle"))
-            found["misalignment"] = {"x_mm": size * math.cos(angle), "y_mm": size * math.sin(angle)}
-        return found
+            result[coordinate.effect][coordinate.parameter] = coordinate.value(float(at))
+        if "misalignment" in result:
+            size, angle = (float(result["misalignment"].pop(name)) for name in ("size", "angle"))
+            result["misalignment"] = {"x_mm": size * math.cos(angle), "y_mm": size * math.sin(angle)}
+        return result
 
     def place_of(self, effects: Mapping[str, Values]) -> Floats | None:
-        """Where these effects are, None where this supposition does not hold them."""
+        """The coordinates of these effects; None where this hypothesis does not contain them."""
         place = self.place_of_shared(effects)
         return place if set(effects) == set(self.fixed) and not np.isnan(place).any() else None
 
     def place_of_shared(self, effects: Mapping[str, Values]) -> Floats:
-        """Where those of these effects are that this supposition holds as they are; nan elsewhere."""
+        """The coordinates of those effects that this hypothesis shares with the given ones; nan elsewhere."""
         known = {name: dict(values) for name, values in effects.items()}
         if "misalignment" in known:
             x, y = (float(known["misalignment"][name]) for name in ("x_mm", "y_mm"))
@@ -87,11 +87,11 @@ class Supposition:
 
 def suppositions(names: Sequence[str], ranges: Ranges) -> list[Supposition]:
     """All laws and signs of a set of effects."""
-    found = []
+    result = []
     for parts in product(*(list(_alone(name, ranges.get(name, {}))) for name in names)):
         fixed = {name: values for name, (values, _) in zip(names, parts, strict=True)}
-        found.append(Supposition(fixed, tuple(entry for _, coordinates in parts for entry in coordinates)))
-    return found
+        result.append(Supposition(fixed, tuple(entry for _, coordinates in parts for entry in coordinates)))
+    return result
 
 
 def _alone(name: str, ranges: Mapping[str, tuple[float, float]]) -> Iterator[tuple[Values, tuple[Coordinate, ...]]]:

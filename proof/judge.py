@@ -1,6 +1,6 @@
-"""What a report answers, held against the truth.
+"""Judges a report against the truth.
 
-An answer is the set of what is missing: mechanisms by name under `explained` and `ambiguous`, `unknown` under
+An answer is the set of effects that are missing: mechanisms by name under `explained` and `ambiguous`, `unknown` under
 `unexplained`, nothing under `no_mismatch` and `insufficient_data`. It is right if it is exactly the truth's set.
 """
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from proof.cases import DrawnCase
 from proof.judge import judge
-from proof.kept import Work, digest_of, kept, of_each, reports, sources
+from proof.stored import Work, digest_of, of_each, reports, sources, stored
 from rig.draw import drawn, record
 from rig.truth import truth_of_lines
 
@@ -19,22 +19,22 @@ SEED = 77077
 MIXTURE, QUIET = 300, 500
 
 
-def judge_mixture(work: Work, tell: Callable[[str], None]) -> dict[str, Any]:
+def judge_mixture(work: Work, progress: Callable[[str], None]) -> dict[str, Any]:
     """The mixture's campaigns beside their truth."""
-    return _judge(work, [DrawnCase(SEED, number) for number in range(work.count or MIXTURE)], tell)
+    return _judge(work, [DrawnCase(SEED, number) for number in range(work.count or MIXTURE)], progress)
 
 
-def judge_quiet(work: Work, tell: Callable[[str], None]) -> dict[str, Any]:
+def judge_quiet(work: Work, progress: Callable[[str], None]) -> dict[str, Any]:
     """Campaigns with nothing missing; what they need besides is drawn anew, so none is one of the mixture's."""
-    return _judge(work, [DrawnCase(SEED + 1, number, "none") for number in range(work.count or QUIET)], tell)
+    return _judge(work, [DrawnCase(SEED + 1, number, "none") for number in range(work.count or QUIET)], progress)
 
 
-def _judge(work: Work, cases: list[DrawnCase], tell: Callable[[str], None]) -> dict[str, Any]:
-    truths = of_each(work, cases, partial(truth, work, sources("rig")), tell)
-    made = reports(work, cases, tell)
+def _judge(work: Work, cases: list[DrawnCase], progress: Callable[[str], None]) -> dict[str, Any]:
+    truths = of_each(work, cases, partial(truth, work, sources("rig")), progress)
+    results = reports(work, cases, progress)
     return {
         "judged": [
-            asdict(judge(case.name, report, known)) for case, report, known in zip(cases, made, truths, strict=True)
+            asdict(judge(case.name, report, known)) for case, report, known in zip(cases, results, truths, strict=True)
         ]
     }
 
@@ -42,4 +42,4 @@ def _judge(work: Work, cases: list[DrawnCase], tell: Callable[[str], None]) -> d
 def truth(work: Work, version: str, case: DrawnCase) -> dict[str, Any]:
     """What the rig knows of a drawn campaign."""
     described = drawn(case.seed, case.number, case.what)
-    return kept(work.folder / "truths", digest_of([described, version]), lambda: truth_of_lines(record(described)))
+    return stored(work.folder / "truths", digest_of([described, version]), lambda: truth_of_lines(record(described)))

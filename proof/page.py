@@ -17,9 +17,9 @@ def write_page(parts: Mapping[str, Mapping[str, Any]], docs: Path) -> list[Path]
     written[0].write_text(document(parts), encoding="utf-8")
     if "mixture" in parts:
         judged = judged_of(parts["mixture"])
-        seen = [entry for entry in judged if entry.visible]
-        written.append(figures.calibration_and_size(seen, folder / "proof-calibration.svg"))
-        written.append(figures.confusion(seen, folder / "proof-confusion.svg"))
+        visible = [entry for entry in judged if entry.visible]
+        written.append(figures.calibration_and_size(visible, folder / "proof-calibration.svg"))
+        written.append(figures.confusion(visible, folder / "proof-confusion.svg"))
     if "recordings" in parts:
         written.append(figures.before_and_after(parts["recordings"]["campaigns"], folder / "proof-recordings.svg"))
     return written

@@ -19,7 +19,7 @@ _MOST_SAMPLES = 1200  # the diagnosis itself works on means over neighbouring sa
 _DUMBBELL_MM = (33.0, float(np.sqrt(4 * 18 / np.pi)))  # gauge length; a circle as large as 3 mm × 6 mm
 _LARGEST_STRAIN = 3.0  # of the dumbbells, some of which reach nine times their length
 _CYLINDER_MM = (30.0, 50.0)
-_NOMINAL_TIP_MM = 5e-3  # AFM tips whose radius the source does not tell: with a free modulus it changes no shape
+_NOMINAL_TIP_MM = 5e-3  # AFM tips whose radius the source does not state: with a free modulus it does not matter
 _STIFFNESS_N_PER_M = {"polymergel_creep": 0.061, "cell_stress_relaxation": 1.068}
 _BLOW_SAMPLES = 8192
 _BLOW_BAND_HZ = (5.0, 500.0)
@@ -28,10 +28,10 @@ _BLOW_LINES = 120
 
 @dataclass(frozen=True)
 class Recorded:
-    """A campaign made of real recordings, and what the diagnosis was told besides the numbers themselves."""
+    """A campaign made of real recordings, and what the diagnosis knew besides the numbers themselves."""
 
     name: str
-    told: str
+    stated: str
     make: Callable[[Path], dict[str, Any]]
 
 
@@ -121,13 +121,13 @@ def _afm(name: str, folder: Path) -> dict[str, Any]:
     time, height, force, segment = rows[(rows[:, 3] == approach) | (rows[:, 3] == approach + 1)].T
     free = float(np.median(force[: len(force) // 100]))
     depth_mm = -1e3 * (height + (force - free) / _STIFFNESS_N_PER_M[name])
-    kept = force - free > 0.02 * (force.max() - free)  # in contact
-    kept |= segment == approach + 1
+    used = force - free > 0.02 * (force.max() - free)  # in contact
+    used |= segment == approach + 1
     held = segment == approach + 1
     # As many samples of the hold as of the approach, which is much shorter
-    kept &= ~held | (np.arange(len(held)) % max(1, int(held.sum() / (kept & ~held).sum())) == 0)
+    used &= ~held | (np.arange(len(held)) % max(1, int(held.sum() / (used & ~held).sum())) == 0)
     geometry = {"indenter_radius_mm": _NOMINAL_TIP_MM}
-    curve = _curve(name, "indentation", geometry, depth_mm[kept], force[kept] - free, time[kept])
+    curve = _curve(name, "indentation", geometry, depth_mm[used], force[used] - free, time[used])
     return _document(name, {}, [curve])
 
 

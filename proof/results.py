@@ -1,4 +1,4 @@
-"""The parts of the proof: each is worked out by itself and kept as one document, from which the page is written."""
+"""The parts of the proof: each is made by itself and stored as one document, from which the page is written."""
 
 import json
 import os
@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from proof import concealed, own_rig, real, riddle
+from proof import concealed, own_rig, paper_array, real
 from proof.cases import DrawnCase, MadeCase
-from proof.kept import Work, kept, of_each, reports, sources
+from proof.stored import Work, of_each, reports, sources, stored
 from underskin.errors import InvalidInput
 
 Tell = Callable[[str], None]
@@ -24,45 +24,45 @@ def folder(setting: str) -> Path:
     return Path(os.environ[setting])
 
 
-def _open(work: Work, tell: Tell) -> dict[str, Any]:
-    return concealed.judge_open(work, folder("UNDERSKIN_CAMPAIGNS"), tell)
+def _open(work: Work, progress: Tell) -> dict[str, Any]:
+    return concealed.judge_open(work, folder("UNDERSKIN_CAMPAIGNS"), progress)
 
 
-def _sealed(work: Work, tell: Tell) -> dict[str, Any]:
-    return concealed.report_sealed(work, folder("UNDERSKIN_CAMPAIGNS"), SEALED, tell)
+def _sealed(work: Work, progress: Tell) -> dict[str, Any]:
+    return concealed.report_sealed(work, folder("UNDERSKIN_CAMPAIGNS"), SEALED, progress)
 
 
-def _recordings(work: Work, tell: Tell) -> dict[str, Any]:
-    made = list(real.recorded())[: work.count]
+def _recordings(work: Work, progress: Tell) -> dict[str, Any]:
+    entries = list(real.recorded())[: work.count]
     place = folder("UNDERSKIN_RECORDINGS")
-    found = reports(work, [MadeCase(entry.name, entry.make(place)) for entry in made], tell)
+    reported = reports(work, [MadeCase(entry.name, entry.make(place)) for entry in entries], progress)
     return {
         "campaigns": [
-            {"name": entry.name, "told": entry.told, "report": report}
-            for entry, report in zip(made, found, strict=True)
+            {"name": entry.name, "stated": entry.stated, "report": report}
+            for entry, report in zip(entries, reported, strict=True)
         ]
     }
 
 
-def _riddle(work: Work, tell: Tell) -> dict[str, Any]:
-    cases = [MadeCase(name, document) for name, document in riddle.worlds().items()]
+def _paper(work: Work, progress: Tell) -> dict[str, Any]:
+    cases = [MadeCase(name, document) for name, document in paper_array.worlds().items()]
     return {
         "campaigns": [
             {"name": case.name, "report": report}
-            for case, report in zip(cases, reports(work, cases, tell), strict=True)
+            for case, report in zip(cases, reports(work, cases, progress), strict=True)
         ]
     }
 
 
-def _ceiling(work: Work, tell: Tell) -> dict[str, Any]:
+def _ceiling(work: Work, progress: Tell) -> dict[str, Any]:
     cases = [DrawnCase(own_rig.SEED, number) for number in range(work.count or own_rig.MIXTURE)]
     version = sources("rig", "proof/ideal*.py")
-    answers = of_each(work, cases, _Ideal(work.folder / "ceiling", version), tell)
+    answers = of_each(work, cases, _Ideal(work.folder / "ceiling", version), progress)
     return {"answers": {case.name: answer for case, answer in zip(cases, answers, strict=True)}}
 
 
 class _Ideal:
-    """The ideal diagnoser on one case, kept; goes to other processes."""
+    """The ideal diagnoser on one case, with stored results; can be sent to other processes."""
 
     def __init__(self, folder: Path, version: str) -> None:
         self.folder, self.version = folder, version
@@ -70,36 +70,36 @@ class _Ideal:
     def __call__(self, case: DrawnCase) -> dict[str, Any]:
         from proof.ideal import diagnosed
 
-        return kept(self.folder, f"{case.name}-{self.version}", lambda: diagnosed(case))
+        return stored(self.folder, f"{case.name}-{self.version}", lambda: diagnosed(case))
 
 
-# In the order of what is short first; the ceiling belongs to the mixture.
+# The shortest first; the ceiling belongs to the mixture.
 PARTS: dict[str, Part] = {
     "open": _open,
     "sealed": _sealed,
     "recordings": _recordings,
-    "riddle": _riddle,
+    "paper": _paper,
     "mixture": own_rig.judge_mixture,
     "ceiling": _ceiling,
     "quiet": own_rig.judge_quiet,
 }
 
 
-def work_out(name: str, work: Work, tell: Tell) -> None:
-    """Work one part out and keep it."""
-    result = {"sources": sources("underskin"), "judged_by": sources(_JUDGE), **PARTS[name](work, tell)}
+def work_out(name: str, work: Work, progress: Tell) -> None:
+    """Make one part and store it."""
+    result = {"sources": sources("underskin"), "judged_by": sources(_JUDGE), **PARTS[name](work, progress)}
     work.folder.mkdir(parents=True, exist_ok=True)
     unfinished = work.folder / f".{name}.json.part"
     unfinished.write_text(json.dumps(result, ensure_ascii=False), encoding="utf-8")
     unfinished.replace(_path(name, work))
 
 
-def kept_parts(work: Work) -> dict[str, dict[str, Any]]:
-    """Every part that has been worked out and judged as it is judged now."""
-    found = {
+def stored_parts(work: Work) -> dict[str, dict[str, Any]]:
+    """Every stored part that was judged by the present sources of the judge."""
+    parts = {
         name: json.loads(_path(name, work).read_text(encoding="utf-8")) for name in PARTS if _path(name, work).exists()
     }
-    return {name: part for name, part in found.items() if part["judged_by"] == sources(_JUDGE)}
+    return {name: part for name, part in parts.items() if part["judged_by"] == sources(_JUDGE)}
 
 
 def _path(name: str, work: Work) -> Path:

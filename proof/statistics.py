@@ -1,4 +1,4 @@
-"""Shares with their intervals, and how well probabilities are calibrated."""
+"""Shares with their intervals, and the calibration of probabilities."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ BINS = 10
 
 @dataclass(frozen=True)
 class Share:
-    """`right` of `count`, with Wilson's 95 % interval; all three are None-like (nan) where count is 0."""
+    """`right` of `count`, with Wilson's 95 % interval; nan where count is 0."""
 
     right: int
     count: int
@@ -31,21 +31,27 @@ class Share:
             return float("nan"), float("nan")
         squared = _95**2 / self.count
         middle = (self.value + squared / 2) / (1 + squared)
-        reach = _95 * np.sqrt(self.value * (1 - self.value) / self.count + squared / (4 * self.count)) / (1 + squared)
-        return float(max(middle - reach, 0.0)), float(min(middle + reach, 1.0))
+        half = _95 * np.sqrt(self.value * (1 - self.value) / self.count + squared / (4 * self.count)) / (1 + squared)
+        return float(max(middle - half, 0.0)), float(min(middle + half, 1.0))
 
 
 def share(right: Sequence[bool]) -> Share:
-    """The share of what is true."""
+    """The share of true entries."""
     return Share(sum(right), len(right))
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Stated probabilities against how often they were right, in ten equal bins; empty bins are left out.
+    """Stated probabilities against the share that was right, in ten equal bins; empty bins are left out.
 
-    `error` is Σ (n_bin/n) |right − stated|; a perfectly calibrated tool that states the same probabilities has an error
-    below `by_chance` in 95 % of cases (both ends of its 95 % range are in `chance_range`).
+    Attributes
+    ----------
+    count, stated, right, low, high : tuple, (bins,)
+        Entries, mean stated probability, share that was right, and its 95 % interval.
+    error : float
+        Expected calibration error Σ (n_bin/n) |right − stated|.
+    chance_range : tuple
+        95 % range of `error` for a perfectly calibrated tool that states the same probabilities.
     """
 
     count: tuple[int, ...]
@@ -58,7 +64,16 @@ class Calibration:
 
 
 def calibration(probabilities: Sequence[float], right: Sequence[bool], draws: int = 4000) -> Calibration:
-    """How well stated probabilities match; the range by chance is simulated with a fixed seed."""
+    """Calibration of stated probabilities; the range by chance is simulated with a fixed seed.
+
+    Parameters
+    ----------
+    probabilities : sequence of float
+    right : sequence of bool
+        Whether each answer was right.
+    draws : int
+        Simulated tools.
+    """
     stated, hit = np.array(probabilities, dtype=float), np.array(right, dtype=float)
     place = np.minimum((stated * BINS).astype(int), BINS - 1)
     used = np.unique(place)
@@ -85,7 +100,19 @@ def _error(members: Sequence[np.ndarray], stated: Floats, hit: Floats) -> float:
 def bootstrap(
     values: Sequence[float], statistic: Callable[[Floats], Floats], draws: int = 2000
 ) -> tuple[float, float, float]:
-    """A statistic over the last axis of the values and its 95 % bootstrap interval, with a fixed seed."""
+    """A statistic with its 95 % bootstrap interval, with a fixed seed.
+
+    Parameters
+    ----------
+    values : sequence of float
+    statistic : callable
+        Maps (draws, values) to (draws,).
+    draws : int
+
+    Returns
+    -------
+    value, low, high : float
+    """
     sample = np.array(values, dtype=float)
     again = np.random.default_rng(2).choice(sample, (draws, len(sample)))
     low, high = np.quantile(statistic(again), [0.025, 0.975])

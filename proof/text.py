@@ -11,7 +11,7 @@ from proof.concealed import judged_of
 from proof.judge import QUIET, Judged, shown
 from proof.markdown import table
 from proof.statistics import Share, bootstrap, calibration, share
-from proof.text_real import recordings, riddle
+from proof.text_real import paper_array, recordings
 from rig.identifiable import THRESHOLD
 from underskin.units import Floats
 
@@ -41,7 +41,7 @@ def document(parts: Mapping[str, Result]) -> str:
         "mixture": lambda result: _mixture(result, parts.get("ceiling")),
         "quiet": _quiet,
         "recordings": recordings,
-        "riddle": riddle,
+        "paper": paper_array,
     }
     written = [section(parts[name]) for name, section in sections.items() if name in parts]
     state = table(
@@ -51,11 +51,11 @@ def document(parts: Mapping[str, Result]) -> str:
     return "\n".join([_HEAD, *written, tail + state])
 
 
-def _percent(found: Share) -> str:
-    if not found.count:
+def _percent(share: Share) -> str:
+    if not share.count:
         return "none there"
-    low, high = found.interval
-    return f"{found.right} of {found.count}: {100 * found.value:.0f} % [{100 * low:.0f}–{100 * high:.0f}]"
+    low, high = share.interval
+    return f"{share.right} of {share.count}: {100 * share.value:.0f} % [{100 * low:.0f}–{100 * high:.0f}]"
 
 
 def _right(judged: Sequence[Judged]) -> str:
@@ -97,12 +97,12 @@ others to judge. Their verdicts: {said}. Nothing was fitted to them.
 
 def _mixture(result: Result, ceiling: Result | None) -> str:
     judged = judged_of(result)
-    seen = [entry for entry in judged if entry.visible]
-    parts = {kind: [entry for entry in seen if entry.kind == kind] for kind in ("none", "single", "pair", "unknown")}
-    parts["all"] = seen
+    visible = [entry for entry in judged if entry.visible]
+    parts = {kind: [entry for entry in visible if entry.kind == kind] for kind in ("none", "single", "pair", "unknown")}
+    parts["all"] = visible
     drawn = Counter(entry.kind for entry in judged) + Counter(all=len(judged))
-    rows = [[kind, str(drawn[kind]), _right(found), _ideal(found, ceiling), _right(_identifiable(found, ceiling))]
-            for kind, found in parts.items()]  # fmt: skip
+    rows = [[kind, str(drawn[kind]), _right(entries), _ideal(entries, ceiling), _right(_identifiable(entries, ceiling))]
+            for kind, entries in parts.items()]  # fmt: skip
     return f"""\
 ## Campaigns of our own rig
 
@@ -114,16 +114,16 @@ shares no code with the diagnosis, and its laws are not the catalogue's.
 What was named where the answer is not right, of the visible. *Left open* is the verdict `ambiguous` with the truth
 among the rivals: for near-twins (a moving edge and a finite amplitude at one amplitude) there is no better answer.
 
-{_confused(seen)}
+{_confused(visible)}
 ![What was hidden against what was named](figures/proof-confusion.svg)
 
-{_probabilities(judged, seen, _identifiable(seen, ceiling))}
+{_probabilities(judged, visible, _identifiable(visible, ceiling))}
 ![Calibration, and accuracy against the effect's size](figures/proof-calibration.svg)
 
-{_held_out(seen)}
+{_held_out(visible)}
 ### Every miss
 
-{_misses(judged, {entry.name for entry in _identifiable(seen, ceiling)})}"""
+{_misses(judged, {entry.name for entry in _identifiable(visible, ceiling)})}"""
 
 
 _CEILING = """\
@@ -169,15 +169,15 @@ def _outcome(entry: Judged) -> str:
     return "part of it" if set(entry.truth) & set(entry.answer) else "other mechanisms"
 
 
-def _probabilities(judged: Sequence[Judged], seen: Sequence[Judged], identifiable: Sequence[Judged]) -> str:
+def _probabilities(judged: Sequence[Judged], visible: Sequence[Judged], identifiable: Sequence[Judged]) -> str:
     rows = []
-    for name, entries in (("identifiable", identifiable), ("visible", seen), ("all", judged)):
+    for name, entries in (("identifiable", identifiable), ("visible", visible), ("all", judged)):
         if not entries:
             continue
-        found = calibration([entry.probability for entry in entries], [entry.right for entry in entries])
-        low, high = found.chance_range
-        inside = "inside" if found.error <= high else "outside"
-        rows.append([name, str(len(entries)), f"{found.error:.3f}", f"{low:.3f}–{high:.3f}", inside])
+        result = calibration([entry.probability for entry in entries], [entry.right for entry in entries])
+        low, high = result.chance_range
+        inside = "inside" if result.error <= high else "outside"
+        rows.append([name, str(len(entries)), f"{result.error:.3f}", f"{low:.3f}–{high:.3f}", inside])
     header = ["campaigns", "count", "expected calibration error", "95 % range of a perfectly calibrated tool", "is"]
     return f"""\
 Stated probability of the answer against how often it was right, in ten equal bins. Some error is there by chance:

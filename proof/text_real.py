@@ -1,4 +1,4 @@
-"""The page's sections on real recordings and on the paper's riddle."""
+"""The page's sections on real recordings and on the paper's array."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -32,12 +32,12 @@ def _rivals(report: Result) -> str:
 
 def _moduli(fit: Result | None) -> str:
     """Young's modulus of the base model and of the explanation, where curves tell it."""
-    found = [fit[part].get("youngs_modulus") for part in ("before", "after")] if fit else []
-    return " → ".join(_number(entry["value"]) for entry in found if entry) or "–"
+    moduli = [fit[part].get("youngs_modulus") for part in ("before", "after")] if fit else []
+    return " → ".join(_number(entry["value"]) for entry in moduli if entry) or "–"
 
 
 def recordings(result: Result) -> str:
-    """What came out of real recordings."""
+    """Diagnoses of real recordings."""
     rows = []
     for entry in result["campaigns"]:
         report, fit = entry["report"], entry["report"]["fit"]
@@ -46,8 +46,8 @@ def recordings(result: Result) -> str:
         rows.append([entry["name"], f"{report['verdict']} {report['probability']:.2f}", _named(report), _rivals(report),
                      _moduli(fit),
                      " → ".join(_number(value) for value in errors[:2]) + f" ({_number(errors[2])})"])  # fmt: skip
-    told = table(
-        ["campaign", "what the diagnosis was told"], [[entry["name"], entry["told"]] for entry in result["campaigns"]]
+    stated = table(
+        ["campaign", "what the diagnosis was told"], [[entry["name"], entry["stated"]] for entry in result["campaigns"]]
     )
     where = "\n".join(f"- **{entry['name']}**: {_said(entry['report'])}" for entry in result["campaigns"])
     header = [
@@ -61,7 +61,7 @@ Public measurements of other labs, each started from the simplest model with the
 found in them was kept from the diagnosis. The held-out part is the highest force of each curve, extrapolated from
 the rest.
 
-{told}
+{stated}
 {table(header, rows)}
 ![Held-out error of real recordings](figures/proof-recordings.svg)
 
@@ -75,12 +75,12 @@ What each report says, in its own words:
 def _said(report: Result) -> str:
     """A report's statement without the laws, and where it locates the misfit."""
     sentences = report["statement"].split(". ")
-    kept = sentences if report["verdict"] == "unexplained" else sentences[:1]
-    return f"{'. '.join(kept).rstrip('.')}. {report['location']['statement']}"
+    chosen = sentences if report["verdict"] == "unexplained" else sentences[:1]
+    return f"{'. '.join(chosen).rstrip('.')}. {report['location']['statement']}"
 
 
 def _findings(result: Result) -> str:
-    """What the sources argue, beside what came out."""
+    """The statements of the sources beside the diagnoses."""
     reports = {entry["name"]: entry["report"] for entry in result["campaigns"]}
 
     def naming(prefix: str, mechanism: str) -> str:
@@ -113,8 +113,8 @@ def _findings(result: Result) -> str:
     return table(["what the source shows", "what the reports say", "in"], rows)
 
 
-def riddle(result: Result) -> str:
-    """What came out of the paper's riddle."""
+def paper_array(result: Result) -> str:
+    """Diagnoses of the paper's array."""
     rows = [
         [entry["name"], f"{entry['report']['verdict']} {entry['report']['probability']:.2f}", _named(entry["report"]),
          _rivals(entry["report"])]
@@ -125,7 +125,7 @@ def riddle(result: Result) -> str:
     undecidable = [entry["axis"] for entry in array["location"]["axes"] if entry["p_value"] is None]
     planned = (array["next_experiment"] or {}).get("statement", "none, since one set holds most of the probability")
     return f"""\
-## The paper's own riddle
+## The paper's array
 
 The paper reports 14 pC/N over two indenters, and on the array 14 pC/N at 1 N (12 sensors) and 22 pC/N at 3 N (41
 sensors), and ties the lower value to the latest runs. The recordings behind these numbers are not public, so they

@@ -19,7 +19,7 @@ def run(
     tdms: Annotated[bool, typer.Option("--tdms", help="Also write raw recordings and their rig description.")] = False,
 ) -> None:
     """Carry out an experiment: campaign.json, truth.json, and raw recordings where asked for."""
-    from rig.experiment import parse
+    from rig.description import parse
     from rig.output import carry_out
     from rig.reading import document
 

@@ -38,10 +38,11 @@ _BASIS: Floats = np.array([np.polynomial.legendre.Legendre.basis(2 * j)(_T) for 
 
 @dataclass(frozen=True)
 class SphereContact:
-    """Curves over a/h for one Poisson ratio and glue line; see `sphere_contact`.
+    """Contact curves over a/h for one Poisson ratio and glue line; made by `sphere_contact`.
 
-    For right sides 1 and s², `_solutions` gives φ at the quadrature nodes, (2, nodes), and `_summary` ∫ φ dt and φ(1),
-    (2, 2). The adhesion w may be an array over contacts, as may every other argument.
+    Lengths are in units of h, moduli of E, forces of E h², work of adhesion of E h; all arguments may be arrays over
+    contacts. For right sides 1 and s², `_solutions` gives φ at the quadrature nodes, (2, nodes), and `_summary` ∫ φ dt
+    and φ(1), (2, 2).
     """
 
     poisson_ratio: float
@@ -51,7 +52,19 @@ class SphereContact:
     def force(
         self, a: Floats, radius: float | Floats, modulus: float | Floats, adhesion: float | Floats = 0.0
     ) -> Floats:
-        """F of a contact of radius a, all in units of h, E and h (F in E h², adhesion w in E h)."""
+        """Force F of a contact.
+
+        Parameters
+        ----------
+        a : ndarray
+            Contact radius.
+        radius : float or ndarray
+            Radius of the sphere.
+        modulus : float or ndarray
+            Young's modulus.
+        adhesion : float or ndarray
+            Work of adhesion w.
+        """
         plane = modulus / (1 - self.poisson_ratio**2)
         punch, bowl = np.moveaxis(self._summary(a)[..., 0], -1, 0)
         depth = self.depth(a, radius, modulus, adhesion)
@@ -60,18 +73,30 @@ class SphereContact:
     def depth(
         self, a: Floats, radius: float | Floats, modulus: float | Floats, adhesion: float | Floats = 0.0
     ) -> Floats:
-        """Indentation δ of a contact of radius a, in units of h."""
+        """Indentation δ of a contact; parameters as in `force`."""
         plane = modulus / (1 - self.poisson_ratio**2)
         edge = self._summary(a)[..., 1]
         pull = 2 / plane * np.sqrt(2 * a * adhesion * plane / np.pi)
         return (a**2 / (2 * radius) * edge[..., 1] - pull) / edge[..., 0]
 
     def stiffness(self, a: Floats, modulus: float | Floats) -> Floats:
-        """dF/dδ at a held edge, in E h."""
+        """Contact stiffness dF/dδ with the edge held, in E h; parameters as in `force`."""
         return np.pi * modulus / (1 - self.poisson_ratio**2) * a * self._summary(a)[..., 0, 0]
 
     def shape(self, a: Floats, radius: Floats, modulus: Floats, adhesion: float | Floats, k: Floats) -> Floats:
-        """Transform of the pressure over its force, (rows, k)."""
+        """Transform of the pressure over its force.
+
+        Parameters
+        ----------
+        a, radius, modulus, adhesion
+            As in `force`, (rows,).
+        k : ndarray, (k,)
+            Wavenumbers in units of 1/h.
+
+        Returns
+        -------
+        ndarray, (rows, k)
+        """
         phi = self._solutions(a)
         depth = self.depth(a, radius, modulus, adhesion)
         profile = depth[:, None] * phi[:, 0] - (a**2 / (2 * radius))[:, None] * phi[:, 1]
@@ -80,21 +105,36 @@ class SphereContact:
         return np.einsum("rt,rkt->rk", weighted, waves) / weighted.sum(axis=1, keepdims=True)
 
     def radius_of(self, force: Floats, radius: Floats, modulus: Floats, adhesion: float | Floats = 0.0) -> Floats:
-        """The contact radius under a force, on the stable branch, by bisection in log a; NaN where none is.
+        """Contact radius under a force, on the branch that is stable under force control; by bisection in log a.
 
-        All in units of h, E, h. Raises RigError where the contact is wider than the curves reach.
+        Parameters
+        ----------
+        force : ndarray
+            F.
+        radius, modulus, adhesion
+            As in `force`.
+
+        Returns
+        -------
+        ndarray
+            NaN below pull-off.
+
+        Raises
+        ------
+        RigError
+            Where the contact is wider than `WIDEST`.
         """
         widest = np.full(np.shape(force), WIDEST)
         if np.any(self.force(widest, radius, modulus, adhesion) < force):
             raise RigError("contact radius", f"more than {WIDEST} h", "choose a lower preload, or a stiffer layer")
         low = np.log(self._least(radius, modulus, adhesion))
         high = np.full(np.shape(force), np.log(WIDEST))
-        held = self.force(np.exp(low), radius, modulus, adhesion) <= force
+        sticks = self.force(np.exp(low), radius, modulus, adhesion) <= force
         for _ in range(48):
             middle = (low + high) / 2
             under = self.force(np.exp(middle), radius, modulus, adhesion) < force
             low, high = np.where(under, middle, low), np.where(under, high, middle)
-        return np.where(held, np.exp((low + high) / 2), np.nan)
+        return np.where(sticks, np.exp((low + high) / 2), np.nan)
 
     def _least(self, radius: Floats, modulus: Floats, adhesion: float | Floats) -> Floats:
         """The radius at pull-off under force control, where F is least: the rising branch begins there."""
@@ -108,7 +148,7 @@ class SphereContact:
 
 @lru_cache(maxsize=64)
 def sphere_contact(layer: Layer) -> SphereContact:
-    """The curves of a layer, from collocation at contact radii up to `WIDEST`."""
+    """Contact curves of a layer, from collocation at contact radii up to `WIDEST`."""
     k, weight = _nodes(160, 40.0)
     missing = weight * (1 - layer.compliance(k))
     solutions = np.array([_solution(alpha, k, missing) for alpha in _RADII])

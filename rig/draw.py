@@ -1,7 +1,7 @@
 """Random experiments of kind frf like a lab's that hide no, one, two or uncatalogued effects; fixed by seed and number.
 
-Skins, arrays, preloads, noise and the effects' strengths are drawn from ranges that labs have, strengths evenly in
-their logarithm, from subtle to strong. An experiment whose contact leaves the rig's reach is drawn again.
+Skins, arrays, preloads, noise and the effects' strengths are drawn from ranges that labs have, strengths uniformly in
+their logarithm, from subtle to strong. An experiment whose contact is outside the rig's range is drawn again.
 """
 
 import math
@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from rig.description import parse
 from rig.effects import EFFECTS, FRF, UNCATALOGUED
 from rig.errors import RigError
-from rig.experiment import SCHEMA, parse
+from rig.experiment import SCHEMA
 from rig.recorded import RecordedLines, record_lines
 from rig.strengths import drawn_parameters, evenly_in_log, of_frf
 
@@ -25,8 +26,8 @@ _ARRAYS = ((1, 1), (1, 1), (2, 2), (3, 3), (4, 2), (4, 4), (8, 4), (8, 8))
 _WIDEST, _HARDEST = 1.8, 0.06  # a/h and L of the base model
 _MOST = 110
 
-# What an effect needs of the design to act at all, or to show. A lab looks for something: the design is made for the
-# effects that are there and, where there is none of the catalogue, for one that is not.
+# What an effect needs of the design to be visible. The design suits the hidden effects and, where none is of the
+# catalogue, one effect of the catalogue that is not hidden: a lab designs an experiment for what it suspects.
 _NEEDS_CYCLES = {"ageing", "cracked_electrode"}
 _NEEDS_DWELL = {"contact_creep"}
 _NEEDS_TIME = {"temperature_drift"}
@@ -43,7 +44,7 @@ _NEEDS_WIDE = {
 
 
 def drawn(seed: int, number: int, what: str | None = None) -> dict[str, Any]:
-    """The description of random experiment `number` of a seed; `what` it hides is drawn too where not given."""
+    """Description of random experiment `number` of a seed; if `what` it hides is not given, it is drawn too."""
     random = np.random.default_rng([seed, number, 17])
     hidden = str(random.choice(list(SHARES), p=list(SHARES.values()))) if what is None else what
     for _ in range(200):
@@ -58,7 +59,7 @@ def drawn(seed: int, number: int, what: str | None = None) -> dict[str, Any]:
 
 
 def _feasible(description: Mapping[str, Any]) -> bool:
-    """Whether the rig reaches the experiment, and it without any one effect, against which that effect is judged."""
+    """Whether the rig can record the experiment, also without each one of its effects, as `truth_of_lines` needs."""
     effects = description["effects"]
     try:
         for without in (None, *effects):
@@ -70,7 +71,7 @@ def _feasible(description: Mapping[str, Any]) -> bool:
 
 
 def record(description: Mapping[str, Any]) -> RecordedLines:
-    """Carry out a description."""
+    """Record the experiment of a description."""
     return record_lines(parse(description))
 
 
@@ -167,7 +168,7 @@ def _design(random: np.random.Generator, skin: Mapping[str, Any], pitch: float, 
 
 
 def _bearable(skin: Mapping[str, Any], indenters: list[float]) -> float:
-    """The force at which the base model's contact gets too wide or too hard."""
+    """The force at which the contact of the base model leaves the range of the tables."""
     modulus, h = skin["youngs_modulus_mpa"], skin["thickness_mm"]
     wide = (_WIDEST * h) ** 3 * modulus / (0.5625 * max(indenters))
     return float(min(wide, _HARDEST * min(indenters) ** 2 * modulus))

@@ -5,16 +5,17 @@ from typing import Any
 
 import numpy as np
 
+from rig.description import parse
 from rig.draw import SHARES
 from rig.effects import EFFECTS, INDENTATION, UNCATALOGUED
-from rig.elastomer import Curve, record_curves
+from rig.elastomer import RecordedCurve, record_curves
 from rig.errors import RigError
-from rig.experiment import SCHEMA, Experiment, parse
+from rig.experiment import SCHEMA, Experiment
 from rig.strengths import drawn_parameters, evenly_in_log, of_curves
 
 
-def drawn_curves(seed: int, number: int, kind: str, what: str | None = None) -> tuple[Experiment, list[Curve]]:
-    """Random experiment `number` of a seed, carried out; `what` it hides is drawn too where not given."""
+def drawn_curves(seed: int, number: int, kind: str, what: str | None = None) -> tuple[Experiment, list[RecordedCurve]]:
+    """Draw and record random experiment `number` of a seed; if `what` it hides is not given, it is drawn too."""
     random = np.random.default_rng([seed, number, 23])
     hidden = str(random.choice(list(SHARES), p=list(SHARES.values()))) if what is None else what
     for _ in range(200):

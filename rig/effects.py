@@ -1,7 +1,7 @@
-"""What may be switched on: every effect's law as the rig has it, its parameters and the kinds it acts on.
+"""The effects that can be switched on: law, parameters and the kinds of recordings that they act on.
 
 The first part has the names of the project's catalogue (docs/mechanisms.md), the second is physics that is not in it.
-The laws are the rig's own: physical, not always in the catalogue's parametrisation. Units stand in the names.
+The laws are the rig's own: physical, not always in the catalogue's parametrisation. Names carry units.
 """
 
 from collections.abc import Mapping
@@ -30,11 +30,11 @@ class Effect:
 
 EFFECTS: dict[str, Effect] = {
     "moving_contact_edge": Effect(
-        "a fraction m of the edge follows the load: (1−m) σ + m d(Fσ)/dF", (FRF,), {"mobile_fraction": (0, 1)}
+        "a fraction m of the contact edge follows the load: (1−m) σ + m d(Fσ)/dF", (FRF,), {"mobile_fraction": (0, 1)}
     ),
-    "layered_contact": Effect("the sphere feels the base: contact radius and pressure of the layer", _PRESSED, {}),
-    "misalignment": Effect("every position is off by one vector", (FRF,), {"x_mm": (-5, 5), "y_mm": (-5, 5)}),
-    "adhesion": Effect("JKR, on the layer where layered_contact is on", _PRESSED, {"work_j_per_m2": (0, 5)}),
+    "layered_contact": Effect("contact radius and pressure of a sphere on the layer with its base", _PRESSED, {}),
+    "misalignment": Effect("all positions are displaced by one vector", (FRF,), {"x_mm": (-5, 5), "y_mm": (-5, 5)}),
+    "adhesion": Effect("JKR theory, on the layer where layered_contact is on", _PRESSED, {"work_j_per_m2": (0, 5)}),
     "strain_stiffening": Effect(
         "with the contact strain e = 0.2 a/R (of a cylinder: u/H): linear E (1 + c e), limited E/(1 − c e)",
         (FRF, INDENTATION, COMPRESSION),
@@ -42,7 +42,9 @@ EFFECTS: dict[str, Effect] = {
         ("linear", "limited"),
     ),
     "compressible_layer": Effect("ν of the layer", _PRESSED, {"poisson_ratio": (0.2, 0.5)}),
-    "interface_slip": Effect("the glue line yields: shear stress κ (G/h) u_r", (FRF,), {"glue_stiffness": (0, 1e6)}),
+    "interface_slip": Effect(
+        "glue line deformable in shear: shear stress κ (G/h) u_r", (FRF,), {"glue_stiffness": (0, 1e6)}
+    ),
     "preload_dependent_d33": Effect(
         "with the sensor's mean stress T: linear 1 + β T, saturating 1 + β T/(1 + T/Ts)",
         (FRF,),
@@ -50,7 +52,7 @@ EFFECTS: dict[str, Effect] = {
         ("linear", "saturating"),
         optional=("saturation_mpa",),
     ),
-    "sensor_spread": Effect("each sensor its own gain, log-normal", (FRF,), {"sd": (0, 1)}),
+    "sensor_spread": Effect("log-normal gain of each sensor", (FRF,), {"sd": (0, 1)}),
     "ageing": Effect(
         "after N load cycles: log 1 − r log10(1 + N/n0), exponential 1 − r (1 − e^(−N/n0))",
         (FRF,),
@@ -81,13 +83,19 @@ EFFECTS: dict[str, Effect] = {
         {"charge_pc": (0, 1000), "mains_hz": (50, 60)},
     ),
     "amplitude_nonlinearity": Effect(
-        "a fraction m of the edge follows the whole cycle: first harmonic of Fσ over Fd", (FRF,), {"mobility": (0, 1)}
+        "a fraction m of the contact edge follows the whole cycle: first harmonic of Fσ over Fd",
+        (FRF,),
+        {"mobility": (0, 1)},
     ),
-    "crosstalk": Effect("a fraction of the charge of each sensor within 1.2 pitch adds", (FRF,), {"fraction": (0, 1)}),
-    "timing_delay": Effect("the charge comes late", (FRF,), {"delay_us": (-1e4, 1e4)}),
-    "instrument_compliance": Effect("the stage gives by F/k", (INDENTATION,), {"stiffness_n_per_mm": (1e-3, 1e6)}),
+    "crosstalk": Effect(
+        "a fraction of the charge of each sensor within 1.2 pitch is added", (FRF,), {"fraction": (0, 1)}
+    ),
+    "timing_delay": Effect("delay of the charge", (FRF,), {"delay_us": (-1e4, 1e4)}),
+    "instrument_compliance": Effect(
+        "compliance of the stage, F/k", (INDENTATION,), {"stiffness_n_per_mm": (1e-3, 1e6)}
+    ),
     "platen_friction": Effect(
-        "friction f holds the cylinder's ends: stiffer by 1 + 2 f S², S = diameter/(4 height)",
+        "friction f at the ends of the cylinder: stiffer by 1 + 2 f S², S = diameter/(4 height)",
         (COMPRESSION,),
         {"friction": (0, 1)},
     ),
@@ -102,7 +110,7 @@ UNCATALOGUED: dict[str, Effect] = {
         {"amplitude": (-1, 2)},
     ),
     "preload_leak": Effect(
-        "the crack under load leaks charge: high-pass whose corner grows as (F/1 N)^p",
+        "charge leaks through a crack under load: high-pass with a corner proportional to (F/1 N)^p",
         (FRF,),
         {"corner_hz": (0, 100), "power": (0, 4)},
     ),
@@ -110,12 +118,12 @@ UNCATALOGUED: dict[str, Effect] = {
         "gain 1 + A sin(2π t/period) with the time of day", (FRF,), {"amplitude": (0, 1), "period_h": (0.1, 100)}
     ),
     "stage_wobble": Effect(
-        "the true position runs round a circle from one recording to the next",
+        "the true position moves on a circle from recording to recording",
         (FRF,),
         {"amplitude_mm": (0, 5), "period_recordings": (2, 1000)},
     ),
     "hysteretic_d33": Effect(
-        "gain 1 − A where the preload before was higher", (FRF,), {"amplitude": (-1, 1)}
+        "gain 1 − A where the previous preload was higher", (FRF,), {"amplitude": (-1, 1)}
     ),
     "rattle": Effect(
         "a loose part at a fixed frequency: 1 + A/(1 − (ω/ω1)² + 2iζω/ω1) − A",
@@ -123,28 +131,28 @@ UNCATALOGUED: dict[str, Effect] = {
         {"hz": (1, 1e4), "amplitude": (-2, 2), "damping": (1e-3, 1)},
     ),
     "notch": Effect(
-        "a trap: (s² + d b s + ω1²)/(s² + b s + ω1²)", (FRF,), {"hz": (1, 1e4), "left": (0, 5), "width_hz": (0.1, 1e4)}
+        "notch: (s² + d b s + ω1²)/(s² + b s + ω1²)", (FRF,), {"hz": (1, 1e4), "left": (0, 5), "width_hz": (0.1, 1e4)}
     ),
     "cable_motion": Effect(
-        "the cable shakes above its own resonance: 1 + A s²/(s² + 1.4 ω1 s + ω1²)",
+        "the cable vibrates above its resonance: 1 + A s²/(s² + 1.4 ω1 s + ω1²)",
         (FRF,),
         {"hz": (1, 1e4), "amplitude": (-2, 2)},
     ),
     "cracked_electrode": Effect(
-        "from one load cycle on the gain drops by A", (FRF,), {"amplitude": (-1, 1), "at_cycle": (0, 1e9)}
+        "the gain is lower by A from one load cycle on", (FRF,), {"amplitude": (-1, 1), "at_cycle": (0, 1e9)}
     ),
     "force_ripple": Effect(
-        "the spindle's pitch shows in the force: A F sin(2π u/pitch)",
+        "ripple of the force with the pitch of the spindle: A F sin(2π u/pitch)",
         (INDENTATION, COMPRESSION),
         {"amplitude": (0, 1), "pitch_mm": (1e-4, 10)},
     ),
     "force_drift": Effect(
-        "the force cell warms: a force that grows with the root of time",
+        "warming of the force cell: a force proportional to the square root of time",
         (INDENTATION, COMPRESSION),
         {"n_per_root_s": (-1, 1)},
     ),
     "tilted_platen": Effect(
-        "the end touches little by little over a wedge", (COMPRESSION,), {"wedge_mm": (0, 5)}
+        "the end face comes into contact gradually over a wedge", (COMPRESSION,), {"wedge_mm": (0, 5)}
     ),
 }  # fmt: skip
 

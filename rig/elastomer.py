@@ -19,24 +19,24 @@ from rig.effects import COMPRESSION, INDENTATION, Values
 from rig.errors import RigError
 from rig.experiment import Experiment
 from rig.layer import Floats, Layer
-from rig.pressed import stiffening
+from rig.layer_contacts import stiffening
 
 _APPROACH = 0.08  # of the largest indentation, before contact
 _RADII = 3000
-_LEAST_LOADING = 8  # samples; fewer tell no law from another
+_LEAST_LOADING = 8  # samples; with fewer no law can be identified
 
 Law = Callable[[Floats, bool], Floats]  # force for unit modulus at displacements, while drawn back or not
 
 
 @dataclass(frozen=True)
-class Curve:
-    """One recording: what is written down of it, and `force_n` before noise."""
+class RecordedCurve:
+    """One recording: its entry in the campaign, and its force [N] before noise."""
 
     entry: dict[str, Any]
     exact_force_n: Floats
 
 
-def record_curves(experiment: Experiment) -> list[Curve]:
+def record_curves(experiment: Experiment) -> list[RecordedCurve]:
     """Carry out an experiment of kind indentation or compression."""
     curves = experiment.curves
     assert curves is not None
@@ -48,13 +48,13 @@ def record_curves(experiment: Experiment) -> list[Curve]:
             for height in curves.heights_mm
             for diameter in curves.diameters_mm
         ]
-    made = [
+    pairs = [
         (shape, speed) for _ in range(curves.repeats) for shape in shapes for speed in curves.speeds_mm_per_s
     ]  # fmt: skip
-    return [_curve(experiment, number, shape, speed) for number, (shape, speed) in enumerate(made)]
+    return [_curve(experiment, number, shape, speed) for number, (shape, speed) in enumerate(pairs)]
 
 
-def _curve(experiment: Experiment, number: int, shape: dict[str, float], speed: float) -> Curve:
+def _curve(experiment: Experiment, number: int, shape: dict[str, float], speed: float) -> RecordedCurve:
     curves, on = experiment.curves, experiment.effects
     assert curves is not None
     random = np.random.default_rng([experiment.seed, 5, number])
@@ -77,11 +77,11 @@ def _curve(experiment: Experiment, number: int, shape: dict[str, float], speed: 
     entry |= {"displacement_mm": measured.tolist(), "force_n": noisy.tolist()}
     if curves.times:
         entry["time_s"] = time.tolist()
-    return Curve(entry, force)
+    return RecordedCurve(entry, force)
 
 
 def _course(experiment: Experiment, shape: Mapping[str, float], speed: float) -> tuple[Floats, Floats]:
-    """Times and displacements: there, a hold, and back; in tension then as far to the other side."""
+    """Times and displacements: loading, hold, unloading; in tension then the same to the other side."""
     curves = experiment.curves
     assert curves is not None
     largest = curves.largest_displacement_mm
@@ -137,7 +137,7 @@ def _with_relaxation(on: Mapping[str, Values], law: Law, time: Floats, pressed: 
 
 
 def _sphere(experiment: Experiment, radius: float) -> Law:
-    """Force of a sphere for E = 1, from curves over the contact radius; with adhesion it holds on when drawn back."""
+    """Force of a sphere for E = 1, from curves over the contact radius; with adhesion it sticks on the way back."""
     on = experiment.effects
     nu = effects.of(on, "compressible_layer", "poisson_ratio") or 0.5
     modulus = experiment.skin.youngs_modulus_mpa
@@ -198,7 +198,7 @@ def _ripple(on: Mapping[str, Values], pressed: Floats) -> Floats:
     return amplitude * np.sin(2 * np.pi * pressed / pitch)
 
 
-def campaign_of_curves(experiment: Experiment, curves: list[Curve]) -> dict[str, Any]:
+def campaign_of_curves(experiment: Experiment, curves: list[RecordedCurve]) -> dict[str, Any]:
     """The campaign (`campaign/1`) of the curves."""
     assert experiment.curves is not None
     skin: dict[str, Any] = {

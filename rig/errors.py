@@ -1,4 +1,4 @@
-"""What the rig raises on purpose."""
+"""The rig's error."""
 
 from typing import Any
 

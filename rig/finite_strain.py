@@ -1,4 +1,4 @@
-"""What finite strain adds to the stress on the base: reads the coefficients that `finite_strain_solve` keeps.
+"""Effect of finite strain on the stress on the base: interpolates the coefficients that `finite_strain_solve` stores.
 
 Δ(k; a/h, x) = c1 x + c2 x² + c3 x³ + c4 x⁴ with x = L^(1/3), L = F/(R² E): a cubic spline over a/h, 0 at a/h = 0.
 """
@@ -26,9 +26,23 @@ def _curve() -> CubicSpline:
 
 
 def added_spectrum(a_over_h: Floats, load: Floats) -> Floats:
-    """Δ at the rig's wavenumbers, to be added to p̂ M: (rows, WAVENUMBERS).
+    """Addition Δ of finite strain to the spectrum p̂ M.
 
-    Raises RigError where a contact or a load is beyond what was solved.
+    Parameters
+    ----------
+    a_over_h : ndarray, (rows,)
+        Contact radius over thickness.
+    load : ndarray, (rows,)
+        Load parameter L.
+
+    Returns
+    -------
+    ndarray, (rows, WAVENUMBERS)
+
+    Raises
+    ------
+    RigError
+        Where a contact or a load is beyond what was solved.
     """
     if np.any(a_over_h > WIDEST):
         raise RigError("contact radius", f"{np.max(a_over_h):.3g} h", f"must be at most {WIDEST} h: lower preload_n")

@@ -74,7 +74,7 @@ def _lagrange(x: float) -> tuple[Floats, Floats]:
     return np.array([x * (x - 1) / 2, 1 - x**2, x * (x + 1) / 2]), np.array([x - 0.5, -2 * x, x + 0.5])
 
 
-class Layer:
+class FiniteStrainLayer:
     """Assembly for one mesh; unknowns are u_r, u_z of every node, then three pressures an element."""
 
     def __init__(self, mesh: Mesh) -> None:
@@ -115,7 +115,7 @@ class Layer:
         angle, weight = np.polynomial.legendre.leggauss(16)
         for element in np.flatnonzero(edges[:-1] < a * (1 - 1e-9)):
             low, high = edges[element], edges[element + 1]
-            # r = a sin θ takes the root at the edge away.
+            # r = a sin θ removes the square root at the edge.
             ends = np.arcsin(np.minimum(np.array([low, high]) / a, 1.0))
             theta = ends.mean() + np.diff(ends) / 2 * angle
             r = a * np.sin(theta)
@@ -214,7 +214,7 @@ def _determinant(f: Floats) -> tuple[Floats, Floats, Floats]:
 
 def added_spectrum(a: float, k: Floats, loads: Floats, fineness: float = 2.5) -> Floats:
     """Δ(k; a, x) at each load x, (loads, k)."""
-    layer = Layer(make_mesh(a, fineness))
+    layer = FiniteStrainLayer(make_mesh(a, fineness))
     unit = layer.load(a)
     state = np.zeros(layer.size)
     state[2 * len(layer.mesh.r) :: 3] = _SHEAR  # the pressure at rest

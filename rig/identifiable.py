@@ -1,19 +1,19 @@
-"""Whether an effect shows at all: how much χ² the true model gains over the base model on the recordings themselves.
+"""Visibility of effects: the gain in χ² of the true model over the base model on the recordings themselves.
 
 Both are fitted by generalised least squares with the rig's own noise levels: line noise, and for each recording a gain
 error along the model's response and an error of position along its derivatives. Both have d33 free, and E, h (2 %, 1 %)
-and the sensors' gains (1 %) near what is declared, or near what they truly are. Mains are known by their charge, not by
-their phase in each recording: they belong to the covariance, and what they add to its log determinant counts too.
+and the sensors' gains (1 %) near their declared or true values. Of mains the charge is known and the phase in each
+recording is not: they are part of the covariance, and their share of its log determinant is included.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.bench import Bench
 from rig.layer import Floats
 from rig.linear_filters import Complexes
 from rig.recorded import RecordedLines
+from rig.true_response import TrueResponse
 
 THRESHOLD = 20.0
 _DECLARED = {"youngs_modulus_mpa": 0.02, "thickness_mm": 0.01}
@@ -25,7 +25,15 @@ _ROUNDS = 4
 
 @dataclass(frozen=True)
 class Visibility:
-    """χ² of the base model less that of the true one; the base model's rms misfit of the response before noise."""
+    """Result of `visibility`.
+
+    Attributes
+    ----------
+    chi2_gain : float
+        χ² of the base model less that of the true one.
+    base_misfit_percent : float
+        rms misfit of the base model to the response before noise.
+    """
 
     chi2_gain: float
     base_misfit_percent: float
@@ -37,12 +45,12 @@ class Visibility:
 
 
 def visibility(recorded: RecordedLines, known: tuple[str, ...] = ()) -> Visibility:
-    """The visibility of what was switched on, to somebody whose model has the effects `known`, as they are."""
-    bench = recorded.bench
-    aimed = replace(bench, missed_mm=np.zeros_like(bench.missed_mm))
-    effects = {name: values for name, values in bench.on.items() if name in known}
-    gains = bench.sensor_gains if "sensor_spread" in known else np.ones_like(bench.sensor_gains)
-    plain = replace(aimed, experiment=replace(bench.experiment, effects=effects), sensor_gains=gains)
+    """Visibility of the effects against a model that has only the effects `known`, at their true values."""
+    response = recorded.response
+    aimed = replace(response, missed_mm=np.zeros_like(response.missed_mm))
+    effects = {name: values for name, values in response.on.items() if name in known}
+    gains = response.sensor_gains if "sensor_spread" in known else np.ones_like(response.sensor_gains)
+    plain = replace(aimed, experiment=replace(response.experiment, effects=effects), sensor_gains=gains)
     true, _ = _Fit(recorded, aimed).best(_with_nuisances(recorded, aimed))
     pickup = recorded.pickup if "mains_pickup" in known else np.zeros_like(recorded.pickup)
     base, fitted = _Fit(recorded, plain).best(_with_nuisances(recorded, plain))
@@ -55,18 +63,18 @@ def visibility(recorded: RecordedLines, known: tuple[str, ...] = ()) -> Visibili
 _Design = tuple[Complexes, Floats]  # (columns, rows, lines), and the prior deviation of each column
 
 
-def _with_nuisances(recorded: RecordedLines, bench: Bench) -> _Design:
+def _with_nuisances(recorded: RecordedLines, response: TrueResponse) -> _Design:
     """The response, its derivatives to ln E and ln h, and each sensor's share of it."""
-    base = bench.lines(recorded.frequency_hz)
+    base = response.lines(recorded.frequency_hz)
     columns, deviations = [base], [np.inf]
     for name, deviation in _DECLARED.items():
-        skin = bench.experiment.skin
+        skin = response.experiment.skin
         other = replace(skin, **{name: getattr(skin, name) * (1 + _STEP)})
-        changed = replace(bench, experiment=replace(bench.experiment, skin=other)).lines(recorded.frequency_hz)
+        changed = replace(response, experiment=replace(response.experiment, skin=other)).lines(recorded.frequency_hz)
         columns.append((changed - base) / _STEP)
         deviations.append(deviation)
-    for number in np.unique(bench.plan.sensor):
-        columns.append(base * (bench.plan.sensor == number)[:, None])
+    for number in np.unique(response.plan.sensor):
+        columns.append(base * (response.plan.sensor == number)[:, None])
         deviations.append(_SENSOR)
     return np.stack(columns), np.array(deviations)
 
@@ -74,26 +82,26 @@ def _with_nuisances(recorded: RecordedLines, bench: Bench) -> _Design:
 class _Fit:
     """Least squares of one model on lines (rows, lines), with covariances that follow the model."""
 
-    def __init__(self, recorded: RecordedLines, bench: Bench) -> None:
+    def __init__(self, recorded: RecordedLines, response: TrueResponse) -> None:
         self.measured = measured = recorded.measured
         self.variance = recorded.line_variance
-        self.noise = bench.experiment.noise
+        self.noise = response.experiment.noise
         self.moved = np.zeros((0, *measured.shape), dtype=complex)
         if self.noise.position_mm:
-            base = bench.lines(recorded.frequency_hz)
+            base = response.lines(recorded.frequency_hz)
             self.moved = np.stack(
                 [
-                    (bench.elsewhere(bench.missed_mm + step).lines(recorded.frequency_hz) - base)
+                    (response.elsewhere(response.missed_mm + step).lines(recorded.frequency_hz) - base)
                     * (self.noise.position_mm / _SMALL_MM)
                     for step in _SMALL_MM * np.eye(2)
                 ]
             )
 
         size = np.abs(recorded.pickup) / np.sqrt(2)  # of any phase: each part has half the square
-        self.mains = np.stack([size, 1j * size]) if "mains_pickup" in bench.on else np.zeros((0, *size.shape))
+        self.mains = np.stack([size, 1j * size]) if "mains_pickup" in response.on else np.zeros((0, *size.shape))
 
     def best(self, design: _Design) -> tuple[float, Complexes]:
-        """The least χ², priors and what mains add to log|C| included, and the response there."""
+        """The least χ², with priors and the share of mains in log|C|, and the response there."""
         columns, deviations = design
         amount = np.zeros(len(columns))
         amount[0] = 1.0
@@ -107,10 +115,10 @@ class _Fit:
             chi2 = float(gram[-1, -1] + penalty @ amount**2)
             step = np.linalg.solve(gram[:-1, :-1] + np.diag(penalty), gram[:-1, -1] - penalty * amount)
             amount = amount + step
-        return chi2 + self._more_determinant(along), np.tensordot(amount, columns, 1)
+        return chi2 + self._mains_determinant(along), np.tensordot(amount, columns, 1)
 
-    def _more_determinant(self, along: Complexes) -> float:
-        """What mains add to log|C|."""
+    def _mains_determinant(self, along: Complexes) -> float:
+        """The share of mains in log|C|."""
         low_rank = _parts(along / np.sqrt(self.variance))
         inner = np.einsum("arl,brl->rab", low_rank, low_rank) + np.eye(len(along))
         without = len(along) - len(self.mains)

@@ -7,7 +7,7 @@ S = −p. `Layer.transmission` M(k) is the pressure on the base over that on the
 deflection of the surface over that of the half space of the same ν. Source: the state-space method, Bahar, J. Eng.
 Mech. Div. ASCE 98 (1972); Small and Booker, Int. J. Numer. Methods Eng. 20 (1984), for the finite-layer form.
 
-Stresses on the base are summed as a Fourier–Bessel series on a disc so wide that its rim is not felt.
+Stresses on the base are summed as a Fourier–Bessel series on a disc so wide that its rim has no influence.
 """
 
 import math
@@ -28,17 +28,25 @@ SERIES: Floats = 2 / (3 * RIM**2 * j1(_ZEROS) ** 2)  # weight of each term of a 
 
 @dataclass(frozen=True)
 class Layer:
-    """Poisson ratio and glue stiffness κ [G/h] of a layer of unit thickness."""
+    """A linear elastic layer of unit thickness.
+
+    Parameters
+    ----------
+    poisson_ratio : float
+        0 to 0.5.
+    glue_stiffness : float
+        κ in units of G/h; infinite when bonded.
+    """
 
     poisson_ratio: float = 0.5
     glue_stiffness: float = math.inf
 
     def transmission(self, k: Floats) -> Floats:
-        """M(k), (k,)."""
+        """Pressure on the base over that on the surface, M(k), for wavenumbers k (k,)."""
         return self._base_and_surface(k)[0]
 
     def compliance(self, k: Floats) -> Floats:
-        """K(k), (k,)."""
+        """Deflection of the surface over that of the half space of the same ν, K(k), for wavenumbers k (k,)."""
         return self._base_and_surface(k)[1]
 
     def _base_and_surface(self, k: Floats) -> tuple[Floats, Floats]:
@@ -92,10 +100,22 @@ def disc_mean(s: Floats) -> Floats:
 
 
 def base_stress(spectrum: Floats, rt_over_h: float, offset_over_h: Floats) -> Floats:
-    """Mean stress on sensors, in units of 3F/(2πh²), of loads whose stress on the base has the transform `spectrum`.
+    """Mean stress on sensors under axisymmetric loads.
 
-    `spectrum` (rows, WAVENUMBERS), `offset_over_h` (rows,) or (rows, sensors). Beyond the disc's rim it is 0.
+    Parameters
+    ----------
+    spectrum : ndarray, (rows, WAVENUMBERS)
+        Transform of the stress on the base.
+    rt_over_h : float
+        Sensor radius over thickness.
+    offset_over_h : ndarray, (rows,) or (rows, sensors)
+        Distance of the sensors from the axis of the load.
+
+    Returns
+    -------
+    ndarray
+        In units of 3F/(2πh²), of the shape of `offset_over_h`; 0 beyond the rim of the disc.
     """
-    felt = spectrum * (SERIES * disc_mean(WAVENUMBERS * rt_over_h))
+    weighted = spectrum * (SERIES * disc_mean(WAVENUMBERS * rt_over_h))
     waves = j0(np.multiply.outer(offset_over_h, WAVENUMBERS))
-    return np.where(offset_over_h + rt_over_h < RIM, np.einsum("rk,r...k->r...", felt, waves), 0.0)
+    return np.where(offset_over_h + rt_over_h < RIM, np.einsum("rk,r...k->r...", weighted, waves), 0.0)

@@ -1,4 +1,4 @@
-"""What lies between the force cell and the recorded charge: filters rational in s = iω, e^(+iωt).
+"""Linear filters between force cell and recorded charge, rational in s = iω, e^(+iωt).
 
 One definition serves both routes: `response` for FRF lines, `apply` for time series (first-order hold).
 """
@@ -24,7 +24,17 @@ _LADDER = 2 * math.pi * np.geomspace(0.005, 5e4, 15)  # rad/s, two a decade
 
 
 def response(chain: Sequence[Filter], frequency_hz: Floats) -> Complexes:
-    """The product of the filters at the frequencies."""
+    """Frequency response of a chain of filters.
+
+    Parameters
+    ----------
+    chain : sequence of Filter
+    frequency_hz : ndarray, (lines,)
+
+    Returns
+    -------
+    ndarray of complex, (lines,)
+    """
     s = 2j * math.pi * frequency_hz
     result = np.ones(frequency_hz.shape, dtype=complex)
     for terms in chain:
@@ -33,10 +43,21 @@ def response(chain: Sequence[Filter], frequency_hz: Floats) -> Complexes:
 
 
 def apply(chain: Sequence[Filter], signal: Floats, step_s: float) -> Floats:
-    """The signal, sampled every `step_s`, after the filters; at rest before.
+    """Response of a chain of filters, at rest before, to a signal; first-order hold.
 
-    Straight lines between the samples weaken a smooth signal by (ωΔt)²/12, which what comes through with inertia is
-    given back beforehand: errors are of order (ωΔt)⁴.
+    Linear interpolation between the samples weakens a smooth signal by (ωΔt)²/12; this is compensated before terms with
+    inertia, so errors are of order (ωΔt)⁴.
+
+    Parameters
+    ----------
+    chain : sequence of Filter
+    signal : ndarray, (samples,)
+    step_s : float
+        Time between samples [s].
+
+    Returns
+    -------
+    ndarray, (samples,)
     """
     for terms in chain:
         sharpened = signal.copy()
@@ -54,7 +75,7 @@ def apply(chain: Sequence[Filter], signal: Floats, step_s: float) -> Floats:
 
 
 def resonance(on: Mapping[str, Values], stiffness_n_per_mm: float) -> list[Filter]:
-    """The tip mass on the contact spring: from the force cell to the contact."""
+    """Filter from force cell to contact: the tip mass on the contact spring."""
     if "contact_resonance" not in on:
         return []
     # g and N/mm: 1 N/mm over 1 g is 1e6 rad²/s².
@@ -64,7 +85,7 @@ def resonance(on: Mapping[str, Values], stiffness_n_per_mm: float) -> list[Filte
 
 
 def electrical(on: Mapping[str, Values], preload_n: float) -> list[Filter]:
-    """From the contact's charge to the recorded one: sensor, cable, amplifier."""
+    """Filters from the contact's charge to the recorded one: sensor, cable, amplifier."""
     chain: list[Filter] = []
     if "sensor_relaxation" in on:
         chain.append(_relaxation(on["sensor_relaxation"]))

@@ -1,7 +1,7 @@
 """An experiment's folder: campaign.json, truth.json and, where asked for, the raw recordings with their description.
 
 `recordings.tdms` has a group a recording: load cell and charge amplifier in volts, as LabVIEW writes them; `rig.yaml`
-(`rig/1`) says what the channels are. The amplifier turns the charge round, as charge amplifiers do.
+(`rig/1`) says what the channels are. The amplifier inverts the sign of the charge, as charge amplifiers do.
 """
 
 import json
@@ -12,14 +12,14 @@ import numpy as np
 import yaml
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
-from rig.bench import Bench
 from rig.effects import FRF
 from rig.elastomer import campaign_of_curves, record_curves
 from rig.errors import RigError
 from rig.experiment import Experiment
 from rig.recorded import campaign, campaign_document, record_lines, recording_headers, skin_document
 from rig.time_domain import TimeSeries, record_series
-from rig.truth import truth_of_bench, truth_of_curves, truth_of_lines
+from rig.true_response import TrueResponse
+from rig.truth import truth_of_curves, truth_of_lines, truth_of_response
 
 _VOLTS_PER_NEWTON = 0.5
 _MILLIVOLTS_PER_PICOCOULOMB = 10.0
@@ -51,24 +51,24 @@ def carry_out(experiment: Experiment, folder: Path, *, tdms: bool = False) -> li
         lines = record_lines(experiment)
         document, truth = campaign(lines), truth_of_lines(lines)
     else:
-        bench, series = record_series(experiment)
-        document, truth = campaign_of_series(bench, series), truth_of_bench(bench)
+        response, series = record_series(experiment)
+        document, truth = campaign_of_series(response, series), truth_of_response(response)
     folder.mkdir(parents=True, exist_ok=True)
     files = [_write_json(folder / "campaign.json", document), _write_json(folder / "truth.json", truth)]
     if tdms:
-        files += [_write_tdms(folder / "recordings.tdms", bench, series), _write_rig(folder / "rig.yaml", bench)]
+        files += [_write_tdms(folder / "recordings.tdms", response, series), _write_rig(folder / "rig.yaml", response)]
     return files
 
 
-def campaign_of_series(bench: Bench, series: list[TimeSeries]) -> dict[str, Any]:
+def campaign_of_series(response: TrueResponse, series: list[TimeSeries]) -> dict[str, Any]:
     """The campaign (`campaign/1`) of time series."""
-    drive = bench.experiment.drive
+    drive = response.experiment.drive
     assert drive is not None
-    entries = recording_headers(bench)
+    entries = recording_headers(response)
     for entry, recorded in zip(entries, series, strict=True):
         entry["sample_rate_hz"] = drive.sample_rate_hz
         entry["force_n"], entry["charge_pc"] = recorded.force_n.tolist(), recorded.charge_pc.tolist()
-    return campaign_document(bench.experiment, entries)
+    return campaign_document(response.experiment, entries)
 
 
 def _write_json(path: Path, document: dict[str, Any]) -> Path:
@@ -76,13 +76,13 @@ def _write_json(path: Path, document: dict[str, Any]) -> Path:
     return path
 
 
-def _write_tdms(path: Path, bench: Bench, series: list[TimeSeries]) -> Path:
-    drive = bench.experiment.drive
+def _write_tdms(path: Path, response: TrueResponse, series: list[TimeSeries]) -> Path:
+    drive = response.experiment.drive
     assert drive is not None
     timing = {"wf_increment": 1 / drive.sample_rate_hz, "wf_start_offset": 0.0, "unit_string": "V"}
     with TdmsWriter(str(path)) as writer:
-        writer.write_segment([RootObject({"name": bench.experiment.name})])
-        for entry, recorded in zip(recording_headers(bench), series, strict=True):
+        writer.write_segment([RootObject({"name": response.experiment.name})])
+        for entry, recorded in zip(recording_headers(response), series, strict=True):
             stated = {_PROPERTIES[name]: value for name, value in entry.items() if name in _PROPERTIES}
             volts = {
                 "Load cell": recorded.force_n * _VOLTS_PER_NEWTON,
@@ -95,13 +95,13 @@ def _write_tdms(path: Path, bench: Bench, series: list[TimeSeries]) -> Path:
     return path
 
 
-def _write_rig(path: Path, bench: Bench) -> Path:
-    known = [name for name in recording_headers(bench)[0] if name in _PROPERTIES]
+def _write_rig(path: Path, response: TrueResponse) -> Path:
+    known = [name for name in recording_headers(response)[0] if name in _PROPERTIES]
     description = {
         "schema": "rig/1",
-        "name": f"virtual rig: {bench.experiment.name}"[:200],
+        "name": f"virtual rig: {response.experiment.name}"[:200],
         "kind": FRF,
-        "skin": {name: value for name, value in skin_document(bench.experiment).items() if value is not None},
+        "skin": {name: value for name, value in skin_document(response.experiment).items() if value is not None},
         "recording": {"id": {"property": "block"}, **{name: {"property": _PROPERTIES[name]} for name in known}},
         "channels": {
             "force_n": {

@@ -48,11 +48,11 @@ def recordings(experiment: Experiment) -> Plan:
     if total > MOST_RECORDINGS and design.most_recordings is None:
         raise RigError("design", f"{total} recordings", f"must make at most {MOST_RECORDINGS}: see most_recordings")
     order = random.permutation(total) if design.shuffled or design.most_recordings is not None else np.arange(total)
-    kept = order[: design.most_recordings]
+    chosen_rows = order[: design.most_recordings]
     if not design.shuffled:
-        kept = np.sort(kept)
-    sensor, indenter, preload, offset, _ = np.unravel_index(kept, shape)
-    rows = len(kept)
+        chosen_rows = np.sort(chosen_rows)
+    sensor, indenter, preload, offset, _ = np.unravel_index(chosen_rows, shape)
+    rows = len(chosen_rows)
     cycles = None
     if design.cycles_per_recording is not None:
         steps = design.cycles_per_recording * random.uniform(0.5, 1.5, rows)

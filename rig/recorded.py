@@ -1,7 +1,7 @@
-"""An experiment carried out: FRF lines with the rig's noise, and what is true of them.
+"""FRF lines of an experiment, with the rig's noise.
 
-Each recording has a gain of its own, e^N(0, gain²), an error of position, and on each part of a line noise of variance
-rel² |G|² + floor². γ² = 1/(1 + 2 n v), v the variance over |G|².
+Each recording has a gain factor e^N(0, gain²), an error of position, and on each part of a line noise of variance
+rel² |G|² + floor². Coherence γ² = 1/(1 + 2 n v), v the variance over |G|².
 """
 
 from dataclasses import dataclass
@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from rig import effects
-from rig.bench import Bench
 from rig.effects import Values
 from rig.experiment import Experiment, Noise
 from rig.layer import Floats
 from rig.linear_filters import Complexes
 from rig.plan import recordings
+from rig.true_response import TrueResponse
 
 _MAINS_WIDTH_HZ = 1.5
 _HARMONICS = ((1, 1.0), (3, 1 / 3))
@@ -23,9 +23,9 @@ _HARMONICS = ((1, 1.0), (3, 1 / 3))
 
 @dataclass(frozen=True)
 class RecordedLines:
-    """`bench` is what truly was; `exact` its lines, `measured` those with everything (rows, lines) [pC/N]."""
+    """`response` is the true one; `exact` its lines, `measured` the lines with noise and mains (rows, lines) [pC/N]."""
 
-    bench: Bench
+    response: TrueResponse
     frequency_hz: Floats
     exact: Complexes
     measured: Complexes
@@ -34,42 +34,42 @@ class RecordedLines:
     coherence: Floats | None
 
 
-def make_bench(experiment: Experiment) -> Bench:
-    """The experiment's bench with its scatter of position and of sensors drawn."""
+def make_response(experiment: Experiment) -> TrueResponse:
+    """The true response of an experiment, with its scatter of positions and of sensors drawn."""
     plan = recordings(experiment)
     random = np.random.default_rng([experiment.seed, 1])
     missed = experiment.noise.position_mm * random.normal(size=(len(plan.preload_n), 2))
     spread = effects.of(experiment.effects, "sensor_spread", "sd")
     gains = np.exp(spread * random.normal(size=len(experiment.skin.sensors)))
-    return Bench(experiment, plan, missed, gains)
+    return TrueResponse(experiment, plan, missed, gains)
 
 
 def recording_gains(experiment: Experiment, rows: int) -> Floats:
-    """The gain error of each recording."""
+    """Gain factor of each recording (rows,), log-normal."""
     return np.exp(experiment.noise.gain * np.random.default_rng([experiment.seed, 2]).normal(size=rows))
 
 
 def record_lines(experiment: Experiment) -> RecordedLines:
     """Carry out an experiment that records FRF lines."""
     assert experiment.lines is not None
-    bench = make_bench(experiment)
+    response = make_response(experiment)
     grid = np.geomspace(experiment.lines.low_hz, experiment.lines.high_hz, experiment.lines.count)
     frequency = np.unique(np.round(grid, 4))
-    exact = bench.lines(frequency)
+    exact = response.lines(frequency)
     random = np.random.default_rng([experiment.seed, 3])
     actual = exact * recording_gains(experiment, len(exact))[:, None]
     variance = line_noise(experiment.noise, frequency) ** 2 * np.abs(actual) ** 2 + experiment.noise.floor_pc_per_n**2
     noise = random.normal(size=(2, *exact.shape)) * np.sqrt(variance)
-    pickup = mains_pickup(experiment.effects, bench.plan.dynamic_n, frequency, random)
+    pickup = mains_pickup(experiment.effects, response.plan.dynamic_n, frequency, random)
     size = np.maximum(np.abs(actual) ** 2, 1e-300)
     coherence = 1 / (1 + 2 * experiment.noise.averages * variance / size) if experiment.noise.coherence else None
     return RecordedLines(
-        bench, frequency, exact, actual + noise[0] + 1j * noise[1] + pickup, variance, pickup, coherence
+        response, frequency, exact, actual + noise[0] + 1j * noise[1] + pickup, variance, pickup, coherence
     )
 
 
 def line_noise(noise: Noise, frequency_hz: Floats) -> Floats:
-    """rel of each line."""
+    """Relative noise rel of each line (lines,)."""
     low, high = frequency_hz[0], frequency_hz[-1]
     return noise.line * (1 + noise.low * low / frequency_hz + noise.high * (frequency_hz / high) ** 2)
 
@@ -77,7 +77,7 @@ def line_noise(noise: Noise, frequency_hz: Floats) -> Floats:
 def mains_pickup(
     on: dict[str, Values], dynamic_n: Floats, frequency_hz: Floats, random: np.random.Generator
 ) -> Complexes:
-    """The error that mains leave on the lines near them, its phase anew in each recording (rows, lines) [pC/N]."""
+    """Mains pick-up on the lines near its frequency, with a random phase in each recording (rows, lines) [pC/N]."""
     if "mains_pickup" not in on:
         return np.zeros((len(dynamic_n), len(frequency_hz)), dtype=complex)
     charge, mains = (effects.of(on, "mains_pickup", name) for name in ("charge_pc", "mains_hz"))
@@ -89,15 +89,15 @@ def mains_pickup(
 
 
 def campaign(recorded: RecordedLines) -> dict[str, Any]:
-    """The campaign (`campaign/1`) of recorded lines: what the lab knows, and no more."""
-    entries = recording_headers(recorded.bench)
+    """The campaign (`campaign/1`) of recorded lines, with what the lab knows."""
+    entries = recording_headers(recorded.response)
     for row, entry in enumerate(entries):
         entry["frequency_hz"] = recorded.frequency_hz.tolist()
         entry["frf_re_pc_per_n"] = _rounded(recorded.measured[row].real)
         entry["frf_im_pc_per_n"] = _rounded(recorded.measured[row].imag)
         if recorded.coherence is not None:
             entry["coherence"] = np.round(recorded.coherence[row], 8).tolist()
-    return campaign_document(recorded.bench.experiment, entries)
+    return campaign_document(recorded.response.experiment, entries)
 
 
 def _rounded(values: Floats) -> list[float]:
@@ -110,7 +110,7 @@ def campaign_document(experiment: Experiment, entries: list[dict[str, Any]]) -> 
 
 
 def skin_document(experiment: Experiment) -> dict[str, Any]:
-    """The skin as the lab declares it; d33 is not known to it."""
+    """The skin as the lab declares it, without d33."""
     skin = experiment.skin
     known = {name: getattr(skin, name) for name in ("id", "width_mm", "length_mm") if getattr(skin, name) is not None}
     return {
@@ -124,9 +124,9 @@ def skin_document(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def recording_headers(bench: Bench) -> list[dict[str, Any]]:
-    """What the lab writes down of each recording, in order."""
-    plan, skin, times = bench.plan, bench.experiment.skin, bench.plan.recorded_at
+def recording_headers(response: TrueResponse) -> list[dict[str, Any]]:
+    """Id and conditions of each recording, in order."""
+    plan, skin, times = response.plan, response.experiment.skin, response.plan.recorded_at
     moved = bool(np.any(plan.offset_mm != 0))
     entries = []
     for row, number in enumerate(plan.sensor):

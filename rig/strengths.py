@@ -1,4 +1,4 @@
-"""How strong a drawn effect is: its parameters, evenly in their logarithm, from subtle to strong for the experiment."""
+"""Strengths of drawn effects: parameters uniform in their logarithm, from subtle to strong for the experiment."""
 
 import math
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from rig.effects import KNOWN, needed_by_law
 
 Ranges = dict[str, dict[str, tuple[float, float]]]
 
-# Parameters that are as often negative, and factors that are as often below 1.
+# Parameters of either sign, and factors above or below 1, with equal probability.
 SIGNED = {
     "preload_dependent_d33": "beta_per_mpa",
     "bending_substrate": "amplitude",
@@ -23,7 +23,7 @@ INVERTED = {"modulus_error", "thickness_error"}
 
 
 def evenly_in_log(random: np.random.Generator, low: float, high: float) -> float:
-    """Even in the logarithm, to three digits."""
+    """A draw uniform in the logarithm, to three significant digits."""
     return float(f"{math.exp(random.uniform(math.log(low), math.log(high))):.3g}")
 
 

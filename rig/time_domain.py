@@ -2,11 +2,9 @@
 
 The shaker's force about the preload is made on a grid `_FINER` times finer than the converter's; tip and electronics
 are integrated there (`linear_filters.apply`), the charge of a moving edge follows the curve Fσ(F) at every instant.
-Noise is white plus 1/f; the converter filters what it could not tell from lower frequencies, rounds to its steps and
-stops at its range.
+Noise is white plus 1/f; the converter has an anti-aliasing filter, rounds to its steps and saturates at its range.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,10 +12,10 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import chirp, resample_poly
 
 from rig import effects, linear_filters
-from rig.bench import Bench
 from rig.experiment import Drive, Experiment
 from rig.layer import Floats
-from rig.recorded import make_bench, recording_gains
+from rig.recorded import make_response, recording_gains
+from rig.true_response import TrueResponse
 
 _FINER = 8
 _RUN_IN_S = 2.0  # before the recording, for filters to settle
@@ -34,26 +32,26 @@ class TimeSeries:
     charge_pc: Floats
 
 
-def record_series(experiment: Experiment) -> tuple[Bench, list[TimeSeries]]:
+def record_series(experiment: Experiment) -> tuple[TrueResponse, list[TimeSeries]]:
     """Carry out an experiment that records time series."""
-    bench = make_bench(experiment)
-    gains = recording_gains(experiment, len(bench.contact))
-    return bench, [_recording(bench, row, float(gain)) for row, gain in enumerate(gains)]
+    response = make_response(experiment)
+    gains = recording_gains(experiment, len(response.contact))
+    return response, [_recording(response, row, float(gain)) for row, gain in enumerate(gains)]
 
 
-def _recording(bench: Bench, row: int, gain: float) -> TimeSeries:
-    drive = bench.experiment.drive
+def _recording(response: TrueResponse, row: int, gain: float) -> TimeSeries:
+    drive = response.experiment.drive
     assert drive is not None
-    random = np.random.default_rng([bench.experiment.seed, 4, row])
+    random = np.random.default_rng([response.experiment.seed, 4, row])
     rate = drive.sample_rate_hz * _FINER
-    preload, dynamic = float(bench.plan.preload_n[row]), float(bench.plan.dynamic_n[row])
+    preload, dynamic = float(response.plan.preload_n[row]), float(response.plan.dynamic_n[row])
     applied = dynamic * shaker(drive, rate, random)
-    tip = linear_filters.apply(linear_filters.resonance(bench.on, float(bench.stiffness[row])), applied, 1 / rate)
-    charge = gain * _charge(bench, row, tip)
-    charge = linear_filters.apply(linear_filters.electrical(bench.on, preload), charge, 1 / rate)
+    tip = linear_filters.apply(linear_filters.resonance(response.on, float(response.stiffness[row])), applied, 1 / rate)
+    charge = gain * _charge(response, row, tip)
+    charge = linear_filters.apply(linear_filters.electrical(response.on, preload), charge, 1 / rate)
     time = np.arange(len(charge)) / rate
-    charge += _mains(bench, time, random)
-    late = 1e-6 * effects.of(bench.on, "timing_delay", "delay_us")
+    charge += _mains(response, time, random)
+    late = 1e-6 * effects.of(response.on, "timing_delay", "delay_us")
     if late:
         charge = CubicSpline(time, charge)(np.clip(time - late, 0, time[-1]))
     applied, charge = _sampled(applied, rate), _sampled(charge, rate)
@@ -66,7 +64,19 @@ def _recording(bench: Bench, row: int, gain: float) -> TimeSeries:
 
 
 def shaker(drive: Drive, rate: float, random: np.random.Generator) -> Floats:
-    """The shaker's force over its peak amplitude, run-in first; random excitation has the rms of such a sine."""
+    """Force of the shaker over its peak amplitude, with the run-in; random excitation has the rms of such a sine.
+
+    Parameters
+    ----------
+    drive : Drive
+    rate : float
+        Samples per second.
+    random : numpy Generator
+
+    Returns
+    -------
+    ndarray, (samples,)
+    """
     if drive.kind == "stepped_sine":
         return _stepped_sine(drive, rate)
     samples = round((_RUN_IN_S + drive.duration_s) * rate)
@@ -89,38 +99,38 @@ def _stepped_sine(drive: Drive, rate: float) -> Floats:
     return np.sin(np.cumsum(2 * np.pi * np.repeat(tones, lengths) / rate))
 
 
-def _charge(bench: Bench, row: int, force: Floats) -> Floats:
-    """Charge under the force about the preload, before the electronics: straight, or along the moving edge's curve."""
-    straight = bench.level[row] * force
-    mobility = effects.of(bench.on, "amplitude_nonlinearity", "mobility")
+def _charge(response: TrueResponse, row: int, force: Floats) -> Floats:
+    """Charge under the force about the preload, before the electronics: linear, or along the curve of a moving edge."""
+    linear_charge = response.level[row] * force
+    mobility = effects.of(response.on, "amplitude_nonlinearity", "mobility")
     if not mobility:
-        return straight
-    preload = bench.plan.preload_n[row]
+        return linear_charge
+    preload = response.plan.preload_n[row]
     reach = min(float(np.abs(force).max()) / preload, 0.999)
-    held = bench.sigma()[row]
+    at_rest = response.sigma()[row]
     factor = np.maximum(1 + reach * _CURVE, 1e-6)
-    curve = [(f * bench.sigma(f)[row] - held) * preload for f in factor]
+    curve = [(f * response.sigma(f)[row] - at_rest) * preload for f in factor]
     moved = CubicSpline(reach * preload * _CURVE, curve)(np.maximum(force, -reach * preload))
-    linear = bench.level[row] / bench.effective_sigma[row]
-    still = bench.effective_sigma[row] - mobility * (bench.first_harmonic[row] - held)
-    return linear * (still * force + mobility * (moved - held * force))
+    linear = response.level[row] / response.effective_sigma[row]
+    still = response.effective_sigma[row] - mobility * (response.first_harmonic[row] - at_rest)
+    return linear * (still * force + mobility * (moved - at_rest * force))
 
 
-def _mains(bench: Bench, time: Floats, random: np.random.Generator) -> Floats:
-    """Mains and a third of it at the third harmonic, the phase of the recording's own."""
-    charge, mains = (effects.of(bench.on, "mains_pickup", name) for name in ("charge_pc", "mains_hz"))
+def _mains(response: TrueResponse, time: Floats, random: np.random.Generator) -> Floats:
+    """Mains with a third of the amplitude at the third harmonic, and a random phase."""
+    charge, mains = (effects.of(response.on, "mains_pickup", name) for name in ("charge_pc", "mains_hz"))
     phase = 2 * np.pi * mains * time + 2 * np.pi * random.random()
     return charge * (np.sin(phase) + np.sin(3 * phase) / 3)
 
 
 def _sampled(signal: Floats, rate: float) -> Floats:
-    """The signal at the converter's rate without the run-in, through the filter that keeps what is beyond half of that
-    rate from folding back: where a sweep begins anew the force jumps."""
+    """The signal at the converter's rate, anti-aliased, without the run-in."""
+    # The force jumps at the start of each sweep.
     return resample_poly(signal, 1, _FINER, padtype="line")[round(_RUN_IN_S * rate / _FINER) :]
 
 
 def coloured_noise(samples: int, drive: Drive, random: np.random.Generator) -> Floats:
-    """White noise of the drive's rms, and 1/f noise as strong at the corner."""
+    """White noise of the drive's rms [pC] plus 1/f noise, equal to it at the corner frequency; (samples,)."""
     frequency = np.fft.rfftfreq(samples, 1 / drive.sample_rate_hz)
     frequency[0] = frequency[1]
     spectrum = np.fft.rfft(random.normal(size=samples)) * np.sqrt(1 + drive.flicker_corner_hz / frequency)
@@ -128,14 +138,6 @@ def coloured_noise(samples: int, drive: Drive, random: np.random.Generator) -> F
 
 
 def converted(signal: Floats, end: float, bits: int) -> Floats:
-    """The signal in steps of 2 end / 2^bits, held at the ends of the range."""
+    """The signal in steps of 2 end / 2^bits, saturated at the ends of the range."""
     step = 2 * end / 2**bits
     return np.clip(np.round(signal / step) * step, -end, end - step)
-
-
-def frf_noise(drive: Drive, dynamic_n: float, frequency_hz: Floats) -> Iterator[float]:
-    """Noise of the charge over signal of the force, as spectral densities [pC²/N²], at each line of a random drive."""
-    force = 0.5 * dynamic_n**2 / (drive.high_hz - drive.low_hz)
-    charge = 2 * drive.charge_noise_pc**2 / drive.sample_rate_hz
-    for frequency in frequency_hz:
-        yield charge * (1 + drive.flicker_corner_hz / frequency) / force

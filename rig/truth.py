@@ -1,20 +1,20 @@
-"""What the rig knows and the campaign does not tell: kept in a file of its own."""
+"""The truth about a campaign (`truth/1`), in a file of its own: effects, parameters, gains, and whether they show."""
 
 from typing import Any
 
-from rig.bench import Bench
 from rig.effects import UNCATALOGUED
-from rig.elastomer import Curve
+from rig.elastomer import RecordedCurve
 from rig.experiment import Experiment
 from rig.identifiable import THRESHOLD, visibility
 from rig.recorded import RecordedLines
+from rig.true_response import TrueResponse
 from rig.visible_curves import chi2_gain
 
 SCHEMA = "truth/1"
 
 
 def truth_of(experiment: Experiment) -> dict[str, Any]:
-    """What holds for any kind: effects by their catalogue names (`unknown` where not in it), and every parameter."""
+    """The truth for any kind: effects by their catalogue names (`unknown` where not in it), and every parameter."""
     names = ["unknown" if name in UNCATALOGUED else name for name in experiment.effects]
     skin, on = experiment.skin, experiment.effects
     factors = {name: float(on[f"{name}_error"]["factor"]) if f"{name}_error" in on else 1.0
@@ -33,14 +33,14 @@ def truth_of(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def truth_of_bench(bench: Bench) -> dict[str, Any]:
-    """The same with the sensors' true gains."""
-    gains = [round(float(gain), 6) for gain in bench.sensor_gains]
-    return {**truth_of(bench.experiment), "sensor_gains": gains}
+def truth_of_response(response: TrueResponse) -> dict[str, Any]:
+    """`truth_of` with the true gains of the sensors."""
+    gains = [round(float(gain), 6) for gain in response.sensor_gains]
+    return {**truth_of(response.experiment), "sensor_gains": gains}
 
 
-def truth_of_curves(experiment: Experiment, curves: list[Curve]) -> dict[str, Any]:
-    """The same with whether the effects show in the curves at all."""
+def truth_of_curves(experiment: Experiment, curves: list[RecordedCurve]) -> dict[str, Any]:
+    """`truth_of` with whether the effects are visible in the curves."""
     gain = chi2_gain(experiment, curves)
     return {
         **truth_of(experiment),
@@ -50,18 +50,18 @@ def truth_of_curves(experiment: Experiment, curves: list[Curve]) -> dict[str, An
 
 
 def truth_of_lines(recorded: RecordedLines) -> dict[str, Any]:
-    """The same with whether each effect, and all of them together, show in the lines at all.
+    """`truth_of_response` with whether each effect, and all of them together, are visible in the lines.
 
-    Where nothing is missing there is nothing to show, and `identifiable` is true.
+    `identifiable` is true where nothing is hidden.
     """
-    seen = visibility(recorded)
-    on = tuple(recorded.bench.on)
+    overall = visibility(recorded)
+    on = tuple(recorded.response.on)
     each = {name: visibility(recorded, tuple(other for other in on if other != name)).chi2_gain for name in on}
     return {
-        **truth_of_bench(recorded.bench),
-        "identifiable": seen.identifiable if on else True,
+        **truth_of_response(recorded.response),
+        "identifiable": overall.identifiable if on else True,
         "every_effect_identifiable": all(gain > THRESHOLD for gain in each.values()),
-        "chi2_gain_of_truth": round(seen.chi2_gain, 2),
+        "chi2_gain_of_truth": round(overall.chi2_gain, 2),
         "chi2_gain_of_each": {name: round(gain, 2) for name, gain in each.items()},
-        "base_rms_misfit_percent": round(seen.base_misfit_percent, 3),
+        "base_rms_misfit_percent": round(overall.base_misfit_percent, 3),
     }

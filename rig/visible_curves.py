@@ -1,4 +1,4 @@
-"""Whether an effect shows in force–displacement curves: χ² of the base model's best fit less that of the truth.
+"""Visibility of effects in force–displacement curves: χ² of the base model's best fit less that of the truth.
 
 Base models: indentation F = (4/3) E/(1 − ν²) √R (u − z)^(3/2), compression F = E A (u − z)/H, with a zero z for each
 curve and one E, within 2 % of the declared one where there is one. Noise is the rig's own, that of displacement
@@ -9,15 +9,15 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from rig.effects import INDENTATION
-from rig.elastomer import Curve
+from rig.elastomer import RecordedCurve
 from rig.experiment import Experiment
 from rig.layer import Floats
 
 _MODULUS = 0.02
 
 
-def chi2_gain(experiment: Experiment, recorded: list[Curve]) -> float:
-    """How much χ² the truth gains over the base model."""
+def chi2_gain(experiment: Experiment, recorded: list[RecordedCurve]) -> float:
+    """The gain in χ² of the truth over the base model."""
     curves = experiment.curves
     assert curves is not None
     displacement = [np.array(curve.entry["displacement_mm"]) for curve in recorded]
@@ -46,7 +46,7 @@ def chi2_gain(experiment: Experiment, recorded: list[Curve]) -> float:
     return float(base - true)
 
 
-def _base(kind: str, curve: Curve, displacement: Floats, modulus: float) -> Floats:
+def _base(kind: str, curve: RecordedCurve, displacement: Floats, modulus: float) -> Floats:
     if kind == INDENTATION:
         depth = np.maximum(displacement, 0)
         return np.asarray(4 / 3 * modulus / 0.75 * np.sqrt(curve.entry["indenter_radius_mm"]) * depth**1.5)

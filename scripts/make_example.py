@@ -41,7 +41,7 @@ def main() -> None:
 def experiment(
     name: str, seed: int, start: str, d33: float, lines: tuple[float, int], effects: dict[str, Any]
 ) -> dict[str, Any]:
-    """What the rig is told."""
+    """The description of the experiment for the rig."""
     return {
         "schema": "experiment/1",
         "name": name,

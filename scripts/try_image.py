@@ -78,7 +78,7 @@ def status(path: str, key: str | None = None) -> int:
 
 
 def check(claim: str, holds: bool, evidence: object = "") -> None:
-    """Print the claim, and stop where it does not hold."""
+    """Print the claim, and stop if it does not hold."""
     print(f"{'ok' if holds else 'FAILED'}: {claim}", flush=True)
     if not holds:
         raise SystemExit(f"{evidence}")

@@ -1,1 +1,1 @@
-"""Tables of the skin by finite elements: the only place of the project that solves."""
+"""Makes the tables by finite elements."""

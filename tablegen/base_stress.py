@@ -15,7 +15,7 @@ from scipy.sparse import coo_matrix, csc_matrix
 from scipy.sparse.linalg import spsolve
 
 from tablegen.discretisation import Discretisation
-from tablegen.faces import shapes_along
+from tablegen.faces import gauss_rule, shapes_along
 from underskin.units import Floats
 
 PROFILE_END = 8.0  # thicknesses
@@ -31,7 +31,7 @@ class BaseStress:
         self.discretisation = discretisation
         self.scalars = discretisation.scalars_on(lambda x: x[1] == 0.0)
         columns = np.unique(discretisation.basis.mesh.p[0])
-        self._r, self._weight = _rule(columns, _POINTS)
+        self._r, self._weight = gauss_rule(columns, _POINTS)
         values, numbers = shapes_along(discretisation, self._r, 0)
         points = np.broadcast_to(np.arange(self._r.size)[:, None], numbers.shape)
         shape = (self._r.size, discretisation.basis.N)
@@ -54,13 +54,13 @@ class BaseStress:
 
     def smooth(self, stress: Floats) -> BSpline:
         """The even spline on |r| ≤ `PROFILE_END` nearest to a stress at the integration points, weighted with r."""
-        kept = self._r <= PROFILE_END
-        r, root = self._r[kept], np.sqrt(self._weight[kept])
+        inside = self._r <= PROFILE_END
+        r, root = self._r[inside], np.sqrt(self._weight[inside])
         positive = np.concatenate([np.arange(1, 28) * _KNOT_SPACING, np.arange(4.5, PROFILE_END, 0.5)])
         inner = np.concatenate([-positive[::-1], [0.0], positive])
         ends = np.full(_DEGREE + 1, PROFILE_END)
         mirrored = np.concatenate([-r[::-1], r])
-        values = np.concatenate([stress[kept][::-1], stress[kept]])
+        values = np.concatenate([stress[inside][::-1], stress[inside]])
         knots = np.concatenate([-ends, inner, ends])
         return make_lsq_spline(mirrored, values, knots, k=_DEGREE, w=np.concatenate([root[::-1], root]))
 
@@ -72,16 +72,8 @@ class BaseStress:
 def disc_averages(profile: BSpline, rho: Floats) -> Floats:
     """(2/ρ²) ∫₀^ρ t r dr for ascending ρ; t(0) at ρ = 0."""
     edges = np.unique(np.concatenate([[0.0], profile.t[profile.t > 0], rho]))
-    r, weight = _rule(edges[edges <= rho[-1]], _DEGREE)
+    r, weight = gauss_rule(edges[edges <= rho[-1]], _DEGREE)
     pieces = (weight * profile(r)).reshape(-1, _DEGREE).sum(axis=1)
     moments = np.interp(rho, edges[edges <= rho[-1]], np.concatenate([[0.0], np.cumsum(pieces)]))
     positive = rho > 0
     return np.where(positive, 2 * moments / np.where(positive, rho, 1.0) ** 2, profile(0.0))
-
-
-def _rule(edges: Floats, points: int) -> tuple[Floats, Floats]:
-    """Gauss–Legendre radii and weights (dr · r) on every interval."""
-    x, w = np.polynomial.legendre.leggauss(points)
-    half = np.diff(edges)[:, None] / 2
-    r = edges[:-1, None] + half * (1 + x)
-    return r.ravel(), (half * w * r).ravel()

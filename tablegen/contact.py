@@ -10,7 +10,7 @@ With n = ∇g, the force on the surface is λ n; ∇²g = (1 − n ⊗ n)/|x −
 
 At equilibrium the increment for dδ at a fixed edge is that of a moving one too: the pressure at the edge is 0, so that
 what the contact gains or loses there as the edge moves is of second order. Hence dF/dδ, and the increment of the stress
-on the base over that of the force, from one more solve (PHYSICS, 6). Lengths in thicknesses, stresses in G.
+on the base over that of the force, from one more solve. Lengths in thicknesses, stresses in G.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from scipy.sparse.linalg import SuperLU
 
 from tablegen.discretisation import Discretisation, Indices
 from tablegen.faces import shapes_along
-from tablegen.newton import Layer, State, factorise
+from tablegen.newton import NonlinearLayer, State, factorise
 from underskin.errors import SolverError
 from underskin.units import Floats
 
@@ -34,7 +34,7 @@ _MOST_ITERATIONS = 15
 
 
 @dataclass(frozen=True)
-class Pressed:
+class PressedState:
     """The layer under the sphere: its deformation, the multipliers (edges, modes) and the indentation."""
 
     state: State
@@ -55,7 +55,7 @@ class _Tangent:
     touch: Floats
 
 
-class ContactLayer(Layer):
+class ContactLayer(NonlinearLayer):
     """A discretised layer with a contact on |r| < a of its surface; the mesh must have a line at r = a."""
 
     def __init__(self, discretisation: Discretisation, a: float) -> None:
@@ -77,11 +77,11 @@ class ContactLayer(Layer):
         self.a = a
         self._edge_pressure = self._singularity_at_edge(edges)
 
-    def untouched(self) -> Pressed:
+    def untouched(self) -> PressedState:
         """The sphere just not yet in touch."""
-        return Pressed(self.rest(), np.zeros((len(self.r), self._modes.shape[1])), 0.0)
+        return PressedState(self.rest(), np.zeros((len(self.r), self._modes.shape[1])), 0.0)
 
-    def press(self, start: Pressed, radius: float) -> Pressed:
+    def press(self, start: PressedState, radius: float) -> PressedState:
         """Equilibrium under the sphere of `radius`, by Newton's method; SolverError when it does not converge."""
         now = start
         for _ in range(_MOST_ITERATIONS):
@@ -98,22 +98,22 @@ class ContactLayer(Layer):
             now = self._step(now, radius, residual, gap)
         raise SolverError("Newton's method did not converge")
 
-    def force(self, now: Pressed, radius: float) -> float:
+    def force(self, now: PressedState, radius: float) -> float:
         """The force on the sphere over 2π."""
         normal, _ = self._normal(now, radius)
         return -float((self.weight * (now.multiplier @ self._modes.T) * normal[..., 1]).sum())
 
-    def pressure(self, now: Pressed) -> Floats:
+    def pressure(self, now: PressedState) -> Floats:
         """λ at the points `r` of the contact, (edges, points)."""
         return now.multiplier @ self._modes.T
 
-    def surface(self, now: Pressed, r: Floats) -> Floats:
+    def surface(self, now: PressedState, r: Floats) -> Floats:
         """Places (points, 2) of the surface points that were at the radii r."""
         values, numbers = shapes_along(self.discretisation, r, 1)
         u = [(values * now.state.displacement[2 * numbers + c]).sum(axis=1) for c in (0, 1)]
         return np.stack([r + u[0], 1 + u[1]], axis=-1)
 
-    def increment(self, now: Pressed, radius: float) -> Floats:
+    def increment(self, now: PressedState, radius: float) -> Floats:
         """Internal forces (all displacements) gained over the gain in δ, the edge at rest."""
         tangent = self._tangent(now, radius)
         du, dp, _ = self._per_depth(now, radius, tangent)
@@ -121,7 +121,7 @@ class ContactLayer(Layer):
         local = stiffness @ du[d.numbers][..., None] - np.swapaxes(tangent.constraint, 1, 2) @ dp[..., None]
         return d.assemble_vector(local[..., 0])
 
-    def _step(self, now: Pressed, radius: float, residual: Floats, gap: Floats) -> Pressed:
+    def _step(self, now: PressedState, radius: float, residual: Floats, gap: Floats) -> PressedState:
         """One Newton increment: that at fixed δ, and as much of the one per unit of δ as frees the edge of pressure."""
         tangent = self._tangent(now, radius)
         volume = self._constraint(self._fields(now.state)[0])
@@ -130,9 +130,9 @@ class ContactLayer(Layer):
         depth = -rest / float(np.sum(self._edge_pressure * per_depth[2]))
         du, dp, dm = (one + depth * other for one, other in zip(fixed, per_depth, strict=True))
         state = State(now.state.displacement + du, now.state.pressure + dp)
-        return Pressed(state, now.multiplier + dm, now.indentation + depth)
+        return PressedState(state, now.multiplier + dm, now.indentation + depth)
 
-    def _tangent(self, now: Pressed, radius: float) -> _Tangent:
+    def _tangent(self, now: PressedState, radius: float) -> _Tangent:
         stiffness, constraint = self.element_matrices(now.state)
         scaled = _AUGMENTATION * self._inverse_mass @ constraint
         matrices = stiffness + np.swapaxes(constraint, 1, 2) @ scaled
@@ -140,7 +140,7 @@ class ContactLayer(Layer):
         matrices[self._elements] += self._curvature(now, radius) + np.swapaxes(touch, 1, 2) @ self._scale @ touch
         return _Tangent(factorise(self.discretisation.assemble_matrix(matrices)), constraint, scaled, touch)
 
-    def _per_depth(self, now: Pressed, radius: float, tangent: _Tangent) -> _Increment:
+    def _per_depth(self, now: PressedState, radius: float, tangent: _Tangent) -> _Increment:
         """What a unit of δ adds: it closes the gap, and it turns the normal, on which the pressure acts."""
         normal, distance = self._normal(now, radius)
         turned = (np.array([0.0, 1.0]) - normal * normal[..., 1:]) / distance[..., None]
@@ -164,7 +164,7 @@ class ContactLayer(Layer):
             residual = np.zeros(d.size)  # balanced by the first solve
         return du, dp, dm
 
-    def _traction(self, now: Pressed, direction: Floats) -> Floats:
+    def _traction(self, now: PressedState, direction: Floats) -> Floats:
         """Nodal forces (all displacements) of the pressure along a direction (edges, points, 2)."""
         traction = (self.weight * self.pressure(now))[..., None] * direction
         every = np.zeros_like(self.discretisation.numbers, dtype=float)
@@ -172,26 +172,26 @@ class ContactLayer(Layer):
             every[self._elements, component::2] = np.einsum("eq,eqn->en", traction[..., component], self._values)
         return self.discretisation.assemble_vector(every)
 
-    def _normal(self, now: Pressed, radius: float) -> tuple[Floats, Floats]:
+    def _normal(self, now: PressedState, radius: float) -> tuple[Floats, Floats]:
         """n (edges, points, 2) and |x − c| (edges, points)."""
         r, height = self._places(now)
         distance = np.hypot(r, height - radius)
         return np.stack([r, height - radius], axis=-1) / distance[..., None], distance
 
-    def _places(self, now: Pressed) -> tuple[Floats, Floats]:
+    def _places(self, now: PressedState) -> tuple[Floats, Floats]:
         """Radius of the contact's points and their height over the sphere's lowest point, (edges, points)."""
         u = now.state.displacement
         radial, axial = (np.einsum("eqn,en->eq", self._values, u[2 * self.numbers + c]) for c in (0, 1))
         return self.r + radial, now.indentation + axial
 
-    def _gap(self, now: Pressed, radius: float) -> Floats:
+    def _gap(self, now: PressedState, radius: float) -> Floats:
         """∫ ψ g dA over each edge, (edges, modes)."""
         r, height = self._places(now)
         _, distance = self._normal(now, radius)
         gap = (r**2 + height**2 - 2 * radius * height) / (distance + radius)  # |x − c| − R, without cancellation
         return (self.weight * gap) @ self._modes
 
-    def _touch_gradient(self, now: Pressed, radius: float) -> tuple[Floats, Floats]:
+    def _touch_gradient(self, now: PressedState, radius: float) -> tuple[Floats, Floats]:
         """Derivatives of `_gap`: to the elements' displacements (edges, modes, 2 n) and to δ (edges, modes)."""
         normal, _ = self._normal(now, radius)
         gradient = np.zeros((len(self.r), self._modes.shape[1], self.discretisation.numbers.shape[1]))
@@ -200,7 +200,7 @@ class ContactLayer(Layer):
             gradient[:, :, component::2] = np.einsum("eq,qm,eqn->emn", weighted, self._modes, self._values)
         return gradient, (self.weight * normal[..., 1]) @ self._modes
 
-    def _curvature(self, now: Pressed, radius: float) -> Floats:
+    def _curvature(self, now: PressedState, radius: float) -> Floats:
         """−∫ λ ∇²g on the elements' displacements, (edges, 2 n, 2 n)."""
         normal, distance = self._normal(now, radius)
         strength = -self.weight * self.pressure(now) / distance

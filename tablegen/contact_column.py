@@ -1,9 +1,9 @@
 """One column of the contact table: one material contact edge, pressed by ever smaller spheres up to the largest load.
 
 The mesh belongs to the edge, so each column has one, and every sphere starts from the one before. Its radius is chosen
-so that x = L^(1/3) falls near every other of the wanted values; they are reached by interpolation along the column,
-where a/h stays and all that changes is the strain, in which everything is smooth. What is kept is over its value by
-Hertz at the same force and sphere (PHYSICS, section 1).
+so that x = L^(1/3) falls near every other of the nodes; the nodes themselves are reached by interpolation along the
+column, where a/h is constant and the strain alone varies, in which all quantities are smooth. Quantities are stored as
+ratios to Hertz theory at the same force and sphere (`underskin.physics.hertz`).
 """
 
 from collections.abc import Iterator
@@ -13,14 +13,15 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 from threadpoolctl import threadpool_limits
 
+from tablegen import linear_layer
 from tablegen.base_stress import BaseStress, disc_averages
-from tablegen.contact import ContactLayer, Pressed
+from tablegen.contact import ContactLayer, PressedState
 from tablegen.contact_mesh import contact_mesh
 from tablegen.discretisation import discretise
 from tablegen.neo_hookean import SHEAR_MODULUS, YOUNGS_MODULUS
 from tablegen.newton import State
 from underskin.errors import SolverError
-from underskin.physics import hertz, linear_layer
+from underskin.physics import hertz
 from underskin.physics.hankel_transform import normal_stress, punch_transform
 from underskin.units import Floats
 
@@ -29,11 +30,17 @@ _PLANE_STRAIN = YOUNGS_MODULUS / 0.75  # E' = E/(1 − ν²)
 
 
 @dataclass(frozen=True)
-class Sphere:
-    """What one sphere does to the layer; lengths in thicknesses, forces in G h².
+class SphereSolution:
+    """The solution for one sphere; lengths in thicknesses, forces in G h².
 
-    `sigma`, `sigma_increment`: σ of the force and of its increment, for each sensor radius.
-    `force_error`: force on the base over that on the sphere, minus 1. `lowest_pressure`: over the highest.
+    Attributes
+    ----------
+    sigma, sigma_increment : ndarray, (rho,)
+        σ of the force and of its increment, for each sensor radius.
+    force_error : float
+        Force on the base over that on the sphere, minus 1.
+    lowest_pressure : float
+        Lowest over highest pressure in the contact.
     """
 
     radius: float
@@ -52,7 +59,7 @@ class Sphere:
         return float(np.cbrt(hertz.load_parameter(self.force, self.radius, YOUNGS_MODULUS)))
 
     def over_hertz(self) -> Floats:
-        """Contact radius, indentation, stiffness over Hertz at this force, then σ and its increment."""
+        """Contact radius, indentation and stiffness over their Hertz values at this force, then σ and its increment."""
         a = float(hertz.contact_radius(self.force, self.radius, YOUNGS_MODULUS))
         ratios = (
             self.contact_radius / a,
@@ -63,9 +70,32 @@ class Sphere:
 
 
 def solve_contact_column(a: float, rho: Floats, cbrt_load: Floats, order: int) -> tuple[Floats, Floats, float]:
-    """R/h at each x of `cbrt_load` (ascending, > 0), `over_hertz` there (x, quantities), and the largest force error.
+    """Solve one column of the contact table.
 
-    Raises SolverError that names the point.
+    Parameters
+    ----------
+    a : float
+        Material contact edge a/h before pressing.
+    rho : ndarray, (rho,)
+        Sensor radii rT/h.
+    cbrt_load : ndarray, (x,)
+        x = L^(1/3), ascending, above 0.
+    order : int
+        Order of the displacement elements.
+
+    Returns
+    -------
+    radius : ndarray, (x,)
+        R/h.
+    values : ndarray, (x, quantities)
+        As `SphereSolution.over_hertz`.
+    force_error : float
+        The largest over the column.
+
+    Raises
+    ------
+    SolverError
+        Names the point where Newton's method did not converge.
     """
     with threadpool_limits(1):  # the same bits whatever the number of cores
         targets = np.concatenate([[cbrt_load[0] / 2], cbrt_load[:-1:2], [cbrt_load[-1]]])
@@ -78,13 +108,13 @@ def solve_contact_column(a: float, rho: Floats, cbrt_load: Floats, order: int) -
     return resampled[:, 0] / cbrt_load, resampled[:, 1:], max(abs(sphere.force_error) for sphere in spheres)
 
 
-def press_spheres(a: float, radii: Floats, rho: Floats, order: int) -> list[Sphere]:
+def press_spheres(a: float, radii: Floats, rho: Floats, order: int) -> list[SphereSolution]:
     """Spheres of these radii (descending, in thicknesses), each touching up to the material radius `a` (a/h)."""
     column = _Column(a, rho, order)
     return [column.advance(float(radius)) for radius in radii]
 
 
-def _follow(a: float, rho: Floats, targets: Floats, order: int) -> Iterator[Sphere]:
+def _follow(a: float, rho: Floats, targets: Floats, order: int) -> Iterator[SphereSolution]:
     """Spheres whose x is near each target, and the last one's at or beyond it."""
     column = _Column(a, rho, order)
     ratio = 1.0 + a  # of the force over Hertz's for a: a first guess
@@ -112,7 +142,7 @@ class _Column:
         self.a, self.rho = a, rho
         self.now, self.strain = self.layer.untouched(), 0.0
 
-    def advance(self, radius: float) -> Sphere:
+    def advance(self, radius: float) -> SphereSolution:
         """To the next sphere, in smaller steps where Newton's method needs them."""
         goal = self.a / radius
         step = goal - self.strain
@@ -129,13 +159,13 @@ class _Column:
             self.strain = strain
         return self._sphere(radius)
 
-    def _scaled(self, strain: float) -> Pressed:
+    def _scaled(self, strain: float) -> PressedState:
         """The present state in proportion to a/R, which it follows nearly."""
         now, factor = self.now, strain / self.strain if self.strain else 0.0
         state = State(now.state.displacement * factor, now.state.pressure * factor)
-        return Pressed(state, now.multiplier * factor, now.indentation * factor)
+        return PressedState(state, now.multiplier * factor, now.indentation * factor)
 
-    def _sphere(self, radius: float) -> Sphere:
+    def _sphere(self, radius: float) -> SphereSolution:
         layer, base, now = self.layer, self.base, self.now
         stress = base.at_points(layer.internal_force(now.state))
         gained = base.at_points(layer.increment(now, radius))
@@ -145,7 +175,7 @@ class _Column:
         # F = 2π force and σ = (2π/3) · mean stress/F, for a mean over the disc; 2π cancels.
         static = stress / (3 * force) - linear_layer.sigma(contact_radius, 0.0, base.points)
         moving = gained / (3 * stiffness) - _punch(contact_radius, 0.0, base.points)
-        return Sphere(
+        return SphereSolution(
             radius=radius,
             force=2 * np.pi * force * SHEAR_MODULUS,
             contact_radius=contact_radius,

@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
-from scipy.ndimage import maximum_filter1d
 
 from tablegen import (
     base_stress,
@@ -24,15 +23,17 @@ from tablegen import (
     contact_mesh,
     discretisation,
     faces,
+    left_out_nodes,
+    linear_layer,
     neo_hookean,
     newton,
 )
 from tablegen.contact_column import solve_contact_column
 from tablegen.contact_mesh import RIM
+from tablegen.left_out_nodes import left_out_errors
 from tablegen.sweep import Arrays, run_pieces, sources_hash
-from underskin.physics import hankel_transform, hertz, linear_layer
+from underskin.physics import hankel_transform, hertz
 from underskin.surrogate.hdf5_format import CONTACT_SCHEMA, Dataset, data_hash, write_table
-from underskin.surrogate.influence_table import interpolation_weights
 from underskin.units import Floats
 
 ORDER = 5
@@ -43,6 +44,7 @@ SOURCES = (
     contact_mesh,
     discretisation,
     faces,
+    left_out_nodes,
     neo_hookean,
     newton,
     hankel_transform,
@@ -50,7 +52,6 @@ SOURCES = (
     linear_layer,
     sys.modules[__name__],
 )
-_LEFT_OUT_GAIN = 4.0
 _RATIOS = ("contact_radius", "indentation", "stiffness")
 
 DEFAULT_EDGES = np.linspace(np.sqrt(0.009), np.sqrt(2.05), 27) ** 2  # a/h before pressing: R/h 0.5 to 8 at every x
@@ -85,7 +86,7 @@ def make_contact_table(
         _on_the_nodes(axes, [done[f"order{order}-{number:02d}"] for number in range(edges.size)])
         for order in (ORDER, ORDER - 1)
     )
-    errors = np.abs(fine - coarse) + interpolation_error((np.log(axes[0]), axes[1]), fine)
+    errors = np.abs(fine - coarse) + sum(left_out_errors((np.log(axes[0]), axes[1]), fine))
     about = {
         "quantity": "contact",
         "poisson_ratio": 0.5,
@@ -103,36 +104,23 @@ def make_contact_table(
 
 
 def solve_piece(a: float, rho: Floats, cbrt_load: Floats, order: int) -> Arrays:
-    """`solve_contact_column` as a dictionary of arrays, which travels to workers and to the disk."""
+    """`solve_contact_column` as a dictionary of arrays, which can be sent to workers and stored."""
     radius, values, force_error = solve_contact_column(a, rho, cbrt_load, order)
     return {"radius": radius, "values": values, "force_error": np.array(force_error)}
-
-
-def interpolation_error(axes: tuple[Floats, ...], values: Floats) -> Floats:
-    """A bound on |spline − truth| over the first axes of `values`, from leaving nodes out."""
-    total = np.zeros_like(values)
-    for number, nodes in enumerate(axes):
-        left_out = np.zeros_like(values)
-        along, found = np.moveaxis(values, number, 0), np.moveaxis(left_out, number, 0)
-        for i in range(1, nodes.size - 1):
-            others = np.delete(np.arange(nodes.size), i)
-            found[i] = np.tensordot(interpolation_weights(nodes[others], nodes[i]), along[others], axes=1) - along[i]
-        total += maximum_filter1d(np.abs(left_out), 3, axis=number) / _LEFT_OUT_GAIN
-    return total
 
 
 def _on_the_nodes(axes: tuple[Floats, Floats, Floats], columns: list[Arrays]) -> Floats:
     """All quantities of the columns at the table's nodes: (R/h, x, quantities)."""
     radius, cbrt_load, rho = axes
-    found = np.stack([column["radius"] for column in columns])
+    radii = np.stack([column["radius"] for column in columns])
     values = np.stack([column["values"] for column in columns])
     point = linear_layer.gamma_n(0.0, rho)
     vanishing = np.concatenate([np.ones(len(_RATIOS)), point, point])
     nodes = [np.broadcast_to(vanishing, (radius.size, vanishing.size))]
     for number in range(cbrt_load.size - 1):
-        if not (found[0, number] <= radius[0] and radius[-1] <= found[-1, number]):
+        if not (radii[0, number] <= radius[0] and radius[-1] <= radii[-1, number]):
             raise ValueError(f"the contact edges do not reach all of R/h at x = {cbrt_load[number + 1]:g}")
-        nodes.append(make_interp_spline(found[:, number], values[:, number], k=5)(radius))
+        nodes.append(make_interp_spline(radii[:, number], values[:, number], k=5)(radius))
     return np.stack(nodes, axis=1)
 
 

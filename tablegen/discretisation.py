@@ -23,7 +23,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Discretisation:
-    """Everything about mesh and element that a solve needs; build it with `discretise`."""
+    """Mesh, elements and shape functions as arrays; build it with `discretise`."""
 
     basis: Basis
     order: int
@@ -58,11 +58,11 @@ class Discretisation:
         local = position[self.numbers]
         rows = np.broadcast_to(local[:, :, None], (*local.shape, local.shape[1]))
         columns = np.broadcast_to(local[:, None, :], rows.shape)
-        kept = ((rows >= 0) & (columns >= 0)).ravel()
-        key = columns.ravel()[kept] * self.free.size + rows.ravel()[kept]
+        inner = ((rows >= 0) & (columns >= 0)).ravel()
+        key = columns.ravel()[inner] * self.free.size + rows.ravel()[inner]
         entries, inverse = np.unique(key, return_inverse=True)
-        target = np.full(kept.size, entries.size)
-        target[kept] = inverse
+        target = np.full(inner.size, entries.size)
+        target[inner] = inverse
         pointers = np.searchsorted(entries, np.arange(self.free.size + 1) * self.free.size)
         shape = (self.free.size, self.free.size)
         return target, csc_matrix((np.zeros(entries.size), entries % self.free.size, pointers), shape=shape)

@@ -38,3 +38,11 @@ def shapes_along(d: Discretisation, r: Floats, z: Literal[0, 1]) -> tuple[Floats
     local = np.stack([np.full_like(xi, z), xi])  # the reference square of a tensor mesh has z first
     values = np.stack([d.basis.elem.lbasis(local, i)[0] for i in range(d.basis.Nbfun)], axis=-1)
     return values, d.basis.element_dofs[:, on_face[column]].T
+
+
+def gauss_rule(edges: Floats, points: int) -> tuple[Floats, Floats]:
+    """Gauss–Legendre radii and weights (dr · r), with so many points on every interval between `edges`."""
+    x, w = np.polynomial.legendre.leggauss(points)
+    half = np.diff(edges)[:, None] / 2
+    r = edges[:-1, None] + half * (1 + x)
+    return r.ravel(), (half * w * r).ravel()

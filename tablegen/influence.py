@@ -1,4 +1,4 @@
-"""Influence functions by reciprocity: the layer with a unit lift over the sensor's disc on its base (PHYSICS, 4).
+"""Influence functions by reciprocity: the layer with a unit lift over the sensor's disc on its base (Betti).
 
 By Betti's theorem the mean stress on a sensor under a point force on the surface is minus that force's work on the
 displacement u of the surface when the base is lifted by 1 over the sensor's disc and by 0 beside it:
@@ -22,7 +22,7 @@ from skfem import MeshQuad
 from threadpoolctl import threadpool_limits
 
 from tablegen.discretisation import Discretisation, Indices, discretise
-from tablegen.faces import shapes_along
+from tablegen.faces import gauss_rule, shapes_along
 from tablegen.newton import factorise
 from underskin.units import Floats
 
@@ -36,7 +36,7 @@ _SHEAR = np.diag([2.0, 1.0, 1.0, 2.0, 2.0]) + np.eye(5)[[0, 2, 1, 3, 4]] * np.ar
 
 
 @dataclass(frozen=True)
-class Influence:
+class SolvedInfluence:
     """γ_n and γ_t for each sensor radius and distance, (rho, r)."""
 
     normal: Floats
@@ -61,15 +61,29 @@ class _Glued(Discretisation):
         return self.scalars_on(lambda x: x[1] == 0.0)
 
 
-def solve_influence(poisson_ratio: float, slip: float, rho: Floats, r: Floats, order: int) -> Influence:
-    """γ_n and γ_t for sensor radii `rho` at distances `r`, both in thicknesses; 0 ≤ ν ≤ 0.5, 0 ≤ slip ≤ 1."""
+def solve_influence(poisson_ratio: float, slip: float, rho: Floats, r: Floats, order: int) -> SolvedInfluence:
+    """Influence functions γ_n and γ_t of a point force on the surface, by finite elements.
+
+    Parameters
+    ----------
+    poisson_ratio : float
+        ν, 0 to 0.5.
+    slip : float
+        1/(1 + κ), 0 (bonded) to 1 (frictionless).
+    rho : ndarray, (rho,)
+        Sensor radii rT/h.
+    r : ndarray, (r,)
+        Distances r̂/h.
+    order : int
+        Order of the displacement elements.
+    """
     with threadpool_limits(1):  # the same bits whatever the number of cores
         mesh = influence_mesh()
         d = _Glued(**vars(discretise(mesh, order)), bonded=slip == 0)
         surface = _displaced_by(d, poisson_ratio, slip, _lifts(d, rho))
     values, numbers = shapes_along(d, r, 1)
     radial, axial = (np.einsum("pn,pnl->lp", values, surface[2 * numbers + c]) for c in (0, 1))
-    return Influence(axial / 3, radial / 3)
+    return SolvedInfluence(axial / 3, radial / 3)
 
 
 def influence_mesh() -> MeshQuad:
@@ -85,7 +99,7 @@ def influence_mesh() -> MeshQuad:
 def _lifts(d: _Glued, rho: Floats) -> Floats:
     """Base displacements (displacements, rho): the lift by 2/ρ² over each disc, projected on the traces."""
     columns = np.unique(d.basis.mesh.p[0])
-    points, weight = _rule(columns, d.order + 1)
+    points, weight = gauss_rule(columns, d.order + 1)
     shapes = _base_shapes(d, points)
     mass = shapes.T @ (weight[:, None] * shapes)
     moments = np.zeros((d.base.size, rho.size))
@@ -93,7 +107,7 @@ def _lifts(d: _Glued, rho: Floats) -> Floats:
         if radius == 0:
             moments[:, number] = _base_shapes(d, np.zeros(1))[0]
         else:
-            points, weight = _rule(np.append(columns[columns < radius], radius), d.order + 1)
+            points, weight = gauss_rule(np.append(columns[columns < radius], radius), d.order + 1)
             moments[:, number] = weight @ _base_shapes(d, points) * 2 / radius**2
     lifted = np.zeros((d.size, rho.size))
     lifted[2 * d.base + 1] = np.linalg.solve(mass, moments)
@@ -122,7 +136,7 @@ def _displaced_by(d: _Glued, poisson_ratio: float, slip: float, lifted: Floats) 
 
     u = lifted.copy()
     u[d.free] = factors.solve(-assembled(stiffness @ lifted[d.numbers])[d.free])
-    if incompressible:  # the volume's defect pushes again, until nothing is left of it
+    if incompressible:  # the remaining volume defect is corrected by each further solve
         defect = constraint @ u[d.numbers]
         for _ in range(_SOLVES_PER_FACTORISATION - 1):
             step = np.zeros_like(u)
@@ -134,7 +148,7 @@ def _displaced_by(d: _Glued, poisson_ratio: float, slip: float, lifted: Floats) 
 
 def _base_springs(d: _Glued) -> Floats:
     """∫ u_r v_r r dr over the base as element matrices."""
-    points, weight = _rule(np.unique(d.basis.mesh.p[0]), d.order + 1)
+    points, weight = gauss_rule(np.unique(d.basis.mesh.p[0]), d.order + 1)
     values, numbers = shapes_along(d, points, 0)
     corner = d.basis.mesh.p[:, d.basis.mesh.t].min(axis=1)
     on_base = np.flatnonzero(corner[1] == 0.0)
@@ -153,11 +167,3 @@ def _base_shapes(d: _Glued, r: Floats) -> Floats:
     every = np.zeros((r.size, int(d.basis.N)))
     np.put_along_axis(every, numbers, values, axis=1)
     return every[:, d.base]
-
-
-def _rule(edges: Floats, points: int) -> tuple[Floats, Floats]:
-    """Gauss–Legendre radii and weights (dr · r) on every interval."""
-    x, w = np.polynomial.legendre.leggauss(points)
-    half = np.diff(edges)[:, None] / 2
-    r = edges[:-1, None] + half * (1 + x)
-    return r.ravel(), (half * w * r).ravel()

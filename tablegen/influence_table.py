@@ -14,18 +14,16 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
-from tablegen import discretisation, faces, influence, newton
+from tablegen import discretisation, faces, influence, left_out_nodes, newton
 from tablegen.influence import RIM, influence_mesh, solve_influence
+from tablegen.left_out_nodes import left_out_errors
 from tablegen.sweep import Arrays, run_pieces, sources_hash
 from underskin.surrogate.hdf5_format import INFLUENCE_SCHEMA, Dataset, data_hash, write_table
-from underskin.surrogate.influence_table import interpolation_weights
 from underskin.units import Floats
 
 ORDER = 6
-SOURCES = (discretisation, newton, faces, influence, sys.modules[__name__])
-_LEFT_OUT_GAIN = 4.0
+SOURCES = (discretisation, newton, faces, influence, left_out_nodes, sys.modules[__name__])
 _AXES = ("poisson_ratio", "slip", "rt_over_h", "r_over_h")
 
 DEFAULT_AXES = (
@@ -54,7 +52,9 @@ def make_influence_table(
     name = data_hash(dict(zip(_AXES, axes, strict=True)))
     done = run_pieces(pieces, parts / f"{sources[:16]}-{name[:8]}", scheduler, "tablegen influence")
     fine, coarse = (_stacked(done, k, axes) for k in (order, order - 1))
-    errors = np.abs(fine - coarse).max(axis=-1) + interpolation_error(axes, fine)
+    errors = np.abs(fine - coarse).max(axis=-1) + sum(
+        part.max(axis=-1) for part in left_out_errors(axes, fine, first=1)
+    )
     digest = write_table(
         path,
         INFLUENCE_SCHEMA,
@@ -74,22 +74,9 @@ def make_influence_table(
 
 
 def solve_piece(poisson_ratio: float, slip: float, rho: Floats, r: Floats, order: int) -> Arrays:
-    """`solve_influence` as a dictionary of arrays, which travels to workers and to the disk."""
+    """`solve_influence` as a dictionary of arrays, which can be sent to workers and stored."""
     solved = solve_influence(poisson_ratio, slip, rho, r, order)
     return {"normal": solved.normal, "tangential": solved.tangential}
-
-
-def interpolation_error(axes: tuple[Floats, ...], values: Floats) -> Floats:
-    """A bound on |spline − truth|, the largest over r, from leaving nodes out; `values` is (2, *axes)."""
-    total = np.zeros(values.shape[:-1])
-    for number, nodes in enumerate(axes, start=1):
-        left_out = np.zeros_like(values)
-        along, found = np.moveaxis(values, number, 0), np.moveaxis(left_out, number, 0)
-        for i in range(1, nodes.size - 1):
-            others = np.delete(np.arange(nodes.size), i)
-            found[i] = np.tensordot(interpolation_weights(nodes[others], nodes[i]), along[others], axes=1) - along[i]
-        total += maximum_filter1d(np.abs(left_out), 3, axis=number).max(axis=-1) / _LEFT_OUT_GAIN
-    return total
 
 
 def _stacked(done: dict[str, Arrays], order: int, axes: tuple[Floats, ...]) -> Floats:

@@ -26,14 +26,14 @@ _MOST_ITERATIONS = 12
 
 @dataclass(frozen=True)
 class State:
-    """Displacements (all of them) and pressure modes (elements, m)."""
+    """Displacements (all, (displacements,)) and pressure modes (elements, m)."""
 
     displacement: Floats
     pressure: Floats
 
 
-class Layer:
-    """A discretised layer; solves for its deformation under nodal loads."""
+class NonlinearLayer:
+    """A discretised neo-Hookean layer, and its deformation under nodal loads."""
 
     def __init__(self, discretisation: Discretisation) -> None:
         self.discretisation = discretisation

@@ -2,7 +2,8 @@
 
 At each L the finite-element solution gives the *change* of the stress on the base against its own linear limit, divided
 by the load; the table adds it to the exact linear solution. Both share mesh and element, so most of their error
-cancels; the linear limit's own error against the exact solution is kept beside it, that the exact part cannot hide it.
+cancels; the error of the linear limit against the exact solution is stored beside it, so that the exact part does not
+hide it.
 """
 
 from collections.abc import Callable
@@ -11,14 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tablegen import linear_layer
 from tablegen.base_stress import BaseStress, disc_averages
 from tablegen.discretisation import discretise
 from tablegen.faces import hertz_load
 from tablegen.mesh import layer_mesh
 from tablegen.neo_hookean import YOUNGS_MODULUS
-from tablegen.newton import Layer, State
+from tablegen.newton import NonlinearLayer, State
 from underskin.errors import SolverError
-from underskin.physics import linear_layer
 from underskin.physics.hertz import peak_pressure_over_modulus
 from underskin.units import Floats
 
@@ -37,7 +38,7 @@ class Nodes:
 
 @dataclass(frozen=True)
 class Column:
-    """What one contact radius gives: changes against the linear limit, and how good the linear limit is."""
+    """The solution for one contact radius: changes against the linear limit, and the error of the linear limit."""
 
     sigma_change: Floats  # (rho, cbrt_load)
     profile_change: Floats  # (r, cbrt_load)
@@ -46,16 +47,30 @@ class Column:
 
 
 def solve_column(a: float, nodes: Nodes, order: int, refinement: int = 1) -> Column:
-    """Solve the layer for the contact radius `a` (a/h > 0) at every load of `nodes`.
+    """Solve the layer for one contact radius at every load.
 
-    Raises SolverError that names a/h and L when a load cannot be reached even with small steps.
+    Parameters
+    ----------
+    a : float
+        Contact radius a/h, above 0.
+    nodes : Nodes
+        The axes of the table.
+    order : int
+        Order of the displacement elements.
+    refinement : int
+        Every element of the mesh is split into `refinement`² equal ones.
+
+    Raises
+    ------
+    SolverError
+        Names a/h and L where a load cannot be reached even with small steps.
     """
     with threadpool_limits(1):  # the same bits whatever the number of cores
         return _solve_column(a, nodes, order, refinement)
 
 
 def _solve_column(a: float, nodes: Nodes, order: int, refinement: int) -> Column:
-    layer = Layer(discretise(layer_mesh(a, refinement), order))
+    layer = NonlinearLayer(discretise(layer_mesh(a, refinement), order))
     load = hertz_load(layer.discretisation, a)
     base = BaseStress(layer.discretisation)
     share = a**2  # t / (q0 a²) is in σ's scale: t = (3F/2πh²) σ with F = (2/3) π a² q0
@@ -81,11 +96,11 @@ def _solve_column(a: float, nodes: Nodes, order: int, refinement: int) -> Column
 
 
 def peak_pressures(cbrt_load: Floats) -> Floats:
-    """q0/G for x = L^(1/3)."""
+    """Peak pressure of Hertz theory over the shear modulus, q0/G, for x = L^(1/3) (loads,)."""
     return YOUNGS_MODULUS * peak_pressure_over_modulus(cbrt_load**3)
 
 
-def _follow(layer: Layer, load: Floats, cbrt_load: Floats, record: Callable[[int, State], None]) -> None:
+def _follow(layer: NonlinearLayer, load: Floats, cbrt_load: Floats, record: Callable[[int, State], None]) -> None:
     """Load continuation from rest (cbrt_load[0] = 0) through every load, halving the step where it fails."""
     peaks = peak_pressures(cbrt_load)
     before, reached = (0.0, layer.rest()), (0.0, layer.rest())

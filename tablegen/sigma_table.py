@@ -18,13 +18,13 @@ import numpy as np
 from scipy.interpolate import NdBSpline
 from scipy.ndimage import maximum_filter
 
-from tablegen import base_stress, discretisation, faces, mesh, neo_hookean, newton
+from tablegen import base_stress, discretisation, faces, linear_layer, mesh, neo_hookean, newton
 from tablegen import sigma as sigma_solve
 from tablegen.base_stress import PROFILE_END
 from tablegen.mesh import RIM, layer_mesh
 from tablegen.sigma import Column, Nodes, solve_column
 from tablegen.sweep import Arrays, run_pieces, sources_hash
-from underskin.physics import hankel_transform, hertz, linear_layer
+from underskin.physics import hankel_transform, hertz
 from underskin.surrogate.hdf5_format import SIGMA_SCHEMA, Dataset, data_hash, write_table
 from underskin.surrogate.sigma_table import interpolation_coefficients
 from underskin.units import Floats
@@ -77,7 +77,7 @@ def make_sigma_table(path: Path, nodes: Nodes = DEFAULT_NODES, scheduler: str | 
 
 
 def solve_piece(a: float, nodes: Nodes, order: int) -> Arrays:
-    """`solve_column` as a dictionary of arrays, which travels to workers and to the disk."""
+    """`solve_column` as a dictionary of arrays, which can be sent to workers and stored."""
     column = solve_column(a, nodes, order)
     return {name: np.asarray(getattr(column, name)) for name in Column.__dataclass_fields__}
 

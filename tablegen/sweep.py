@@ -1,7 +1,7 @@
-"""A sweep: independent pieces of work on all cores or on a cluster, each kept on the disk as soon as it is done.
+"""A sweep: independent pieces of work on all cores or on a cluster, each stored on the disk as soon as it is done.
 
-A piece's result is a dictionary of arrays in one file beside the table, written whole or not at all, so that a sweep
-killed at any moment goes on where it was; results do not depend on who computed them or in which order. The folder's
+A piece's result is a dictionary of arrays in one file beside the table, written atomically, so that a sweep that was
+killed resumes; results do not depend on who computed them or in which order. The folder's
 name holds a hash of the sources and settings: pieces of another version are never mixed in.
 """
 
@@ -35,7 +35,7 @@ Piece = Callable[[], Arrays]
 
 
 def sources_hash(modules: Sequence[ModuleType]) -> str:
-    """SHA-256 of what the modules compute that decide a table's numbers (see underskin.source_digest)."""
+    """SHA-256 of the sources that decide a table's numbers (`underskin.source_digest`)."""
     return source_digest({module.__name__: inspect.getsource(module) for module in modules})
 
 
@@ -47,7 +47,7 @@ def run_pieces(
     Raises SolverError as soon as a piece fails; what is done stays in the folder.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    done = {name: kept for name in pieces if (kept := _load(folder / f"{name}.npz")) is not None}
+    done = {name: stored for name in pieces if (stored := _load(folder / f"{name}.npz")) is not None}
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),

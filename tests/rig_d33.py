@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.experiment import parse as experiment
+from rig.description import parse as experiment
 from rig.output import campaign_of_series
 from rig.time_domain import record_series
 from underskin.inversion import invert

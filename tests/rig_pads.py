@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from rig.description import parse
 from rig.elastomer import campaign_of_curves, record_curves
-from rig.experiment import parse
 
 
 def pressed(

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from rig.experiment import parse
+from rig.description import parse
 from rig.output import campaign_of_series
 from rig.time_domain import record_series
 from tests.rig_experiments import described

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from tablegen import deep_layer
-from tablegen.block import Block, solve
-from underskin.physics import half_space, linear_layer
+from docs.paper import deep_layer
+from docs.paper.block import FiniteBlock, solve
+from tablegen import linear_layer
+from underskin.physics import half_space
 
 A = 0.289
 RHO = np.array([0.0, 0.2, 0.6])
@@ -33,19 +34,21 @@ def test_the_half_spaces_error_falls_with_the_depth_of_the_base() -> None:
 @pytest.mark.parametrize(("depth", "bonded"), [(1.0, True), (4.0, True), (1.0, False)])
 def test_a_very_wide_block_is_the_endless_layer(depth: float, bonded: bool) -> None:
     wide = 16 * max(1.0, depth)
-    block = solve(Block(wide, wide, depth, bonded), A, RHO, order=5)
+    block = solve(FiniteBlock(wide, wide, depth, bonded), A, RHO, order=5)
     np.testing.assert_allclose(block.sigma, deep_layer.sigma(depth, A, RHO, bonded=bonded), rtol=1e-5)
 
 
 def test_the_error_falls_with_the_order_of_the_elements() -> None:
     exact = linear_layer.sigma(A, RHO)
-    errors = [float(np.max(np.abs(solve(Block(16.0, 16.0, 1.0), A, RHO, order).sigma / exact - 1))) for order in (4, 5)]
+    errors = [
+        float(np.max(np.abs(solve(FiniteBlock(16.0, 16.0, 1.0), A, RHO, order).sigma / exact - 1))) for order in (4, 5)
+    ]
     assert errors[1] < errors[0] / 10
 
 
 @pytest.mark.parametrize("depth", [1.0, 12.0])
 def test_the_papers_block_converges_and_carries_the_whole_force(depth: float) -> None:
-    block = Block(PAPER_LENGTH, PAPER_WIDTH, depth)
+    block = FiniteBlock(PAPER_LENGTH, PAPER_WIDTH, depth)
     coarse, fine = solve(block, A, RHO, order=4), solve(block, A, RHO, order=5)
     assert fine.force == pytest.approx(1.0, abs=1e-8)
     assert fine.unknowns > coarse.unknowns
@@ -53,13 +56,13 @@ def test_the_papers_block_converges_and_carries_the_whole_force(depth: float) ->
 
 
 def test_length_and_width_can_be_exchanged() -> None:
-    along = solve(Block(PAPER_LENGTH, PAPER_WIDTH, 4.0), A, RHO, order=4)
-    across = solve(Block(PAPER_WIDTH, PAPER_LENGTH, 4.0), A, RHO, order=4)
+    along = solve(FiniteBlock(PAPER_LENGTH, PAPER_WIDTH, 4.0), A, RHO, order=4)
+    across = solve(FiniteBlock(PAPER_WIDTH, PAPER_LENGTH, 4.0), A, RHO, order=4)
     np.testing.assert_allclose(along.sigma, across.sigma, rtol=1e-8)
 
 
 def test_a_narrow_column_carries_the_mean_pressure() -> None:
     """Saint-Venant: many widths below the load the stress is F over the area, so σ = (2π/3) h²/area."""
     side = 0.25
-    column = solve(Block(side, side, 2.0), 0.1, np.array([0.0, 0.1]), order=4)
+    column = solve(FiniteBlock(side, side, 2.0), 0.1, np.array([0.0, 0.1]), order=4)
     np.testing.assert_allclose(column.sigma, 2 * np.pi / 3 / side**2, rtol=1e-6)

@@ -10,12 +10,12 @@ from numpy.polynomial import legendre
 from scipy.special import j0
 
 from tests.oracle import NEEDS_ORACLE
+from tests.sphere_contact import SphereContact, SphereOnLayer
 from underskin.errors import InvalidInput
 from underskin.physics import elastic_layer, hertz
 from underskin.physics.contact_integral_equation import ContactEquation, mode_transforms
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import normal_stress
-from underskin.physics.sphere_contact import SphereContact, SphereOnLayer
 from underskin.units import Floats
 
 RADIUS, MODULUS, DEEP, THICKNESS = 4e-3, 1e6, 1e6, 2.5e-3  # m, Pa

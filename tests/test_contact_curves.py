@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.special import j0
 
+from tests.sphere_contact import SphereOnLayer
 from underskin.physics.contact_curves import REACH, ContactRows, CurveGrid
 from underskin.physics.contact_integral_equation import ContactEquation, mode_transforms
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average
-from underskin.physics.sphere_contact import SphereOnLayer
 from underskin.units import Floats
 
 K = np.linspace(0.05, 25.0, 250)

@@ -7,19 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tablegen import linear_layer
 from tablegen.base_stress import BaseStress
 from tablegen.contact import ContactLayer
-from tablegen.contact_column import Sphere, press_spheres
+from tablegen.contact_column import SphereSolution, press_spheres
 from tablegen.contact_mesh import contact_mesh
 from tablegen.discretisation import discretise
 from tests.oracle import NEEDS_ORACLE
 from underskin import SolverError
-from underskin.physics import linear_layer
 
 RHO = np.array([0.0, 0.2, 0.6, 1.0, 3.0])
 
 
-def hertz_ratios(sphere: Sphere, a: float) -> list[float]:
+def hertz_ratios(sphere: SphereSolution, a: float) -> list[float]:
     """F, δ and dF/dδ over Hertz's for the contact radius a, in the oracle's manner; E' = 4 G."""
     hertz = 16 / 3 * a**3 / sphere.radius
     return [sphere.force / hertz, sphere.indentation * sphere.radius / a**2, sphere.stiffness / (8 * a)]

@@ -10,15 +10,16 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from tablegen import linear_layer
 from tablegen.contact_column import press_spheres
 from tablegen.contact_interpolation import ContactInterpolation
 from tests import felupe_contact
 from tests.oracle import NEEDS_ORACLE
+from tests.sphere_contact import SphereOnLayer
 from underskin import TableError
-from underskin.physics import hertz, linear_layer
+from underskin.physics import hertz
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import normal_stress
-from underskin.physics.sphere_contact import SphereOnLayer
 from underskin.surrogate.sigma_table import load_table, tables_folder
 
 TABLE = ContactInterpolation(tables_folder() / "contact.h5")

@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
+from rig.description import parse
 from rig.elastomer import campaign_of_curves, record_curves
-from rig.experiment import parse
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import from_dict
 from underskin.surrogate.sigma_table import load_table

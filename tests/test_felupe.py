@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from tablegen import linear_layer
 from tests import felupe_layer
-from underskin.physics import linear_layer
 from underskin.surrogate.sigma_table import load_table
 
 POINTS = [

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tablegen import linear_layer
 from tests.oracle import NEEDS_ORACLE
 from underskin.errors import InvalidInput
-from underskin.physics import elastic_layer, linear_layer
+from underskin.physics import elastic_layer
 from underskin.physics.elastic_layer import Layer, slip
 from underskin.physics.hankel_transform import normal_stress, punch_transform
 from underskin.units import Floats

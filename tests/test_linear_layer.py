@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from tablegen import linear_layer
 from tests.oracle import NEEDS_ORACLE, linear_layer_values
-from underskin.physics import half_space, linear_layer
+from underskin.physics import half_space
 from underskin.physics.hankel_transform import normal_stress, punch_transform
 
 

@@ -20,9 +20,9 @@ from tests.mechanism_campaigns import (
     table,
 )
 from tests.oracle import NEEDS_ORACLE
+from tests.sphere_contact import SphereOnLayer
 from underskin.mechanisms import Normal, compose
 from underskin.physics.elastic_layer import Layer
-from underskin.physics.sphere_contact import SphereOnLayer
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
 from underskin.recordings.conditions import SkinDescription
 from underskin.units import Floats

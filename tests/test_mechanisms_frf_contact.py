@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from tablegen.linear_layer import transmission
 from tests.mechanism_campaigns import SKIN, campaign, frf_recording, predicted, table
 from tests.mechanism_contacts import LINEAR_MM, RHO, E, H, level, linear_contact, oracle_rows, sphere_on_layer
 from tests.oracle import NEEDS_ORACLE
+from tests.sphere_contact import SphereOnLayer
 from underskin.physics import hertz
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import hertz_transform, normal_stress, punch_transform
-from underskin.physics.linear_layer import transmission
-from underskin.physics.sphere_contact import SphereOnLayer
 
 
 @NEEDS_ORACLE

@@ -10,9 +10,9 @@ from scipy.optimize import brentq
 
 from tests.contact_elements import Body, force_of_elements
 from tests.mechanism_campaigns import SKIN, fit_of, hertz_force, predicted, table
+from tests.sphere_contact import SphereOnLayer
 from underskin.mechanisms import Unsupported, compose
 from underskin.physics.elastic_layer import Layer
-from underskin.physics.sphere_contact import SphereOnLayer
 from underskin.recordings.campaign import Campaign, IndentationRecording
 from underskin.units import Floats
 

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tablegen import linear_layer
 from underskin import Indenter, Skin, load_table, transmission
-from underskin.physics import linear_layer
 from underskin.prediction.pressed_skin import frf_gradient
 from underskin.units import Floats
 

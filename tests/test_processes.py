@@ -20,7 +20,7 @@ SMALL = Made(("contact_resonance",), (6.0, 0.05), sensors=1, highest_hz=1000.0, 
 SLEEPING = """
 import time
 from pathlib import Path
-from proof.kept import Work, of_each
+from proof.stored import Work, of_each
 if __name__ == "__main__":
     of_each(Work(Path("."), 2), [0.0] * 4 + [60.0] * 4, time.sleep, lambda told: Path("{done}").touch())
 """

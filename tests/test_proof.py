@@ -1,4 +1,4 @@
-"""The proof's own tools: judging, statistics, kept work, the ideal diagnoser, and the page from a small run."""
+"""The proof's own tools: judging, statistics, stored results, the ideal diagnoser, and the page from a small run."""
 
 import json
 import os
@@ -11,19 +11,19 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from proof import figures, own_rig, riddle
+from proof import figures, own_rig, paper_array
 from proof.cases import DrawnCase, FileCase, MadeCase
 from proof.commands import prove
 from proof.ideal import diagnosed
 from proof.ideal_laws import suppositions
 from proof.judge import QUIET, Judged, judge
-from proof.kept import Work, kept, of_each, reports, sources
 from proof.real import recorded
 from proof.results import PARTS
 from proof.statistics import calibration, share
+from proof.stored import Work, of_each, reports, sources, stored
 from proof.text import document
+from rig.description import parse as parse_experiment
 from rig.draw import CATALOGUED, UNKNOWN, drawn
-from rig.experiment import parse as parse_experiment
 from rig.strengths import of_frf
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import FrfRecording, parse
@@ -117,7 +117,7 @@ def test_work_is_kept_and_found_again(tmp_path: Path) -> None:
             made.append(item)
             return {"twice": 2 * item}
 
-        return kept(tmp_path, str(item), count)
+        return stored(tmp_path, str(item), count)
 
     for _ in range(2):
         assert of_each(Work(tmp_path), [1, 2], make, lambda _: None) == [{"twice": 2}, {"twice": 4}]
@@ -242,15 +242,15 @@ def test_what_was_judged_survives_being_kept(tmp_path: Path) -> None:
     assert FileCase(path).name == "x"
 
 
-def test_the_riddles_campaigns_say_what_the_paper_says() -> None:
-    array = parse(riddle.worlds()["array"])
+def test_the_paper_s_campaigns_say_what_the_paper_says() -> None:
+    array = parse(paper_array.worlds()["array"])
     preloads = [entry.preload_n for entry in array.recordings if isinstance(entry, FrfRecording)]
-    assert (preloads.count(3.0), preloads.count(1.0)) == (riddle.AT_HIGHER, riddle.AT_LOWER)
+    assert (preloads.count(3.0), preloads.count(1.0)) == (paper_array.AT_HIGHER, paper_array.AT_LOWER)
 
 
-def test_the_riddle_is_left_open_and_what_would_settle_it_is_planned() -> None:
+def test_the_paper_s_question_is_left_open_and_what_would_settle_it_is_planned() -> None:
     """Preload and age go together on the array: both are named, neither is guessed, and the plan takes them apart."""
-    made = riddle.worlds()
+    made = paper_array.worlds()
     array = diagnosis_report(parse(made["array"]), load_table())
     rivals = {"preload_dependent_d33", "ageing"}
     assert array["verdict"] == "ambiguous"
@@ -264,9 +264,9 @@ def test_the_riddle_is_left_open_and_what_would_settle_it_is_planned() -> None:
     assert all(entry["position_mm"] == [0.0, 0.0] for entry in planned["recordings"])
 
 
-def test_what_would_settle_the_riddle_does() -> None:
+def test_what_would_settle_the_paper_s_question_does() -> None:
     """Both preloads on late sensors: what did it is named."""
-    made = riddle.worlds()
+    made = paper_array.worlds()
     aged = diagnosis_report(parse(made["array, then both preloads: age did it"]), load_table())
     assert {entry["name"] for entry in aged["mechanisms"]} == {"ageing"}
 

@@ -43,12 +43,12 @@ def test_draws_are_campaigns_within_the_tables_and_their_truth_says_what_shows()
         kept = campaigns.parse(campaign(recorded))
         truth = truth_of_lines(recorded)
         assert 1 <= len(kept.recordings) <= 110
-        skin, plan = recorded.bench.experiment.skin, recorded.bench.plan
+        skin, plan = recorded.response.experiment.skin, recorded.response.plan
         radius = np.cbrt(0.5625 * plan.preload_n * plan.indenter_mm / skin.youngs_modulus_mpa)
         assert radius.max() / skin.thickness_mm < 2
         if not truth["effects"]:
             assert truth["identifiable"]
-            assert abs(truth["chi2_gain_of_truth"]) < 1e-6 + 20 * bool(recorded.bench.missed_mm.any())
+            assert abs(truth["chi2_gain_of_truth"]) < 1e-6 + 20 * bool(recorded.response.missed_mm.any())
         shows.append(truth["identifiable"])
         if "unknown" in truth["effects"]:
             assert set(truth["parameters"]) <= set(UNCATALOGUED)

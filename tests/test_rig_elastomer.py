@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import quad
 
 from rig import effects
-from rig.elastomer import Curve, campaign_of_curves, record_curves
+from rig.description import parse
+from rig.elastomer import RecordedCurve, campaign_of_curves, record_curves
 from rig.errors import RigError
-from rig.experiment import parse
 from rig.visible_curves import chi2_gain
 from underskin.recordings import campaign as campaigns
 
@@ -46,7 +46,7 @@ def described(kind: str, on: dict[str, Any], **curves: Any) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def curve(kind: str, on: dict[str, Any], **curves: Any) -> tuple[Curve, np.ndarray, np.ndarray]:
+def curve(kind: str, on: dict[str, Any], **curves: Any) -> tuple[RecordedCurve, np.ndarray, np.ndarray]:
     (recorded,) = record_curves(parse(described(kind, on, **curves)))
     return recorded, np.array(recorded.entry["displacement_mm"]), np.array(recorded.entry["force_n"])
 

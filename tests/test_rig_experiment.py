@@ -9,9 +9,10 @@ import pytest
 from typer.testing import CliRunner
 
 from rig.commands import rig as command
+from rig.description import parse
 from rig.effects import KNOWN
 from rig.errors import RigError
-from rig.experiment import Curves, Design, Drive, Lines, Noise, Skin, parse
+from rig.experiment import CurveDesign, DeclaredSkin, Drive, LineGrid, Noise, RecordingDesign
 from rig.reading import document
 from rig.recorded import record_lines
 from tests.rig_experiments import PARAMETERS, described
@@ -120,7 +121,7 @@ def test_everything_is_documented() -> None:
         assert effect.law in row
         assert all(f"`{word}`" in row for word in (*effect.parameters, *effect.laws))
         assert ", ".join(effect.kinds) in row
-    for part in (Skin, Design, Lines, Drive, Noise, Curves):
+    for part in (DeclaredSkin, RecordingDesign, LineGrid, Drive, Noise, CurveDesign):
         for entry in fields(part):
             assert re.search(rf"\b{entry.name}\b", text), f"{part.__name__}.{entry.name}"
 
@@ -137,6 +138,6 @@ def test_the_documented_description_is_accepted(tmp_path: Path) -> None:
     parse({"schema": whole["schema"], "name": "x", "kind": "indentation", "skin": whole["skin"], **curves})
     assert set(whole) >= {"skin", "design", "lines", "noise", "effects"}
     assert set(drive["drive"]) == {entry.name for entry in fields(Drive)}
-    assert set(curves["curves"]) == {entry.name for entry in fields(Curves)}
-    assert set(whole["design"]) == {entry.name for entry in fields(Design)}
+    assert set(curves["curves"]) == {entry.name for entry in fields(CurveDesign)}
+    assert set(whole["design"]) == {entry.name for entry in fields(RecordingDesign)}
     assert set(whole["noise"]) == {entry.name for entry in fields(Noise)}

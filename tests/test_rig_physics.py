@@ -10,14 +10,14 @@ import pytest
 
 import underskin
 from rig import effects, finite_strain_solve, linear_filters
-from rig.bench import Bench
 from rig.contact import sphere_contact
+from rig.description import parse
 from rig.errors import RigError
-from rig.experiment import parse
 from rig.finite_strain import added_spectrum
 from rig.layer import WAVENUMBERS, Layer, base_stress, hertz_shape
-from rig.pressed import Pressed
-from rig.recorded import make_bench
+from rig.layer_contacts import LayerContacts
+from rig.recorded import make_response
+from rig.true_response import TrueResponse
 from tests.oracle import NEEDS_ORACLE
 from tests.rig_experiments import PARAMETERS, described
 from underskin.surrogate.off_centre_sigma import positioned_sigma
@@ -100,7 +100,7 @@ def test_finite_strain_as_kept_is_what_the_solver_gives_between_the_nodes() -> N
 
 
 def test_the_solver_carries_the_whole_load_to_the_base() -> None:
-    layer = finite_strain_solve.Layer(finite_strain_solve.make_mesh(0.6))
+    layer = finite_strain_solve.FiniteStrainLayer(finite_strain_solve.make_mesh(0.6))
     assert layer.load(0.6).sum() == pytest.approx(-1, rel=1e-12)
     state = np.zeros(layer.size)
     state[2 * len(layer.mesh.r) :: 3] = 1.0
@@ -109,16 +109,16 @@ def test_the_solver_carries_the_whole_load_to_the_base() -> None:
 
 
 def test_base_contact_is_hertz() -> None:
-    pressed = Pressed(2.5, 16.0, {}, np.array([4.0]), np.array([1.0]), np.zeros(1))
+    pressed = LayerContacts(2.5, 16.0, {}, np.array([4.0]), np.array([1.0]), np.zeros(1))
     assert pressed.contact_radius[0] ** 3 == pytest.approx(0.75 * 0.75 * 1.0 * 4.0 / 16.0)
 
 
-def bench(**changes: object) -> Bench:
-    return make_bench(parse(described(**changes)))
+def response(**changes: object) -> TrueResponse:
+    return make_response(parse(described(**changes)))
 
 
 def test_the_frf_is_real_and_positive_in_compression_and_what_the_paper_says() -> None:
-    lines = bench(effects={}).lines(np.array([10.0, 100.0]))
+    lines = response(effects={}).lines(np.array([10.0, 100.0]))
     assert (lines.imag == 0).all()
     assert (lines.real > 0).all()
     a = (0.5625 * 0.5 * 4 / 16) ** (1 / 3)
@@ -126,12 +126,12 @@ def test_the_frf_is_real_and_positive_in_compression_and_what_the_paper_says() -
 
 
 def test_resonance_where_tip_mass_and_contact_spring_say() -> None:
-    rig = bench(effects={"contact_resonance": {"tip_mass_g": 2.0, "damping": 0.01}})
+    rig = response(effects={"contact_resonance": {"tip_mass_g": 2.0, "damping": 0.01}})
     frequency = np.linspace(100, 2500, 24001)
     peak = frequency[np.argmax(np.abs(rig.lines(frequency)), axis=1)]
     expected = np.sqrt(rig.stiffness * 1e3 / 2e-3) / (2 * np.pi)
     assert peak == pytest.approx(expected, rel=1e-3)
-    assert len(np.unique(peak.round())) == len(rig.pressed.force)  # it moves with preload and indenter
+    assert len(np.unique(peak.round())) == len(rig.contacts.force)  # it moves with preload and indenter
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def test_resonance_where_tip_mass_and_contact_spring_say() -> None:
 )
 def test_signs_of_phase(name: str, sign: int) -> None:
     """e^(+iωt): what comes late or follows with inertia has a negative phase, a high-pass leads."""
-    lines = bench(effects={name: PARAMETERS[name]}).lines(np.array([20.0]))
+    lines = response(effects={name: PARAMETERS[name]}).lines(np.array([20.0]))
     assert (np.sign(lines.imag) == sign).all()
 
 
@@ -154,16 +154,16 @@ def test_relaxation_ladder_is_a_power_law() -> None:
 
 def test_edges_that_move_agree_in_the_limit_of_a_small_amplitude() -> None:
     moving, cycling = (
-        bench(effects={name: {key: 1.0}}, design={"dynamic_forces_n": [1e-3]}).effective_sigma
+        response(effects={name: {key: 1.0}}, design={"dynamic_forces_n": [1e-3]}).effective_sigma
         for name, key in (("moving_contact_edge", "mobile_fraction"), ("amplitude_nonlinearity", "mobility"))
     )
     assert moving == pytest.approx(cycling, rel=1e-5)
 
 
 def test_a_fast_oscillation_meets_the_unrelaxed_modulus_on_the_contact_that_crept() -> None:
-    crept = bench(effects={"contact_creep": {"fraction": 0.4, "time_s": 10.0}}, design={"dwells_s": [1e6]})
-    softer = bench(effects={"modulus_error": {"factor": 0.6}})
-    assert crept.pressed.contact_radius == pytest.approx(softer.pressed.contact_radius, rel=1e-12)
+    crept = response(effects={"contact_creep": {"fraction": 0.4, "time_s": 10.0}}, design={"dwells_s": [1e6]})
+    softer = response(effects={"modulus_error": {"factor": 0.6}})
+    assert crept.contacts.contact_radius == pytest.approx(softer.contacts.contact_radius, rel=1e-12)
     assert crept.stiffness == pytest.approx(softer.stiffness / 0.6, rel=1e-12)
 
 
@@ -187,14 +187,14 @@ FREQUENCY = np.geomspace(2, 500, 12)
 
 @pytest.mark.parametrize("name", LIMITS)
 def test_every_effect_has_the_base_model_as_its_limit(name: str) -> None:
-    base = bench(effects={}).lines(FREQUENCY)
-    assert bench(effects={name: LIMITS[name]}).lines(FREQUENCY) == pytest.approx(base, rel=2e-6)
+    base = response(effects={}).lines(FREQUENCY)
+    assert response(effects={name: LIMITS[name]}).lines(FREQUENCY) == pytest.approx(base, rel=2e-6)
 
 
 @pytest.mark.parametrize("name", [name for name in PARAMETERS if name not in ("mains_pickup", "layered_contact")])
 def test_every_effect_changes_the_response(name: str) -> None:
-    base = bench(effects={}).lines(FREQUENCY)
-    changed = bench(effects={name: PARAMETERS[name]}).lines(FREQUENCY)
+    base = response(effects={}).lines(FREQUENCY)
+    changed = response(effects={name: PARAMETERS[name]}).lines(FREQUENCY)
     assert np.abs(changed / base - 1).max() > 5e-3
 
 
@@ -205,7 +205,7 @@ def test_every_effect_of_a_recording_of_kind_frf_is_tested() -> None:
 
 def test_layered_contact_tends_to_hertz_on_a_thick_layer() -> None:
     thick = {"skin": {"thickness_mm": 60.0, "sensor_radius_mm": 36.0, "array": {"pitch_mm": 72.0}}}
-    base, layered = (bench(effects=on, **thick).pressed.contact_radius for on in ({}, {"layered_contact": None}))
+    base, layered = (response(effects=on, **thick).contacts.contact_radius for on in ({}, {"layered_contact": None}))
     assert layered == pytest.approx(base, rel=1e-4)
 
 
@@ -215,8 +215,8 @@ def test_a_neighbour_s_charge_is_what_it_makes_of_its_own_stress() -> None:
         "skin": {"array": {"columns": 2, "pitch_mm": 4.0}},
         "design": {"preloads_n": [3.0], "indenters_mm": [10.0], "offsets_mm": [[1.5, 0.0], [-2.5, 0.0]]},
     }
-    alone = bench(effects=under, **made).level
-    coupled = bench(effects={**under, "crosstalk": {"fraction": 0.4}}, **made).level
+    alone = response(effects=under, **made).level
+    coupled = response(effects={**under, "crosstalk": {"fraction": 0.4}}, **made).level
     first, second = 0, 3  # the sphere in one place, 1.5 mm from the first sensor and 2.5 mm from the second
     assert coupled[first] == pytest.approx(alone[first] + 0.4 * alone[second], rel=1e-12)
     assert coupled[second] == pytest.approx(alone[second] + 0.4 * alone[first], rel=1e-12)
@@ -227,20 +227,20 @@ def test_a_neighbour_far_off_on_a_thin_skin_adds_no_charge() -> None:
         "skin": {"thickness_mm": 0.2, "sensor_radius_mm": 0.1, "array": {"columns": 2, "pitch_mm": 8.0}},
         "design": {"preloads_n": [0.2], "indenters_mm": [4.0], "offsets_mm": [[0.0, 0.0]]},
     }
-    alone, coupled = (bench(effects=on, **thin).level for on in ({}, {"crosstalk": {"fraction": 1.0}}))
+    alone, coupled = (response(effects=on, **thin).level for on in ({}, {"crosstalk": {"fraction": 1.0}}))
     assert coupled == pytest.approx(alone, rel=1e-12)
 
 
 def test_all_effects_of_the_catalogue_work_together() -> None:
     together = {name: PARAMETERS[name] for name in PARAMETERS if name in effects.EFFECTS}
-    assert np.isfinite(bench(effects=together).lines(FREQUENCY)).all()
+    assert np.isfinite(response(effects=together).lines(FREQUENCY)).all()
 
 
 def test_a_contact_beyond_what_was_solved_is_refused() -> None:
     with pytest.raises(RigError, match=r"load parameter.*must be at most 0\.1"):
-        bench(skin={"youngs_modulus_mpa": 0.5}).lines(FREQUENCY)
+        response(skin={"youngs_modulus_mpa": 0.5}).lines(FREQUENCY)
     with pytest.raises(RigError, match=r"contact radius.*lower preload_n"):
-        bench(skin={"thickness_mm": 0.2, "sensor_radius_mm": 0.1}).lines(FREQUENCY)
+        response(skin={"thickness_mm": 0.2, "sensor_radius_mm": 0.1}).lines(FREQUENCY)
 
 
 def test_the_base_model_is_that_of_the_tables() -> None:

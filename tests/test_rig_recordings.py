@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import underskin
 from rig.commands import rig as command
-from rig.experiment import parse
+from rig.description import parse
 from rig.output import carry_out
 from rig.recorded import line_noise, record_lines
 from rig.time_domain import record_series
@@ -55,10 +55,10 @@ IN_TIME = [
 
 @pytest.mark.parametrize("on", IN_TIME, ids=lambda on: "+".join(on) or "base")
 def test_time_series_have_the_frf_of_the_other_route(on: dict[str, Any]) -> None:
-    bench, series = series_of({}, on)
+    response, series = series_of({}, on)
     for row, recorded in enumerate(series):
         frf = broadband(recorded.force_n, recorded.charge_pc, RATE)
-        assert_agrees(frf, bench.lines(frf.frequency)[row], (10.0, 550.0))
+        assert_agrees(frf, response.lines(frf.frequency)[row], (10.0, 550.0))
 
 
 def assert_agrees(frf: Frf, expected: np.ndarray, band: tuple[float, float]) -> None:
@@ -71,36 +71,36 @@ def assert_agrees(frf: Frf, expected: np.ndarray, band: tuple[float, float]) -> 
 
 
 def test_a_sweep_has_the_frf_of_the_other_route() -> None:
-    bench, series = series_of({"kind": "sweep", "duration_s": 16.0}, {"amplifier_high_pass": {"corner_hz": 1.0}})
+    response, series = series_of({"kind": "sweep", "duration_s": 16.0}, {"amplifier_high_pass": {"corner_hz": 1.0}})
     frf = broadband(series[0].force_n, series[0].charge_pc, RATE, block_samples=2048)  # two sweeps a block
     inside = (frf.frequency > 20) & (frf.frequency < 550)
-    assert np.abs(frf.values / bench.lines(frf.frequency)[0] - 1)[inside].max() < 0.01
+    assert np.abs(frf.values / response.lines(frf.frequency)[0] - 1)[inside].max() < 0.01
 
 
 def test_where_a_sweep_begins_anew_nothing_folds_back() -> None:
     """The force jumps there: without the converter's filter the lowest lines are off by a percent."""
     drive = {"kind": "sweep", "duration_s": 8.0, "sample_rate_hz": 512.0, "low_hz": 1.0, "high_hz": 130.0}
-    bench, series = series_of(drive | {"charge_noise_pc": 0.0}, {"amplifier_high_pass": {"corner_hz": 1.0}})
+    response, series = series_of(drive | {"charge_noise_pc": 0.0}, {"amplifier_high_pass": {"corner_hz": 1.0}})
     frf = estimate(series[0].force_n, series[0].charge_pc, 512.0)
     inside = frf.frequency < 130
-    assert np.abs(frf.values / bench.lines(frf.frequency)[0] - 1)[inside].max() < 2e-3
+    assert np.abs(frf.values / response.lines(frf.frequency)[0] - 1)[inside].max() < 2e-3
 
 
 def test_stepped_sine_has_the_frf_of_the_other_route() -> None:
     on = {"contact_resonance": {"tip_mass_g": 3.0, "damping": 0.1}, "timing_delay": {"delay_us": 100.0}}
-    bench, series = series_of({"kind": "stepped_sine", "steps": 12}, on)
+    response, series = series_of({"kind": "stepped_sine", "steps": 12}, on)
     frf = estimate(series[0].force_n, series[0].charge_pc, RATE)
     assert len(frf.frequency) == 12
-    assert np.abs(frf.values / bench.lines(frf.frequency)[0] - 1).max() < 3e-4
+    assert np.abs(frf.values / response.lines(frf.frequency)[0] - 1).max() < 3e-4
 
 
 def test_a_large_amplitude_shows_in_time_as_its_first_harmonic() -> None:
     """The edge moves with the cycle: Fσ(F) at each instant has the first harmonic of the other route."""
     on = {"amplitude_nonlinearity": {"mobility": 1.0}}
     drive = {"kind": "stepped_sine", "steps": 6, "charge_noise_pc": 0.0002}
-    bench, series = series_of(drive, on, dynamic_n=0.8)
+    response, series = series_of(drive, on, dynamic_n=0.8)
     frf = estimate(series[0].force_n, series[0].charge_pc, RATE)
-    assert frf.values == pytest.approx(bench.lines(frf.frequency)[0], rel=1e-3)
+    assert frf.values == pytest.approx(response.lines(frf.frequency)[0], rel=1e-3)
     still, _ = series_of(drive, {}, dynamic_n=0.8)
     assert np.abs(frf.values[0] / still.lines(frf.frequency)[0, 0] - 1) > 0.005
 

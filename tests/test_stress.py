@@ -12,6 +12,7 @@ import httpx
 import numpy as np
 import pytest
 
+from tests.sphere_contact import SphereOnLayer
 from tests.stress_documents import COMMAND, PRESS, SKIN, Document, document, posted
 from underskin import Client
 from underskin.array_stress.answer import answer
@@ -20,7 +21,6 @@ from underskin.physics import elastic_layer
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.half_space import stress as half_space_stress
 from underskin.physics.hankel_transform import normal_stress
-from underskin.physics.sphere_contact import SphereOnLayer
 from underskin.surrogate.influence_table import load_influence
 from underskin.units import Floats
 

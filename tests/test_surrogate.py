@@ -9,10 +9,10 @@ import h5py
 import numpy as np
 import pytest
 
+from tablegen import linear_layer
 from tablegen.sigma import Nodes, solve_column
 from tests.oracle import NEEDS_ORACLE, linear_layer_values
 from underskin import TableError, load_table
-from underskin.physics import linear_layer
 from underskin.surrogate.hdf5_format import data_hash, read_table
 from underskin.surrogate.sigma_table import SigmaTable, tables_folder
 

@@ -5,14 +5,14 @@ import pytest
 
 import tablegen.mesh
 import tablegen.newton
+from tablegen import linear_layer
 from tablegen.base_stress import BaseStress
 from tablegen.discretisation import discretise
 from tablegen.faces import hertz_load
 from tablegen.mesh import layer_mesh
-from tablegen.newton import Layer
+from tablegen.newton import NonlinearLayer
 from tablegen.sigma import Nodes, peak_pressures, solve_column
 from underskin import SolverError
-from underskin.physics import linear_layer
 
 RHO = np.array([0.0, 0.1, 0.2, 0.6, 1.0, 2.0, 3.0])
 R = np.linspace(0, 8, 17)
@@ -34,7 +34,7 @@ def test_convergence_rate_of_the_stress_on_the_base(order: int) -> None:
     """Stresses of elements of order k converge like h^k in the mean square, here on the base under a wide contact."""
     errors = []
     for refinement in (1, 2):
-        layer = Layer(discretise(layer_mesh(1.0, refinement), order))
+        layer = NonlinearLayer(discretise(layer_mesh(1.0, refinement), order))
         base = BaseStress(layer.discretisation)
         stress = base.at_points(layer.linear_force(hertz_load(layer.discretisation, 1.0)))
         exact = linear_layer.sigma(1.0, 0.0, base.points)
@@ -50,7 +50,7 @@ def test_finite_strain_reference_values() -> None:
 
 
 def test_volume_is_kept_and_the_path_of_loading_does_not_matter() -> None:
-    layer = Layer(discretise(layer_mesh(0.5), 4))
+    layer = NonlinearLayer(discretise(layer_mesh(0.5), 4))
     load = hertz_load(layer.discretisation, 0.5)
     peak = float(peak_pressures(np.cbrt(np.array([0.1])))[0])
     direct = layer.equilibrium(layer.rest(), peak * load)
@@ -62,7 +62,7 @@ def test_volume_is_kept_and_the_path_of_loading_does_not_matter() -> None:
 
 def test_the_surface_sinks_under_the_contact_and_the_base_does_not_move() -> None:
     d = discretise(layer_mesh(0.5), 4)
-    layer = Layer(d)
+    layer = NonlinearLayer(d)
     state = layer.equilibrium(layer.rest(), 0.3 * hertz_load(d, 0.5))
     vertices = d.basis.mesh.p
     on_axis = np.flatnonzero((vertices[0] == 0) & (vertices[1] == 1.0))

@@ -1,4 +1,4 @@
-"""Numbers and probabilities as people read them."""
+"""Numbers and probabilities for readers."""
 
 from decimal import Decimal
 
@@ -12,7 +12,7 @@ def significant(value: float, digits: int, *, trailing_zeros: bool = False) -> s
 
 
 def in_percent(probability: float) -> str:
-    """A probability in words; never 0 or 100 %, which nothing here can know."""
+    """A probability in words; never 0 or 100 %."""
     stated = round(probability, 3)
     if 0.001 <= stated <= 0.999:
         return f"{100 * stated:.3g} %"

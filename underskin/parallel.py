@@ -1,6 +1,6 @@
-"""Processes for many computations that do not depend on each other.
+"""Processes for many independent computations.
 
-Each is a fresh interpreter with one BLAS thread: the same numbers whatever the number of cores. They end with the
+Each is a fresh interpreter with one BLAS thread, so results do not depend on the number of cores. They end with the
 process that started them, however that one ends.
 """
 
@@ -16,14 +16,14 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def one_blas_thread() -> None:
-    """For the processes to come, and for this one where NumPy has not been imported yet."""
+    """Set one BLAS thread for new processes, and for this one if NumPy has not been imported yet."""
     for name in _THREADS:
         os.environ[name] = "1"
 
 
 @contextmanager
 def processes(count: int) -> Iterator[Executor]:
-    """So many. Where the block is left by an exception, Ctrl-C among them, they are killed with what they are at."""
+    """A pool of `count` processes; if the block is left by an exception, such as Ctrl-C, they are killed."""
     one_blas_thread()
     others = set(active_children())
     with ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_end_with_the_parent) as pool:
@@ -37,7 +37,7 @@ def processes(count: int) -> Iterator[Executor]:
 
 
 def _end_with_the_parent() -> None:
-    """A killed parent says nothing, and its pipes stay open in its other children; Ctrl-C is the parent's to hear."""
+    """End this process with its parent, also if that is killed; Ctrl-C is left to the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_await_the_parent, daemon=True).start()
 

@@ -1,10 +1,10 @@
-"""A digest of what Python sources compute, whatever their modules are called and however they are described.
+"""A digest of what Python sources compute, independent of module names and documentation.
 
-Work that takes hours is kept as long as the code that made it computes the same. So the digest is of the syntax trees
-without docstrings, comments and layout, and each module counts by its content and not by its name or place. A name that
-is imported stands for what it is: of a module among those digested for the content of that module, of another package
-for its full name, of another module of this project for its last name. Any other change, also of the name of a function
-or of a variable, makes another digest.
+Results that take hours are kept as long as the code that made them computes the same. The digest covers the syntax
+trees without docstrings, comments and layout; each module counts by its content, not by its name or folder. An imported
+name stands for its origin: the content of a module among those digested, the full name in another package, the last
+name in another module of this project. Any other change, also of the name of a function or a variable, changes the
+digest.
 """
 
 import ast
@@ -43,7 +43,7 @@ def _digest(tree: ast.Module, identities: Mapping[str, str]) -> str:
 
 
 def _bare(node: ast.AST) -> ast.AST:
-    """A node with the kinds of its children in their places: what they are is told of them."""
+    """A node with the kinds of its children in their places; the children are digested as nodes of their own."""
     fields: dict[str, Any] = {}
     for name, value in ast.iter_fields(node):
         if isinstance(value, ast.AST):
@@ -57,7 +57,7 @@ def _bare(node: ast.AST) -> ast.AST:
 
 
 def _meanings(tree: ast.Module, identities: Mapping[str, str]) -> dict[str, str]:
-    """What each imported name stands for."""
+    """The origin of each imported name."""
     ours = {name.partition(".")[0] for name in identities}
     meanings = {}
     for node in ast.walk(tree):

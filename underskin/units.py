@@ -1,8 +1,8 @@
-"""Lab units at the boundary, SI inside: the one place where the two meet.
+"""Lab units at the boundary, SI inside: the only place of conversion.
 
-A boundary field carries its unit in its name (`thickness_mm`). `LAB` lists every such field with its unit, its
-factor to SI and the range of magnitudes that a piezoelectric skin's lab can mean; `checked` refuses what is not
-finite, not positive, or of a magnitude that looks like a slip of units, and guesses the slip.
+A boundary field carries its unit in its name (`thickness_mm`). `LAB` lists every such field with its unit, its factor
+to SI and the range of magnitudes that are likely in a piezoelectric skin's lab. `checked` rejects values that are not
+finite, not positive, or of unlikely magnitude, and guesses the unit that was meant.
 """
 
 from dataclasses import dataclass
@@ -83,10 +83,27 @@ def to_lab(name: str, value: ArrayLike) -> Floats:
 
 
 def checked(name: str, value: ArrayLike, *, units_checked: bool = False) -> Floats:
-    """The SI value of a declared field given in lab units, after checking every entry.
+    """The SI value of a declared field in lab units, with every entry checked.
 
-    Raises InvalidInput at the first entry that is not finite, is zero, is negative (unless the field may be:
-    d33 has a sign), or has an unlikely magnitude (unless `units_checked`).
+    Parameters
+    ----------
+    name : str
+        A field of `LAB`.
+    value : array_like
+        In the field's lab unit.
+    units_checked : bool
+        Accept unlikely magnitudes.
+
+    Returns
+    -------
+    ndarray
+        SI, of the shape of `value`.
+
+    Raises
+    ------
+    InvalidInput
+        At the first entry that is not finite, is zero, is negative (unless the field may be: d33 has a sign), or has an
+        unlikely magnitude.
     """
     field = LAB[name]
     values = np.asarray(value, dtype=float)
@@ -103,12 +120,12 @@ def checked(name: str, value: ArrayLike, *, units_checked: bool = False) -> Floa
 
 
 def non_negative(name: str, values: Floats) -> Floats:
-    """`values`, after refusing what is not finite or below 0 (InvalidInput with the first such row)."""
+    """`values`; raises InvalidInput at the first row that is not finite or below 0."""
     return _accepted(name, values, np.isfinite(values) & (values >= 0), "must be finite and at least 0")
 
 
 def finite(name: str, values: Floats) -> Floats:
-    """`values`, after refusing what is not finite (InvalidInput with the first such row)."""
+    """`values`; raises InvalidInput at the first row that is not finite."""
     return _accepted(name, values, np.isfinite(values), "must be finite")
 
 
@@ -130,9 +147,9 @@ class Finding:
 
 
 def findings(name: str, value: ArrayLike) -> list[Finding]:
-    """The first entry of a measured field whose magnitude looks like a slip of units or a dead sensor, if any.
+    """The first entry of a measured field of unlikely magnitude, if any: a wrong unit, or a dead sensor.
 
-    Measured values are never refused for their magnitude, unlike declared ones (see `checked`).
+    Measured values are never rejected for their magnitude, unlike declared ones (`checked`).
     """
     field = LAB[name]
     values = np.asarray(value, dtype=float)
@@ -156,7 +173,7 @@ def _refuse(name: str, values: Floats, bad: NDArray[np.bool_], allowed: str) -> 
 
 
 def _slip(field: LabField, size: float) -> Requirement:
-    """What is allowed, and the unit that was probably meant."""
+    """The allowed range, and the unit that was probably meant."""
     assert field.likely is not None
     low, high = field.likely
     text = f"must be {low:g} to {high:g} {field.unit} in magnitude"
@@ -164,7 +181,7 @@ def _slip(field: LabField, size: float) -> Requirement:
 
 
 def _guess(field: LabField, size: float) -> str:
-    """The slip that would explain a magnitude outside the likely range."""
+    """The wrong unit that would explain a magnitude outside the likely range."""
     assert field.likely is not None
     low, high = field.likely
     for factor, unit in _NEIGHBOURS[field.unit].items():

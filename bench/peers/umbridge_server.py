@@ -11,7 +11,7 @@ from bench.peers.spline import read_spline
 spline = read_spline(sys.argv[1])
 
 
-class Sigma(umbridge.Model):  # type: ignore[misc]  # the package has no types
+class SigmaModel(umbridge.Model):  # type: ignore[misc]  # the package has no types
     """σ(a/h, rT/h, L) as a UM-Bridge model."""
 
     def __init__(self) -> None:
@@ -31,4 +31,4 @@ class Sigma(umbridge.Model):  # type: ignore[misc]  # the package has no types
         return [[float(spline(np.array([[a, rho, load ** (1 / 3)]]))[0])]]
 
 
-umbridge.serve_models([Sigma()], int(sys.argv[2]))
+umbridge.serve_models([SigmaModel()], int(sys.argv[2]))

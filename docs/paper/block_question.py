@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tablegen import deep_layer
-from tablegen.block import Block, solve
+from docs.paper import deep_layer
+from docs.paper.block import FiniteBlock, solve
 from underskin.physics import half_space
 from underskin.units import Floats
 
@@ -45,9 +45,9 @@ HALF_SPACE = half_space.sigma(A_OVER_H, RHO)
 def at_depth(depth_mm: float) -> Depth:
     """Solve the block with its base at `depth_mm`."""
     depth = depth_mm / H_MM
-    block = Block(LENGTH_MM / H_MM, WIDTH_MM / H_MM, depth)
+    block = FiniteBlock(LENGTH_MM / H_MM, WIDTH_MM / H_MM, depth)
     coarse, fine = solve(block, A_OVER_H, RHO, _ORDER), solve(block, A_OVER_H, RHO, _ORDER + 1)
-    slippery = solve(Block(block.length, block.width, depth, bonded=False), A_OVER_H, RHO, _ORDER)
+    slippery = solve(FiniteBlock(block.length, block.width, depth, bonded=False), A_OVER_H, RHO, _ORDER)
     return Depth(
         depth_mm=depth_mm,
         endless=deep_layer.sigma(depth, A_OVER_H, RHO),
@@ -61,5 +61,5 @@ def at_depth(depth_mm: float) -> Depth:
 
 def wide_block_error() -> float:
     """The largest relative error of a very wide block of depth h against the exact endless layer."""
-    wide = solve(Block(_WIDE, _WIDE, 1.0), A_OVER_H, RHO, _ORDER + 1)
+    wide = solve(FiniteBlock(_WIDE, _WIDE, 1.0), A_OVER_H, RHO, _ORDER + 1)
     return float(np.max(np.abs(wide.sigma / deep_layer.sigma(1.0, A_OVER_H, RHO) - 1)))

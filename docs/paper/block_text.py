@@ -15,9 +15,9 @@ _INTRODUCTION = f"""\
 
 At ρ = 0.2 and a/h = 0.289 the paper gives the half space an error of "about 40 %" at depth h = 2.5 mm, "10 %" with
 the substrate at 10 mm and "1 %" at 30 mm. Here the paper's block, {block.LENGTH_MM:g} × {block.WIDTH_MM:g} mm with
-free side walls on a bonded rigid base, is solved in three dimensions (`tablegen.block`: linear, incompressible,
+free side walls on a bonded rigid base, is solved in three dimensions (`docs/paper/block.py`: linear, incompressible,
 Taylor–Hood elements of order 6, a quarter by symmetry, sensors' plane 2.5 mm below the top), beside the exact endless
-layer (`tablegen.deep_layer`). A base at 5 mm and the prototype's ρ = 0.6 are added.
+layer (`docs/paper/deep_layer.py`). A base at 5 mm and the prototype's ρ = 0.6 are added.
 
 """
 

@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from docs.paper.prototype import BEST_FIT_D33_PC_PER_N, INDENTERS_MM, PRELOADS_N, RHO, press
-from underskin.physics import charge_response, half_space, linear_layer
+from tablegen import linear_layer
+from underskin.physics import charge_response, half_space
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 

@@ -19,7 +19,8 @@ from docs.paper.prototype import (
     preload_at_peak_pressure,
     press,
 )
-from underskin.physics import charge_response, half_space, hertz, linear_layer
+from tablegen import linear_layer
+from underskin.physics import charge_response, half_space, hertz
 from underskin.surrogate.sigma_table import SigmaTable
 
 _LINEAR_UP_TO_MPA = 2.0

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from underskin.physics import half_space, hertz, linear_layer
+from tablegen import linear_layer
+from underskin.physics import half_space, hertz
 from underskin.physics.skin import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
 from underskin.surrogate.sigma_table import SigmaTable
@@ -44,19 +45,19 @@ class Press:
 def press(table: SigmaTable, indenter_radius_mm: float, preload_n: ArrayLike) -> Press:
     """The prototype under a sphere."""
     preload = np.asarray(preload_n, dtype=float)
-    felt = transmission(table, SKIN, Indenter.from_lab(indenter_radius_mm=indenter_radius_mm), preload)
+    response = transmission(table, SKIN, Indenter.from_lab(indenter_radius_mm=indenter_radius_mm), preload)
     return Press(
         indenter_radius_mm=indenter_radius_mm,
         preload_n=preload,
-        contact_radius_mm=to_lab("contact_radius_mm", felt.contact_radius),
-        a_over_h=felt.a_over_h,
-        load_parameter=felt.load_parameter,
-        peak_pressure_mpa=to_lab("mean_stress_mpa", hertz.peak_pressure(preload, felt.contact_radius)),
-        mean_stress_mpa=to_lab("mean_stress_mpa", felt.mean_stress),
-        half_space=half_space.sigma(felt.a_over_h, RHO),
-        linear=linear_layer.sigma(felt.a_over_h, RHO),
-        table=felt.sigma,
-        table_error=felt.rel_error,
+        contact_radius_mm=to_lab("contact_radius_mm", response.contact_radius),
+        a_over_h=response.a_over_h,
+        load_parameter=response.load_parameter,
+        peak_pressure_mpa=to_lab("mean_stress_mpa", hertz.peak_pressure(preload, response.contact_radius)),
+        mean_stress_mpa=to_lab("mean_stress_mpa", response.mean_stress),
+        half_space=half_space.sigma(response.a_over_h, RHO),
+        linear=linear_layer.sigma(response.a_over_h, RHO),
+        table=response.sigma,
+        table_error=response.rel_error,
     )
 
 

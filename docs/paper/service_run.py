@@ -16,8 +16,9 @@ import httpx
 import numpy as np
 
 from docs.paper.prototype import MODULUS_MPA, RHO, SENSOR_RADIUS_MM, SKIN, THICKNESS_MM
+from tablegen import linear_layer
 from tablegen.sigma import Nodes, solve_column
-from underskin.physics import charge_response, hertz, linear_layer
+from underskin.physics import charge_response, hertz
 from underskin.physics.skin import Indenter
 from underskin.units import Floats
 
@@ -54,8 +55,8 @@ def run_array() -> ArrayRun:
             "indenter_radius_mm": INDENTER_RADIUS_MM,
             "preload_n": preload.tolist(),
         }
-        felt = _post(client, "/v1/frf", {**skin, "d33_pc_per_n": np.repeat(D33_PC_PER_N, SENSORS).tolist()})
-        frf = np.array(felt["frf_pc_per_n"])
+        response = _post(client, "/v1/frf", {**skin, "d33_pc_per_n": np.repeat(D33_PC_PER_N, SENSORS).tolist()})
+        frf = np.array(response["frf_pc_per_n"])
         answer = _post(client, "/v1/d33", {**skin, "frf_pc_per_n": frf.tolist()})
         of_fresh = _post(client, "/v1/d33", {**skin, "frf_pc_per_n": np.repeat(fresh, SENSORS).tolist()})
     d33 = np.array(answer["d33_pc_per_n"])
@@ -65,7 +66,7 @@ def run_array() -> ArrayRun:
         d33_from_service=d33[first],
         frf_from_fresh_solve=fresh,
         d33_from_fresh_solve=np.array(of_fresh["d33_pc_per_n"])[first],
-        status=sorted(set(answer["status"]) | set(felt["status"]) | set(of_fresh["status"])),
+        status=sorted(set(answer["status"]) | set(response["status"]) | set(of_fresh["status"])),
         largest_spread=max(float(np.ptp(group) / group.mean()) for group in groups),
     )
 

@@ -4,7 +4,7 @@ import tempfile
 from pathlib import Path
 
 from docs.tour.photographer import browsing, photograph, serving
-from docs.tour.steps import STEPS, Step
+from docs.tour.steps import STEPS, TourStep
 
 _HEAD = """# Five minutes with the pages
 
@@ -28,11 +28,11 @@ def document() -> str:
     return _HEAD + "".join(_section(number, step) for number, step in enumerate(STEPS, start=1))
 
 
-def picture(number: int, step: Step) -> str:
+def picture(number: int, step: TourStep) -> str:
     return f"tour-{number}-{step.name}.png"
 
 
-def _section(number: int, step: Step) -> str:
+def _section(number: int, step: TourStep) -> str:
     return f"\n## {number}. {step.title}\n\n{step.text}\n\n![{step.title}](figures/{picture(number, step)})\n"
 
 

@@ -14,7 +14,7 @@ VERDICT = "a contact resonance with a tip mass of 6.00 g, at a probability of 98
 
 
 @dataclass(frozen=True)
-class Step:
+class TourStep:
     """A picture: how to come there from the step before, and what is to be said."""
 
     name: str
@@ -89,7 +89,7 @@ def _design(page: Page) -> None:
 
 
 STEPS = (
-    Step(
+    TourStep(
         "start",
         "Start",
         "An empty server offers an example: a 4 × 2 array over half a year, recorded by the [virtual rig](rig.md) "
@@ -97,7 +97,7 @@ STEPS = (
         "whether the recordings agree with the model.",
         lambda page: page.goto("/"),
     ),
-    Step(
+    TourStep(
         "skin",
         "A skin",
         "*Load the example skin* leads here: the array as a map, coloured by d33, its uncertainty or its trend, and "
@@ -105,14 +105,14 @@ STEPS = (
         "as CSV; *The same by request*, at the foot of each page, is what your own program would send.",
         _example,
     ),
-    Step(
+    TourStep(
         "campaign",
         "A campaign",
         "Magnitude, phase and coherence of its recordings, with the flat zone that d33 is averaged over and why it "
         "ends there: here a resonance moves with preload and sphere. Choose a sensor to see its recordings one by one.",
         _campaign,
     ),
-    Step(
+    TourStep(
         "response",
         "What it tells of the array",
         "The FRF against preload, for each sphere, with the model's line; d33 of each sensor with its 95 % interval. "
@@ -120,7 +120,7 @@ STEPS = (
         "campaign withdrawn, with a reason; nothing is ever deleted.",
         _response,
     ),
-    Step(
+    TourStep(
         "diagnosis",
         "A diagnosis",
         "*Diagnose* asks what the model leaves out; for these 64 recordings the answer takes some seconds. First the "
@@ -129,7 +129,7 @@ STEPS = (
         "recordings cannot tell. [How it reasons](diagnosis.md).",
         _diagnosis,
     ),
-    Step(
+    TourStep(
         "better",
         "How much better",
         "The error with the explanation and without, on recordings that it was not fitted to, beside what noise alone "
@@ -138,7 +138,7 @@ STEPS = (
         "saved as PDF from the browser's print dialog, or saved as one HTML file that opens anywhere.",
         _better,
     ),
-    Step(
+    TourStep(
         "adopted",
         "Adopted",
         "Adopted, the explanation is the skin's model: skin and start head it, with d33 by it beside the paper's; map "
@@ -146,7 +146,7 @@ STEPS = (
         "and the paper's model is in force again.",
         _adopted,
     ),
-    Step(
+    TourStep(
         "upload",
         "Your own files",
         "*Upload* takes what your instruments wrote, such as this TDMS file of a load cell and a charge amplifier. You "
@@ -154,7 +154,7 @@ STEPS = (
         "FRFs, and of a bad recording what is wrong, field by field. Nothing is kept until you say so.",
         _upload,
     ),
-    Step(
+    TourStep(
         "design",
         "Design",
         "The design view starts from a skin and answers while you move a slider: what reaches a sensor, how finely the "

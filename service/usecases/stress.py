@@ -4,11 +4,11 @@ from dataclasses import asdict
 
 from service.schemas.columns_answer import Columns
 from underskin.array_stress.answer import answer
-from underskin.array_stress.request import StressRequest
+from underskin.array_stress.request import LoadCase
 from underskin.surrogate.influence_table import InfluenceTable
 
 
-def stress(table: InfluenceTable, request: StressRequest) -> Columns:
+def stress(table: InfluenceTable, request: LoadCase) -> Columns:
     """Charge and stress on each sensor."""
     result = answer(table, request)
     return Columns(

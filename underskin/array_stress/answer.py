@@ -10,12 +10,12 @@ from underskin.array_stress.load_integration import (
     Load,
     array_stress,
     charge,
+    combined,
     contact_load,
     map_points,
     pressure_map_loads,
-    together,
 )
-from underskin.array_stress.request import StressRequest
+from underskin.array_stress.request import LoadCase
 from underskin.array_stress.validation import findings, refuse_beside_skin, refuse_coarse, refuse_many, refuse_overlap
 from underskin.errors import InvalidInput
 from underskin.physics.contact_pressure import MOST_A_OVER_H, SpherePressure, sphere_pressures
@@ -26,10 +26,17 @@ from underskin.units import Finding, Floats, checked, to_lab, to_si
 
 
 @dataclass(frozen=True)
-class StressAnswer:
-    """One entry a sensor; NaN where no load is within the table's reach, or numbers overflow (not `inside`).
+class ArrayStress:
+    """Charge and stress of every sensor.
 
-    `contact_radius_mm`: one entry a contact; empty for a map.
+    Attributes
+    ----------
+    columns : mapping
+        Lab-unit columns by field name, each (sensors,); NaN where a sensor is not `inside`.
+    inside : ndarray of bool, (sensors,)
+        False where no load is within the table's range, or numbers overflow.
+    contact_radius_mm : ndarray, (contacts,)
+        Empty for a map.
     """
 
     columns: Mapping[str, Floats]
@@ -40,11 +47,13 @@ class StressAnswer:
     findings: list[Finding]
 
 
-def answer(table: InfluenceTable, request: StressRequest) -> StressAnswer:
+def answer(table: InfluenceTable, request: LoadCase) -> ArrayStress:
     """Charge and mean stress on every sensor.
 
-    InvalidInput for a skin outside the table, for loads beside the skin, over one another or too wide, and for too much
-    at once.
+    Raises
+    ------
+    InvalidInput
+        For a skin outside the table, for loads beside the skin, overlapping or too wide, and for too large a request.
     """
     thickness, radius, d33 = (
         float(checked(name, getattr(request, name), units_checked=True))
@@ -54,9 +63,9 @@ def answer(table: InfluenceTable, request: StressRequest) -> StressAnswer:
     sensors = to_si("x_mm", [[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
     pressures = _pressures(request, thickness)
     loads = [_contacts_load(request, pressures, thickness)] if request.contacts else _map_loads(request, thickness)
-    found = array_stress(influence, thickness, sensors, loads)
-    inside = found.inside & np.isfinite(found.stress)
-    stress, error = (np.where(inside, values, np.nan) for values in (found.stress, found.error))
+    total = array_stress(influence, thickness, sensors, loads)
+    inside = total.inside & np.isfinite(total.stress)
+    stress, error = (np.where(inside, values, np.nan) for values in (total.stress, total.error))
     columns = {
         "x_mm": to_lab("x_mm", sensors[:, 0]),
         "y_mm": to_lab("y_mm", sensors[:, 1]),
@@ -64,7 +73,7 @@ def answer(table: InfluenceTable, request: StressRequest) -> StressAnswer:
         "charge_error_pc": to_lab("charge_error_pc", np.abs(charge(error, d33, radius))),
         "mean_stress_mpa": to_lab("mean_stress_mpa", 0.0 - stress),
     }
-    return StressAnswer(
+    return ArrayStress(
         columns=columns,
         sensors=tuple(sensor.id for sensor in request.sensors),
         inside=inside,
@@ -74,8 +83,8 @@ def answer(table: InfluenceTable, request: StressRequest) -> StressAnswer:
     )
 
 
-def _influence(table: InfluenceTable, request: StressRequest, rt_over_h: float) -> Influence:
-    """The skin's influence; InvalidInput where the table has none."""
+def _influence(table: InfluenceTable, request: LoadCase, rt_over_h: float) -> Influence:
+    """The influence functions of the skin; InvalidInput where the table has none."""
     low, high = table.domain["poisson_ratio"]
     if not low <= request.poisson_ratio <= high:
         allowed = f"must be {low:g} to {high:g}: the table of influences holds no other"
@@ -90,7 +99,7 @@ def _influence(table: InfluenceTable, request: StressRequest, rt_over_h: float) 
     return influence
 
 
-def _pressures(request: StressRequest, thickness: float) -> list[SpherePressure]:
+def _pressures(request: LoadCase, thickness: float) -> list[SpherePressure]:
     """Pressures of the contacts; InvalidInput for those too wide for a linear layer."""
     if not request.contacts:
         return []
@@ -99,7 +108,7 @@ def _pressures(request: StressRequest, thickness: float) -> list[SpherePressure]
     radii = to_si("indenter_radius_mm", [contact.indenter_radius_mm for contact in request.contacts])
     forces = to_si("normal_force_n", [contact.normal_force_n for contact in request.contacts])
     layer = Layer(request.poisson_ratio, slip(glue))
-    found = []
+    pressures = []
     for index, pressure in enumerate(sphere_pressures(layer, thickness, modulus, radii, forces)):
         if pressure is None or pressure.radius >= radii[index]:
             allowed = (
@@ -107,30 +116,30 @@ def _pressures(request: StressRequest, thickness: float) -> list[SpherePressure]
                 "is the modulus in MPa?"
             )
             raise InvalidInput(f"contacts[{index}].normal_force_n", request.contacts[index].normal_force_n, allowed)
-        found.append(pressure)
-    return found
+        pressures.append(pressure)
+    return pressures
 
 
-def _contacts_load(request: StressRequest, pressures: list[SpherePressure], thickness: float) -> Load:
-    places = to_si("x_mm", [[contact.x_mm, contact.y_mm] for contact in request.contacts])
+def _contacts_load(request: LoadCase, pressures: list[SpherePressure], thickness: float) -> Load:
+    positions = to_si("x_mm", [[contact.x_mm, contact.y_mm] for contact in request.contacts])
     radii = np.array([pressure.radius for pressure in pressures])
-    refuse_beside_skin(request, places, radii[:, None], "contacts[{}]".format)
-    refuse_overlap(places, radii)
-    load = together(
+    refuse_beside_skin(request, positions, radii[:, None], "contacts[{}]".format)
+    refuse_overlap(positions, radii)
+    load = combined(
         [
             contact_load(place, (*contact.tangential_force_n, contact.normal_force_n), pressure, thickness)
-            for place, contact, pressure in zip(places, request.contacts, pressures, strict=True)
+            for place, contact, pressure in zip(positions, request.contacts, pressures, strict=True)
         ]
     )
-    refuse_many(request, len(load.places))
+    refuse_many(request, len(load.positions))
     return load
 
 
-def _map_loads(request: StressRequest, thickness: float) -> Iterable[Load]:
-    found = request.pressure_map
-    assert found is not None
-    x, y = to_si("x_mm", found.x_mm), to_si("x_mm", found.y_mm)
-    pressure = to_si("pressure_mpa", found.pressure_mpa)
+def _map_loads(request: LoadCase, thickness: float) -> Iterable[Load]:
+    pressure_map = request.pressure_map
+    assert pressure_map is not None
+    x, y = to_si("x_mm", pressure_map.x_mm), to_si("x_mm", pressure_map.y_mm)
+    pressure = to_si("pressure_mpa", pressure_map.pressure_mpa)
     refuse_coarse(x, y, thickness)
     row, column = np.nonzero(pressure)
     half = np.array([x[1] - x[0], y[1] - y[0]]) / 2

@@ -1,7 +1,7 @@
-"""Surface loads as point forces, and the charge that they put on every sensor of an array.
+"""Surface loads as point forces, and the charge that they cause on every sensor of an array.
 
-A contact's tangential force is spread like its pressure, as where a sphere slides. A pressure map is constant in each
-of its cells. All in SI; x and y in the sensors' frame.
+A contact's tangential force is distributed like its pressure, as under a sliding sphere. A pressure map is constant in
+each of its cells. All in SI; x and y in the sensors' frame.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -21,17 +21,35 @@ _POINTS_AT_ONCE = 1 << 16  # of a map, which may make more than memory holds
 
 @dataclass(frozen=True)
 class Load:
-    """Point forces (F1, F2, F3) [N], (points, 3), at places (points, 2) [m]."""
+    """Point forces on the surface.
 
-    places: Floats
+    Attributes
+    ----------
+    positions : ndarray, (points, 2)
+        x, y [m].
+    forces : ndarray, (points, 3)
+        F1, F2, F3 [N]; F3 positive into the skin.
+    """
+
+    positions: Floats
     forces: Floats
 
 
 def contact_load(place: Floats, force: Sequence[float], pressure: SpherePressure, thickness: float) -> Load:
-    """A contact at `place` x, y [m] with the force (F1, F2, F3) [N], F3 > 0 into the skin, as point forces.
+    """A contact as point forces.
 
-    The pressure's share of a ring is smooth in t = √(1 − r²/a²), so that Gauss' rule in t and equal angles integrate γ,
-    which is analytic, to machine precision.
+    The pressure's share of a ring is smooth in t = √(1 − r²/a²), so that Gauss' rule in t and equal angles integrate
+    the influence function γ, which is analytic, to machine precision.
+
+    Parameters
+    ----------
+    place : ndarray, (2,)
+        x, y of the contact [m].
+    force : sequence of float
+        F1, F2, F3 [N]; F3 above 0, into the skin.
+    pressure : SpherePressure
+    thickness : float
+        h [m].
     """
     wide = int(np.ceil(pressure.radius / thickness))
     t, weight = np.polynomial.legendre.leggauss(6 + 4 * wide)
@@ -39,13 +57,23 @@ def contact_load(place: Floats, force: Sequence[float], pressure: SpherePressure
     count = 12 + 12 * wide
     angle = 2 * np.pi * (np.arange(count) + 0.5) / count
     r = pressure.radius * np.sqrt(1 - t**2)
-    places = np.stack([np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle))], axis=-1).reshape(-1, 2)
+    positions = np.stack([np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle))], axis=-1).reshape(-1, 2)
     share = np.repeat(pressure.ring_share(t) * weight / count, count)
-    return Load(places + place, np.outer(share, force))
+    return Load(positions + place, np.outer(share, force))
 
 
 def pressure_map_loads(x: Floats, y: Floats, pressure: Floats, thickness: float) -> Iterator[Load]:
-    """A map as point forces, part by part: `pressure` (y, x) [Pa], constant in cells around evenly spaced x and y."""
+    """A pressure map as point forces, in parts.
+
+    Parameters
+    ----------
+    x, y : ndarray, (columns,) and (rows,)
+        Evenly spaced centres of the cells [m].
+    pressure : ndarray, (rows, columns)
+        Constant in each cell [Pa].
+    thickness : float
+        h [m].
+    """
     width, height = x[1] - x[0], y[1] - y[0]
     across, across_share = _cell_rule(width / thickness)
     along, along_share = _cell_rule(height / thickness)
@@ -53,50 +81,81 @@ def pressure_map_loads(x: Floats, y: Floats, pressure: Floats, thickness: float)
     at_once = max(1, _POINTS_AT_ONCE // (along.size * across.size))
     for start in range(0, max(1, every_row.size), at_once):
         row, column = (every[start : start + at_once] for every in (every_row, every_column))
-        places = np.empty((row.size, along.size, across.size, 2))
-        places[..., 0] = x[column, None, None] + width * across
-        places[..., 1] = y[row, None, None] + height * along[:, None]
+        positions = np.empty((row.size, along.size, across.size, 2))
+        positions[..., 0] = x[column, None, None] + width * across
+        positions[..., 1] = y[row, None, None] + height * along[:, None]
         force = pressure[row, column, None, None] * width * height * np.outer(along_share, across_share)
         forces = np.zeros((force.size, 3))
         forces[:, 2] = force.ravel()
-        yield Load(places.reshape(-1, 2), forces)
+        yield Load(positions.reshape(-1, 2), forces)
 
 
 def map_points(x: Floats, y: Floats, pressure: Floats, thickness: float) -> int:
-    """How many point forces `pressure_map_loads` makes of a map."""
+    """Number of point forces that `pressure_map_loads` makes of a map."""
     width, height = (_rule_of((axis[1] - axis[0]) / thickness) for axis in (x, y))
     return int(np.count_nonzero(pressure)) * width[0] * width[1] * height[0] * height[1]
 
 
-def together(loads: Sequence[Load]) -> Load:
+def combined(loads: Sequence[Load]) -> Load:
     """Several loads as one."""
-    return Load(np.concatenate([load.places for load in loads]), np.concatenate([load.forces for load in loads]))
+    return Load(np.concatenate([load.positions for load in loads]), np.concatenate([load.forces for load in loads]))
 
 
 def array_stress(influence: Influence, thickness: float, sensors: Floats, loads: Iterable[Load]) -> SensorStress:
-    """Mean stress on sensors (sensors, 2) [m] under all loads."""
+    """Mean stress on sensors under all loads.
+
+    Parameters
+    ----------
+    influence : Influence
+        Of the skin.
+    thickness : float
+        h [m].
+    sensors : ndarray, (sensors, 2)
+        Centres x, y [m].
+    loads : iterable of Load
+
+    Returns
+    -------
+    SensorStress
+        Stress, bound on its error, and whether any load is in range; each (sensors,).
+    """
     stress, error, inside = np.zeros(len(sensors)), np.zeros(len(sensors)), np.zeros(len(sensors), dtype=bool)
     for load in loads:
-        part = influence.stress(thickness, sensors, load.places, load.forces)
+        part = influence.stress(thickness, sensors, load.positions, load.forces)
         stress, error, inside = stress + part.stress, error + part.error, inside | part.inside
     return SensorStress(stress, error, inside)
 
 
 def charge(stress: Floats, d33: float, sensor_radius: float) -> Floats:
-    """Q = −d33 π rT² T̄ [C]: positive in compression for a positive d33."""
+    """Charge Q = −d33 π rT² T̄, positive in compression for a positive d33.
+
+    Parameters
+    ----------
+    stress : ndarray
+        Mean stress T̄ [Pa], tension positive.
+    d33 : float
+        [C/N].
+    sensor_radius : float
+        rT [m].
+
+    Returns
+    -------
+    ndarray
+        [C], of the shape of `stress`.
+    """
     return 0.0 - d33 * np.pi * sensor_radius**2 * stress  # no load is 0, not −0
 
 
 def _rule_of(size: float) -> tuple[int, int]:
-    """Points in each part of a cell of `size` thicknesses, and how many parts."""
+    """Number of quadrature points in each part of a cell of `size` thicknesses, and number of parts."""
     points = 1 if size <= _FINE_CELL else 2 if size <= _MIDDLING_CELL else 3
     return points, max(1, int(np.ceil(size / _SUBCELL)))
 
 
 def _cell_rule(size: float) -> tuple[Floats, Floats]:
-    """Places in a cell, −1/2 to 1/2, and their shares, for a cell of `size` thicknesses."""
+    """Quadrature points in a cell, −1/2 to 1/2, and their weights, for a cell of `size` thicknesses."""
     points, parts = _rule_of(size)
     node, weight = np.polynomial.legendre.leggauss(points)
     start = (np.arange(parts) - parts / 2) / parts
-    places = (start[:, None] + (1 + node) / 2 / parts).ravel()
-    return places, np.tile(weight / 2 / parts, parts)
+    positions = (start[:, None] + (1 + node) / 2 / parts).ravel()
+    return positions, np.tile(weight / 2 / parts, parts)

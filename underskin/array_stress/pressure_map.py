@@ -43,13 +43,13 @@ def parse(content: bytes, name: str) -> dict[str, Any]:
 
 
 def _lines(content: bytes, name: str) -> tuple[list[Line], str]:
-    """The lines that hold something, and the decimal sign."""
+    """The non-empty lines, and the decimal mark."""
     try:
-        told = text.decode(content, name)
+        document = text.decode(content, name)
     except FileError as error:
         raise InvalidInput(_FIELD, name, f"must be a readable CSV file ({error.place}: {error.reason})") from None
-    separator = next((sign for sign in ("\t", ";") if sign in told), ",")
-    numbered = [(number, _cells(line, separator, number, name)) for number, line in enumerate(text.lines(told), 1)]
+    separator = next((sign for sign in ("\t", ";") if sign in document), ",")
+    numbered = [(number, _cells(line, separator, number, name)) for number, line in enumerate(text.lines(document), 1)]
     decimal = text.decimal_mark([cells for _, cells in numbered], separator)
     return [(number, cells) for number, cells in numbered if any(cells)], decimal
 

@@ -1,4 +1,4 @@
-"""What `POST /v1/stress` and `underskin stress` are asked, as the lab writes it.
+"""The request of `POST /v1/stress` and `underskin stress`, in lab units.
 
 The skin's fields are named as in a campaign; x runs along its length, y along its width.
 """
@@ -26,7 +26,7 @@ _MOST_NAMED = 5  # cells of a map that are refused
 
 @dataclass(frozen=True)
 class LabContact:
-    """A sphere pressed and dragged: forces on the skin along x and y, and into it."""
+    """A sphere that is pressed and dragged: forces on the skin along x and y, and into it."""
 
     x_mm: field.Number
     y_mm: field.Number
@@ -52,18 +52,18 @@ def _contacts(name: str, value: Any, units_checked: bool) -> tuple[LabContact, .
 
 
 def _pressure_map(name: str, value: Any, units_checked: bool) -> PressureMap:
-    found = field.build(PressureMap, name, value, units_checked)
-    for axis, places in (("x_mm", found.x_mm), ("y_mm", found.y_mm)):
-        steps = np.diff(places)
-        if places.size < 2 or np.ptp(steps) > _EVEN * steps[0]:
-            raise InvalidInput(f"{name}.{axis}", shown(places.tolist()), "must be two or more evenly spaced places")
-    shape = (found.y_mm.size, found.x_mm.size)
-    if found.pressure_mpa.shape != shape:
-        rows, columns = found.pressure_mpa.shape
+    result = field.build(PressureMap, name, value, units_checked)
+    for axis, positions in (("x_mm", result.x_mm), ("y_mm", result.y_mm)):
+        steps = np.diff(positions)
+        if positions.size < 2 or np.ptp(steps) > _EVEN * steps[0]:
+            raise InvalidInput(f"{name}.{axis}", shown(positions.tolist()), "must be two or more evenly spaced places")
+    shape = (result.y_mm.size, result.x_mm.size)
+    if result.pressure_mpa.shape != shape:
+        rows, columns = result.pressure_mpa.shape
         allowed = f"must have a row for each y_mm ({shape[0]}) and a column for each x_mm ({shape[1]})"
         raise InvalidInput(f"{name}.pressure_mpa", f"{rows} rows, {columns} columns", allowed)
-    _refuse_pull(f"{name}.pressure_mpa", found.pressure_mpa)
-    return found
+    _refuse_pull(f"{name}.pressure_mpa", result.pressure_mpa)
+    return result
 
 
 def _refuse_pull(name: str, pressure: Floats) -> None:
@@ -78,7 +78,7 @@ def _refuse_pull(name: str, pressure: Floats) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class StressRequest:
+class LoadCase:
     """A skin, its sensors, and either `contacts` or a `pressure_map`.
 
     `glue_stiffness` κ [-]: shear stress at the base over (G/h) times the slip there; left out: bonded.
@@ -97,7 +97,7 @@ class StressRequest:
     pressure_map: Annotated[PressureMap | None, _pressure_map] = None
 
 
-def read_file(path: str, map_path: str | None = None) -> StressRequest:
+def read_file(path: str, map_path: str | None = None) -> LoadCase:
     """The request in a JSON file (`-`: standard input), with the pressure map of a CSV file.
 
     Raises InvalidInput, or FileError that names line and column of what is not JSON.
@@ -122,14 +122,14 @@ def _map_in_file(path: str) -> dict[str, Any]:
     return pressure_map.parse(content, path)
 
 
-def read_request(document: Any) -> StressRequest:
+def read_request(document: Any) -> LoadCase:
     """The request that a JSON document makes; raises InvalidInput at the first field that cannot be used."""
-    given = dict(field.mapping("body", document))
-    units_checked = field.flag("units_checked", given.pop("units_checked", False), False)
-    values, refused = field.check_fields(StressRequest, given, units_checked=units_checked)
+    fields = dict(field.mapping("body", document))
+    units_checked = field.flag("units_checked", fields.pop("units_checked", False), False)
+    values, refused = field.check_fields(LoadCase, fields, units_checked=units_checked)
     if refused:
         raise refused[0]
-    request = StressRequest(**values)
+    request = LoadCase(**values)
     if not request.sensors:
         raise InvalidInput("sensors", shown(request.sensors), "must hold at least one sensor")
     if bool(request.contacts) == (request.pressure_map is not None):

@@ -1,4 +1,4 @@
-"""What is refused of the loads on an array, and what is answered all the same but looks wrong.
+"""Checks of the loads on an array: errors for loads that cannot be used, findings for unusual ones.
 
 Where the skin's length and width are given, it is taken to be centred on the middle of the sensors' extent.
 """
@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from underskin.array_stress.request import LabContact, PressureMap, StressRequest
+from underskin.array_stress.request import LabContact, LoadCase, PressureMap
 from underskin.errors import InvalidInput
 from underskin.physics import hertz
 from underskin.requirement import Mention, Requirement
@@ -22,18 +22,18 @@ _LINEAR = 0.01  # of L; there finite strain adds up to 1.3 % beneath a sphere
 _ROUNDING = 1e-9
 
 
-def refuse_many(request: StressRequest, points: int) -> None:
-    """Refuse what would take minutes."""
+def refuse_many(request: LoadCase, points: int) -> None:
+    """Reject a load that would take minutes to integrate (InvalidInput)."""
     if len(request.sensors) * points > MOST_PAIRS:
         allowed = f"sensors times points of the load must be at most {MOST_PAIRS}: send fewer, or coarser, at a time"
         raise InvalidInput("sensors", f"{len(request.sensors)} sensors, {points} points", allowed)
 
 
 def refuse_coarse(x: Floats, y: Floats, thickness: float) -> None:
-    """Refuse maps whose cells are wider than the skin's influence reaches: [m]."""
+    """Reject maps whose cells are wider than the range of the influence function (InvalidInput); lengths in m."""
     widest = _WIDEST_CELL * thickness
-    for name, places in (("x_mm", x), ("y_mm", y)):
-        step = places[1] - places[0]
+    for name, positions in (("x_mm", x), ("y_mm", y)):
+        step = positions[1] - positions[0]
         if step > widest:
             allowed = (
                 f"must be in steps of at most {to_lab('x_mm', widest):g} mm, {_WIDEST_CELL:g} thicknesses: is it in mm?"
@@ -41,14 +41,14 @@ def refuse_coarse(x: Floats, y: Floats, thickness: float) -> None:
             raise InvalidInput(f"pressure_map.{name}", f"steps of {to_lab('x_mm', step):g} mm", allowed)
 
 
-def refuse_beside_skin(request: StressRequest, places: Floats, half: Floats, name: Callable[[int], str]) -> None:
-    """Refuse loads at `places` (loads, 2) [m] that reach by `half` (…, 2) [m] over the skin's edge, where it is known.
+def refuse_beside_skin(request: LoadCase, positions: Floats, half: Floats, name: Callable[[int], str]) -> None:
+    """Reject loads at `positions` (loads, 2) [m], of half width `half` (…, 2) [m], beyond the edge of the skin.
 
-    The sensors' centres must lie on it too. `name` tells a load's field.
+    The centres of the sensors must lie on the skin too. `name` gives the field of a load.
     """
     sensors = np.array([[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
     lowest, highest = sensors.min(axis=0), sensors.max(axis=0)
-    outermost = np.abs(places - to_si("x_mm", (lowest + highest) / 2)) + half
+    outermost = np.abs(positions - to_si("x_mm", (lowest + highest) / 2)) + half
     for axis, (extent, size) in enumerate((("length_mm", request.length_mm), ("width_mm", request.width_mm))):
         if size is None:
             continue
@@ -59,7 +59,7 @@ def refuse_beside_skin(request: StressRequest, places: Floats, half: Floats, nam
         if over.any():
             first = int(np.argmax(over))
             place, reach = (
-                float(to_lab("x_mm", np.broadcast_to(v, places.shape)[first, axis])) for v in (places, half)
+                float(to_lab("x_mm", np.broadcast_to(v, positions.shape)[first, axis])) for v in (positions, half)
             )
             allowed = (
                 f"must lie on the skin, {'xy'[axis]} from {middle - size / 2:g} to {middle + size / 2:g} mm "
@@ -69,9 +69,9 @@ def refuse_beside_skin(request: StressRequest, places: Floats, half: Floats, nam
             raise InvalidInput(name(first), value, allowed)
 
 
-def refuse_overlap(places: Floats, radii: Floats) -> None:
-    """Refuse contacts (contacts, 2) [m] of radii (contacts,) [m] over one another."""
-    distance = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
+def refuse_overlap(positions: Floats, radii: Floats) -> None:
+    """Reject contacts at (contacts, 2) [m] with radii (contacts,) [m] that overlap (InvalidInput)."""
+    distance = np.hypot(*(positions[:, None] - positions).transpose(2, 0, 1))
     apart = radii[:, None] + radii
     first, second = np.nonzero(np.triu(distance < apart, 1))
     if first.size:
@@ -79,12 +79,12 @@ def refuse_overlap(places: Floats, radii: Floats) -> None:
         gap, least = to_lab("x_mm", distance[i, j]), to_lab("x_mm", apart[i, j])
         gaps = f": the centres are {gap:.4g} mm apart, the radii add to {least:.4g} mm"
         allowed = Requirement("must not overlap ", Mention(f"contacts[{i}]"), gaps)
-        x, y = to_lab("x_mm", places[j])
+        x, y = to_lab("x_mm", positions[j])
         raise InvalidInput(f"contacts[{j}]", f"at x {x:g}, y {y:g} mm", allowed)
 
 
-def findings(request: StressRequest) -> list[Finding]:
-    """What the answer is right for, but hardly the skin."""
+def findings(request: LoadCase) -> list[Finding]:
+    """Findings on unusual loads: the answer is valid for them, but they are unlikely for a skin."""
     if request.pressure_map is not None:
         return [
             *_about_sensors(request),
@@ -108,11 +108,12 @@ def findings(request: StressRequest) -> list[Finding]:
     ]
 
 
-def _about_sensors(request: StressRequest) -> Iterator[Finding]:
-    places = np.array([[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
-    if len(places) < 2:
+def _about_sensors(request: LoadCase) -> Iterator[Finding]:
+    positions = np.array([[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
+    if len(positions) < 2:
         return
-    distances, nearest = (np.asarray(found) for found in cKDTree(places).query(places, k=2))  # each finds itself too
+    # The first of the two is the sensor itself.
+    distances, nearest = (np.asarray(part) for part in cKDTree(positions).query(positions, k=2))
     distance = distances[:, 1]
     first = int(np.argmin(distance))
     other = next(int(i) for i in nearest[first] if i != first)
@@ -122,9 +123,9 @@ def _about_sensors(request: StressRequest) -> Iterator[Finding]:
         yield Finding(f"sensors[{first}]", None, statement)
 
 
-def _worst(found: Iterable[tuple[float, int]], statement: str) -> Iterator[Finding]:
-    """One finding for all contacts alike, about the worst of them."""
-    several = sorted(found, reverse=True)
+def _worst(cases: Iterable[tuple[float, int]], statement: str) -> Iterator[Finding]:
+    """One finding about the worst of all such contacts."""
+    several = sorted(cases, reverse=True)
     if several:
         value, index = several[0]
         others = f" ({len(several) - 1} more contacts like it)" if len(several) > 1 else ""
@@ -132,8 +133,8 @@ def _worst(found: Iterable[tuple[float, int]], statement: str) -> Iterator[Findi
 
 
 def _about_places(given: PressureMap, sensor_radius_mm: float) -> Iterator[Finding]:
-    for name, places in (("x_mm", given.x_mm), ("y_mm", given.y_mm)):
-        span = float(np.ptp(places))
+    for name, positions in (("x_mm", given.x_mm), ("y_mm", given.y_mm)):
+        span = float(np.ptp(positions))
         if span < _NARROW * sensor_radius_mm:
             statement = f"the map spans {span:g} mm, on sensors {2 * sensor_radius_mm:g} mm across: is it in mm?"
             yield Finding(f"pressure_map.{name}", None, statement)

@@ -30,12 +30,12 @@ _NOT_IN_IMAGE = ("prove",)
 app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
-    rich_markup_mode="markdown",  # or [mm] is taken for a style
+    rich_markup_mode="markdown",  # in rich markup, [mm] would be a style
     help="Stress, FRF and d33 of piezoelectric electronic skin.",
 )
 
 
-class Model(StrEnum):
+class Body(StrEnum):
     """Which body carries the stress to the sensor."""
 
     LAYER = "layer"
@@ -68,17 +68,17 @@ def sigma(
     a_over_h: Annotated[_Given, _column("Contact radius over thickness.")] = None,
     rt_over_h: Annotated[_Given, _column("Sensor radius over thickness; 0 is a point sensor.")] = None,
     load_parameter: Annotated[_Given, _column("L = F/(R² E), 0 if left out: the linear layer.")] = None,
-    model: Annotated[Model, typer.Option(help="The layer on a rigid base, or the half space.")] = Model.LAYER,
+    model: Annotated[Body, typer.Option(help="The layer on a rigid base, or the half space.")] = Body.LAYER,
     input_file: Input = None,
     csv: Csv = False,
 ) -> None:
     """The stress transmission σ, from dimensionless numbers."""
 
-    given = {"a_over_h": a_over_h, "rt_over_h": rt_over_h, "load_parameter": load_parameter}
+    options = {"a_over_h": a_over_h, "rt_over_h": rt_over_h, "load_parameter": load_parameter}
     from underskin.prediction import answers
 
     _answer(
-        given,
+        options,
         {"load_parameter": 0.0},
         input_file,
         csv,
@@ -101,7 +101,7 @@ def frf(
 ) -> None:
     """The FRF, charge over force, that a skin should show under a sphere."""
 
-    given = {
+    options = {
         "thickness_mm": thickness_mm,
         "youngs_modulus_mpa": youngs_modulus_mpa,
         "sensor_radius_mm": sensor_radius_mm,
@@ -113,7 +113,7 @@ def frf(
     from underskin.prediction import answers
 
     _answer(
-        given,
+        options,
         {"poisson_ratio": 0.5},
         input_file,
         csv,
@@ -146,7 +146,7 @@ def d33(
 
     Files also tell the elastomer's modulus, where it was recorded on the same bench (compression, indentation).
     """
-    given = {
+    options = {
         "thickness_mm": thickness_mm,
         "youngs_modulus_mpa": youngs_modulus_mpa,
         "sensor_radius_mm": sensor_radius_mm,
@@ -157,7 +157,7 @@ def d33(
         "frf_uncertainty_pc_per_n": frf_uncertainty_pc_per_n,
     }
     if files:
-        for_columns = [f"--{name.replace('_', '-')}" for name, values in given.items() if values]
+        for_columns = [f"--{name.replace('_', '-')}" for name, values in options.items() if values]
         for_columns += [name for name, used in (("--input", input_file), ("--units-checked", units_checked)) if used]
         invert_files.refuse(for_columns, "is for columns; files say it themselves")
         invert_files.invert_files(files, rig, band, figures, together, csv)
@@ -169,11 +169,11 @@ def d33(
     defaults: dict[str, float | None] = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": None}
     from underskin.prediction import answers
 
-    _answer(given, defaults, input_file, csv, lambda table, columns: answers.d33(table, columns, units_checked))
+    _answer(options, defaults, input_file, csv, lambda table, columns: answers.d33(table, columns, units_checked))
 
 
 def _answer(
-    given: Mapping[str, _Given],
+    options: Mapping[str, _Given],
     defaults: Mapping[str, float | None],
     input_file: str | None,
     as_csv: bool,
@@ -184,12 +184,12 @@ def _answer(
     from underskin.columns import rows
     from underskin.surrogate.sigma_table import load_table
 
-    gathered = columns.gather(given, defaults, input_file)
+    gathered = columns.gather(options, defaults, input_file)
     count = rows(gathered)
     table = load_table()
     answer = compute(table, gathered)
     everything = {**gathered, **answer.columns}
-    columns.say(answer.findings)
+    columns.write_findings(answer.findings)
     if as_csv:
         columns.write_csv(everything, answer.inside, count)
     else:
@@ -263,13 +263,13 @@ def main() -> None:
     """Run the command line; an error is one line on stderr and exit status 2."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal may know no σ
+            stream.reconfigure(errors="replace")  # some terminals cannot print σ
     _add_commands_of_other_packages()
     try:
         sys.exit(_run(app, sys.argv[1:], "underskin"))
     except (typer.TyperException, UnderskinError) as error:
         message = error.format_message() if isinstance(error, typer.TyperException) else str(error)
-        if message:  # empty where the help was shown instead
+        if message:  # empty if the help was shown
             typer.echo(f"underskin: {message}", err=True)
         sys.exit(2)
     except typer.Abort:

@@ -1,4 +1,4 @@
-"""What campaigns told of d33 and of their elastomer, for the command line: as tables to read, or as CSV."""
+"""The d33 and the modulus of the elastomer of campaigns, for the command line: as tables, or as CSV."""
 
 import csv
 import sys
@@ -28,89 +28,89 @@ _HEADER = (
 
 
 @dataclass(frozen=True)
-class Told:
-    """A file, or files by the name of their campaign: what was read, its d33 or why none, and what of the elastomer."""
+class InvertedFile:
+    """An inverted file, or several as one campaign: the reading, its d33 or why there is none, and its moduli."""
 
     file: str
     reading: Reading
-    found: Inversion | InvalidInput
+    inversion: Inversion | InvalidInput
     moduli: Sequence[RecordingModulus]
 
     @property
     def title(self) -> str:
-        """What the campaign is called, and the file that it is in."""
+        """The name of the campaign, and the file that it is in."""
         name = self.reading.campaign.name
         return name if name == self.file else f"{name} ({self.file})"
 
     @property
     def is_of_use(self) -> bool:
-        """Whether it gave d33, or a modulus."""
+        """Whether the inversion gave d33 or a modulus."""
         measured = any(not isinstance(modulus.found, InvalidInput) for modulus in self.moduli)
-        return isinstance(self.found, Inversion) or measured
+        return isinstance(self.inversion, Inversion) or measured
 
     @property
     def notes(self) -> list[str]:
-        """In words: what looks wrong, and each recording or sensor that the figures do without."""
+        """Findings in words, and each recording or sensor that is left out."""
         notes = [f"look at: {warning}" for warning in self.reading.warnings]
         campaign = self.reading.campaign
-        found = self.found.findings if isinstance(self.found, Inversion) else plausibility.in_words(campaign)
-        notes += [f"look at: {finding}" for finding in found]
-        if not isinstance(self.found, Inversion) and not self.moduli:
+        findings = self.inversion.findings if isinstance(self.inversion, Inversion) else plausibility.in_words(campaign)
+        notes += [f"look at: {finding}" for finding in findings]
+        if not isinstance(self.inversion, Inversion) and not self.moduli:
             refused = len(self.reading.problems)
             all_refused = refused and not campaign.recordings
-            why = f"none of the {refused} recordings can be used" if all_refused else self.found
+            why = f"none of the {refused} recordings can be used" if all_refused else self.inversion
             notes.append(f"no d33: {why}")
         for problem in self.reading.problems:
-            said = InvalidInput(problem.field, problem.value, problem.allowed)
-            notes.append(f"left out: recording {problem.recording}: {said}")
+            error = InvalidInput(problem.field, problem.value, problem.allowed)
+            notes.append(f"left out: recording {problem.recording}: {error}")
         for modulus in self.moduli:
             if isinstance(modulus.found, InvalidInput):
                 notes.append(f"left out: recording {modulus.recording}: {modulus.found}")
-        if isinstance(self.found, Inversion):
-            notes += [f"left out: {left}" for left in self.found.left_out]
+        if isinstance(self.inversion, Inversion):
+            notes += [f"left out: {left}" for left in self.inversion.left_out]
         return notes
 
 
-def write_tables(everything: Iterable[Told]) -> None:
-    """Each file's array, sensors and elastomer, and what was left out or looks wrong."""
+def write_tables(everything: Iterable[InvertedFile]) -> None:
+    """Each file's array, sensors and elastomer, what was left out, and its findings."""
     console = Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH)
-    for told in everything:
-        console.print(Text(told.title, style="bold"))
-        if isinstance(told.found, Inversion):
-            console.print(_array(told.found))
-            console.print(_sensors(told.found))
-        if any(not isinstance(modulus.found, InvalidInput) for modulus in told.moduli):
-            console.print(_elastomer(told.moduli))
-        for note in told.notes:
+    for entry in everything:
+        console.print(Text(entry.title, style="bold"))
+        if isinstance(entry.inversion, Inversion):
+            console.print(_array(entry.inversion))
+            console.print(_sensors(entry.inversion))
+        if any(not isinstance(modulus.found, InvalidInput) for modulus in entry.moduli):
+            console.print(_elastomer(entry.moduli))
+        for note in entry.notes:
             console.print(Text(note), soft_wrap=True)
         console.print()
 
 
-def write_csv(everything: Iterable[Told]) -> None:
+def write_csv(everything: Iterable[InvertedFile]) -> None:
     """d33 in rows: of the array, of each sensor, of each sensor × indenter × preload.
 
-    What looks wrong or was left out goes to standard error.
+    Findings, and what was left out, go to standard error.
     """
     writer = csv.writer(sys.stdout, lineterminator="\n")
     writer.writerow(_HEADER)
-    for told in everything:
-        if isinstance(told.found, Inversion):
-            writer.writerows([told.file, *row] for row in _rows(told.found))
-        for note in told.notes:
-            print(f"underskin: {told.file}: {note}", file=sys.stderr)
+    for entry in everything:
+        if isinstance(entry.inversion, Inversion):
+            writer.writerows([entry.file, *row] for row in _rows(entry.inversion))
+        for note in entry.notes:
+            print(f"underskin: {entry.file}: {note}", file=sys.stderr)
 
 
-def _rows(found: Inversion) -> list[list[str]]:
-    rows, cells = [], found.cells
-    if found.campaign_d33 is not None:
-        rows.append(["array", "", "", "", "", *_full(_in_lab(found.campaign_d33)[0]), ""])
-    for name, numbers in zip(found.sensor_ids, _in_lab(found.sensors), strict=True):
-        codes = " ".join(flag.code for flag in found.flags if flag.sensor == name)
+def _rows(inversion: Inversion) -> list[list[str]]:
+    rows, cells = [], inversion.cells
+    if inversion.campaign_d33 is not None:
+        rows.append(["array", "", "", "", "", *_full(_in_lab(inversion.campaign_d33)[0]), ""])
+    for name, numbers in zip(inversion.sensor_ids, _in_lab(inversion.sensors), strict=True):
+        codes = " ".join(flag.code for flag in inversion.flags if flag.sensor == name)
         rows.append(["sensor", name, "", "", "", *_full(numbers), codes])
     radii = to_lab("indenter_radius_mm", cells.indenter_radius).round(9)
     conditions = zip(cells.sensor, radii.tolist(), cells.preload.tolist(), cells.recordings.tolist(), strict=True)
     for (sensor, radius, preload, count), numbers in zip(conditions, _in_lab(cells.d33), strict=True):
-        where = [found.sensor_ids[sensor], repr(radius), repr(preload), str(count)]
+        where = [inversion.sensor_ids[sensor], repr(radius), repr(preload), str(count)]
         rows.append(["cell", *where, *_full(numbers), ""])
     return rows
 
@@ -126,33 +126,33 @@ def _in_lab(estimate: Estimate) -> list[list[float]]:
     return [list(row) for row in zip(*columns, strict=True)]
 
 
-def _array(found: Inversion) -> Table:
+def _array(inversion: Inversion) -> Table:
     listed = Table.grid(padding=(0, 2))
-    zone = found.zone
-    if found.campaign_d33 is not None:
-        value, uncertainty, low, high = _in_lab(found.campaign_d33)[0]
+    zone = inversion.zone
+    if inversion.campaign_d33 is not None:
+        value, uncertainty, low, high = _in_lab(inversion.campaign_d33)[0]
         ends = f"{significant(low, 4)} to {significant(high, 4)}"
         listed.add_row(
             "d33 of the array", f"{significant(value, 4)} ± {significant(uncertainty, 2)} pC/N (95 %: {ends})"
         )
     for name, scatter, factor, unit in (
-        ("spread over sensors", found.spread, 100.0, "%"),
-        ("scatter of gain", found.gain, 100.0, "%"),
-        ("scatter of position", found.position, 1e3, "mm"),
+        ("spread over sensors", inversion.spread, 100.0, "%"),
+        ("scatter of gain", inversion.gain, 100.0, "%"),
+        ("scatter of position", inversion.position, 1e3, "mm"),
     ):
         if scatter is not None:
             value, low, high = (factor * float(part) for part in (scatter.value, scatter.low, scatter.high))
             listed.add_row(name, f"± {value:.2g} {unit} (95 %: {low:.2g} to {high:.2g})")
-    listed.add_row("E 2 % and h 1 % off", f"would move d33 by {found.declared_percent:.2g} %, not in the intervals")
-    asked = f"{zone.low_hz:.4g} to {zone.high_hz:.4g} Hz, as asked"
-    listed.add_row("band", asked if zone.chosen_by_user else zone.reason)
+    listed.add_row("E 2 % and h 1 % off", f"would move d33 by {inversion.declared_percent:.2g} %, not in the intervals")
+    chosen = f"{zone.low_hz:.4g} to {zone.high_hz:.4g} Hz, as asked"
+    listed.add_row("band", chosen if zone.chosen_by_user else zone.reason)
     return listed
 
 
-def _sensors(found: Inversion) -> Table:
+def _sensors(inversion: Inversion) -> Table:
     table = _table("sensor", "d33\npC/N", "±\npC/N", "95 % from\npC/N", "to\npC/N", remark="stands out")
-    for name, numbers in zip(found.sensor_ids, _in_lab(found.sensors), strict=True):
-        reasons = "; ".join(flag.reason for flag in found.flags if flag.sensor == name)
+    for name, numbers in zip(inversion.sensor_ids, _in_lab(inversion.sensors), strict=True):
+        reasons = "; ".join(flag.reason for flag in inversion.flags if flag.sensor == name)
         table.add_row(Text(name), *_short(numbers), Text(reasons))
     return table
 
@@ -176,7 +176,7 @@ def _table(first: str, *numbers: str, remark: str) -> Table:
 
 
 def _short(numbers: Sequence[float]) -> list[str]:
-    """As many digits as are read; two of an uncertainty, which comes second."""
+    """Four significant digits of a value and its limits, two of the uncertainty, which comes second."""
     digits = (4, 2, 4, 4)
     return [
         "-" if number != number else significant(number, most) for number, most in zip(numbers, digits, strict=False)

@@ -17,7 +17,7 @@ from underskin.units import LAB, Finding, Floats
 
 STANDARD_INPUT = "-"
 
-# In words where there is room, as a symbol over a column.
+# The name in a list, and the symbol over a column.
 _NAMES = {
     "thickness_mm": ("thickness h", "h"),
     "youngs_modulus_mpa": ("Young's modulus E", "E"),
@@ -107,7 +107,7 @@ def write_csv(
 def write_table(
     columns: Mapping[str, Floats], inside: NDArray[np.bool_], count: int, names: Mapping[str, Sequence[str]] = _NO_NAMES
 ) -> None:
-    """What is the same in all rows as a list, the rest as a table, rounded to be read; `names` go first."""
+    """Columns that are constant as a list, the others as a table, rounded; `names` go first."""
     console = Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH)
     varying = {name: values for name, values in columns.items() if values.size > 1 and np.unique(values).size > 1}
     listed = Table.grid(padding=(0, 2))
@@ -138,8 +138,8 @@ def _rows_table(columns: Mapping[str, Floats], inside: NDArray[np.bool_], names:
     return table
 
 
-def say(findings: Sequence[Finding]) -> None:
-    """What looks wrong and is used all the same, a line each on standard error."""
+def write_findings(findings: Sequence[Finding]) -> None:
+    """Write findings to standard error, a line each."""
     for finding in findings:
         sys.stderr.write(f"underskin: look at {finding.field}: {finding.statement}\n")
 

@@ -30,7 +30,7 @@ Workers = Annotated[int, typer.Option(min=0, help="Processes; 0 is one for each 
 
 @dataclass(frozen=True)
 class _Outcome:
-    """What became of one campaign: its verdict, or why there is no report."""
+    """The outcome of one campaign: its verdict, or why there is no report."""
 
     source: str
     problem: str = ""
@@ -92,8 +92,8 @@ def _refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_
         raise typer.BadParameter("give files or --campaign", param_hint="FILES")
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        given = [(file.stem, str(file)) for file in files] + [(name, f"--campaign {name}") for name in campaigns]
-        clashing = " and ".join(source for name, source in given if name == twice[0])
+        sources = [(file.stem, str(file)) for file in files] + [(name, f"--campaign {name}") for name in campaigns]
+        clashing = " and ".join(source for name, source in sources if name == twice[0])
         problem = (
             f"reports are named like their campaigns: {clashing} would all become {twice[0]}.json. "
             "Rename files, or run once for each, with an --output-dir of its own"
@@ -111,23 +111,23 @@ def _of_files(
         for file in files:
             yield _one(file, output_dir, html)
         return
-    left = list(files)
-    while left:
-        for file, outcome in _of_pool(left, output_dir, html, min(workers, len(left)), scheduler):
-            left.remove(file)
+    remaining = list(files)
+    while remaining:
+        for file, outcome in _of_pool(remaining, output_dir, html, min(workers, len(remaining)), scheduler):
+            remaining.remove(file)
             yield outcome
-        # A process that dies takes the others' work with it: what can have been at fault goes on alone, one by one
-        suspects = left[:workers]
+        # A process that dies ends the pool: the files that may have caused it are diagnosed alone, one by one
+        suspects = remaining[:workers]
         for file in suspects:
             alone = dict(_of_pool([file], output_dir, html, 1, scheduler))
-            left.remove(file)
+            remaining.remove(file)
             yield alone.get(file, _Outcome(str(file), f"{file}: the process that worked it out was killed; memory?"))
 
 
 def _of_pool(
     files: Sequence[Path], output_dir: Path, html: bool, workers: int, scheduler: str | None
 ) -> Iterator[tuple[Path, _Outcome]]:
-    """Of those files that were worked out before any process died."""
+    """The outcomes of the files that were diagnosed before any process died."""
     with _executor(workers, scheduler) as pool:
         # Absolute, since a cluster's workers have a working folder of their own
         folder = output_dir.resolve()
@@ -140,7 +140,7 @@ def _of_pool(
                 yield file, done.result()
             except BrokenExecutor:
                 continue
-            except Exception as error:  # must not take the other campaigns with it
+            except Exception as error:  # one failure must not stop the other campaigns
                 yield file, _Outcome(str(file), f"{file}: {type(error).__name__}: {error}")
 
 
@@ -174,30 +174,30 @@ def _one(file: Path, output_dir: Path, html: bool) -> _Outcome:
 
     try:
         reading = read_file(file, file.name)
-        found = with_refused(work_out(reading.campaign, load_table()), reading.problems)
+        diagnosis = with_refused(work_out(reading.campaign, load_table()), reading.problems)
     except UnderskinError as error:
         return _Outcome(str(file), f"{file}: {' '.join(str(error).split())}")
-    document = report(found)
+    document = report(diagnosis)
     write_report(document, output_dir / f"{file.stem}.json")
     if html:
         from underskin.diagnosis.reporting.figures import figures
         from underskin.diagnosis.reporting.html_report import page
 
-        _write(page(document, figures(found, document)), output_dir / f"{file.stem}.html")
+        _write(page(document, figures(diagnosis, document)), output_dir / f"{file.stem}.html")
     return _Outcome(str(file), verdict=str(document["verdict"]))
 
 
 def _of_store(campaigns: Sequence[str], output_dir: Path, html: bool, url: str, key: str | None) -> Iterator[_Outcome]:
-    """Have campaigns diagnosed where they are kept; all are asked for before the first is awaited."""
+    """Have the service diagnose stored campaigns; all are started before the first is awaited."""
     if not campaigns:
         return
     with connect(url, key) as client:
-        asked = [(campaign, _asked(client, campaign)) for campaign in campaigns]
-        for campaign, started in asked:
+        diagnoses = [(campaign, _start(client, campaign)) for campaign in campaigns]
+        for campaign, started in diagnoses:
             yield started if isinstance(started, _Outcome) else _fetched(client, campaign, started, output_dir, html)
 
 
-def _asked(client: "Client", campaign: str) -> str | _Outcome:
+def _start(client: "Client", campaign: str) -> str | _Outcome:
     """The id of the diagnosis."""
     try:
         return str(client.diagnoses.start(campaign)["id"])
@@ -206,14 +206,14 @@ def _asked(client: "Client", campaign: str) -> str | _Outcome:
 
 
 def _fetched(client: "Client", campaign: str, diagnosis: str, output_dir: Path, html: bool) -> _Outcome:
-    """Await one diagnosis and write its report; its page has the one figure that a report alone can give."""
+    """Await one diagnosis and write its report; its page has the one figure that can be drawn from a report."""
     try:
-        found = client.diagnoses.wait(diagnosis)
+        finished = client.diagnoses.wait(diagnosis)
     except UnderskinError as error:
         return _Outcome(campaign, f"{campaign}: {error}")
-    document = found["report"]
+    document = finished["report"]
     if document is None:
-        return _Outcome(campaign, f"{campaign}: {found['state']}: {found['reason'] or 'no report'}")
+        return _Outcome(campaign, f"{campaign}: {finished['state']}: {finished['reason'] or 'no report'}")
     write_report(document, output_dir / f"{campaign}.json")
     if html:
         from underskin.diagnosis.reporting.html_report import page
@@ -267,5 +267,5 @@ def plan(
         dwell_s=dwell_s,
         recordings=recordings,
     )
-    found = work_out(campaign, load_table(), limits=limits)
-    typer.echo(json.dumps(dict(found.next_experiment), ensure_ascii=False, indent=1))
+    diagnosis = work_out(campaign, load_table(), limits=limits)
+    typer.echo(json.dumps(dict(diagnosis.next_experiment), ensure_ascii=False, indent=1))

@@ -12,7 +12,7 @@ from underskin.errors import InvalidInput, UnderskinError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from underskin.cli.campaign_table import Told
+    from underskin.cli.campaign_table import InvertedFile
     from underskin.recordings.reading import Reading
     from underskin.recordings.rig_description import RigDescription
     from underskin.surrogate.sigma_table import SigmaTable
@@ -35,13 +35,13 @@ Figures = Annotated[
 
 
 def refuse(options: Sequence[str], why: str) -> None:
-    """Raises UnderskinError where there are any."""
+    """Raise UnderskinError where any options are given."""
     if options:
         raise UnderskinError(f"{', '.join(options)} {why}")
 
 
-class _Complaints:
-    """What is wrong with files, printed beside the bar, and how many they are."""
+class _FileErrors:
+    """Prints errors of files beside the progress bar, and counts them."""
 
     def __init__(self, console: "Console") -> None:
         self.count = 0
@@ -49,7 +49,7 @@ class _Complaints:
 
     @contextmanager
     def about(self, name: str) -> Iterator[None]:
-        """Turns an error of the block into a line."""
+        """Print an error of the block as one line."""
         try:
             yield
         except (UnderskinError, OSError) as error:
@@ -61,7 +61,7 @@ class _Complaints:
 def invert_files(
     files: Sequence[Path], rig: Path | None, band: str | None, figures: Path | None, together: str | None, as_csv: bool
 ) -> None:
-    """Print what each file tells, or all `together`; exit status 2 where one cannot be read or nothing is told.
+    """Print d33 and moduli of each file, or of all `together`; exit status 2 where one is unreadable or gives neither.
 
     Raises UnderskinError where files that go together are not of one skin.
     """
@@ -73,37 +73,39 @@ def invert_files(
     if together is not None:
         validation.name("together", together, False)
     band_hz = None if band is None else _band(band)
-    described = None if rig is None else _described(rig)
-    named = [(str(file), file.name) for file in files] if together is None else [(together, together.replace("/", "-"))]
-    pages = {} if figures is None else _pages(named, figures)
+    description = None if rig is None else _rig_description(rig)
+    batches = (
+        [(str(file), file.name) for file in files] if together is None else [(together, together.replace("/", "-"))]
+    )
+    pages = {} if figures is None else _pages(batches, figures)
     from underskin.cli import campaign_table
     from underskin.surrogate.sigma_table import load_table
 
     table = load_table()
-    known: list[Told] = []
-    # What is told comes after the bar, which would take it from a pipe.
+    inverted: list[InvertedFile] = []
+    # Results are written after the bar, which would take them from a pipe.
     console = Console(stderr=True)
-    complaints = _Complaints(console)
+    errors = _FileErrors(console)
     with Progress(console=console, redirect_stdout=False, disable=not console.is_terminal) as progress:
-        readings = _readings(progress.track(files, description="inverting"), described, complaints)
+        readings = _readings(progress.track(files, description="inverting"), description, errors)
         for name, reading in readings if together is None else _joined(together, list(readings)):
-            with complaints.about(name):
-                told = _told(name, reading, table, band_hz)
-                _write_page(told, pages.get(name))
-                known.append(told)
-    (campaign_table.write_csv if as_csv else campaign_table.write_tables)(known)
-    if not all(told.is_of_use for told in known) or complaints.count:
+            with errors.about(name):
+                result = _inverted(name, reading, table, band_hz)
+                _write_page(result, pages.get(name))
+                inverted.append(result)
+    (campaign_table.write_csv if as_csv else campaign_table.write_tables)(inverted)
+    if not all(result.is_of_use for result in inverted) or errors.count:
         raise typer.Exit(2)
 
 
 def _readings(
-    files: Iterable[Path], rig: "RigDescription | None", complaints: _Complaints
+    files: Iterable[Path], rig: "RigDescription | None", errors: _FileErrors
 ) -> "Iterator[tuple[str, Reading]]":
     """Each file that can be read, by its name."""
     from underskin.recordings import read_file
 
     for file in files:
-        with complaints.about(str(file)):
+        with errors.about(str(file)):
             reading = read_file(file, str(file), rig)
             yield str(file), reading
 
@@ -115,21 +117,21 @@ def _joined(name: str, readings: "Sequence[tuple[str, Reading]]") -> "list[tuple
     return [(name, join(name, readings))] if readings else []
 
 
-def _told(name: str, reading: "Reading", table: "SigmaTable", band_hz: _BandHz | None) -> "Told":
-    """What a campaign tells."""
-    from underskin.cli.campaign_table import Told
+def _inverted(name: str, reading: "Reading", table: "SigmaTable", band_hz: _BandHz | None) -> "InvertedFile":
+    """The inversion of a campaign, or the reason why there is none, and its moduli."""
+    from underskin.cli.campaign_table import InvertedFile
     from underskin.inversion.invert import Inversion, invert
     from underskin.recordings import elastomer
 
-    found: Inversion | InvalidInput
+    inversion: Inversion | InvalidInput
     try:
-        found = invert(reading.campaign, table, band_hz)
+        inversion = invert(reading.campaign, table, band_hz)
     except InvalidInput as error:
-        found = error
-    return Told(name, reading, found, elastomer.of_campaign(reading.campaign))
+        inversion = error
+    return InvertedFile(name, reading, inversion, elastomer.of_campaign(reading.campaign))
 
 
-def _described(rig: Path) -> "RigDescription":
+def _rig_description(rig: Path) -> "RigDescription":
     from underskin.recordings import rig_description
 
     try:
@@ -150,10 +152,10 @@ def _band(text: str) -> _BandHz:
     return low, high
 
 
-def _pages(named: Iterable[tuple[str, str]], folder: Path) -> dict[str, Path]:
-    """Where the figures of each go, by its name; two pages of one name would be one page (InvalidInput)."""
+def _pages(batches: Iterable[tuple[str, str]], folder: Path) -> dict[str, Path]:
+    """The page of each file's figures, by its name; raises InvalidInput where two would have the same page."""
     pages: dict[str, Path] = {}
-    for name, short in named:
+    for name, short in batches:
         page = folder / f"{short}.html"
         if page in pages.values():
             raise InvalidInput("figures", str(page), f"would hold two files' figures; {name} needs a run of its own")
@@ -165,12 +167,12 @@ def _pages(named: Iterable[tuple[str, str]], folder: Path) -> dict[str, Path]:
     return pages
 
 
-def _write_page(told: "Told", page: Path | None) -> None:
+def _write_page(result: "InvertedFile", page: Path | None) -> None:
     from underskin.inversion.invert import Inversion
 
-    if page is None or not isinstance(told.found, Inversion):
+    if page is None or not isinstance(result.inversion, Inversion):
         return
     from underskin.figures import campaign_figures
 
-    campaign = told.reading.campaign
-    page.write_text(campaign_figures.page(campaign, told.found), encoding="utf-8")
+    campaign = result.reading.campaign
+    page.write_text(campaign_figures.page(campaign, result.inversion), encoding="utf-8")

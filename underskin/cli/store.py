@@ -44,7 +44,7 @@ def import_files(
     batches = [(str(file), [file]) for file in files] if together is None else [(together, files)]
     terms = {"skin": skin, "rig": rig, "all_or_nothing": all_or_nothing, "together": together}
     console = Console(stderr=True)
-    # The bar may take what is written to a terminal, to stay below it, but not what goes into a pipe.
+    # In a terminal, the bar redirects the output to stay below it; a pipe must get the output itself.
     bar = Progress(console=console, disable=not console.is_terminal, redirect_stdout=sys.stdout.isatty())
     with connect(url, key) as client, bar:
         for name, batch in bar.track(batches, description="importing"):
@@ -76,14 +76,14 @@ def export_skin(
 
 
 def connect(url: str, key: str | None) -> "Client":
-    """A client that waits long enough for what the service does with a big file."""
+    """A client whose timeout allows for large files."""
     from underskin.client.service_client import Client
 
     return Client(url, api_key=key, timeout=_LONGEST_WAIT_S)
 
 
 def _sent(client: "Client", files: Sequence[Path], terms: Mapping[str, Any]) -> list[tuple[bool, str]]:
-    """What became of files sent at once: whether it is good, and a line a campaign or refused recording."""
+    """The outcome of files sent at once: whether it succeeded, and a line for each campaign or refused recording."""
     try:
         if terms["together"] is None and _is_export(files[0]):
             brought = client.skins.load(files[0])
@@ -94,18 +94,18 @@ def _sent(client: "Client", files: Sequence[Path], terms: Mapping[str, Any]) -> 
     except OSError as error:
         place = f"{error.filename} " if len(files) > 1 else ""
         return [(False, f"{place}cannot be opened: {error.strerror}")]
-    return [line for result in results for line in _told(client, result)]
+    return [line for result in results for line in _lines(client, result)]
 
 
 def _content_key(files: Sequence[Path], terms: Mapping[str, Any]) -> str:
-    """The same for the same files, by name and content, on the same terms: what is imported twice is kept once."""
-    sent = [*files] if terms["rig"] is None else [*files, terms["rig"]]
+    """A key that is the same for the same files and options, so that what is imported twice is stored once."""
+    inputs = [*files] if terms["rig"] is None else [*files, terms["rig"]]
     digests = []
-    for file in sent:
+    for file in inputs:
         with file.open("rb") as opened:
             digests.append((file.name, hashlib.file_digest(opened, "sha256").hexdigest()))
-    told = [terms["skin"], terms["all_or_nothing"], terms["together"], terms["rig"] is None]
-    return f"content {hashlib.sha256(repr([told, digests]).encode()).hexdigest()}"
+    options = [terms["skin"], terms["all_or_nothing"], terms["together"], terms["rig"] is None]
+    return f"content {hashlib.sha256(repr([options, digests]).encode()).hexdigest()}"
 
 
 def _is_export(file: Path) -> bool:
@@ -116,15 +116,15 @@ def _is_export(file: Path) -> bool:
         return is_export(opened, str(file))
 
 
-def _told(client: "Client", result: dict[str, Any]) -> list[tuple[bool, str]]:
-    kept = [entry for entry in result["recordings"] if entry["status"] == "ok"]
+def _lines(client: "Client", result: dict[str, Any]) -> list[tuple[bool, str]]:
+    accepted = [entry for entry in result["recordings"] if entry["status"] == "ok"]
     lines = [(False, _refused(error)) for error in result["errors"]]
     lines += [
         (False, f"{entry['id']} {_refused(error)}") for entry in result["recordings"] for error in entry["errors"]
     ]
     lines += [(True, note) for note in result["notes"]]
     if result["status"] == "ok":
-        count = f"{len(kept)} recording{'s' if len(kept) != 1 else ''}"
+        count = f"{len(accepted)} recording{'s' if len(accepted) != 1 else ''}"
         figures, remarks = _figures(client, result["id"])
         before = ", was there" if result["repeated"] else ""
         lines.insert(0, (True, f"campaign {result['id']} of skin {result['skin_id']}{before}, {count}: {figures}"))
@@ -133,16 +133,16 @@ def _told(client: "Client", result: dict[str, Any]) -> list[tuple[bool, str]]:
 
 
 def _refused(error: Mapping[str, Any]) -> str:
-    """What is wrong with a value; without it where none was sent, or where the value is not what is wrong."""
+    """A refused value in words; without the value where none was sent."""
     value = "" if error["value"] is None else f" = {error['value']!r}"
     return f"{error['field']}{value}: {error['allowed']}"
 
 
 def _figures(client: "Client", campaign_id: str) -> tuple[str, list[str]]:
-    """What a campaign tells, in short, and a line each for what looks wrong and what its figures do without."""
+    """d33 and moduli of a campaign in one line, and a line for each finding and for each thing left out."""
     try:
         answer = client.campaigns.d33(campaign_id)
-    except UnderskinError as error:  # the campaign is kept all the same
+    except UnderskinError as error:  # the campaign is stored nevertheless
         return f"no d33: {error}", []
     moduli = [
         f"E {significant(one['youngs_modulus_mpa'], 4)} ± {significant(one['youngs_modulus_uncertainty_mpa'], 2)} MPa"
@@ -153,9 +153,9 @@ def _figures(client: "Client", campaign_id: str) -> tuple[str, list[str]]:
         d33 = f"d33 {significant(array['d33_pc_per_n'], 3)} ± {significant(array['d33_uncertainty_pc_per_n'], 2)} pC/N"
     else:
         d33 = f"no d33: {answer['reason'] or 'every sensor stands out'}"
-    told = moduli if moduli and answer["status"] == "none" else [d33, *moduli]
+    results = moduli if moduli and answer["status"] == "none" else [d33, *moduli]
     remarks = [f"look at: {finding}" for finding in answer["findings"]]
     for left in answer["left_out"]:
         of = "" if left["recording"] is None else f"recording {left['recording']}: "
         remarks.append(f"left out: {of}{left['reason']}")
-    return ", ".join(told), remarks
+    return ", ".join(results), remarks

@@ -25,9 +25,9 @@ def stress(
     from underskin.cli import columns
     from underskin.surrogate.influence_table import load_influence
 
-    found = answer(load_influence(), read_file(request, pressure_map))
-    columns.say(found.findings)
+    stresses = answer(load_influence(), read_file(request, pressure_map))
+    columns.write_findings(stresses.findings)
     write = columns.write_csv if csv else columns.write_table
-    write(found.columns, found.inside, len(found.sensors), {"sensor": found.sensors})
-    if not csv and not found.inside.all():
-        typer.echo(f"Out of the domain are sensors with no load within {found.reach_mm:g} mm.")
+    write(stresses.columns, stresses.inside, len(stresses.sensors), {"sensor": stresses.sensors})
+    if not csv and not stresses.inside.all():
+        typer.echo(f"Out of the domain are sensors with no load within {stresses.reach_mm:g} mm.")

@@ -1,4 +1,4 @@
-"""What the client answers, in columns, and what it takes beside them."""
+"""Answers of the service in columns, and the model that a request may name."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ from underskin.units import Finding, Floats
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What every answer in columns says: the model, the table's hash (None where none was read), status per row."""
+class ServiceAnswer:
+    """Common to all answers in columns: the model, hash of the table (None where none was read), status per row."""
 
     model: str
     table_sha256: str | None
@@ -20,7 +20,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class SigmaAnswer(Answer):
+class SigmaAnswer(ServiceAnswer):
     """σ and the bound on its relative error."""
 
     sigma: Floats
@@ -28,8 +28,8 @@ class SigmaAnswer(Answer):
 
 
 @dataclass(frozen=True)
-class PressedSkinAnswer(Answer):
-    """What reaches the sensor; units as the names say, the rest dimensionless."""
+class PressedSkinAnswer(ServiceAnswer):
+    """Contact and stress on the sensor; units in the names, the others dimensionless."""
 
     contact_radius_mm: Floats
     a_over_h: Floats
@@ -65,8 +65,8 @@ class D33Answer(PressedSkinAnswer):
 
 
 @dataclass(frozen=True)
-class StressAnswer(Answer):
-    """What each sensor bears: ids, places, charge with the table's error, and stress (compression positive).
+class StressAnswer(ServiceAnswer):
+    """The load on each sensor: id, position, charge with the table's error, and stress (positive in compression).
 
     `contact_radius_mm`: one entry a contact, none for a map.
     """
@@ -84,7 +84,7 @@ class StressAnswer(Answer):
 
 @dataclass(frozen=True)
 class Adopted:
-    """The model that was adopted for a skin, and what it may need of each row (`client.skins.model(...)["needs"]`)."""
+    """The adopted model of a skin, and the columns that it may need (`client.skins.model(...)["needs"]`)."""
 
     skin_id: str
     sensor: str | None = None
@@ -95,12 +95,12 @@ class Adopted:
     load_cycles: ArrayLike | None = None
 
     def columns(self) -> dict[str, ArrayLike | None]:
-        """Its columns."""
+        """The columns of the request that the adopted model uses."""
         names = ("offset_x_mm", "offset_y_mm", "dynamic_force_n", "dwell_s", "load_cycles")
         return {name: getattr(self, name) for name in names}
 
     def shared(self) -> dict[str, str | None]:
-        """What holds for all rows."""
+        """The fields of the request that hold for all rows."""
         return {"model": "adopted", "skin_id": self.skin_id, "sensor": self.sensor}
 
 

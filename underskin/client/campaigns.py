@@ -1,4 +1,4 @@
-"""The client's part that sends campaigns and asks for what is kept: `client.campaigns` and `client.skins`.
+"""Campaigns and skins through the client: `client.campaigns` and `client.skins`.
 
 Answers are the documents of the HTTP interface (docs/store.md, /openapi.json), as dictionaries.
 """
@@ -22,7 +22,7 @@ _TRIES = 3
 
 
 class Campaigns:
-    """Campaigns: sent, read, withdrawn, corrected, their recordings excluded, their d33."""
+    """Campaigns: send, read, withdraw, correct; exclude recordings; d33."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -37,10 +37,10 @@ class Campaigns:
         all_or_nothing: bool = False,
         idempotency_key: str | None = None,
     ) -> Document:
-        """Send a campaign, or its document; says of each recording whether it was kept.
+        """Send a campaign, or its document; the answer says of each recording whether it was accepted.
 
-        It is kept once even where the connection breaks and it is sent again; with an `idempotency_key` of your own,
-        even where your program ends and starts anew.
+        Without an answer the request is repeated up to three times under one `idempotency_key`, so the campaign is
+        stored once. With a key of your own this holds also when your program is restarted.
         """
         document = to_dict(campaign) if isinstance(campaign, Campaign) else dict(campaign)
         content = orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
@@ -62,9 +62,8 @@ class Campaigns:
     ) -> list[Document]:
         """Send files as instruments write them; one entry a campaign. `rig` describes their channels.
 
-        `repeated` of an entry says whether it was kept before, under the same `idempotency_key`.
-
-        `together` is the name of the one campaign that they are joined into, such as a file a press.
+        `repeated` of an entry says whether it had been stored before, under the same `idempotency_key`. `together`
+        joins the files, for instance one file for each press, into one campaign of that name.
         """
         if not files:
             raise InvalidInput("files", [], "must name at least one file")
@@ -73,10 +72,12 @@ class Campaigns:
 
         def send() -> Document:
             with ExitStack() as opened:
-                named = [("file", Path(file)) for file in files] + ([] if rig is None else [("rig", Path(rig))])
-                parts = [(name, (path.name, opened.enter_context(path.open("rb")))) for name, path in named]
-                answer, told = self._session.answered("POST", "/v1/campaigns", **query, headers=headers, files=parts)
-            repeated = "Idempotency-Replayed" in told
+                sources = [("file", Path(file)) for file in files] + ([] if rig is None else [("rig", Path(rig))])
+                parts = [(name, (path.name, opened.enter_context(path.open("rb")))) for name, path in sources]
+                answer, received = self._session.answered(
+                    "POST", "/v1/campaigns", **query, headers=headers, files=parts
+                )
+            repeated = "Idempotency-Replayed" in received
             return {"campaigns": [{**entry, "repeated": repeated} for entry in answer["campaigns"]]}
 
         return list(self._again(send)["campaigns"])
@@ -104,28 +105,28 @@ class Campaigns:
         return self._session.json("GET", _path(campaign_id))
 
     def load(self, campaign_id: str) -> Campaign:
-        """A campaign as it was sent, arrays and all."""
+        """A campaign as it was sent, with its arrays."""
         return parse(self._session.json("GET", _path(campaign_id, "document")))
 
     def d33(
         self, campaign_id: str, band_hz: tuple[float, float] | None = None, *, model: ModelName = "paper"
     ) -> Document:
-        """d33 by sensor, indenter and preload, over the flat zone or a band of your own, and what it leaves out."""
+        """d33 by sensor, indenter and preload, over the flat zone or a given band, and what is left out."""
         low, high = (None, None) if band_hz is None else band_hz
         query = query_of(band_low_hz=low, band_high_hz=high, model=model)
         return self._session.json("GET", _path(campaign_id, "d33"), **query)
 
     def withdraw(self, campaign_id: str, reason: str) -> Document:
-        """Take it out of all figures; it can still be read."""
+        """Exclude a campaign from all results; it can still be read."""
         return self._session.json("POST", _path(campaign_id, "withdraw"), json={"reason": reason})
 
     def exclude(self, campaign_id: str, recording: str, reason: str) -> Document:
-        """Take a recording out of all figures; it can still be read."""
+        """Exclude a recording from all results; it can still be read."""
         body = {"recording": recording, "reason": reason}
         return self._session.json("POST", _path(campaign_id, "exclusions"), json=body)
 
     def _again(self, send: Callable[[], Document]) -> Document:
-        """Send under one Idempotency-Key until an answer comes, a few times at most."""
+        """Repeat a request, under its one Idempotency-Key, until an answer comes; three times at most."""
         for _ in range(_TRIES - 1):
             try:
                 return send()
@@ -135,7 +136,7 @@ class Campaigns:
 
 
 class Skins:
-    """Skins: listed, joined, their d33 over time, all of one as a file."""
+    """Skins: list, join, d33 over time, adopted models, export."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -145,7 +146,7 @@ class Skins:
         yield from pages(self._session, "/v1/skins", "skins", id_contains=id_contains)
 
     def get(self, skin_id: str) -> Document:
-        """A skin, and what was joined to it."""
+        """A skin, and the skins that were joined to it."""
         return self._session.json("GET", _skin(skin_id))
 
     def join(self, skin_id: str, other: str, reason: str) -> Document:
@@ -153,15 +154,15 @@ class Skins:
         return self._session.json("POST", _skin(skin_id, "join"), json={"skin_id": other, "reason": reason})
 
     def history(self, skin_id: str, *, model: ModelName = "paper") -> Document:
-        """d33 of each sensor over time, its trend, and what that leaves out."""
+        """d33 of each sensor over time, its trend, and what is left out."""
         return self._session.json("GET", _skin(skin_id, "history"), **query_of(model=model))
 
     def adopt(self, skin_id: str, diagnosis_id: str) -> Document:
-        """Make an explained diagnosis the skin's model, which `adopted` stands for from now on."""
+        """Adopt the model of an explained diagnosis for the skin; requests with the model `adopted` use it."""
         return self._session.json("POST", _skin(skin_id, "model"), json={"diagnosis_id": diagnosis_id})
 
     def withdraw_model(self, skin_id: str, reason: str) -> Document:
-        """Have no model in force, as before the first was adopted; the version that was stays, with when and why."""
+        """Withdraw the adopted model; its version stays on record with date and reason."""
         return self._session.json("DELETE", _skin(skin_id, "model"), **query_of(reason=reason))
 
     def model(self, skin_id: str) -> Document:
@@ -173,7 +174,7 @@ class Skins:
         return list(self._session.json("GET", _skin(skin_id, "model", "versions"))["models"])
 
     def export(self, skin_id: str, file: str | Path, progress: Callable[[int], object] = lambda _: None) -> None:
-        """Write all that is kept of a skin into one HDF5 file; `progress` hears how many bytes came."""
+        """Write everything stored of a skin into one HDF5 file; `progress` is called with the bytes of each chunk."""
         part = Path(file).with_name(Path(file).name + ".part")
         try:
             with self._session.stream("GET", _skin(skin_id, "export")) as response, part.open("wb") as target:
@@ -185,7 +186,7 @@ class Skins:
             part.unlink(missing_ok=True)
 
     def load(self, file: str | Path) -> Document:
-        """Bring in what `export` wrote elsewhere."""
+        """Import a file that `export` wrote."""
         headers = {"Content-Type": "application/octet-stream"}
         with Path(file).open("rb") as source:
             return self._session.json("POST", "/v1/skins/import", headers=headers, content=source)
@@ -200,7 +201,7 @@ def _skin(skin_id: str, *more: str) -> str:
 
 
 def query_of(**given: Any) -> dict[str, dict[str, Any]]:
-    """What was given, as httpx takes a query."""
+    """The given values as the query of an httpx request."""
     return {"params": {name: value for name, value in given.items() if value is not None}}
 
 

@@ -1,4 +1,4 @@
-"""The client's part that has campaigns diagnosed: `client.diagnoses`.
+"""Diagnoses through the client: `client.diagnoses`.
 
     started = client.diagnoses.start(campaign_id)
     report = client.diagnoses.wait(started["id"], progress=print)["report"]
@@ -19,17 +19,17 @@ _SILENT_S = 60.0
 
 
 class Diagnoses:
-    """Diagnoses of kept campaigns: started, awaited, read, cancelled."""
+    """Diagnoses of stored campaigns: start, wait, read, cancel."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
 
     def start(self, campaign_id: str) -> Document:
-        """Have a campaign diagnosed; its `id` and `state`. One that was diagnosed as it is now is `done` at once."""
+        """Start a diagnosis; its `id` and `state`. A campaign that was diagnosed as it is now is `done` at once."""
         return self._session.json("POST", f"/v1/campaigns/{quote(campaign_id, safe='')}/diagnosis")
 
     def get(self, diagnosis_id: str) -> Document:
-        """How far it is and, once it is done, its `report`."""
+        """A diagnosis: its `state` and `progress` and, once it is done, its `report`."""
         return self._session.json("GET", _path(diagnosis_id))
 
     def all(
@@ -45,27 +45,28 @@ class Diagnoses:
         progress: Callable[[float], object] = lambda _: None,
         timeout: float | None = None,
     ) -> Document:
-        """The diagnosis once it is done, has failed or was cancelled; `progress` hears how far it is, 0 to 1.
+        """The diagnosis once it is done, has failed or was cancelled; `progress` is called with its progress, 0 to 1.
 
-        A server that is being restarted is waited for, a minute at most. Raises TimeoutError after `timeout` seconds.
+        A server that does not answer, for instance while it restarts, is tried again for a minute. Raises TimeoutError
+        after `timeout` seconds.
         """
-        start = heard = time.monotonic()
+        start = answered_at = time.monotonic()
         while True:
             try:
-                found = self.get(diagnosis_id)
-                heard = time.monotonic()
-                progress(found["progress"])
-                if found["state"] not in ("queued", "running"):
-                    return found
+                diagnosis = self.get(diagnosis_id)
+                answered_at = time.monotonic()
+                progress(diagnosis["progress"])
+                if diagnosis["state"] not in ("queued", "running"):
+                    return diagnosis
             except Unreachable:
-                if time.monotonic() - heard > _SILENT_S:
+                if time.monotonic() - answered_at > _SILENT_S:
                     raise
             if timeout is not None and time.monotonic() - start > timeout:
                 raise TimeoutError(f"diagnosis {diagnosis_id} is not done after {timeout:g} s; it goes on")
             time.sleep(_POLL_S)
 
     def cancel(self, diagnosis_id: str) -> Document:
-        """End it; one that is done or has failed raises ServiceError (409)."""
+        """Cancel a diagnosis; raises ServiceError (409) if it is done or has failed."""
         return self._session.json("DELETE", _path(diagnosis_id))
 
 

@@ -1,4 +1,4 @@
-"""Requests to the service, and their errors as ours."""
+"""HTTP requests to the service, with its errors as exceptions."""
 
 import re
 from collections.abc import Iterator
@@ -47,7 +47,7 @@ class Session:
 
     @contextmanager
     def stream(self, method: str, path: str, **options: Any) -> Iterator[httpx.Response]:
-        """An answer of any type, to be read as it comes."""
+        """An answer of any type, read in chunks."""
         with self._reaching(), self.http.stream(method, path, **options) as response:
             if not response.is_success:
                 response.read()
@@ -73,5 +73,5 @@ def _document(response: httpx.Response) -> dict[str, Any] | None:
 
 
 def _foreign(response: httpx.Response) -> dict[str, Any]:
-    """A problem for an answer that another program gave, such as a proxy."""
+    """A problem document for an answer of another program, such as a proxy."""
     return {"title": response.reason_phrase, "detail": f"not an answer of underskin: {response.text[:200]!r}"}

@@ -4,10 +4,10 @@
         answer = client.sigma(a_over_h=[0.1, 0.3], rt_over_h=0.6)
         answer.sigma, answer.status
 
-Fields are named and meant as in the HTTP interface, in lab units. A single number holds for all rows; arrays must be
+Fields have the names and the lab units of the HTTP interface. A single number holds for all rows; arrays must be
 equally long. Answers have one entry a row, or shape () where only single numbers were given; a row outside the model's
 domain has the status `out_of_domain` and NaN in all that depends on σ. Campaigns and skins: `client.campaigns` and
-`client.skins` (underskin.campaign_client); diagnoses: `client.diagnoses` (underskin.diagnosis_client).
+`client.skins` (`underskin.client.campaigns`); diagnoses: `client.diagnoses` (`underskin.client.diagnoses`).
 """
 
 from collections.abc import Mapping
@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike
 
 from underskin.client.answers import (
     Adopted,
-    Answer,
     D33Answer,
     FrfAnswer,
+    ServiceAnswer,
     SigmaAnswer,
     StressAnswer,
     TableAxis,
@@ -34,7 +34,7 @@ from underskin.client.diagnoses import Diagnoses
 from underskin.client.http_session import Session
 from underskin.units import Finding, Floats
 
-_Answer = TypeVar("_Answer", bound=Answer)
+_Answer = TypeVar("_Answer", bound=ServiceAnswer)
 
 
 class Client:
@@ -88,7 +88,7 @@ class Client:
     ) -> FrfAnswer:
         """The FRF of a skin under a sphere; `frequency_hz` (a list for all rows) adds spectra.
 
-        `units_checked` accepts magnitudes that look like a slip of units; `adopted` asks the skin's own model.
+        `units_checked` accepts unusual magnitudes; `adopted` uses the adopted model of the skin.
         """
         columns = {
             "thickness_mm": thickness_mm,
@@ -123,8 +123,8 @@ class Client:
         """d33 from plateau values `frf_pc_per_n`, or from lines averaged over a band.
 
         For lines give `frequency_hz` (for all rows), `frf_re_pc_per_n` and, if measured, `frf_im_pc_per_n` (rows ×
-        lines), and `band_hz`. `units_checked` accepts magnitudes that look like a slip of units; `adopted` asks the
-        skin's own model.
+        lines), and `band_hz`. `units_checked` accepts unusual magnitudes; `adopted` uses the adopted model of
+        the skin.
         """
         columns = {
             "thickness_mm": thickness_mm,
@@ -152,8 +152,7 @@ class Client:
         return StressAnswer(**values | {"sensor": tuple(document["sensor"])})
 
     def design(self, **fields: float) -> dict[str, Any]:
-        """How much of a load a skin's sensors feel, how finely its array tells where it is, and how far apart two loads
-        must be; `fields` as `POST /v1/design` takes them."""
+        """Sensitivity and spatial resolution of a skin's design; `fields` as `POST /v1/design` takes them."""
         return self._request("POST", "/v1/design", fields)
 
     def tables(self) -> tuple[TableEntry, ...]:

@@ -1,11 +1,11 @@
 """Figures of arrays, FRFs, histories and designs: the same in pages, reports and notebooks.
 
-Built from columns in lab units; colours that colour-blind people tell apart, and what a colour says, a marker, a dash
-or the text under the pointer says too.
+They are built from columns in lab units. Colours can be told apart by colour-blind readers, and what a colour shows is
+also shown by a marker, a dash or the text under the pointer.
 """
 
 from underskin.figures.array import Quantity, array_map, frf_versus_preload, response_per_sensor
-from underskin.figures.curves import Curve, force_curves
+from underskin.figures.curves import ForceCurve, force_curves
 from underskin.figures.design import Mark, array_response, design_overview
 from underskin.figures.frf import frf_overview, frf_recordings
 from underskin.figures.history import SensorPoints, array_history, d33_history
@@ -13,7 +13,7 @@ from underskin.figures.loads import loaded_array, pressure_on_array
 from underskin.figures.traces import Trace, raw_traces
 
 __all__ = [
-    "Curve",
+    "ForceCurve",
     "Mark",
     "Quantity",
     "SensorPoints",

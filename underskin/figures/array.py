@@ -20,7 +20,7 @@ _HOVER_INTERVAL = "%{text}<br>d33 %{y:.5g} pC/N<br>%{customdata[0]:.5g} to %{cus
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a map shows of each sensor; `diverging`: its colours part at 0."""
+    """The quantity that a map shows of each sensor; `diverging`: the colour scale is centred on 0."""
 
     name: str
     unit: str
@@ -39,8 +39,7 @@ def array_map(
     reasons: Sequence[str],
     quantity: Quantity = D33,
 ) -> go.Figure:
-    """Where each sensor lies and what its d33, or another quantity, is; `reasons` says why a sensor stands out, empty
-    where it does not.
+    """Map of the sensors, coloured by d33 or another quantity; `reasons` says why a sensor stands out, empty otherwise.
 
     Raises InvalidInput where a column's length differs from that of `sensors`.
     """

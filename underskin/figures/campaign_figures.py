@@ -27,59 +27,59 @@ _PAGE = """<!doctype html>
 """
 
 
-def figures(campaign: Campaign, found: Inversion) -> "tuple[go.Figure, go.Figure, go.Figure]":
+def figures(campaign: Campaign, inversion: Inversion) -> "tuple[go.Figure, go.Figure, go.Figure]":
     """The map of the array, FRF against preload per indenter, and the response of each sensor.
 
-    The model's line is the array's d33 times (3/2) ρ² σ, σ at the commanded offset (mean of the recordings alike).
+    The model's line is the array's d33 times (3/2) ρ² σ, with σ at the commanded offset, averaged over the recordings
+    of the same sphere and preload.
     """
-    places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-    x_mm, y_mm = zip(*(places[name] for name in found.sensor_ids), strict=True)
-    reasons = ["; ".join(flag.reason for flag in found.flags if flag.sensor == name) for name in found.sensor_ids]
+    names, sensors, array = inversion.sensor_ids, inversion.sensors, inversion.campaign_d33
+    positions = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
+    x_mm, y_mm = zip(*(positions[name] for name in names), strict=True)
+    reasons = ["; ".join(flag.reason for flag in inversion.flags if flag.sensor == name) for name in names]
     d33, uncertainty, low, high = (
-        to_lab("d33_pc_per_n", part)
-        for part in (found.sensors.value, found.sensors.uncertainty, found.sensors.low, found.sensors.high)
+        to_lab("d33_pc_per_n", part) for part in (sensors.value, sensors.uncertainty, sensors.low, sensors.high)
     )
-    array = found.campaign_d33
     limits = None
     if array is not None:
         limits = (float(to_lab("d33_pc_per_n", array.low)), float(to_lab("d33_pc_per_n", array.high)))
-    rows = found.recordings
+    rows = inversion.recordings
     return (
-        array_map(found.sensor_ids, x_mm, y_mm, d33, uncertainty, reasons),
+        array_map(names, x_mm, y_mm, d33, uncertainty, reasons),
         frf_versus_preload(
-            [f"{name}, sensor {found.sensor_ids[sensor]}" for name, sensor in zip(rows.ids, rows.sensor, strict=True)],
+            [f"{name}, sensor {names[sensor]}" for name, sensor in zip(rows.ids, rows.sensor, strict=True)],
             to_lab("indenter_radius_mm", rows.indenter_radius),
             to_lab("preload_n", rows.preload),
             to_lab("frf_pc_per_n", rows.frf),
             to_lab("frf_pc_per_n", rows.frf_uncertainty),
-            to_lab("frf_pc_per_n", model_frf(campaign, found)),
+            to_lab("frf_pc_per_n", model_frf(campaign, inversion)),
         ),
-        response_per_sensor(found.sensor_ids, d33, low, high, limits, reasons),
+        response_per_sensor(names, d33, low, high, limits, reasons),
     )
 
 
-def page(campaign: Campaign, found: Inversion) -> str:
-    """An HTML page with the figures one under the other; the script that draws them is inside, once."""
+def page(campaign: Campaign, inversion: Inversion) -> str:
+    """An HTML page with the figures one below the other; it contains plotly's script once."""
     parts = [
         figure.to_html(full_html=False, include_plotlyjs=number == 0, div_id=f"figure-{number}")
-        for number, figure in enumerate(figures(campaign, found))
+        for number, figure in enumerate(figures(campaign, inversion))
     ]
-    notes = "".join(f"<li>{escape(note)}</li>" for note in (*found.findings, *found.left_out))
+    notes = "".join(f"<li>{escape(note)}</li>" for note in (*inversion.findings, *inversion.left_out))
     return _PAGE.format(
         title=escape(campaign.name),
         band=escape(
-            f"{found.zone.low_hz:.4g} to {found.zone.high_hz:.4g} Hz"
-            if found.zone.chosen_by_user
-            else found.zone.reason
+            f"{inversion.zone.low_hz:.4g} to {inversion.zone.high_hz:.4g} Hz"
+            if inversion.zone.chosen_by_user
+            else inversion.zone.reason
         ),
         notes=f"<p>Left out, or worth a look:</p><ul>{notes}</ul>" if notes else "",
         figures="\n".join(parts),
     )
 
 
-def model_frf(campaign: Campaign, found: Inversion) -> Floats:
+def model_frf(campaign: Campaign, inversion: Inversion) -> Floats:
     """FRF of the model [C/N] for each recording; NaN where the array has no d33."""
-    rows = found.recordings
+    rows = inversion.recordings
     assert campaign.skin.sensor_radius_mm is not None
     assert campaign.skin.thickness_mm is not None
     rho = campaign.skin.sensor_radius_mm / campaign.skin.thickness_mm
@@ -88,5 +88,5 @@ def model_frf(campaign: Campaign, found: Inversion) -> Floats:
     count = np.bincount(alike, known)
     with np.errstate(invalid="ignore"):
         sigma = np.bincount(alike, np.where(known, rows.sigma, 0.0)) / count
-    d33 = np.nan if found.campaign_d33 is None else float(found.campaign_d33.value)
+    d33 = np.nan if inversion.campaign_d33 is None else float(inversion.campaign_d33.value)
     return d33 * gain(sigma[alike], rho)

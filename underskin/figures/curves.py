@@ -13,7 +13,7 @@ _MOST_SAMPLES = 400  # of one curve
 
 
 @dataclass(frozen=True)
-class Curve:
+class ForceCurve:
     """One recording: displacement [mm] and force [N], each (samples,)."""
 
     name: str
@@ -21,8 +21,8 @@ class Curve:
     force_n: Floats
 
 
-def force_curves(curves: Sequence[Curve]) -> go.Figure:
-    """Each recording's curve, thinned evenly where it has more samples than a figure shows."""
+def force_curves(curves: Sequence[ForceCurve]) -> go.Figure:
+    """Each recording's curve, thinned evenly if it has more samples than a figure shows."""
     figure = go.Figure()
     for number, curve in enumerate(curves):
         count = len(curve.force_n)

@@ -1,4 +1,4 @@
-"""A design: σ and γ against what they depend on, with the design's own point, and what an array of a pitch sees."""
+"""Figures of a design: σ and γ over their arguments, with the design's own point, and the response of an array."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ class Mark:
 
 
 def design_overview(design: Design, own: Mark | None) -> go.Figure:
-    """σ and γ over each of a/h, rT/h and L, the others as designed; `own`: the skin that it departs from."""
+    """σ and γ over each of a/h, rT/h and L, the others as designed; `own`: the skin that is varied."""
     figure = make_subplots(1, 3, shared_yaxes=True, horizontal_spacing=0.03)
     contact = design.contact
     chosen = Mark(
@@ -63,7 +63,7 @@ def design_overview(design: Design, own: Mark | None) -> go.Figure:
 
 
 def array_response(design: Design, pitch_mm: float) -> go.Figure:
-    """The response of each sensor of a row to the contact's place along it, over that above a sensor."""
+    """Response of each sensor of a row over the contact's position along it, relative to a contact above a sensor."""
     figure = go.Figure()
     offset = to_lab("x_mm", design.offset)
     percent = 100 * design.response / design.response[0]

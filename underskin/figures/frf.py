@@ -17,14 +17,13 @@ Trace = dict[str, Any]
 _AXES = ("", "2", "3")  # of the panels
 _UNITS = (" pC/N", "°", "")
 _HEIGHT = 640
-_BRIGHTEST = 0.85  # of Viridis, that still shows on white
-_LEAST_PHASE = 10.0  # ° to each side, so that noise looks like noise
+_BRIGHTEST = 0.85  # of Viridis; lighter colours are invisible on white
+_LEAST_PHASE = 10.0  # ° to each side, so that noise is not magnified
 _WIDE = 3.0  # largest magnitude over the median, from which on the axis is logarithmic
 
 
 def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | None) -> go.Figure:
-    """Of each condition the median magnitude and phase and the lowest coherence; as a band, the magnitudes of all its
-    recordings."""
+    """Median magnitude and phase and lowest coherence of each condition, with the range of its magnitudes as a band."""
     traces: list[Trace] = []
     for number, spread in enumerate(spreads):
         colour, dash = _look(spread, spreads)
@@ -64,9 +63,9 @@ def frf_recordings(recordings: Sequence[FrfLines], zone_hz: tuple[float, float] 
 def _lines(
     name: str, group: str, frequency_hz: Floats, parts: Sequence[Floats], line: dict[str, Any]
 ) -> Iterator[Trace]:
-    """Magnitude, phase and coherence, each in its panel; without what was not recorded.
+    """Magnitude, phase and coherence in three panels, without those that were not recorded.
 
-    As dictionaries: plotly checks them once, and traces that are added one by one three times.
+    Traces are given as dictionaries, which plotly validates once.
     """
     for axis, unit, values in zip(_AXES, _UNITS, parts, strict=True):
         if not np.isnan(values).all():
@@ -108,7 +107,7 @@ def _finished(traces: Sequence[Trace], zone_hz: tuple[float, float] | None, titl
 
 
 def _magnitude_axis(traces: Sequence[Trace]) -> dict[str, Any]:
-    """Logarithmic where a resonance would leave the rest a line at the foot."""
+    """A logarithmic axis where a resonance exceeds the other values by far."""
     values = _values(traces, "y")
     values = values[values > 0]
     wide = len(values) > 0 and values.max() > _WIDE * np.median(values)
@@ -121,7 +120,7 @@ def _values(traces: Sequence[Trace], axis: str) -> Floats:
 
 
 def _look(spread: FrfSpread, spreads: Sequence[FrfSpread]) -> tuple[str, str]:
-    """A colour for each preload, from dark to bright; a dash for each indenter."""
+    """Colour by preload, from dark to bright; dash by indenter."""
     preloads = sorted({entry.preload_n for entry in spreads})
     radii = sorted({entry.indenter_radius_mm for entry in spreads})
     place = _BRIGHTEST * preloads.index(spread.preload_n) / max(len(preloads) - 1, 1)
@@ -136,6 +135,6 @@ def _faint(colour: str) -> str:
 
 
 def _short(values: Floats) -> "np.ndarray[Any, np.dtype[np.float32]]":
-    """Half the bytes; seven digits are more than a figure shows."""
+    """Values in single precision, which halves the bytes; seven digits are more than a figure shows."""
     with np.errstate(over="ignore"):
         return values.astype(np.float32)

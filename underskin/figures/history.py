@@ -46,7 +46,7 @@ def d33_history(sensors: Sequence[SensorPoints]) -> go.Figure:
 def array_history(
     times: Sequence[str], low_pc_per_n: ArrayLike, median_pc_per_n: ArrayLike, high_pc_per_n: ArrayLike
 ) -> go.Figure:
-    """The median over the sensors at each time, and from the lowest to the highest sensor as a band."""
+    """Median over the sensors at each time, with the range from the lowest to the highest sensor as a band."""
     figure = go.Figure()
     band = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
     figure.add_scatter(x=list(times), y=np.asarray(high_pc_per_n), showlegend=False, **band)
@@ -65,7 +65,7 @@ def array_history(
 def _finished(figure: go.Figure, title: str, times: Sequence[str]) -> go.Figure:
     figure.update_xaxes(title="recorded", type="date")
     moments = sorted(datetime.fromisoformat(time) for time in times)
-    if moments and moments[-1] - moments[0] < _DAY:  # else the axis of a single campaign would count milliseconds
+    if moments and moments[-1] - moments[0] < _DAY:  # otherwise the axis of a single campaign would show milliseconds
         figure.update_xaxes(range=[moments[0] - _DAY, moments[-1] + _DAY])
     figure.update_yaxes(title="d33 [pC/N]")
     return styled(figure, title)

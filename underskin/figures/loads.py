@@ -21,7 +21,7 @@ def loaded_array(
     charge_error_pc: ArrayLike,
     loads_mm: Sequence[tuple[float, float]],
 ) -> go.Figure:
-    """Each sensor coloured by its charge, and where the loads are, if they are at places.
+    """Each sensor coloured by its charge, with the loads where they have positions.
 
     Raises InvalidInput where a column's length differs from that of `sensors`.
     """

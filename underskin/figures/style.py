@@ -1,4 +1,4 @@
-"""How all figures look: colours of Okabe and Ito, and Cividis, that colour-blind people tell apart."""
+"""Common style of all figures: the colours of Okabe and Ito, and Cividis, which colour-blind readers can tell apart."""
 
 from html import escape
 
@@ -41,10 +41,10 @@ _TEMPLATE = go.layout.Template(
 
 
 def styled(figure: go.Figure, title: str, height: int = 420) -> go.Figure:
-    """The figure with its title, looking like all others; `height` in pixels."""
+    """The figure with its title in the common style; `height` in pixels."""
     return figure.update_layout(template=_TEMPLATE, title=title, height=height)
 
 
 def label(text: str) -> str:
-    """A name that came with a campaign, as plotly shows it: short, and its markup as text."""
+    """A name from a campaign for plotly: shortened, with markup escaped."""
     return escape(text if len(text) <= _LONGEST_LABEL else text[: _LONGEST_LABEL - 1] + "…", quote=False)

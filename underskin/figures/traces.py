@@ -1,4 +1,4 @@
-"""Channels as they came, one above another."""
+"""Raw channels, one above the other."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class Trace:
 
 
 def raw_traces(traces: Sequence[Trace], sample_rate_hz: float | None) -> go.Figure:
-    """Each channel over time, or over the number of the sample; of many samples the extremes are kept."""
+    """Each channel over time, or over the sample number; of many samples the extremes are drawn."""
     figure = make_subplots(len(traces), 1, shared_xaxes=True, vertical_spacing=0.12 / len(traces))
     place = "sample %{x}" if sample_rate_hz is None else "%{x:.6g} s"
     for row, trace in enumerate(traces, start=1):
@@ -51,7 +51,7 @@ def raw_traces(traces: Sequence[Trace], sample_rate_hz: float | None) -> go.Figu
 
 
 def _extremes(values: Floats) -> "np.ndarray[tuple[int], np.dtype[np.intp]]":
-    """Which samples to show: all, or the lowest and the highest of each of as many parts as can be told apart."""
+    """Which samples to draw: all, or the lowest and the highest of each of as many bins as a figure resolves."""
     count = len(values)
     if count <= _MOST_POINTS:
         return np.arange(count)

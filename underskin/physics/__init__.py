@@ -1,1 +1,1 @@
-"""The mechanics, in SI: contacts, layers, and what reaches a sensor."""
+"""Mechanics in SI units: skin, contacts, elastic layers, and the response of a sensor."""

@@ -1,4 +1,4 @@
-"""Interpolation of smooth functions on [0, end] at Chebyshev's points: the error falls geometrically with their count.
+"""Interpolation of smooth functions on [0, end] at Chebyshev points; the error falls geometrically with their number.
 
 Source: Trefethen, Approximation Theory and Approximation Practice (2013), ch. 3.
 """
@@ -10,7 +10,20 @@ from underskin.units import Floats
 
 
 class ChebyshevInterval:
-    """`nodes` (count,), all inside (0, end), where a function must be known."""
+    """Chebyshev interpolation on [0, end].
+
+    Parameters
+    ----------
+    end : float
+        Upper end of the interval.
+    count : int
+        Number of points.
+
+    Attributes
+    ----------
+    nodes : ndarray, (count,)
+        The interpolation points, all inside (0, end).
+    """
 
     def __init__(self, end: float, count: int) -> None:
         self.end = end
@@ -21,14 +34,14 @@ class ChebyshevInterval:
         self._derivative = chebyshev.chebder(np.eye(count)) * (2 / end)
 
     def basis(self, x: Floats) -> Floats:
-        """The polynomials at x (rows,): (rows, count). A function there is basis @ coefficients."""
+        """Chebyshev polynomials at x (rows,): (rows, count). A function is `basis(x) @ coefficients`."""
         return np.asarray(chebyshev.chebvander(2 / self.end * x - 1, len(self.nodes) - 1), dtype=float)
 
     def coefficients(self, values: Floats) -> Floats:
-        """From values at the nodes (count, ...)."""
+        """Coefficients (count, ...) of the interpolant from values at the nodes (count, ...)."""
         return np.tensordot(self._transform, values, 1)
 
     def derivative(self, coefficients: Floats) -> Floats:
-        """The coefficients (count, ...) of the derivative; the last is 0."""
+        """Coefficients (count, ...) of the derivative of the interpolant; the last is 0."""
         shorter = np.tensordot(self._derivative, coefficients, 1)
         return np.concatenate([shorter, np.zeros_like(coefficients[:1])])

@@ -1,17 +1,18 @@
-"""Contacts of spheres with the layer, many at once and with derivatives: what the mechanisms compute with.
+"""Contacts of spheres with an elastic layer, many at once and with derivatives, as the mechanisms use them.
 
-All is dimensionless. With E' = E/(1 − ν²), α = a/h and the work of adhesion w (JKR), linearity leaves two loads and
-the sum of two solutions, a sphere without adhesion and a flat punch whose φ at the edge is that of adhesion:
+All is dimensionless. With E' = E/(1 − ν²), α = a/h and the work of adhesion w (JKR), the solution is the sum of a
+sphere without adhesion and a flat punch whose φ at the edge is that of adhesion:
 
     P = F R/(E' h³),   Δ = δ R/h²,   U = √(w/(E' h³)) R
     P = (4/3) α³ A(α) − U √(8π α³) G(α),   Δ = α² B(α) − U √(2πα) V(α),   dF/dδ = 2 E' a S(α)  (edge held)
 
-A, B, G, V, S are 1 at α = 0 and depend on α, the Poisson ratio and the glue line alone: they are solved at Chebyshev's
-points in α (contact_equation) once for each layer, which takes about a millisecond.
+A, B, G, V, S are 1 at α = 0 and depend on α, the Poisson ratio and the glue line alone: they are solved once for each
+layer at Chebyshev points in α (`contact_integral_equation`), which takes about a millisecond.
 
 The stress follows in the same way: at the same points in α, the transforms of both pressures at given wave numbers are
-contracted with the layer's transmission, a few numbers for each place of the sensor, smooth in α; a row then costs one
-product of `basis` with those. Both transforms are 1 at k = 0: a contact's is [Ps p̂_sphere + (P − Ps) p̂_punch]/P.
+contracted with the layer's transmission. This leaves a few numbers for each position of the sensor, smooth in α, and a
+row costs one product of `basis` with them. Both transforms are 1 at k = 0: that of a contact is
+[Ps p̂_sphere + (P − Ps) p̂_punch]/P.
 """
 
 from dataclasses import dataclass
@@ -27,7 +28,7 @@ REACH = 4.0  # largest a/h
 _NODES = 28
 _TABLE: Floats = REACH / 128 * np.arange(1.0, 129.0)  # of a/h, for first guesses
 _SMALLEST = 1e-12
-_TOLERANCE = 1e-7  # of the last step; the error that is left is about its square
+_TOLERANCE = 1e-7  # of the last step; the remaining error is about its square
 _ITERATIONS = 60
 
 # Sums of terms: factor, exponent of α, the curve among A, G, B, V, S, and whether U multiplies it.
@@ -39,8 +40,15 @@ _STIFFNESS: _Law = ((1.0, 0.0, 4, False),)
 
 
 @dataclass(frozen=True)
-class Rows:
-    """`value` (rows,) and `slopes` (4, rows): derivatives with respect to what was given (P or α), U, ν and slip."""
+class ValueWithSlopes:
+    """A quantity of each contact with its derivatives.
+
+    Attributes
+    ----------
+    value : ndarray, (rows,)
+    slopes : ndarray, (4, rows)
+        Derivatives with respect to the given quantity (P or α), U, ν and the slip of the glue line.
+    """
 
     value: Floats
     slopes: Floats
@@ -50,19 +58,33 @@ class Rows:
 class ContactRows:
     """Contacts (rows,); NaN where there is none: below pull-off, or beyond a/h = REACH.
 
-    `alpha`: a/h. `load`: P. `depth`: Δ. `sphere_load`: Ps, the sphere's part of P; the punch's is P − Ps ≤ 0.
-    `stiffness`: S = (dF/dδ at a fixed edge)/(2 E' a); without adhesion that is dF/dδ altogether.
+    Attributes
+    ----------
+    alpha : ValueWithSlopes
+        a/h.
+    load, depth : ValueWithSlopes
+        P and Δ.
+    sphere_load : ValueWithSlopes
+        Ps, the share of the sphere in P; that of the punch is P − Ps ≤ 0.
+    stiffness : ValueWithSlopes
+        S = (dF/dδ at a fixed edge)/(2 E' a); without adhesion this is the total dF/dδ.
     """
 
-    alpha: Rows
-    load: Rows
-    depth: Rows
-    sphere_load: Rows
-    stiffness: Rows
+    alpha: ValueWithSlopes
+    load: ValueWithSlopes
+    depth: ValueWithSlopes
+    sphere_load: ValueWithSlopes
+    stiffness: ValueWithSlopes
 
 
 class CurveGrid:
-    """What depends on no layer: the points in α and the modes' transforms at `wave_numbers` (k,), in units of 1/h."""
+    """What is common to all layers: the Chebyshev points in α and the modes' transforms at given wave numbers.
+
+    Parameters
+    ----------
+    wave_numbers : ndarray, (k,)
+        In units of 1/h.
+    """
 
     def __init__(self, wave_numbers: Floats) -> None:
         self.interval = ChebyshevInterval(REACH, _NODES)
@@ -72,15 +94,17 @@ class CurveGrid:
         self.table_basis = self.interval.basis(_TABLE)
 
     def curves(self, layer: Layer) -> "ContactCurves":
-        """The curves of one layer."""
+        """The contact curves of one layer."""
         return ContactCurves(self, layer)
 
 
 class ContactCurves:
-    """The functions A, B, G, V, S of one layer and the pressures' transforms.
+    """The functions A, B, G, V, S of one layer and the transforms of the pressures.
 
-    `sphere_transform`, `punch_transform` (3, points, k): at the points `interval.nodes` in α, the value, its derivative
-    with respect to ν, and that with respect to slip.
+    Attributes
+    ----------
+    sphere_transform, punch_transform : ndarray, (3, points, k)
+        At the points `interval.nodes` in α: the value, and its derivatives with respect to ν and to the slip.
     """
 
     def __init__(self, grid: CurveGrid, layer: Layer) -> None:
@@ -97,7 +121,15 @@ class ContactCurves:
         self.sphere_transform, self.punch_transform = transforms[:3], transforms[3:]
 
     def at_load(self, load: Floats, root_adhesion: Floats) -> ContactRows:
-        """Contacts at P (rows,), U (rows,) on the branch that is stable under a given force."""
+        """Contacts under given loads, on the branch that is stable under force control.
+
+        Parameters
+        ----------
+        load : ndarray, (rows,)
+            P [-].
+        root_adhesion : ndarray, (rows,)
+            U [-].
+        """
         jkr = 3 * np.pi * root_adhesion**2
         equivalent = load + jkr + np.sqrt(np.maximum(jkr * (2 * load + jkr), 0.0))
         alpha = self._newton(load, root_adhesion, self._start(np.cbrt(equivalent), root_adhesion))
@@ -105,27 +137,37 @@ class ContactCurves:
         _, by_alpha, *partial = _law(_LOAD, alpha, root_adhesion, at)
         slopes = np.stack([1 / by_alpha, *(-x / by_alpha for x in partial)])
 
-        def rows(law: _Law) -> Rows:
+        def rows(law: _Law) -> ValueWithSlopes:
             value, by_alpha, *partial = _law(law, alpha, root_adhesion, at)
             total = by_alpha * slopes
             total[1:] += partial
-            return Rows(value, total)
+            return ValueWithSlopes(value, total)
 
-        return ContactRows(Rows(alpha, slopes), *(rows(law) for law in (_LOAD, _DEPTH, _SPHERE_LOAD, _STIFFNESS)))
+        laws = (_LOAD, _DEPTH, _SPHERE_LOAD, _STIFFNESS)
+        return ContactRows(ValueWithSlopes(alpha, slopes), *map(rows, laws))
 
     def at_radius(self, alpha: Floats, root_adhesion: Floats) -> ContactRows:
-        """Contacts at a/h (rows,), above 0 and up to REACH, and U (rows,), stable or not."""
+        """Contacts of given radii, stable or not.
+
+        Parameters
+        ----------
+        alpha : ndarray, (rows,)
+            a/h, above 0 and up to REACH.
+        root_adhesion : ndarray, (rows,)
+            U [-].
+        """
         at = self._evaluated(self.interval.basis(alpha))
         one = np.outer([1.0, 0.0, 0.0, 0.0], np.ones_like(alpha))
 
-        def rows(law: _Law) -> Rows:
+        def rows(law: _Law) -> ValueWithSlopes:
             value, *slopes = _law(law, alpha, root_adhesion, at)
-            return Rows(value, np.stack(slopes))
+            return ValueWithSlopes(value, np.stack(slopes))
 
-        return ContactRows(Rows(alpha, one), *(rows(law) for law in (_LOAD, _DEPTH, _SPHERE_LOAD, _STIFFNESS)))
+        laws = (_LOAD, _DEPTH, _SPHERE_LOAD, _STIFFNESS)
+        return ContactRows(ValueWithSlopes(alpha, one), *map(rows, laws))
 
     def stiffness_at(self, alpha: Floats) -> Floats:
-        """S at given a/h (rows,), 0 to REACH: its value and derivatives by α, ν and slip (4, rows)."""
+        """S at a/h (rows,) from 0 to REACH: its value and derivatives with respect to α, ν and slip, (4, rows)."""
         return self._evaluated(self.interval.basis(alpha))[:, _STIFFNESS[0][2]]
 
     def _newton(self, target: Floats, root_adhesion: Floats, start: Floats) -> Floats:

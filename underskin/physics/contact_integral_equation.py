@@ -5,12 +5,12 @@ Lengths in units of the thickness, α = a/h (Lebedev and Ufliand 1958):
     (π/2) φ(x) − ∫₀^α φ(t) N(x, t) dt = f(x),   N(x, t) = ∫₀^∞ (1 − K(k)) cos kx cos kt dk,
     p̂(k) = ∫₀^α φ(t) cos kt dt
 
-φ is analytic and even, so that a few modes eₙ(t/α) = (−1)ⁿ √(4n + 1) P₂ₙ(t/α) hold it; their cosine transforms are
-α √(4n + 1) j₂ₙ(kα), and Galerkin's matrix is (π/2) I − α ∫ (1 − K) j jᵀ dk, symmetric. f = 1 is the flat punch φ₀ and
-f = (t/α)² gives φ₂; a sphere without adhesion is φ_s = φ₂(α)/φ₀(α) φ₀ − φ₂, which vanishes at the edge.
+φ is analytic and even, so a few modes eₙ(t/α) = (−1)ⁿ √(4n + 1) P₂ₙ(t/α) represent it; their cosine transforms are
+α √(4n + 1) j₂ₙ(kα), and the Galerkin matrix is (π/2) I − α ∫ (1 − K) j jᵀ dk, symmetric. f = 1 is the flat punch φ₀
+and f = (t/α)² gives φ₂; a sphere without adhesion is φ_s = φ₂(α)/φ₀(α) φ₀ − φ₂, which is 0 at the edge.
 
-Whatever depends on the layer is an array whose first axis holds its value, its derivative with respect to the Poisson
-ratio, and that with respect to the slip of the glue line.
+An array that depends on the layer holds, along its first axis, the value, its derivative with respect to the Poisson
+ratio, and its derivative with respect to the slip of the glue line.
 """
 
 from dataclasses import dataclass
@@ -22,16 +22,25 @@ from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
 _END = 18.0  # where 1 − K has fallen below 1e-13
-_FIRST_PANELS = (0.0, 0.02, 0.15, 0.7)  # a nearly frictionless base bends K close to k = 0
+_FIRST_PANELS = (0.0, 0.02, 0.15, 0.7)  # on a nearly frictionless base, K changes rapidly near k = 0
 
 
 @dataclass(frozen=True)
 class EdgeSolutions:
-    """Contacts of radii α (m,), each ratio (3, m) to the half space's value of the same radius, each shape (3, m, n).
+    """Contacts of radii α (m,): ratios (3, m) to the half space at the same radius, and shapes (3, m, n).
 
-    `sphere_force`: F R/(E' h³) over 4α³/3; `sphere_depth`: δ R/h² over α²; `stiffness`: dF/dδ at a fixed edge over
-    2E'a; `edge_force`, `edge_depth`: force and depth of a flat punch per value φ(a) at its edge. The shapes are
-    Legendre coefficients of φ over ∫φ dt, of the sphere and of the flat punch.
+    Attributes
+    ----------
+    sphere_force : ndarray, (3, m)
+        F R/(E' h³) over 4α³/3.
+    sphere_depth : ndarray, (3, m)
+        δ R/h² over α².
+    stiffness : ndarray, (3, m)
+        dF/dδ at a fixed edge over 2E'a.
+    edge_force, edge_depth : ndarray, (3, m)
+        Force and depth of a flat punch per value φ(a) at its edge.
+    sphere_shape, punch_shape : ndarray, (3, m, n)
+        Legendre coefficients of φ over ∫φ dt.
     """
 
     sphere_force: Floats
@@ -44,7 +53,13 @@ class EdgeSolutions:
 
 
 class ContactEquation:
-    """The equation at radii `alpha` (m,) in units of h, all > 0: what does not depend on the layer is computed here."""
+    """The integral equation at given contact radii; computes once what does not depend on the layer.
+
+    Parameters
+    ----------
+    alpha : ndarray, (m,)
+        a/h, all above 0.
+    """
 
     def __init__(self, alpha: Floats) -> None:
         largest = float(np.max(alpha))
@@ -56,7 +71,7 @@ class ContactEquation:
         self._edge = np.sqrt(4 * order + 1) * (-1.0) ** order  # eₙ(1)
 
     def solve(self, layer: Layer) -> EdgeSolutions:
-        """All contacts on one layer."""
+        """Solve all contacts on one layer."""
         punch, square = self._flat_and_square(layer)
         punch_edge, square_edge = punch @ self._edge, square @ self._edge
         depth = _over(square_edge, punch_edge)
@@ -92,7 +107,19 @@ class ContactEquation:
 
 
 def mode_transforms(s: Floats, modes: int) -> Floats:
-    """√(4n + 1) j₂ₙ(s), the modes' cosine transforms over α at s = kα, of any shape: (*s.shape, modes)."""
+    """Cosine transforms of the modes over α, √(4n + 1) j₂ₙ(s).
+
+    Parameters
+    ----------
+    s : ndarray
+        k α [-], of any shape.
+    modes : int
+        Number of modes n.
+
+    Returns
+    -------
+    ndarray, (*s.shape, modes)
+    """
     order = np.arange(modes)
     return np.sqrt(4 * order + 1) * np.asarray(spherical_jn(2 * order, s[..., None]))
 

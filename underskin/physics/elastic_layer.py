@@ -1,12 +1,13 @@
-"""A linear elastic layer of unit thickness on a rigid base, of any Poisson ratio 0 to 0.5, bonded or glued.
+"""A linear elastic layer of unit thickness on a rigid base, of any Poisson ratio from 0 to 0.5, bonded or glued.
 
-The glue line yields in shear: τ = κ (G/h) u_r at the base; κ = ∞ is bonded, κ = 0 frictionless. It is given here by
-its `slip` = 1/(1 + κ), 0 to 1, in which everything below is a ratio of linear functions, so that both ends are reached.
+The glue line deforms in shear: τ = κ (G/h) u_r at the base; κ = ∞ is bonded, κ = 0 frictionless. It is described by
+its `slip` = 1/(1 + κ), 0 to 1: in the slip, everything below is a ratio of linear functions, so both ends can be
+evaluated.
 
-Derivation (Sneddon, Fourier Transforms (1951), ch. 10): the transforms u, w of the
-displacements and S, T of σ_zz, τ_rz obey x' = A x in ζ = k z with (A² − 1)² = 0, so that exp(A ζ) has a closed form,
-and the 4×4 system of two conditions at the base (w = 0, u = (k/κ) T) and two at the surface reduces by hand.
-With C = cosh k, H = sinh k, p = (1 − 2ν)/(2 − 2ν), which is 0 when incompressible, and g = 2k (1 − p)/κ:
+Derivation (Sneddon, Fourier Transforms (1951), ch. 10): the transforms u, w of the displacements and S, T of σ_zz,
+τ_rz obey x' = A x in ζ = k z with (A² − 1)² = 0, so that exp(A ζ) has a closed form, and the 4×4 system of two
+conditions at the base (w = 0, u = (k/κ) T) and two at the surface reduces by hand. With C = cosh k, H = sinh k,
+p = (1 − 2ν)/(2 − 2ν), which is 0 for an incompressible layer, and g = 2k (1 − p)/κ:
 
     D      = C² + k² − 2pk² + p²(k² − H²)           + g (CH + k)
     M D    = C + kH − p kH                          + g (H + kC)     M: normal stress, base / surface
@@ -27,7 +28,23 @@ _SMALLEST_K = 1e-12  # at k = 0 a frictionless base gives 0/0; the limits are re
 
 
 def slip(glue_stiffness: float) -> float:
-    """1/(1 + κ) of a glue line with τ = κ (G/h) u_r; 0 for κ = ∞ (bonded). InvalidInput if κ is negative or NaN."""
+    """Slip 1/(1 + κ) of a glue line with τ = κ (G/h) u_r.
+
+    Parameters
+    ----------
+    glue_stiffness : float
+        κ [-], at least 0; infinite when bonded.
+
+    Returns
+    -------
+    float
+        0 (bonded) to 1 (frictionless).
+
+    Raises
+    ------
+    InvalidInput
+        If κ is negative or NaN.
+    """
     if not glue_stiffness >= 0:
         raise InvalidInput("glue_stiffness", glue_stiffness, "must be at least 0 (infinity: bonded)")
     return 1 / (1 + glue_stiffness)
@@ -44,9 +61,21 @@ class Sloped:
 
 @dataclass(frozen=True)
 class Layer:
-    """Poisson ratio 0 to 0.5 (0.5 included) and slip 0 (bonded) to 1 (frictionless); InvalidInput outside.
+    """An elastic layer of unit thickness.
 
-    Its functions take wave numbers k ≥ 0 (times h), (k,), and return `Sloped`.
+    Its functions take wave numbers k ≥ 0 in units of 1/h, (k,), and return `Sloped`.
+
+    Parameters
+    ----------
+    poisson_ratio : float
+        0 to 0.5, 0.5 included.
+    slip : float
+        0 (bonded) to 1 (frictionless).
+
+    Raises
+    ------
+    InvalidInput
+        Outside these ranges.
     """
 
     poisson_ratio: float = 0.5
@@ -59,25 +88,25 @@ class Layer:
             raise InvalidInput("slip", self.slip, "must be 0 (bonded) to 1 (frictionless)")
 
     def transmission(self, k: Floats) -> Sloped:
-        """M(k): 1 at k = 0; its value serves hankel.normal_stress (γ_n, σ)."""
+        """Normal transmission M(k), 1 at k = 0, as `hankel_transform.normal_stress` takes it (γ_n, σ)."""
         k, decay, cosh, sinh = _scaled_hyperbolic(k)
         bonded = (cosh + k * sinh) * decay, -k * sinh * decay, np.zeros_like(k)
         return self._ratio(k, bonded, (sinh + k * cosh) * decay)
 
     def tangential_transmission(self, k: Floats) -> Sloped:
-        """M_t(k): 0 at k = 0; its value serves hankel.tangential_stress (γ_t)."""
+        """Tangential transmission M_t(k), 0 at k = 0, as `hankel_transform.tangential_stress` takes it (γ_t)."""
         k, decay, cosh, sinh = _scaled_hyperbolic(k)
         bonded = k * cosh * decay, (sinh - k * cosh) * decay, np.zeros_like(k)
         return self._ratio(k, bonded, k * sinh * decay)
 
     def compliance(self, k: Floats) -> Sloped:
-        """K(k): surface deflection over that of the half space of the same ν; 0 at k = 0, 1 at k = ∞."""
+        """Compliance K(k): surface deflection over that of the half space of the same ν; 0 at k = 0, 1 at k = ∞."""
         k, decay, cosh, sinh = _scaled_hyperbolic(k)
         bonded = _sinh_cosh_minus(k), 2 * k * decay**2, -(cosh * sinh + k * decay**2)
         return self._ratio(k, bonded, sinh**2)
 
     def stiffening(self, k: Floats) -> Sloped:
-        """1 − K(k), exact to rounding where K nears 1; falls like k² e^(−2k)."""
+        """1 − K(k), exact to rounding where K is close to 1; falls like k² e^(−2k)."""
         k, decay, _, sinh = _scaled_hyperbolic(k)
         square, far = k * (1 + k), decay**2
         bonded = (1 + square - sinh) * far, -2 * square * far, (square + sinh) * far
@@ -106,22 +135,55 @@ class Layer:
 
 
 def gamma_n(layer: Layer, offset: ArrayLike, rho: ArrayLike) -> Floats:
-    """γ_n(r̂/h, ρ) of a normal point force; arrays broadcast."""
+    """Stress factor γ_n of a normal point force, averaged over the sensor.
+
+    Parameters
+    ----------
+    layer : Layer
+    offset : array_like
+        Distance r̂/h of the force from the centre of the sensor [-].
+    rho : array_like
+        ρ = rT/h [-].
+
+    Returns
+    -------
+    ndarray
+        [-], of the broadcast shape.
+    """
     return normal_stress(lambda k: layer.transmission(k).value, np.ones_like, 0.0, rho, offset)
 
 
 def gamma_t(layer: Layer, offset: ArrayLike, rho: ArrayLike) -> Floats:
-    """γ_t(r̂/h, ρ) of a tangential point force, positive where the force points away from the sensor."""
+    """Stress factor γ_t of a tangential point force, positive where the force points away from the sensor.
+
+    Parameters and result as in `gamma_n`.
+    """
     return tangential_stress(lambda k: layer.tangential_transmission(k).value, rho, offset)
 
 
 def sigma(layer: Layer, a: ArrayLike, rho: ArrayLike, offset: ArrayLike = 0.0) -> Floats:
-    """σ(a/h, ρ) under the Hertz pressure, `offset` r̂/h beside the sensor; arrays broadcast."""
+    """Transmission factor σ(a/h, ρ) under the Hertz pressure.
+
+    Parameters
+    ----------
+    layer : Layer
+    a : array_like
+        Contact radius a/h [-].
+    rho : array_like
+        ρ = rT/h [-].
+    offset : array_like
+        Distance r̂/h of the load from the centre of the sensor [-].
+
+    Returns
+    -------
+    ndarray
+        [-], of the broadcast shape.
+    """
     return normal_stress(lambda k: layer.transmission(k).value, hertz_transform, a, rho, offset)
 
 
 def _scaled_hyperbolic(k: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """k, kept off 0, with e^(−k), e^(−k) cosh k and e^(−k) sinh k."""
+    """k, at least `_SMALLEST_K`, with e^(−k), e^(−k) cosh k and e^(−k) sinh k."""
     k = np.maximum(k, _SMALLEST_K)
     decay = np.exp(-k)
     return k, decay, (1 + decay**2) / 2, -np.expm1(-2 * k) / 2

@@ -1,4 +1,4 @@
-"""The skin as Boussinesq's half space: stress at depth h under forces on the surface.
+"""The skin as a half space (Boussinesq): stress at depth h under forces on the surface.
 
 Lengths in units of the depth h. Source: Seminara 2018, equations 4–6, 12 and 14; Johnson, Contact Mechanics (1985),
 sections 3.2 and 3.6.
@@ -25,10 +25,27 @@ def stress(
     force_y: ArrayLike = 0.0,
     azimuth: ArrayLike = 0.0,
 ) -> Floats:
-    """T3 [Pa] at depth h under a point force, tension positive (equation 4).
+    """Normal stress T3 at depth h under a point force, tension positive (equation 4).
 
-    T3 = (3/2π) h² / (r² + h²)^(5/2) · [(F1 cos β + F2 sin β) r − F3 h], with r [m] the lateral distance, F3 [N]
-    pressing into the skin, β [rad] the azimuth of the load seen from the sensor.
+    T3 = (3/2π) h²/(r² + h²)^(5/2) · [(F1 cos β + F2 sin β) r − F3 h]
+
+    Parameters
+    ----------
+    r : array_like
+        Lateral distance [m].
+    depth : array_like
+        h [m].
+    normal_force : array_like
+        F3 [N], positive into the skin.
+    force_x, force_y : array_like
+        F1, F2 [N].
+    azimuth : array_like
+        β [rad], direction of the load seen from the sensor.
+
+    Returns
+    -------
+    ndarray
+        [Pa], of the broadcast shape.
     """
     r_, h = np.asarray(r, dtype=float), np.asarray(depth, dtype=float)
     outward = np.asarray(force_x) * np.cos(azimuth) + np.asarray(force_y) * np.sin(azimuth)
@@ -36,27 +53,64 @@ def stress(
 
 
 def gamma_n(offset: ArrayLike, rho: ArrayLike) -> Floats:
-    """γ(r̂/h, ρ): a normal point force averaged over the sensor's disc (equation 6); (1 + λ²)^(−5/2) at ρ = 0."""
+    """Stress factor γ_n of a normal point force, averaged over the sensor's disc (equation 6).
+
+    Parameters
+    ----------
+    offset : array_like
+        λ = r̂/h [-].
+    rho : array_like
+        ρ = rT/h [-].
+
+    Returns
+    -------
+    ndarray
+        [-], of the broadcast shape; (1 + λ²)^(−5/2) at ρ = 0.
+    """
     return normal_stress(_normal, np.ones_like, 0.0, rho, offset)
 
 
 def gamma_t(offset: ArrayLike, rho: ArrayLike) -> Floats:
-    """The same for a tangential force: λ (1 + λ²)^(−5/2) at ρ = 0; T3 = +(3/2πh²)(F1 cos β + F2 sin β) γ_t."""
+    """Stress factor γ_t of a tangential force: T3 = (3/2πh²)(F1 cos β + F2 sin β) γ_t; λ (1 + λ²)^(−5/2) at ρ = 0.
+
+    Parameters and result as in `gamma_n`.
+    """
     return tangential_stress(_tangential, rho, offset)
 
 
 def delta(a: ArrayLike) -> Floats:
-    """δ(a/h) = 1 / (1 + (a/h)²): Hertz pressure on a point sensor (equation 12, in closed form)."""
+    """Factor δ = 1/(1 + (a/h)²) of the Hertz pressure on a point sensor (equation 12 in closed form).
+
+    Parameters
+    ----------
+    a : array_like
+        a/h [-].
+    """
     return 1 / (1 + np.square(np.asarray(a, dtype=float)))
 
 
 def sigma(a: ArrayLike, rho: ArrayLike, offset: ArrayLike = 0.0) -> Floats:
-    """σ(a/h, ρ): Hertz pressure on an extended sensor, `offset` r̂/h beside it (equation 14)."""
+    """Transmission factor σ(a/h, ρ) of the half space: Hertz pressure on an extended sensor (equation 14).
+
+    Parameters
+    ----------
+    a : array_like
+        Contact radius a/h [-].
+    rho : array_like
+        ρ = rT/h [-].
+    offset : array_like
+        Distance r̂/h of the load from the centre of the sensor [-].
+
+    Returns
+    -------
+    ndarray
+        [-], of the broadcast shape.
+    """
     return normal_stress(_normal, hertz_transform, a, rho, offset)
 
 
 def sigma_in_domain(a: ArrayLike, rho: ArrayLike) -> Sigma:
-    """σ with its error, NaN where a/h or ρ exceeds `DOMAIN_END`; arrays broadcast."""
+    """σ with its error; NaN where a/h or ρ exceeds `DOMAIN_END`. Parameters as in `sigma`."""
     a_all, rho_all = np.broadcast_arrays(np.asarray(a, dtype=float), np.asarray(rho, dtype=float))
     inside = (a_all <= DOMAIN_END) & (rho_all <= DOMAIN_END)
     value = np.full(a_all.shape, np.nan)

@@ -6,7 +6,7 @@ T3 = −(3/2π)(F/h²) · s, whose average over a disc of radius ρ, its centre 
     s(e, ρ) = (1/3) ∫₀^∞ p̂(k) M(k) [2 J1(kρ)/(kρ)] J0(k e) k dk
 
 with M the transmission of the body: 1 at k = 0, falling like (1 + k) e^(−k) or 2 (1 + k) e^(−k), so that the
-integral ends at k = 44 for double precision. Source: PHYSICS, section 3; Sneddon, Fourier Transforms (1951), ch. 10.
+integral ends at k = 44 for double precision. Source: Sneddon, Fourier Transforms (1951), ch. 10.
 """
 
 from collections.abc import Callable
@@ -24,7 +24,7 @@ _ROWS_AT_ONCE = 2048
 
 
 def hertz_transform(s: Floats) -> Floats:
-    """p̂ of the Hertz pressure, 3 (sin s − s cos s)/s³, with s = k a/h; 1 at s = 0."""
+    """Transform p̂ of the Hertz pressure, 3 (sin s − s cos s)/s³, with s = k a/h; 1 at s = 0."""
     small = np.abs(s) < 0.05
     safe = np.where(small, 1.0, s)
     series = 1 - s**2 / 10 + s**4 / 280
@@ -32,12 +32,12 @@ def hertz_transform(s: Floats) -> Floats:
 
 
 def punch_transform(s: Floats) -> Floats:
-    """p̂ of the flat punch's pressure, sin s / s."""
+    """Transform p̂ of the pressure of a flat punch, sin s/s."""
     return np.sinc(s / np.pi)
 
 
 def disc_average(s: Floats) -> Floats:
-    """2 J1(s)/s, the transform of the average over a disc, with s = k ρ; 1 at s = 0."""
+    """Transform of the average over a disc, 2 J1(s)/s with s = k ρ; 1 at s = 0."""
     small = np.abs(s) < 1e-4
     safe = np.where(small, 1.0, s)
     return np.where(small, 1 - s**2 / 8, 2 * j1(safe) / safe)
@@ -46,12 +46,34 @@ def disc_average(s: Floats) -> Floats:
 def normal_stress(
     transmission: Transform, pressure: Transform, a: ArrayLike, rho: ArrayLike, offset: ArrayLike = 0.0
 ) -> Floats:
-    """s(e, ρ) of the module's equation for a pressure of radius a; arrays broadcast."""
+    """Mean normal stress s(e, ρ) on a disc, in units of 3F/(2πh²), under a normal axisymmetric load.
+
+    Parameters
+    ----------
+    transmission : callable
+        M(k), (k,) to (k,).
+    pressure : callable
+        p̂ as a function of s = k a/h.
+    a : array_like
+        Radius of the load a/h [-].
+    rho : array_like
+        Radius of the disc ρ [-]; 0 is a point.
+    offset : array_like
+        Distance e of the disc's centre from the axis of the load [-].
+
+    Returns
+    -------
+    ndarray
+        [-], of the broadcast shape.
+    """
     return _transform(transmission, pressure, j0, a, rho, offset)
 
 
 def tangential_stress(transmission: Transform, rho: ArrayLike, offset: ArrayLike) -> Floats:
-    """The same for a tangential point force: (1/3) ∫ M(k) [2 J1(kρ)/(kρ)] J1(k e) k dk; arrays broadcast."""
+    """Mean normal stress on a disc under a tangential point force: (1/3) ∫ M(k) [2 J1(kρ)/(kρ)] J1(k e) k dk.
+
+    Parameters and result as in `normal_stress`.
+    """
     return _transform(transmission, np.ones_like, j1, 0.0, rho, offset)
 
 

@@ -1,4 +1,4 @@
-"""What is pressed and what presses: the skin and the indenter, in SI.
+"""The skin and the indenter, in SI.
 
 Source: Seminara, Sensors 18 (2018) 459, section 2.
 """
@@ -16,10 +16,18 @@ INCOMPRESSIBLE = 0.5
 
 @dataclass(frozen=True)
 class Skin:
-    """An elastomer layer on a rigid base with circular sensors under it.
+    """An elastomer layer on a rigid base with circular sensors under it; scalars or arrays that broadcast.
 
-    `thickness` h [m], `youngs_modulus` E [Pa], `poisson_ratio` ν [-], `sensor_radius` rT [m]: scalars or arrays
-    that broadcast, so that one Skin may stand for a column of them.
+    Attributes
+    ----------
+    thickness : ndarray
+        h [m].
+    youngs_modulus : ndarray
+        E [Pa].
+    sensor_radius : ndarray
+        rT [m].
+    poisson_ratio : ndarray
+        ν [-].
     """
 
     thickness: Floats
@@ -37,7 +45,13 @@ class Skin:
         poisson_ratio: ArrayLike = INCOMPRESSIBLE,
         units_checked: bool = False,
     ) -> "Skin":
-        """The skin as a lab describes it; raises InvalidInput that names the field and guesses a unit slip."""
+        """The skin from a lab's units.
+
+        Raises
+        ------
+        InvalidInput
+            Names the field that cannot be used, and guesses the unit that was meant.
+        """
         return cls(
             thickness=checked("thickness_mm", thickness_mm, units_checked=units_checked),
             youngs_modulus=checked("youngs_modulus_mpa", youngs_modulus_mpa, units_checked=units_checked),
@@ -53,13 +67,13 @@ class Skin:
 
 @dataclass(frozen=True)
 class Indenter:
-    """A rigid sphere of `radius` R [m]; scalar or array."""
+    """A rigid sphere of radius R [m], a scalar or an array."""
 
     radius: Floats
 
     @classmethod
     def from_lab(cls, *, indenter_radius_mm: ArrayLike, units_checked: bool = False) -> "Indenter":
-        """The sphere as a lab describes it; raises InvalidInput that names the field and guesses a unit slip."""
+        """The sphere from a lab's units; raises InvalidInput as `Skin.from_lab` does."""
         return cls(checked("indenter_radius_mm", indenter_radius_mm, units_checked=units_checked))
 
 

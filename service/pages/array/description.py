@@ -15,7 +15,7 @@ from service.store import campaigns, skins
 from service.store.engine import Database
 from service.usecases.table_loader import influence_table
 from underskin import InvalidInput, UnderskinError
-from underskin.array_stress.answer import StressAnswer, answer
+from underskin.array_stress.answer import ArrayStress, answer
 from underskin.array_stress.request import read_request
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -76,14 +76,14 @@ def refused(error: UnderskinError, lines: Sequence[int] = ()) -> str:
     return in_form_words(error, _LABELS, lines, "or tick “Take unlikely magnitudes as they are”")
 
 
-def answered(request: Request, document: Mapping[str, Any]) -> StressAnswer:
+def answered(request: Request, document: Mapping[str, Any]) -> ArrayStress:
     """What `POST /v1/stress` answers; raises UnderskinError."""
     table = influence_table(request.app.state.settings.tables)
     with np.errstate(all="ignore"):  # what overflows is out of reach
         return answer(table, read_request(document))
 
 
-def charge_columns(answer: StressAnswer) -> dict[str, list[Any]]:
+def charge_columns(answer: ArrayStress) -> dict[str, list[Any]]:
     """Charge and stress on each sensor."""
     return {"sensor": list(answer.sensors), **{name: column.tolist() for name, column in answer.columns.items()}}
 

@@ -12,7 +12,7 @@ from service.pages.shared.figures import csv_answer, drawn
 from service.pages.shared.html import page
 from service.pages.shared.typed_numbers import numbers
 from underskin import InvalidInput, UnderskinError
-from underskin.array_stress.answer import StressAnswer
+from underskin.array_stress.answer import ArrayStress
 
 router = APIRouter(prefix="/loads")
 
@@ -30,7 +30,7 @@ def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, l
     array = described(store, table, request.query_params, skin)
     error: str | None = None
     document: dict[str, Any] = {}
-    answer: StressAnswer | None = None
+    answer: ArrayStress | None = None
     try:
         document = _document(array, loads)
         answer = answered(request, document)
@@ -55,7 +55,7 @@ def charge_csv(request: Request, store: Store, table: Table, skin: SkinQuery = N
     return csv_answer("charge", charge_columns(answer))
 
 
-def _figure(request: Request, document: Mapping[str, Any], answer: StressAnswer) -> Any:
+def _figure(request: Request, document: Mapping[str, Any], answer: ArrayStress) -> Any:
     from underskin.figures import loaded_array
 
     columns = answer.columns

@@ -23,7 +23,7 @@ from service.pages.shared.html import page
 from service.store.engine import Database
 from underskin import InvalidInput, UnderskinError
 from underskin.array_stress import pressure_map
-from underskin.array_stress.answer import StressAnswer
+from underskin.array_stress.answer import ArrayStress
 from underskin.recordings.readers import text
 
 router = APIRouter(prefix="/loads/map")
@@ -62,7 +62,7 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
     described = description.described(store, request.app.state.table, given, given.get(_SKIN))
     error: str | None = None
     document: dict[str, Any] = {}
-    answer: StressAnswer | None = None
+    answer: ArrayStress | None = None
     try:
         if len(content) > _LARGEST_BYTES:
             raise InvalidInput("pressure_map", name, f"must have at most {_LARGEST_BYTES / 1e6:g} MB: make it coarser")
@@ -85,7 +85,7 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
     )
 
 
-def _figures(document: Mapping[str, Any], answer: StressAnswer) -> list[Drawn]:
+def _figures(document: Mapping[str, Any], answer: ArrayStress) -> list[Drawn]:
     from underskin.figures import loaded_array, pressure_on_array
 
     columns, held = answer.columns, document["pressure_map"]

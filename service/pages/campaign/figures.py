@@ -140,12 +140,12 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any]) -> 
 
 
 def _curves(row: AnyRow, campaign: Campaign) -> list[Drawn]:
-    from underskin.figures import Curve, force_curves
+    from underskin.figures import ForceCurve, force_curves
 
     kinds = (IndentationRecording, CompressionRecording)
     chosen = [recording for recording in campaign.recordings if isinstance(recording, kinds)]
     if not chosen:
         return []
-    figure = force_curves([Curve(one.id, one.displacement_mm, one.force_n) for one in chosen[:_MOST_CURVES]])
+    figure = force_curves([ForceCurve(one.id, one.displacement_mm, one.force_n) for one in chosen[:_MOST_CURVES]])
     about = f"Force against displacement of {min(len(chosen), _MOST_CURVES)} of {len(chosen)} recordings."
     return [drawn("curves", figure, about, f"/campaigns/{row.id}/curves.csv")]

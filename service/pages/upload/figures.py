@@ -85,13 +85,13 @@ def _frf(campaigns: list[Campaign], place: str) -> list[Drawn]:
 
 
 def _curves(campaigns: list[Campaign]) -> list[Drawn]:
-    from underskin.figures import Curve, force_curves
+    from underskin.figures import ForceCurve, force_curves
 
     kinds = (IndentationRecording, CompressionRecording)
     chosen = [one for campaign in campaigns for one in campaign.recordings if isinstance(one, kinds)]
     if not chosen:
         return []
-    figure = force_curves([Curve(one.id, one.displacement_mm, one.force_n) for one in chosen[:_MOST_CURVES]])
+    figure = force_curves([ForceCurve(one.id, one.displacement_mm, one.force_n) for one in chosen[:_MOST_CURVES]])
     return [
         drawn("curves", figure, f"Force against displacement of {min(len(chosen), _MOST_CURVES)} of {len(chosen)}.")
     ]

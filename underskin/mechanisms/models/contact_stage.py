@@ -13,7 +13,7 @@ import numpy as np
 
 from underskin.mechanisms.autodiff import Differentiated, cbrt, chain
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.physics.contact_curves import REACH, ContactCurves, CurveGrid, Rows
+from underskin.physics.contact_curves import REACH, ContactCurves, CurveGrid, ValueWithSlopes
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
@@ -56,7 +56,7 @@ def _on_layer(contacts: Contacts, curves: ContactCurves) -> Pressed:
 
     beyond = np.isnan(solved.alpha.value)  # of the curves' reach, which is beyond the table's
 
-    def differentiated(rows: Rows, otherwise: Floats | float) -> Differentiated:
+    def differentiated(rows: ValueWithSlopes, otherwise: Floats | float) -> Differentiated:
         by_load, by_root, by_poisson_ratio, by_slip = np.where(beyond, 0.0, rows.slopes)
         terms = [(by_load, load), (by_poisson_ratio, contacts.poisson_ratio)]
         terms += [] if root is None else [(by_root, root)]

@@ -1,21 +1,18 @@
-"""What no rig can carry out, refused by name: sensors in one place, presses beside the skin, spheres that lift off."""
+"""Rejects experiments that no rig can carry out: overlapping sensors, loads beside the skin, spheres that lift off."""
 
 import math
 from collections.abc import Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 from rig.errors import RigError
+from rig.experiment import DeclaredSkin, RecordingDesign
 
-if TYPE_CHECKING:
-    from rig.experiment import Design, Skin
-
-_LEAST_D33 = 0.05  # pC/N; a polymer without poling has as much
-_FELT_WITHIN = 8.0  # thicknesses; further off less than a millionth of the stress arrives
+_LEAST_D33 = 0.05  # pC/N; even an unpoled polymer has as much
+_INFLUENCE = 8.0  # thicknesses; beyond, less than a millionth of the stress remains
 
 
-def check_skin(skin: "Skin") -> None:
-    """A d33 that shows, and sensors beside each other; raises RigError."""
+def check_skin(skin: DeclaredSkin) -> None:
+    """Raise RigError for a d33 that is too small, and for sensors that overlap."""
     size = abs(skin.d33_pc_per_n)
     if size < _LEAST_D33:
         slip = f"; {size:g} C/N would be {1e12 * size:g} pC/N" if 1e12 * size >= _LEAST_D33 else ""
@@ -30,24 +27,24 @@ def check_skin(skin: "Skin") -> None:
             raise RigError("skin.sensors", f"{first} and {second}, {apart:g} mm apart", allowed)
 
 
-def check_presses(design: "Design", skin: "Skin") -> None:
-    """Spheres that stay down, on the skin, where the sensor feels them; raises RigError."""
+def check_presses(design: RecordingDesign, skin: DeclaredSkin) -> None:
+    """Raise RigError for spheres that lift off, that are beside the skin, or out of range of the sensor."""
     lowest = min(design.preloads_n)
     for index, force in enumerate(design.dynamic_forces_n):
         if force >= lowest:
             allowed = f"must be below the lowest preload, {lowest:g} N: the sphere would lift off"
             raise RigError(f"design.dynamic_forces_n[{index}]", force, allowed)
-    reach = _FELT_WITHIN * skin.thickness_mm - skin.sensor_radius_mm
+    reach = _INFLUENCE * skin.thickness_mm - skin.sensor_radius_mm
     for index, offset in enumerate(design.offsets_mm):
         field, away = f"design.offsets_mm[{index}]", math.hypot(*offset)
         if away > max(reach, 0.0):
-            allowed = f"must be 0 to {max(reach, 0):g} mm from the sensor's centre, which feels nothing further off"
+            allowed = f"must be 0 to {max(reach, 0):g} mm from the sensor's centre, beyond which nothing reaches it"
             raise RigError(field, list(offset), allowed)
         _check_on_skin(field, offset, skin, design.sensors)
 
 
-def _check_on_skin(field: str, offset: Sequence[float], skin: "Skin", sensors: Sequence[str]) -> None:
-    """The array lies in the middle of the skin, whose length runs along x."""
+def _check_on_skin(field: str, offset: Sequence[float], skin: DeclaredSkin, sensors: Sequence[str]) -> None:
+    """Raise RigError for a load beside the skin; the array is in its middle, its length along x."""
     for axis, extent, name in ((0, skin.length_mm, "length_mm"), (1, skin.width_mm, "width_mm")):
         if extent is None:
             continue

@@ -1,6 +1,6 @@
-"""Work that is kept: a result a file, found again by what went in and by the sources that made it.
+"""Results stored in files under a digest of their input and of the sources that made them.
 
-A run that is stopped goes on where it was; a diagnosis that has changed since is worked out again.
+A run that was stopped resumes; a result of changed sources is calculated again.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ FAILED = "failed"
 
 @dataclass(frozen=True)
 class Work:
-    """Where results are kept, on how many processes, and how many campaigns of each kind at most (None: all)."""
+    """Folder of the results, number of processes, and the most campaigns of each kind (None: all)."""
 
     folder: Path
     workers: int = 1
@@ -34,7 +34,7 @@ class Work:
 
 
 def sources(*packages: str) -> str:
-    """A digest of what packages of this project compute, or single files under them (see underskin.source_digest)."""
+    """Digest (`underskin.source_digest`) of packages of this project, or of files in them (`package/pattern`)."""
     roots = {module.__name__: Path(str(module.__file__)).parent for module in (underskin, rig, proof)}
     texts = {
         ".".join([name, *path.relative_to(roots[name]).with_suffix("").parts]): path.read_text(encoding="utf-8")
@@ -49,47 +49,47 @@ def digest_of(document: Any) -> str:
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()[:24]
 
 
-def kept(folder: Path, key: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """The result of that key, made where it is not there yet."""
+def stored(folder: Path, key: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """The stored result of a key; made and stored if there is none."""
     path = folder / f"{key}.json"
     if path.exists():
         return dict(json.loads(path.read_text(encoding="utf-8")))
-    made = make()
+    result = make()
     folder.mkdir(parents=True, exist_ok=True)
     unfinished = folder / f".{key}.{os.getpid()}"
-    unfinished.write_text(json.dumps(made, ensure_ascii=False), encoding="utf-8")
+    unfinished.write_text(json.dumps(result, ensure_ascii=False), encoding="utf-8")
     unfinished.replace(path)
-    return made
+    return result
 
 
 def of_each(
-    work: Work, items: Sequence[Item], make: Callable[[Item], dict[str, Any]], tell: Callable[[str], None]
+    work: Work, items: Sequence[Item], make: Callable[[Item], dict[str, Any]], progress: Callable[[str], None]
 ) -> list[dict[str, Any]]:
-    """`make` of each item, in order, on all of the work's processes; `tell` hears how far it is."""
+    """`make` of each item, in order, on all of the work's processes; `progress` is called with the count."""
     if work.workers == 1 or len(items) < 2:
         results = []
         for number, item in enumerate(items, 1):
             results.append(make(item))
-            tell(f"{number} of {len(items)}")
+            progress(f"{number} of {len(items)}")
         return results
     with processes(min(work.workers, len(items))) as pool:
         pending: list[Future[dict[str, Any]]] = [pool.submit(make, item) for item in items]
         for number, _ in enumerate(as_completed(pending), 1):
-            tell(f"{number} of {len(items)}")
+            progress(f"{number} of {len(items)}")
         return [future.result() for future in pending]
 
 
-def reports(work: Work, cases: Sequence[Case], tell: Callable[[str], None]) -> list[dict[str, Any]]:
+def reports(work: Work, cases: Sequence[Case], progress: Callable[[str], None]) -> list[dict[str, Any]]:
     """The report (`report/1`) of each case."""
     from underskin.surrogate.sigma_table import load_table
 
     version = f"{sources('underskin')} {load_table().sha256}"
-    return of_each(work, cases, partial(_report, work.folder / "reports", version), tell)
+    return of_each(work, cases, partial(_report, work.folder / "reports", version), progress)
 
 
 def _report(folder: Path, version: str, case: Case) -> dict[str, Any]:
     document = case.document()
-    return kept(folder, digest_of([document, version]), partial(_diagnosed, document))
+    return stored(folder, digest_of([document, version]), partial(_diagnosed, document))
 
 
 def _diagnosed(document: dict[str, Any]) -> dict[str, Any]:
@@ -100,6 +100,6 @@ def _diagnosed(document: dict[str, Any]) -> dict[str, Any]:
     try:
         campaign, refused = from_dict(document)
         return diagnosis_report(campaign, load_table(), refused=refused)
-    except Exception as error:  # a diagnosis that fails is a wrong answer, and no reason to lose the others
+    except Exception as error:  # a failed diagnosis counts as a wrong answer; the others go on
         failed = {"verdict": FAILED, "probability": 0.0, "statement": repr(error), "mechanisms": [{"name": FAILED}]}
         return {**failed, "alternatives": [], "fit": None}

@@ -23,8 +23,20 @@ _STIFFENING_STEPS = 40
 
 
 @dataclass(frozen=True)
-class Pressed:
-    """Spheres of `radius` on a layer under `force` for `dwell` seconds, arrays (rows,)."""
+class LayerContacts:
+    """Spheres pressed into a layer.
+
+    Attributes
+    ----------
+    thickness : float
+        h [mm].
+    modulus : float
+        Young's modulus at rest [MPa].
+    on : mapping
+        Effects that are switched on, with their parameters.
+    radius, force, dwell : ndarray, (rows,)
+        Radius of the sphere [mm], preload [N], time under preload [s].
+    """
 
     thickness: float
     modulus: float
@@ -33,27 +45,27 @@ class Pressed:
     force: Floats
     dwell: Floats
 
-    def at(self, force: Floats) -> "Pressed":
-        """The same under another force; kept."""
+    def at(self, force: Floats) -> "LayerContacts":
+        """The same contacts under another force (rows,); cached."""
         key = force.tobytes()
         if key not in self._others:
-            self._others[key] = Pressed(self.thickness, self.modulus, self.on, self.radius, force, self.dwell)
+            self._others[key] = LayerContacts(self.thickness, self.modulus, self.on, self.radius, force, self.dwell)
         return self._others[key]
 
     @cached_property
-    def _others(self) -> dict[bytes, "Pressed"]:
+    def _others(self) -> dict[bytes, "LayerContacts"]:
         return {}
 
     @cached_property
     def layer(self) -> Layer:
-        """ν and glue line."""
+        """Poisson ratio and glue line of the layer."""
         nu = effects.of(self.on, "compressible_layer", "poisson_ratio") or 0.5
-        slips = "interface_slip" in self.on
-        return Layer(nu, effects.of(self.on, "interface_slip", "glue_stiffness") if slips else math.inf)
+        slipping = "interface_slip" in self.on
+        return Layer(nu, effects.of(self.on, "interface_slip", "glue_stiffness") if slipping else math.inf)
 
     @cached_property
     def contact_radius(self) -> Floats:
-        """a; with stiffening, the fixed point of a and E(a/R)."""
+        """Contact radius a (rows,) [mm]; with stiffening, the fixed point of a and E(a/R)."""
         a = self._radius_at(self._relaxed)
         if "strain_stiffening" in self.on:
             for _ in range(_STIFFENING_STEPS):
@@ -62,7 +74,7 @@ class Pressed:
 
     @cached_property
     def effective_modulus(self) -> Floats:
-        """E in force, (rows,)."""
+        """Effective Young's modulus of each contact (rows,) [MPa]."""
         return self._relaxed * self._stiffening(self.contact_radius)
 
     @cached_property
@@ -76,12 +88,20 @@ class Pressed:
 
     @cached_property
     def stiffness(self) -> Floats:
-        """dF/dδ of the layer's contact, edge held [N/mm], against an oscillation too fast to relax."""
+        """Contact stiffness dF/dδ (rows,) [N/mm] with the edge held, against an oscillation too fast to relax."""
         alpha = self.contact_radius / self.thickness
         return self._curves.stiffness(alpha, self.modulus * self._stiffening(self.contact_radius)) * self.thickness
 
     def sigma(self, rt: float, offset: Floats) -> Floats:
-        """σ on sensors of radius rt at the offsets (rows,) or (rows, sensors)."""
+        """Transmission factor σ of sensors.
+
+        Parameters
+        ----------
+        rt : float
+            Sensor radius [mm].
+        offset : ndarray, (rows,) or (rows, sensors)
+            Distance of the sensors from the axis of the load [mm].
+        """
         return base_stress(self.spectrum, rt / self.thickness, offset / self.thickness)
 
     @property
@@ -130,7 +150,7 @@ class Pressed:
 
 
 def stiffening(values: Values, strain: Floats) -> Floats:
-    """E over that at rest; raises RigError where the limited law's strain is reached."""
+    """Young's modulus over that at rest, under a strain (rows,); RigError at the locking strain of the limited law."""
     grown = float(values["coefficient"]) * strain
     if values["law"] == "linear":
         return 1 + grown

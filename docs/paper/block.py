@@ -7,7 +7,7 @@ modulus 1, find u and p so that for all v that respect the base and the planes o
 
     ∫ 2 ε(u):ε(v) − p div v − q div u = −∫_top pressure · v_z
 
-in Taylor–Hood elements Q_k/Q_(k−1) on a tensor grid (`tablegen.block_grid`), where every matrix is a sum of
+in Taylor–Hood elements Q_k/Q_(k−1) on a tensor grid (`block_grid.py`), where every matrix is a sum of
 Kronecker products of one-dimensional ones; the three-dimensional matrix is never formed. MINRES solves it,
 preconditioned by the inverse of each diagonal block of the elasticity operator (fast diagonalisation) and of
 the pressure's mass matrix. Source: Elman, Silvester, Wathen, Finite Elements and Fast Iterative Solvers,
@@ -22,7 +22,7 @@ from scipy.linalg import eigh
 from scipy.sparse.linalg import LinearOperator, minres
 from threadpoolctl import threadpool_limits
 
-from tablegen.block_grid import Axis, graded_nodes, polar_points
+from docs.paper.block_grid import Axis, graded_nodes, polar_points
 from underskin.errors import SolverError
 from underskin.units import Floats
 
@@ -34,7 +34,7 @@ Axes = tuple[Axis, Axis, Axis]
 
 
 @dataclass(frozen=True)
-class Block:
+class FiniteBlock:
     """Full length (along x), full width (along y) and depth of the base, in units of h; `depth` ≥ 1.
 
     `bonded`: the base holds the block; otherwise it only carries it, without friction.
@@ -61,7 +61,7 @@ class Solution:
     iterations: int
 
 
-def solve(block: Block, a: float, rho: Floats, order: int = 5) -> Solution:
+def solve(block: FiniteBlock, a: float, rho: Floats, order: int = 5) -> Solution:
     """σ of the block under the Hertz pressure of radius `a` (a/h) for sensors of radii `rho` (rT/h, array).
 
     `order` is that of the displacements, at least 4. Raises SolverError if the iteration does not converge.
@@ -76,7 +76,7 @@ def solve(block: Block, a: float, rho: Floats, order: int = 5) -> Solution:
     return Solution(np.array(sigma), force, problem.unknowns, iterations)
 
 
-def _grid(block: Block, a: float, order: int) -> Axes:
+def _grid(block: FiniteBlock, a: float, order: int) -> Axes:
     """Fine at the contact and, less so, where free walls meet the base; a node on the sensors' plane."""
     fine, corner = a / 2, 0.2
     x, y = (graded_nodes(edge / 2, fine, corner) for edge in (block.length, block.width))
@@ -218,11 +218,11 @@ class _FastInverse:
         self.modes = []
         values = []
         for direction, axis in enumerate(axes):
-            kept = np.flatnonzero(free.any(axis=tuple(set(_DIRECTIONS) - {direction})))
-            square = np.ix_(kept, kept)
+            free_rows = np.flatnonzero(free.any(axis=tuple(set(_DIRECTIONS) - {direction})))
+            square = np.ix_(free_rows, free_rows)
             value, vector = eigh(axis.stiffness[square], axis.mass[square])
-            modes = np.zeros((free.shape[direction], kept.size))
-            modes[kept] = vector
+            modes = np.zeros((free.shape[direction], free_rows.size))
+            modes[free_rows] = vector
             self.modes.append(modes)
             values.append((2 if direction == a else 1) * value)
         self.values = values[0][:, None, None] + values[1][:, None] + values[2]

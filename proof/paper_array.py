@@ -1,4 +1,4 @@
-"""The paper's own riddle: 14 pC/N over two indenters, but on the array 14 pC/N at 1 N and 22 pC/N at 3 N.
+"""The paper's contradictory d33: 14 pC/N over two indenters, but on the array 14 pC/N at 1 N and 22 pC/N at 3 N.
 
 Its d33 values are turned back into the recordings that give them under the base model, with the design that it reports.
 What it does not report is assumed here and said on the page: 5 % scatter of recordings, 1 % line noise, 200 load cycles
@@ -25,7 +25,7 @@ _FREQUENCY = np.round(np.geomspace(1, 130, 15), 3)
 
 
 @dataclass(frozen=True)
-class Pressed:
+class ArrayRecording:
     """One recording: sensor by number, sphere, preload, the d33 that it gives, and whether it is of the latest runs."""
 
     sensor: int
@@ -41,13 +41,15 @@ def worlds() -> dict[str, dict[str, Any]]:
     In it the last twelve sensors are pressed with both preloads on the same days. If age did it, both give 14 pC/N; if
     the preload did it, 14 and 22.
     """
-    array = [Pressed(n, 4.0, 3.0, HIGHER) for n in range(AT_HIGHER)]
-    array += [Pressed(n, 4.0, 1.0, LOWER, late=True) for n in range(AT_LOWER)]
+    array = [ArrayRecording(n, 4.0, 3.0, HIGHER) for n in range(AT_HIGHER)]
+    array += [ArrayRecording(n, 4.0, 1.0, LOWER, late=True) for n in range(AT_LOWER)]
     again = [(n, preload) for n in range(AT_LOWER) for preload in (3.0, 1.0)]
-    aged = [Pressed(n, 4.0, preload, LOWER, late=True) for n, preload in again]
-    preloaded = [Pressed(n, 4.0, preload, HIGHER if preload == 3.0 else LOWER, late=True) for n, preload in again]
+    aged = [ArrayRecording(n, 4.0, preload, LOWER, late=True) for n, preload in again]
+    preloaded = [
+        ArrayRecording(n, 4.0, preload, HIGHER if preload == 3.0 else LOWER, late=True) for n, preload in again
+    ]
     prototype = [
-        Pressed(0, radius, preload, LOWER)
+        ArrayRecording(0, radius, preload, LOWER)
         for _ in range(3)
         for radius in (4.0, 10.0)
         for preload in (0.5, 1.0, 2.0, 3.0)
@@ -60,17 +62,17 @@ def worlds() -> dict[str, dict[str, Any]]:
     }
 
 
-def _campaign(name: str, rows: Iterable[Pressed]) -> dict[str, Any]:
+def _campaign(name: str, rows: Iterable[ArrayRecording]) -> dict[str, Any]:
     rows = list(rows)
     table = load_table()
     skin = Skin.from_lab(thickness_mm=THICKNESS_MM, youngs_modulus_mpa=MODULUS_MPA, sensor_radius_mm=SENSOR_RADIUS_MM)
     random = np.random.default_rng(len(rows))
     recordings = []
     for number, row in enumerate(rows):
-        felt = transmission(
+        response = transmission(
             table, skin, Indenter.from_lab(indenter_radius_mm=row.indenter_mm), np.array([row.preload_n])
         )
-        level = row.d33_pc_per_n * float(charge_response.gain(felt.sigma, float(skin.rt_over_h))[0])
+        level = row.d33_pc_per_n * float(charge_response.gain(response.sigma, float(skin.rt_over_h))[0])
         level *= float(np.exp(_GAIN * random.normal()))
         noise = _LINE * level * random.normal(size=(2, len(_FREQUENCY)))
         recordings.append(

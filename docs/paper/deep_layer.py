@@ -4,7 +4,7 @@ Lengths in units of the depth h of the sensors' plane; the rigid base lies `dept
 u_z = W(z) J0(kr) and, by incompressibility, u_r = −W'(z)/k · J1(kr), equilibrium leaves W = a combination of
 e^(±kz) and z e^(±kz); the shear stress is −(W'' + k² W)/k and T3 = 3 W' − W'''/k² (shear modulus 1). Four
 conditions at base and top fix the combination for each wavenumber k. For depth 1 this is
-`underskin.linear_layer`, for depth → ∞ `underskin.half_space`.
+`tablegen.linear_layer`, for depth → ∞ `underskin.physics.half_space`.
 """
 
 import numpy as np
