@@ -72,10 +72,11 @@ $(VENV)/.created: scripts/make-venv.sh
 	@scripts/make-venv.sh $(VENV)
 	@touch $@
 
+# Without an index, a package that the lock lacks is an error and not a download.
 $(VENV)/.runtime: $(VENV)/.created requirements.lock pyproject.toml
 	@echo "Installing the locked packages into $(VENV) ..."
 	@$(PIP_INSTALL) --require-hashes -r requirements.lock
-	@$(PIP_INSTALL) --no-deps --no-build-isolation -e .
+	@$(PIP_INSTALL) --no-index --no-build-isolation -e '.[server,fem]'
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.runtime requirements-dev.lock
