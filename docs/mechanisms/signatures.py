@@ -5,6 +5,7 @@ A soft skin (h 2.5 mm, rT 1.5 mm, E 2 MPa) under spheres of 4 and 10 mm; values 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -70,7 +71,7 @@ def panels(name: str, table: SigmaTable) -> list[Panel]:
     return [make(name, table) for make in _PANELS[name]]
 
 
-def _recording(number: int, **changes: object) -> FrfRecording:
+def _recording(number: int, **changes: Any) -> FrfRecording:
     frequency = np.array([30.0])
     plain = FrfRecording(
         f"r{number}",
@@ -84,7 +85,7 @@ def _recording(number: int, **changes: object) -> FrfRecording:
         frf_re_pc_per_n=np.ones(1),
         frf_im_pc_per_n=np.zeros(1),
     )
-    return replace(plain, **changes)  # type: ignore[arg-type]
+    return replace(plain, **changes)
 
 
 def _fit(name: str, model: Model) -> Floats:
