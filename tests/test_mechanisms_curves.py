@@ -143,7 +143,7 @@ def test_a_ramp_of_force_relaxes_as_its_closed_form() -> None:
 def test_a_body_that_relaxed_is_softer_on_the_way_back() -> None:
     recorded = indentation_campaign()
     force = predicted(["contact_creep"], recorded, relaxed_fraction=0.5, relaxation_time=3.0)[:106]
-    (curve,) = recorded.recordings
+    curve = recorded.recordings[0]
     assert isinstance(curve, IndentationRecording)
     depth = curve.displacement_mm
     for level in (0.1, 0.2, 0.3):

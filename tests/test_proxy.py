@@ -24,6 +24,7 @@ NGINX = shutil.which("nginx", path=os.environ["PATH"] + os.pathsep + "/usr/sbin"
 OPENSSL = shutil.which("openssl")
 
 pytestmark = [
+    pytest.mark.server,
     pytest.mark.skipif(NGINX is None, reason="nginx is not installed"),
     pytest.mark.skipif(OPENSSL is None, reason="openssl, which makes the certificate, is not installed"),
 ]
