@@ -10,7 +10,7 @@ COPY service /app/service
 COPY tablegen /app/tablegen
 COPY rig /app/rig
 COPY tables /app/tables
-RUN /opt/venv/bin/pip install --quiet --no-deps --no-build-isolation -e /app
+RUN /opt/venv/bin/pip install --quiet --no-index --no-build-isolation -e '/app[server,fem]'
 # The root is read-only later, so byte code is written now; the packages' own test suites and pip are not needed any more.
 RUN python3 -m compileall -q /app && \
     find /opt/venv -type d -name tests -prune -exec rm -rf {} + && \

@@ -13,13 +13,16 @@ PYTEST = $(PYTHON) -m pytest --numprocesses 2 --dist loadfile
 PIP_INSTALL = $(PYTHON) -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test check docs tables paper tour mechanisms proof bench soak lock clean
+.PHONY: help serve unit test check docs tables paper tour mechanisms proof bench soak lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 serve: $(VENV)/.runtime ## serve on http://127.0.0.1:8000 (PORT=...)
 	@$(VENV)/bin/underskin serve --port $(PORT)
+
+unit: $(VENV)/.dev ## run the quick tests, without server, browser or database (TESTS=...)
+	$(PYTEST) -m unit --durations 5 $(TESTS)
 
 test: $(VENV)/.dev ## run the tests at reduced counts (TESTS=tests/test_x.py for some of them)
 	@scripts/system-packages.sh $(TEST_PACKAGES)
@@ -72,10 +75,11 @@ $(VENV)/.created: scripts/make-venv.sh
 	@scripts/make-venv.sh $(VENV)
 	@touch $@
 
+# Without an index, a package that the lock lacks is an error and not a download.
 $(VENV)/.runtime: $(VENV)/.created requirements.lock pyproject.toml
 	@echo "Installing the locked packages into $(VENV) ..."
 	@$(PIP_INSTALL) --require-hashes -r requirements.lock
-	@$(PIP_INSTALL) --no-deps --no-build-isolation -e .
+	@$(PIP_INSTALL) --no-index --no-build-isolation -e '.[server,fem]'
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.runtime requirements-dev.lock

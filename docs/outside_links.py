@@ -5,7 +5,7 @@ A hook of MkDocs (mkdocs.yml), which takes pages from `docs/` alone.
 
 import os
 import re
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
@@ -33,10 +33,10 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, *, page: Page, **_: object) -> str:
     """Lead the links from a page to the places of their targets on the site."""
     folder = _source(page.file.src_uri).parent
-    here = os.path.dirname(page.file.src_uri)  # noqa: PTH120 (of a URI, not of a file)
+    here = PurePosixPath(page.file.src_uri).parent
 
     def moved(match: re.Match[str]) -> str:
-        return f"]({os.path.relpath(_site_uri((folder / match[1]).resolve()), here or '.')}"
+        return f"]({os.path.relpath(_site_uri((folder / match[1]).resolve()), here)}"
 
     return _LINK.sub(moved, markdown)
 

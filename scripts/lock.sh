@@ -11,8 +11,8 @@ compile() { # OUTPUT ARGUMENT...
         --no-header --no-annotate --no-emit-index-url --output-file "$output" "$@" >/dev/null
 }
 
-# The service and the table generator, which runs from a checkout as well.
-compile requirements.lock pyproject.toml --extra fem --group build
+# The library, the service and the table generator: what `make serve` and the image install.
+compile requirements.lock pyproject.toml --extra server --extra fem --group build
 # The same versions, and everything that tests, checks, documents and measures.
 compile requirements-dev.lock pyproject.toml --all-extras --group build --constraint requirements.lock
 # A peer of `make bench` that caps versions we are past: it gets an environment of its own.

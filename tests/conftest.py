@@ -1,4 +1,4 @@
-"""A real server process for the tests that talk HTTP."""
+"""A real server process for the tests that talk HTTP, and the markers that say what a test needs."""
 
 import os
 import signal
@@ -6,7 +6,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +19,16 @@ _START_LIMIT = 30.0  # s
 
 # A shell that runs the tests in the background has them ignore it, and the servers would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+# Fixtures that start something; a test that uses one, directly or through another, gets the marker.
+_STARTED_BY = {
+    "server": {"server", "servers", "idle", "locked"},
+    "browser": {"browser"},
+    "database": {"cluster"},
+}
+_NO_UNIT = {"server", "browser", "database", "slow", "soak"}
+_unit_test_under_way = ""
 
 
 @dataclass(frozen=True)
@@ -85,3 +95,47 @@ def http(server: Server) -> Iterator[httpx.Client]:
     """A client of it."""
     with httpx.Client(base_url=server.url, timeout=60) as client:
         yield client
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark each test with what it needs, and `unit` where that is nothing but a second of this process."""
+    for item in items:
+        for marker in _needs(item):
+            item.add_marker(marker)
+        if _NO_UNIT.isdisjoint(marker.name for marker in item.iter_markers()):
+            item.add_marker("unit")
+
+
+def _needs(item: pytest.Item) -> set[str]:
+    """Markers by the fixtures of a test, by its case (`postgresql`), and by its module: one that imports `running`."""
+    if not isinstance(item, pytest.Function):
+        return set()
+    needs = {marker for marker, fixtures in _STARTED_BY.items() if fixtures & set(item.fixturenames)}
+    if hasattr(item, "callspec") and "postgresql" in item.callspec.params.values():
+        needs.add("database")
+    if any(getattr(value, "__name__", "") == "running" for value in vars(item.module).values()):
+        needs.add("server")
+    return needs
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """Let unit tests start no server, browser or database."""
+    global _unit_test_under_way
+    _unit_test_under_way = item.nodeid if item.get_closest_marker("unit") else ""
+    try:
+        return (yield)
+    finally:
+        _unit_test_under_way = ""
+
+
+def _refuse_servers_in_unit_tests(event: str, arguments: tuple[object, ...]) -> None:
+    if event == "subprocess.Popen" and _unit_test_under_way:
+        program, given = arguments[:2]
+        words = [Path(str(word)).name for word in (given if isinstance(given, Sequence) else [program])]
+        if (words[1:2] == ["serve"] and "--help" not in words) or words[0] in ("chromium", "initdb"):
+            raise RuntimeError(f"{_unit_test_under_way} starts {words[0]}: it needs a marker (CONTRIBUTING.md)")
+
+
+sys.addaudithook(_refuse_servers_in_unit_tests)

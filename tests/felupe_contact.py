@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import felupe
 import numpy as np
-from felupe.mechanics._helpers import Assemble, Results
+from felupe.mechanics import Assemble, Results
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 
@@ -63,14 +63,14 @@ class Sphere:
         """Take the present pressure for the multiplier."""
         self.multiplier = self._state()[0]
 
-    def _vector(self, field: felupe.FieldContainer | None = None, parallel: bool = False) -> csr_matrix:  # noqa: ARG002
-        pressure, normal, _ = self._state()
+    def _vector(self, **_: object) -> csr_matrix:
+        pressure, normal = self._state()[:2]
         traction = (self.weight * pressure)[..., None] * normal
         forces = np.zeros_like(self.field[0].values)
         np.add.at(forces, self.edges, -np.einsum("qn,eqc->enc", self.shape, traction))
         return csr_matrix(forces.reshape(-1, 1))
 
-    def _matrix(self, field: felupe.FieldContainer | None = None, parallel: bool = False) -> csr_matrix:  # noqa: ARG002
+    def _matrix(self, **_: object) -> csr_matrix:
         pressure, normal, places = self._state()
         outer = normal[..., :, None] * normal[..., None, :]
         distance = np.hypot(places[..., 0], places[..., 1])[..., None, None]
@@ -90,7 +90,7 @@ def press(radius: float, indentation: float, a: float, rho: Sequence[float]) -> 
     `a` is where the edge of the contact is expected: the mesh is fine there, no more.
     """
     layer = FelupeLayer(a, _mesh(a))
-    sphere = Sphere(layer.field, layer._nodes(1.0), radius)
+    sphere = Sphere(layer.field, layer.nodes(1.0), radius)
     reached, step = 0.0, _FIRST_STEP
     while reached < 1:
         goal = min(1.0, reached + step)
@@ -103,7 +103,7 @@ def press(radius: float, indentation: float, a: float, rho: Sequence[float]) -> 
     for _ in range(_CORRECTIONS):
         sphere.correct()
         assert _solved(layer, sphere, 1.0)
-    profile = layer._base_stress()
+    profile = layer.base_stress()
     primitive = profile.antiderivative()
     means = np.array([(primitive(x**2) - primitive(0.0)) / x**2 for x in rho])
     return sphere.force, sphere.contact_radius, 2 * np.pi / 3 * means / sphere.force
@@ -127,7 +127,7 @@ def _solved(layer: FelupeLayer, sphere: Sphere, factor: float) -> bool:
                 maxiter=40,
                 verbose=0,
             )
-    except (Warning, RuntimeError, felupe.tools._newton.NewtonConvergenceError):
+    except (Warning, RuntimeError, felupe.NewtonConvergenceError):
         for part, values in zip(layer.field.fields, before, strict=True):
             part.values[:] = values
         return False

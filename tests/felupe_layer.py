@@ -33,7 +33,7 @@ class FelupeLayer:
         self.field = felupe.FieldsMixed(region, n=3, axisymmetric=True, disconnect=False)
         material = felupe.NearlyIncompressible(felupe.NeoHooke(mu=1.0), bulk=BULK_MODULUS)
         self.body = felupe.SolidBody(material, self.field)
-        self.load = felupe.PointLoad(self.field, self._nodes(1.0))
+        self.load = felupe.PointLoad(self.field, self.nodes(1.0))
         self._unit_load = self._hertz_forces()
         boundaries = {
             "base": felupe.Boundary(self.field[0], fx=0.0),
@@ -60,12 +60,12 @@ class FelupeLayer:
 
     def sigma(self, rho: Sequence[float]) -> Floats:
         """σ = (2π/3) · mean stress on the base over each disc · h²/F, F the applied force."""
-        profile = self._base_stress()
+        profile = self.base_stress()
         primitive = profile.antiderivative()  # the mean over a disc is the mean over r² from 0 to ρ²
         means = [(primitive(x**2) - primitive(0.0)) / x**2 if x > 0 else profile(0.0) for x in rho]
         return 2 * np.pi / 3 * np.array(means) / -self.load.values[:, 0].sum()
 
-    def _base_stress(self) -> BSpline:
+    def base_stress(self) -> BSpline:
         """The compressive stress on the base as a spline in r², which has the same moments as the reactions.
 
         The reactions are ∫ t φ_i dA for the traces φ_i of the shape functions. The spline t = Σ c_k B_k
@@ -73,7 +73,7 @@ class FelupeLayer:
         """
         size = self.field[0].values.size
         reactions = self.body.assemble.vector(self.field).toarray()[:size, 0].reshape(-1, 2)
-        nodes = self._nodes(0.0)
+        nodes = self.nodes(0.0)
         r = self.mesh.points[nodes, 1]
         knots = np.concatenate([np.arange(0, 4, 0.2), np.arange(4.0, r[-1] - 0.5), [r[-1]]]) ** 2
         padded = np.pad(knots, 5, mode="edge")
@@ -88,7 +88,7 @@ class FelupeLayer:
 
     def _hertz_forces(self) -> Floats:
         """∫ √(1 − r²/a²) φ_i dA on the surface; r = a sin θ removes the root at the edge of the contact."""
-        r = self.mesh.points[self._nodes(1.0), 1]
+        r = self.mesh.points[self.nodes(1.0), 1]
         forces = np.zeros(r.size)
         for first in range(0, int(np.searchsorted(r, self.a - 1e-9)), 2):
             angle, weights = _gauss(*np.arcsin(np.clip(r[[first, first + 2]] / self.a, 0, 1)))
@@ -97,7 +97,7 @@ class FelupeLayer:
             forces[first : first + 3] += _shape(points, r[first], r[first + 2]) @ weights
         return forces
 
-    def _nodes(self, z: float) -> NDArray[np.int64]:
+    def nodes(self, z: float) -> NDArray[np.int64]:
         """The nodes at height z, by ascending radius."""
         nodes = np.flatnonzero(np.isclose(self.mesh.points[:, 0], z))
         return nodes[np.argsort(self.mesh.points[nodes, 1])]

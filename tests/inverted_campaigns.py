@@ -1,6 +1,7 @@
 """Campaigns drawn or changed for the tests of the inversion, and how often intervals cover."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -36,8 +37,8 @@ def covered(estimate: Estimate, truth_pc_per_n: Floats) -> Floats:
     return np.asarray((estimate.low <= truth) & (truth <= estimate.high), dtype=float)
 
 
-def moved(campaign: Campaign, row: int, **changes: object) -> Campaign:
-    recording = replace(campaign.recordings[row], **changes)  # type: ignore[arg-type]
+def moved(campaign: Campaign, row: int, **changes: Any) -> Campaign:
+    recording = replace(campaign.recordings[row], **changes)
     return replace(campaign, recordings=(*campaign.recordings[:row], recording, *campaign.recordings[row + 1 :]))
 
 

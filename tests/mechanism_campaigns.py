@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +29,7 @@ def table() -> SigmaTable:
     return load_table()
 
 
-def frf_recording(**changes: object) -> FrfRecording:
+def frf_recording(**changes: Any) -> FrfRecording:
     """One recording on s1."""
     plain = FrfRecording(
         id="r",
@@ -40,7 +41,7 @@ def frf_recording(**changes: object) -> FrfRecording:
         frf_re_pc_per_n=np.full(len(FREQUENCY), 5.0),
         frf_im_pc_per_n=np.zeros(len(FREQUENCY)),
     )
-    return replace(plain, **changes)  # type: ignore[arg-type]
+    return replace(plain, **changes)
 
 
 def campaign(recordings: Sequence[FrfRecording], skin: SkinDescription = SKIN) -> Campaign:

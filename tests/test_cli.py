@@ -5,8 +5,6 @@ import io
 import os
 import subprocess
 import sys
-import tomllib
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -207,47 +205,3 @@ def test_python_m() -> None:
         text=True,
     )
     assert "0.93651" in shown.stdout
-
-
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel's content, unpacked as an installer would."""
-    folder = tmp_path_factory.mktemp("wheel")
-    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder), str(ROOT)]
-    subprocess.run(build, check=True, capture_output=True)
-    (archive,) = folder.glob("*.whl")
-    with zipfile.ZipFile(archive) as file:
-        file.extractall(folder / "site")
-    return folder / "site"
-
-
-# The dependencies as they are installed, but not the checkout that an editable install adds.
-ALONE = """
-import pathlib, sys
-sys.path = [sys.argv.pop(1), *(path for path in sys.path if not (pathlib.Path(path) / "service").is_dir())]
-from underskin.cli import main
-main()
-"""
-
-
-def run_alone(wheel: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-P", "-c", ALONE, str(wheel), *arguments]
-    return subprocess.run(command, cwd=wheel, capture_output=True, text=True)
-
-
-def test_wheel_alone_computes_from_the_table_inside_it(wheel: Path) -> None:
-    assert "0.93651" in run_alone(wheel, "sigma", "--a-over-h", "0.3", "--rt-over-h", "0.6").stdout
-
-
-def test_wheel_alone_says_where_the_other_commands_are(wheel: Path) -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    others = project["entry-points"]["underskin.commands"]
-    image = (ROOT / "Dockerfile").read_text(encoding="utf-8")
-    shown = run_alone(wheel, "--help").stdout.splitlines()
-    for name, target in others.items():
-        inside = f"COPY {target.partition('.')[0]} " in image
-        where = f"(runs from a checkout{' or the image' if inside else ''})"
-        assert any(name in line.split() and where in line for line in shown), name
-    refusal = run_alone(wheel, "serve", "--port", "1")
-    assert refusal.returncode == 2
-    assert refusal.stderr == "underskin: this command runs from a checkout or the image (No module named 'service')\n"

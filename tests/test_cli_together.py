@@ -12,7 +12,7 @@ import pytest
 from tests.simulated_campaign import Rig, simulate
 from tests.test_cli import refused, run
 from underskin import load_table
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.readers import json_file
 
 
@@ -27,8 +27,8 @@ def palm() -> Campaign:
 def presses(palm: Campaign, tmp_path: Path) -> list[str]:
     """A file for each recording, which knows its own sensor only and calls the recording r."""
     names = []
-    for number, recording in enumerate(palm.recordings):
-        sensors = tuple(sensor for sensor in palm.skin.sensors if sensor.id == recording.sensor)  # type: ignore[union-attr]
+    for number, recording in enumerate(one for one in palm.recordings if isinstance(one, FrfRecording)):
+        sensors = tuple(sensor for sensor in palm.skin.sensors if sensor.id == recording.sensor)
         skin = replace(palm.skin, sensors=sensors)
         one = Campaign(f"press {number}", skin, (replace(recording, id="r"),))
         (tmp_path / f"press-{number}.json").write_bytes(json_file.write(one))

@@ -144,6 +144,7 @@ def test_it_needs_nothing_from_outside(text: str) -> None:
     assert "http" not in policy
 
 
+@pytest.mark.browser
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 def test_a_browser_draws_every_figure(text: str, tmp_path: Path) -> None:
     assert CHROMIUM is not None

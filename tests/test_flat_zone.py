@@ -3,6 +3,7 @@
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -59,8 +60,8 @@ def recorded(
     return frfs, conditions
 
 
-def zone_of(shape: str, frequency: Floats = LOG_GRID, **options: float) -> FlatZone:
-    frfs, conditions = recorded(frequency, shape, **options)  # type: ignore[arg-type]
+def zone_of(shape: str, frequency: Floats = LOG_GRID, **options: Any) -> FlatZone:
+    frfs, conditions = recorded(frequency, shape, **options)
     return flat_zone(stacked(frfs), conditions)
 
 

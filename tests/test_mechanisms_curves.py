@@ -144,7 +144,9 @@ def test_a_ramp_of_force_relaxes_as_its_closed_form() -> None:
 def test_a_body_that_relaxed_is_softer_on_the_way_back() -> None:
     recorded = indentation_campaign()
     force = predicted(["contact_creep"], recorded, relaxed_fraction=0.5, relaxation_time=3.0)[:106]
-    depth = recorded.recordings[0].displacement_mm  # type: ignore[union-attr]
+    curve = recorded.recordings[0]
+    assert isinstance(curve, IndentationRecording)
+    depth = curve.displacement_mm
     for level in (0.1, 0.2, 0.3):
         loading, unloading = np.interp(level, depth[:46], force[:46]), np.interp(-level, -depth[56:], force[56:])
         assert unloading < loading

@@ -1,6 +1,7 @@
 """Files of one rig as one campaign."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,9 +25,9 @@ def press(name: str, sensor: str = "s1", level: float = 7.0) -> FrfRecording:
     )  # fmt: skip
 
 
-def reading(*recordings: FrfRecording, warnings: tuple[str, ...] = (), **skin: object) -> Reading:
+def reading(*recordings: FrfRecording, warnings: tuple[str, ...] = (), **skin: Any) -> Reading:
     places = tuple(Sensor(name, 8.0 * int(name[1:]), 0.0) for name in sorted({one.sensor for one in recordings}))
-    description = replace(SKIN, **{"sensors": places, **skin})  # type: ignore[arg-type]
+    description = replace(SKIN, **{"sensors": places, **skin})
     return Reading(Campaign("a press", description, recordings), [], list(warnings))
 
 
@@ -66,9 +67,9 @@ def test_a_file_may_leave_out_what_another_says() -> None:
         ({"sensors": (Sensor("s1", 8.0, 1.0),)}, r"skin.sensors\[s1\].y_mm = 1.0: in b.csv; must be 0.0, as in a.csv"),
     ],
 )
-def test_files_of_different_skins_are_not_joined(skin: dict[str, object], says: str) -> None:
+def test_files_of_different_skins_are_not_joined(skin: dict[str, Any], says: str) -> None:
     with pytest.raises(InvalidInput, match=says):
-        join("both", [("a.csv", reading(press("a"), id="palm-3")), ("b.csv", reading(press("b"), **skin))])  # type: ignore[arg-type]
+        join("both", [("a.csv", reading(press("a"), id="palm-3")), ("b.csv", reading(press("b"), **skin))])
 
 
 def test_an_id_of_the_skin_can_be_said_for_all() -> None:
@@ -142,13 +143,13 @@ def test_a_recording_is_a_copy_by_its_numbers_its_sensor_and_its_contact() -> No
         press("a"), frequency_hz=np.arange(1.0, 21), frf_re_pc_per_n=noisy, frf_im_pc_per_n=0.01 * noisy,
         recorded_at="2017-05-03T09:00:00Z",
     )  # fmt: skip
-    apart: list[dict[str, object]] = [
+    apart: list[dict[str, Any]] = [
         {"sensor": "s2"}, {"preload_n": 2.0}, {"indenter_radius_mm": 5.0}, {"frf_re_pc_per_n": noisy + 1e-9},
         {"coherence": np.full(20, 0.9)}, {"dynamic_force_n": 0.2}, {"position_mm": (1.0, 0.0)},
     ]  # fmt: skip
-    copies: list[dict[str, object]] = [{"recorded_at": None}, {"dwell_s": 3.0}, {"load_cycles": 9}]
+    copies: list[dict[str, Any]] = [{"recorded_at": None}, {"dwell_s": 3.0}, {"load_cycles": 9}]
     for changes, kept in [*((one, ["a", "b"]) for one in apart), *((one, ["a"]) for one in copies)]:
-        other = replace(first, id="b", **changes)  # type: ignore[arg-type]
+        other = replace(first, id="b", **changes)
         assert ids(join("both", [("a.csv", reading(first)), ("b.csv", reading(other))])) == kept, changes
 
 

@@ -93,20 +93,20 @@ def test_a_file_that_takes_too_long_is_refused(stream: BinaryIO) -> None:
         parse_apart("TDMS", stream, "slow.tdms", Limits(seconds=0.02))
 
 
-def die(stream: BinaryIO) -> None:  # noqa: ARG001
+def die(_stream: BinaryIO) -> None:
     os.kill(os.getpid(), signal.SIGSEGV)
 
 
-def fail(stream: BinaryIO) -> None:  # noqa: ARG001
+def fail(_stream: BinaryIO) -> None:
     raise RuntimeError("something unforeseen")
 
 
-def write_much(stream: BinaryIO) -> dict[str, Any]:  # noqa: ARG001
+def write_much(_stream: BinaryIO) -> dict[str, Any]:
     part = np.zeros(10_000_000)
     return {str(number): part for number in range(5)}
 
 
-def see_environment(stream: BinaryIO) -> dict[str, str]:  # noqa: ARG001
+def see_environment(_stream: BinaryIO) -> dict[str, str]:
     return dict(os.environ)
 
 
@@ -136,7 +136,7 @@ def link_outside(target: Any, secret: Path) -> None:
     target["force"] = h5py.ExternalLink(str(secret), "/data")
 
 
-def link_inside(target: Any, secret: Path) -> None:  # noqa: ARG001
+def link_inside(target: Any, _secret: Path) -> None:
     target["force"] = h5py.SoftLink("/elsewhere")
 
 
@@ -150,11 +150,11 @@ def map_outside(target: Any, secret: Path) -> None:
     target.create_virtual_dataset("force", layout)
 
 
-def lead_back(target: Any, secret: Path) -> None:  # noqa: ARG001
+def lead_back(target: Any, _secret: Path) -> None:
     target.create_group("run")["again"] = target
 
 
-def same_twice(target: Any, secret: Path) -> None:  # noqa: ARG001
+def same_twice(target: Any, _secret: Path) -> None:
     target["a"] = np.zeros(3)
     target["b"] = target["a"]
 

@@ -6,6 +6,7 @@ shown, or at a typical strength. The mechanism says over which axes its figure i
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -52,7 +53,7 @@ def shown(parameter: Parameter) -> float:
     return parameter.from_fit(parameter.typical) if parameter.shown is None else parameter.shown
 
 
-def _recording(number: int, **changes: object) -> FrfRecording:
+def _recording(number: int, **changes: Any) -> FrfRecording:
     frequency = np.array([30.0])
     plain = FrfRecording(
         f"r{number}",
@@ -66,7 +67,7 @@ def _recording(number: int, **changes: object) -> FrfRecording:
         frf_re_pc_per_n=np.ones(1),
         frf_im_pc_per_n=np.zeros(1),
     )
-    return replace(plain, **changes)  # type: ignore[arg-type]
+    return replace(plain, **changes)
 
 
 def _fit(model: Model, base: Model) -> Floats:

@@ -41,10 +41,10 @@ def test_corrections_exclusions_and_withdrawals(client: Client) -> None:
         client.campaigns.withdraw(second, "again")
 
 
-def test_pages_are_turned(client: Client) -> None:
+def test_pages_are_turned(client: Client, server: Server) -> None:
     for number in range(3):
         documents = [campaign(f"{number}-{index}", sensors=1, lines=3) for index in range(70)]
-        assert client._session.json("POST", "/v1/campaigns", json=documents)["campaigns"]
+        assert server.http.post("/v1/campaigns", json=documents).json()["campaigns"]
     assert len({entry["id"] for entry in client.campaigns.all()}) == 210
     assert len({entry["id"] for entry in client.skins.all()}) == 210
 

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 COMMAND_GROUP = "underskin.commands"
 _NOT_IN_IMAGE = ("prove",)
+# The packages of the checkout that have commands, and the extra that each needs.
+_EXTRAS = {"service": "server", "tablegen": "fem", "rig": None, "proof": "docs"}
 
 app = typer.Typer(
     add_completion=False,
@@ -221,7 +223,7 @@ def _forward(entry: EntryPoint) -> Callable[[typer.Context], None]:
         try:
             loaded = entry.load()
         except ImportError as error:
-            raise UnderskinError(f"this command {_elsewhere(entry)} ({error})") from error
+            raise UnderskinError(f"this command {_unavailable(entry, error)}") from error
         if not isinstance(loaded, typer.Typer):
             function, loaded = loaded, typer.Typer(add_completion=False)
             loaded.command(entry.name)(function)
@@ -231,7 +233,23 @@ def _forward(entry: EntryPoint) -> Callable[[typer.Context], None]:
 
 
 def _elsewhere(entry: EntryPoint) -> str:
+    """Where a command runs whose package is not installed."""
+    if _package(entry) not in _EXTRAS:
+        return f"is not available: its module {entry.module} is missing"
     return "runs from a checkout" + ("" if entry.name in _NOT_IN_IMAGE else " or the image")
+
+
+def _unavailable(entry: EntryPoint, error: ImportError) -> str:
+    """Why a command cannot be loaded, and what to install."""
+    if _package(entry) not in _EXTRAS:
+        return f"is not available: its module {entry.module} cannot be imported ({error})"
+    extra = _EXTRAS[_package(entry)]
+    install = f"; in a checkout, pip install -e '.[{extra}]' installs what it needs" if extra else ""
+    return f"{_elsewhere(entry)} ({error}){install}"
+
+
+def _package(entry: EntryPoint) -> str:
+    return entry.module.partition(".")[0]
 
 
 def _summary(entry: EntryPoint) -> str:

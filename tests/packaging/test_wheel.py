@@ -1,0 +1,141 @@
+"""The wheel in a fresh environment: it computes with what the library requires, and says what it does not hold."""
+
+import json
+import os
+import re
+import subprocess
+import tomllib
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.packaging.fresh_environment import ROOT, Environment, build_wheel, new_environment, required
+
+PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+CAMPAIGN = ROOT / "examples" / "campaigns" / "2017-06.csv"
+SKIN = [
+    "--thickness-mm=2.5",
+    "--youngs-modulus-mpa=16",
+    "--sensor-radius-mm=1.5",
+    "--indenter-radius-mm=4",
+    "--preload-n=1",
+]
+
+# Every module of the library, but for the cluster's `distributed`, which is imported when it is asked for.
+IMPORT_ALL = """
+import importlib, pkgutil, sys, underskin
+for module in pkgutil.walk_packages(underskin.__path__, "underskin."):
+    if not module.name.endswith("__main__"):
+        importlib.import_module(module.name)
+print("underskin.diagnosis.pipeline" in sys.modules)
+"""
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel of this checkout."""
+    return build_wheel(tmp_path_factory.mktemp("wheel"))
+
+
+@pytest.fixture(scope="module")
+def fresh(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Environment:
+    """An environment with the wheel and the library's own dependencies."""
+    environment = new_environment(tmp_path_factory.mktemp("fresh") / "venv", PROJECT["dependencies"])
+    environment.install(str(wheel))
+    return environment
+
+
+def run(environment: Environment, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """`underskin` in an empty folder, without this environment's variables for Python."""
+    variables = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    command = [str(environment.command), *arguments]
+    return subprocess.run(command, cwd=folder, env=variables | {"COLUMNS": "120"}, capture_output=True, text=True)
+
+
+def printed(environment: Environment, folder: Path, *arguments: str) -> str:
+    """What a command prints that succeeds."""
+    done = run(environment, folder, *arguments)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_wheel_holds_the_library_and_the_tables_alone(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as file:
+        names = file.namelist()
+    assert {name.split("/")[0] for name in names} == {"underskin", f"underskin-{PROJECT['version']}.dist-info"}
+    assert {f"underskin/tables/{table.name}" for table in (ROOT / "tables").glob("*.h5")} < set(names)
+
+
+def test_the_environment_has_what_the_wheel_requires_and_no_more(fresh: Environment) -> None:
+    assert fresh.pip("check") == "No broken requirements found.\n"
+    installed = {entry["name"].lower().replace("_", "-") for entry in json.loads(fresh.pip("list", "--format", "json"))}
+    assert installed == required(PROJECT["dependencies"]) | {"underskin"}
+    assert fresh.python("import fastapi").returncode == 1
+
+
+def test_every_module_is_imported_without_the_packages_of_the_server(fresh: Environment) -> None:
+    done = fresh.python(IMPORT_ALL)
+    assert (done.returncode, done.stdout) == (0, "True\n"), done.stderr
+
+
+def test_sigma(fresh: Environment, tmp_path: Path) -> None:
+    assert "0.93651" in printed(fresh, tmp_path, "sigma", "--a-over-h", "0.3", "--rt-over-h", "0.6")
+
+
+def test_the_frf_and_the_d33_that_explains_it(fresh: Environment, tmp_path: Path) -> None:
+    frf = printed(fresh, tmp_path, "frf", *SKIN, "--d33-pc-per-n", "14", "--csv").splitlines()
+    value = dict(zip(frf[0].split(","), frf[1].split(","), strict=True))["frf_pc_per_n"]
+    d33 = printed(fresh, tmp_path, "d33", *SKIN, "--frf-pc-per-n", value, "--csv").splitlines()
+    answer = dict(zip(d33[0].split(","), d33[1].split(","), strict=True))
+    assert float(answer["d33_pc_per_n"]) == pytest.approx(14, rel=1e-12)
+
+
+def test_the_d33_of_a_campaign(fresh: Environment, tmp_path: Path) -> None:
+    assert "d33 of the array     13.92 ± 0.53 pC/N" in printed(fresh, tmp_path, "d33", str(CAMPAIGN))
+
+
+def test_a_diagnosis(fresh: Environment, tmp_path: Path) -> None:
+    printed(fresh, tmp_path, "diagnose", str(CAMPAIGN), "--output-dir", "reports", "--html")
+    report = json.loads((tmp_path / "reports" / "2017-06.json").read_text(encoding="utf-8"))
+    assert report["verdict"] == "explained"
+    assert [mechanism["name"] for mechanism in report["mechanisms"]] == ["sensor_spread"]
+    assert (tmp_path / "reports" / "2017-06.html").stat().st_size > 100_000
+
+
+def test_the_help_says_where_the_other_commands_run(fresh: Environment, tmp_path: Path) -> None:
+    image = (ROOT / "Dockerfile").read_text(encoding="utf-8")
+    shown = printed(fresh, tmp_path, "--help").splitlines()
+    for name, target in PROJECT["entry-points"]["underskin.commands"].items():
+        inside = f"COPY {target.partition('.')[0]} " in image
+        where = f"(runs from a checkout{' or the image' if inside else ''})"
+        assert any(name in line.split() and where in line for line in shown), name
+
+
+@pytest.mark.parametrize(
+    ("command", "where", "extra"),
+    [
+        ("serve", "a checkout or the image", "server"),
+        ("prove", "a checkout", "docs"),
+        ("rig", "a checkout or the image", ""),
+    ],
+)
+def test_a_command_that_the_wheel_does_not_hold_says_what_to_install(
+    fresh: Environment, tmp_path: Path, command: str, where: str, extra: str
+) -> None:
+    refusal = run(fresh, tmp_path, command)
+    assert (refusal.returncode, refusal.stdout) == (2, "")
+    install = f"; in a checkout, pip install -e '.[{extra}]' installs what it needs" if extra else ""
+    assert re.fullmatch(
+        rf"underskin: this command runs from {where} \(No module named '\w+'\){re.escape(install)}\n", refusal.stderr
+    )
+
+
+def test_a_checkout_without_the_extra_says_what_to_install(tmp_path: Path) -> None:
+    environment = new_environment(tmp_path / "venv", [*PROJECT["dependencies"], "hatchling", "editables"])
+    environment.install("--editable", str(ROOT))
+    refusal = run(environment, tmp_path, "serve")
+    assert refusal.returncode == 2
+    assert "No module named" in refusal.stderr
+    assert "in a checkout, pip install -e '.[server]' installs what it needs" in refusal.stderr
