@@ -186,7 +186,7 @@ def test_query_that_is_not_understood(http: httpx.Client, query: str) -> None:
     [
         (b"", 400, "header"),
         (b"a_over_h,rt_over_h\n", 400, "at least one row"),
-        (b"a_over_h,rt_over_h\n0.3\n", 400, "Row 0"),
+        (b"a_over_h,rt_over_h\n0.3\n", 400, "row 0"),
         (b"a_over_h,a_over_h\n0.3,0.3\n", 400, "twice"),
         (b"\xff\xfe", 400, "UTF-8"),
         (b'a_over_h,rt_over_h\n"0.3,0.6\n', 400, "CSV"),

@@ -3,6 +3,7 @@
 import csv
 import io
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,8 +63,8 @@ def from_csv(text: str) -> dict[str, list[str]]:
     return {name: list(cells) for name, cells in zip(header, zip(*lines[1:], strict=True), strict=True)}
 
 
-def to_csv(columns: Mapping[str, Floats | Sequence[str]], line_end: str) -> str:
-    """Columns of equal length as CSV (RFC 4180): numbers in full, `NaN` where there is no value."""
+def to_csv(columns: Mapping[str, Floats | Sequence[Any]], line_end: str) -> str:
+    """Columns of equal length as CSV (RFC 4180): arrays in full, `NaN` where there is no value; lists as they are."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator=line_end)
     writer.writerow(columns)
@@ -71,7 +72,7 @@ def to_csv(columns: Mapping[str, Floats | Sequence[str]], line_end: str) -> str:
     return text.getvalue()
 
 
-def _cells(column: Floats | Sequence[str]) -> Sequence[str]:
+def _cells(column: Floats | Sequence[Any]) -> Sequence[Any]:
     if not isinstance(column, np.ndarray):
         return column
     return ["NaN" if value != value else repr(value) for value in column.tolist()]

@@ -28,12 +28,12 @@ from underskin.units import Complexes, to_si
 
 _DECLARED = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio")
 NOT_ADOPTED = {
-    "ambiguous": "must be explained: several explanations remain, and only one can serve. Record what the report plans "
+    "ambiguous": "several explanations remain, and only one can serve. Record what the report plans "
     "(next_experiment), send it together with these recordings, and diagnose that",
-    "unexplained": "must be explained: none of the known mechanisms describes what is missing, so that nothing could "
+    "unexplained": "none of the known mechanisms describes what is missing, so that nothing could "
     "be predicted with it. Look at the rig where the report says that the misfit lies, and record it again",
-    "no_mismatch": "must be explained: nothing is missing, so that there is nothing to adopt; the paper's model serves",
-    "insufficient_data": "must be explained: too little was recorded to tell what is missing. Record what the report "
+    "no_mismatch": "nothing is missing, so that there is nothing to adopt; the paper's model serves",
+    "insufficient_data": "too little was recorded to tell what is missing. Record what the report "
     "plans (next_experiment), send it together with these recordings, and diagnose that",
 }  # by verdict: why it is refused, and what to do
 _SAME = 1e-9  # relative
@@ -138,7 +138,9 @@ def adopted(report: Mapping[str, Any], campaign: Campaign) -> AdoptedModel:
     """The model of a `report/1` and the campaign that it is of; raises InvalidInput where it cannot serve."""
     if report["verdict"] != "explained":
         raise InvalidInput(
-            "diagnosis_id", f"a diagnosis of verdict {report['verdict']}", NOT_ADOPTED[report["verdict"]]
+            "diagnosis_id",
+            f"a diagnosis of verdict {report['verdict']}",
+            f"must be explained: {NOT_ADOPTED[report['verdict']]}",
         )
     reason = implausible_d33(report)
     if reason is not None:

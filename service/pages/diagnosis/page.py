@@ -135,7 +135,7 @@ def _not_adopted(report: Mapping[str, Any]) -> str | None:
             return "it is of curves, which have no d33: a model of a skin is of FRFs"
         reason = implausible_d33(report)
         return None if reason is None else f"its d33 cannot be right: {reason}"
-    return NOT_ADOPTED[report["verdict"]].removeprefix("must be explained: ")
+    return NOT_ADOPTED[report["verdict"]]
 
 
 def _done(store: Database, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any], dict[str, str]]:

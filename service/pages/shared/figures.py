@@ -1,7 +1,5 @@
 """A plotly figure in a page: its JSON, its words, and where its numbers are."""
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -13,6 +11,7 @@ from markupsafe import Markup
 
 from service.pages.shared.assets import LIBRARY, gzipped
 from service.pages.shared.formats import json_inside
+from underskin.columns import to_csv
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -63,11 +62,7 @@ def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> Response:
 
 def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
     """Columns as CSV."""
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(columns)
-    writer.writerows([_cell(value) for value in row] for row in zip(*columns.values(), strict=True))
-    return text.getvalue()
+    return to_csv({name: [_cell(value) for value in column] for name, column in columns.items()}, "\r\n")
 
 
 def _cell(value: Any) -> Any:

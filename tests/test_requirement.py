@@ -1,0 +1,33 @@
+"""A requirement is a text, and knows the fields that it mentions."""
+
+import orjson
+import pytest
+
+from underskin import InvalidInput
+from underskin.requirement import REQUIRED, UNITS_CHECKED, Mention, Requirement
+from underskin.units import checked
+
+
+def upper(mention: Mention) -> str:
+    return mention.field.upper()
+
+
+def test_mentions_are_worded_apart_from_the_rest_of_the_sentence() -> None:
+    requirement = Requirement("must have 3 rows, as many as ", Mention("preload_n"), "; preload_n is a name")
+    assert requirement == "must have 3 rows, as many as preload_n; preload_n is a name"
+    assert requirement.worded(upper) == "must have 3 rows, as many as PRELOAD_N; preload_n is a name"
+    assert orjson.loads(orjson.dumps({"allowed": requirement})) == {"allowed": str(requirement)}
+
+
+def test_requirements_are_joined_with_their_mentions() -> None:
+    inner = Requirement("say a sign for ", Mention("force_n"))
+    assert Requirement(Mention("time_s"), ": ", inner).worded(upper) == "TIME_S: say a sign for FORCE_N"
+
+
+def test_what_is_missing_and_what_is_unlikely_are_known_without_reading_the_sentence() -> None:
+    assert REQUIRED.parts == ("required",)
+    with pytest.raises(InvalidInput) as refused:
+        checked("thickness_mm", 2500.0)
+    assert isinstance(refused.value.allowed, Requirement)
+    assert UNITS_CHECKED in refused.value.allowed.parts
+    assert "(or set units_checked to true)" in refused.value.allowed
