@@ -23,7 +23,7 @@ from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.models.pickup import Pickup, together
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.registry import GROUP, built_in
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 from underskin.recordings.readers import formats
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "lab-skin"
@@ -41,7 +41,7 @@ class LowPass(Mechanism):
     axes = ("frequency_hz",)
     changes: Mapping[str, Any] = {}
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         fields: dict[str, Any] = {
             "name": "upper_corner",
             "unit": "Hz",
@@ -111,7 +111,7 @@ def test_the_field_that_breaks_the_contract_is_named(attributes: dict[str, Any],
 
 def test_a_law_that_is_not_finite_at_a_bound_is_refused_there() -> None:
     class Diverging(LowPass):
-        def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
             """From a limit at which the law divides by zero."""
             return (Parameter("gap", "-", 0.0, 1.0, Uniform(), "linear", None, "a guess"),)
 

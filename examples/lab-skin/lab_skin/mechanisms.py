@@ -6,7 +6,7 @@ from underskin.mechanisms import Kind, Mechanism, Normal, Parameter, Stage, Valu
 from underskin.mechanisms.autodiff import Differentiated
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 
 
 class AmplifierLowPass(Mechanism):
@@ -20,7 +20,7 @@ class AmplifierLowPass(Mechanism):
     stage = Stage.LINES
     axes = ("frequency_hz", "phase")
 
-    def parameters(self, campaign: Campaign, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The corner frequency."""
         return (
             Parameter(
