@@ -152,7 +152,7 @@ def _place(recording: str) -> str:
 
 def _kept(connection: Connection, found: Arrived, terms: Terms, rig: RigDescription | None) -> dict[str, Any]:
     refused = [{"id": entry["id"], "status": "refused", "errors": entry["errors"]} for entry in found.refused]
-    findings = [] if found.campaign is None else list(plausibility.in_words(found.campaign))
+    findings = [] if found.campaign is None else [one.sentence for one in plausibility.implausible(found.campaign)]
     result: dict[str, Any] = {"file": found.file, "errors": found.errors, "notes": found.notes, "findings": findings}
     if found.campaign is None:
         return {**result, "status": "refused", "id": None, "skin_id": None, "recordings": refused}

@@ -1,7 +1,6 @@
 """d33 of each sensor from its measured FRF."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
 from typing import Any, ClassVar
 
 import numpy as np
@@ -140,7 +139,7 @@ def _adopted_answer(table: SigmaTable, store: Database, request: D33Columns) -> 
 
 
 def _findings(measured: Mapping[str, Floats], d33: Floats) -> list[dict[str, Any]]:
-    return [asdict(finding) for finding in plausibility.of_rows(measured["frf_pc_per_n"], d33)]
+    return [finding.in_columns() for finding in plausibility.of_rows(measured["frf_pc_per_n"], d33)]
 
 
 def _given(request: D33Columns) -> dict[str, Floats]:

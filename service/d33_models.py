@@ -156,7 +156,7 @@ def of_inversion(found: "Inversion") -> dict[str, Any]:
                 strict=True,
             )
         ],
-        "findings": list(found.findings),
+        "findings": [finding.sentence for finding in found.findings],
     }  # fmt: skip
 
 

@@ -165,9 +165,9 @@ def _inverted(campaign: Campaign, table: SigmaTable, band_hz: Band | None) -> "t
     except InvalidInput as error:
         if band_hz is not None and error.field == "band_hz":
             raise
-        findings = list(plausibility.in_words(campaign))
+        findings = [finding.sentence for finding in plausibility.implausible(campaign)]
         return {**_none(str(error)), "findings": findings, "moduli": moduli, "left_out": silent}, None
-    left_out = [{"recording": None, "reason": reason} for reason in found.left_out]
+    left_out = [{"recording": None, "reason": left.sentence} for left in found.left_out]
     return {**of_inversion(found), "moduli": moduli, "left_out": left_out + silent}, found
 
 

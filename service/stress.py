@@ -1,6 +1,5 @@
 """Charge on every sensor of an array under several contacts or a pressure map."""
 
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,7 @@ def columns(table: InfluenceTable, request: StressRequest) -> Columns:
         shared={
             "reach_mm": found.reach_mm,
             "contact_radius_mm": found.contact_radius_mm,
-            "findings": [asdict(finding) for finding in found.findings],
+            "findings": [finding.in_columns() for finding in found.findings],
         },
         names={"sensor": found.sensors},
         columns=found.columns,

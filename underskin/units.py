@@ -11,6 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from underskin.errors import InvalidInput
+from underskin.findings import english
+from underskin.findings.arguments import UnitGuess
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -119,16 +123,7 @@ def _accepted(name: str, values: Floats, good: NDArray[np.bool_], allowed: str) 
     return values
 
 
-@dataclass(frozen=True)
-class Finding:
-    """A measured value that looks wrong but is used all the same: the row, and what to look at."""
-
-    field: str
-    index: int | None
-    statement: str
-
-
-def findings(name: str, value: ArrayLike) -> list[Finding]:
+def unusual(name: str, value: ArrayLike) -> list[Finding]:
     """The first entry of a measured field whose magnitude looks like a slip of units or a dead sensor, if any.
 
     Measured values are never refused for their magnitude, unlike declared ones (see `checked`).
@@ -142,10 +137,13 @@ def findings(name: str, value: ArrayLike) -> list[Finding]:
         return []
     first = int(np.argmax(unlikely))
     number = float(values.flat[first])
-    guess = "a dead sensor?" if number == 0 else _guess(field, abs(number))
-    more = int(unlikely.sum()) - 1
-    others = f" ({more} more rows like it)" if more else ""
-    return [Finding(name, first if values.ndim else None, f"{number:g} {field.unit} is unusual: {guess}{others}")]
+    arguments = {
+        "value": number,
+        "unit": field.unit,
+        "guess": _guess(field, abs(number)),
+        "more": int(unlikely.sum()) - 1,
+    }
+    return [Finding(Reason.UNUSUAL_MAGNITUDE, "", name, arguments, index=first if values.ndim else None)]
 
 
 def _refuse(name: str, values: Floats, bad: NDArray[np.bool_], allowed: str) -> None:
@@ -159,20 +157,22 @@ def _slip(field: LabField, size: float) -> str:
     assert field.likely is not None
     low, high = field.likely
     text = f"must be {low:g} to {high:g} {field.unit} in magnitude (or set units_checked to true)"
-    return f"{text}; {_guess(field, size)}"
+    return f"{text}; {english.unit_guess(_guess(field, size))}"
 
 
-def _guess(field: LabField, size: float) -> str:
+def _guess(field: LabField, size: float) -> UnitGuess:
     """The slip that would explain a magnitude outside the likely range."""
     assert field.likely is not None
     low, high = field.likely
+    if size == 0:
+        return UnitGuess(size, field.unit)
     for factor, unit in _NEIGHBOURS[field.unit].items():
         if _usual(size * factor, low, high):
-            return f"{size:g} {unit} is {size * factor:g} {field.unit}: was it given in {unit}?"
+            return UnitGuess(size, field.unit, size * factor, given_in=unit)
     for power in (3, 6, 9, 12, -3, -6, -9, -12):
         if _usual(size * 10.0**power, low, high):
-            return f"off by a factor of 10^{-power}? {size * 10.0**power:g} {field.unit} would be usual"
-    return "no unit that we know explains it"
+            return UnitGuess(size, field.unit, size * 10.0**power, off_by=-power)
+    return UnitGuess(size, field.unit)
 
 
 def _usual(size: float, low: float, high: float) -> bool:

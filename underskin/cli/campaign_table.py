@@ -53,8 +53,8 @@ class Told:
         """In words: what looks wrong, and each recording or sensor that the figures do without."""
         notes = [f"look at: {warning}" for warning in self.reading.warnings]
         campaign = self.reading.campaign
-        found = self.found.findings if isinstance(self.found, Inversion) else plausibility.in_words(campaign)
-        notes += [f"look at: {finding}" for finding in found]
+        findings = self.found.findings if isinstance(self.found, Inversion) else plausibility.implausible(campaign)
+        notes += [f"look at: {finding.sentence}" for finding in findings]
         if not isinstance(self.found, Inversion) and not self.moduli:
             refused = len(self.reading.problems)
             all_refused = refused and not campaign.recordings
@@ -67,7 +67,7 @@ class Told:
             if isinstance(modulus.found, InvalidInput):
                 notes.append(f"left out: recording {modulus.recording}: {modulus.found}")
         if isinstance(self.found, Inversion):
-            notes += [f"left out: {left}" for left in self.found.left_out]
+            notes += [f"left out: {left.sentence}" for left in self.found.left_out]
         return notes
 
 

@@ -13,7 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.errors import InvalidInput
-from underskin.inversion import findings, mixed_model
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.inversion import mixed_model
+from underskin.inversion.findings import findings_of
 from underskin.inversion.mixed_model import Estimate, MixedModel, Rows
 from underskin.inversion.outliers import strays
 from underskin.inversion.sensor_flags import Flag, standing_out, unfit
@@ -22,10 +25,10 @@ from underskin.physics.skin import Indenter, Skin
 from underskin.prediction import domain_checks
 from underskin.prediction.domain_checks import usable
 from underskin.prediction.pressed_skin import Transmission, frf_gradient, transmission
-from underskin.recordings import plausibility
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.recordings.frf.flat_zone import FlatZone, band_average, flat_zone, stacked
+from underskin.recordings.plausibility import implausible
 from underskin.surrogate.off_centre_sigma import PositionedSigma, positioned_sigma
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_lab, to_si
@@ -86,8 +89,8 @@ class Inversion:
     spread: Estimate | None
     gain: Estimate | None
     position: Estimate | None
-    left_out: tuple[str, ...]  # in words, each sensor or recording that the campaign's d33 does without
-    findings: tuple[str, ...]  # in words, what looked wrong and was used all the same
+    left_out: tuple[Finding | Flag, ...]  # each recording or sensor that the campaign's d33 does without
+    findings: tuple[Finding, ...]  # what looks wrong and is used all the same
     declared_percent: float  # change of d33 for E 2 % and h 1 % off, in quadrature
 
 
@@ -102,22 +105,18 @@ def invert(
     recorded = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
     if not recorded:
         raise NoD33("recordings", campaign.name, "there is no recording of kind frf in it")
-    measured, recorded, refused = _measured(recorded)
+    measured, recorded, left_out = _measured(recorded)
     if not recorded:
-        raise _none_usable(campaign, refused)
+        raise _none_usable(campaign, left_out)
     frfs = stacked(measured)
     zone = zone or flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
     contact = _Contact.of(campaign, recorded, table)
     inside = usable(level, noise, contact.positioned.sigma, contact.felt)
     reasons = domain_checks.reasons(recorded, campaign.skin, contact.felt, level, table)
-    refused += [
-        f"recording {item.id}: {reason}"
-        for item, reason, good in zip(recorded, reasons, inside, strict=True)
-        if not good
-    ]
+    left_out += [reason for reason, good in zip(reasons, inside, strict=True) if not good]
     if not inside.any():
-        raise _none_usable(campaign, refused)
+        raise _none_usable(campaign, left_out)
     if np.abs(level[inside]).max() < _LEAST_CHARGE:
         raise NoD33("recordings", campaign.name, "there is no charge in any recording")
     seen = gain(contact.positioned.sigma, contact.felt.rt_over_h)
@@ -138,36 +137,31 @@ def invert(
         d33_uncertainty=np.where(inside, uncertainty, np.nan),
         inside=inside,
     )
-    found = _estimated(ids, rows, contact, zone)
-    looked_at = [
-        *plausibility.in_words(campaign),
-        *findings.in_words(recorded, measured, level, found.campaign_d33),
-    ]
-    return replace(found, left_out=(*refused, *found.left_out), findings=tuple(looked_at))
+    inversion = _estimated(ids, rows, contact, zone)
+    findings = (*implausible(campaign), *findings_of(recorded, measured, level, inversion.campaign_d33))
+    return replace(inversion, left_out=(*left_out, *inversion.left_out), findings=findings)
 
 
-def _none_usable(campaign: Campaign, refused: Sequence[str]) -> NoD33:
-    """Of a campaign whose recordings are all refused, each with the reason: the first reasons that differ."""
-    different = list({line.partition(": ")[2]: line for line in reversed(refused)}.values())[::-1]
-    more = (
-        f"; and {len(refused) - len(different[:_MOST_REASONS])} more"
-        if len(refused) > len(different[:_MOST_REASONS])
-        else ""
-    )
-    said = "; ".join(different[:_MOST_REASONS])
-    return NoD33("recordings", campaign.name, f"none of the {len(refused)} recordings can be used: {said}{more}")
+def _none_usable(campaign: Campaign, left_out: Sequence[Finding]) -> NoD33:
+    """Of a campaign whose recordings are all left out: the first reasons that differ."""
+    by_reason = {finding.statement: finding.sentence for finding in reversed(left_out)}
+    reasons = list(by_reason.values())[::-1][:_MOST_REASONS]
+    others = len(left_out) - len(reasons)
+    more = f"; and {others} more" if others > 0 else ""
+    allowed = f"none of the {len(left_out)} recordings can be used: {'; '.join(reasons)}{more}"
+    return NoD33("recordings", campaign.name, allowed)
 
 
-def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfRecording], list[str]]:
-    """The FRF of each recording that has one, those recordings, and in words why the others have none."""
-    frfs, kept, refused = [], [], []
+def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfRecording], list[Finding]]:
+    """The FRF of each recording that has one, those recordings, and findings on the others."""
+    frfs, with_frf, left_out = [], [], []
     for recording in recorded:
         try:
             frfs.append(lines_of(recording))
-            kept.append(recording)
-        except InvalidInput as error:
-            refused.append(f"recording {recording.id}: {error}")
-    return frfs, kept, refused
+            with_frf.append(recording)
+        except InvalidInput as refusal:
+            left_out.append(Finding(Reason.NO_FRF, recording.id, refusal.field, {"refusal": refusal}))
+    return frfs, with_frf, left_out
 
 
 @dataclass(frozen=True)
@@ -223,7 +217,7 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
     stray = _strays(rows, np.sqrt((mean[-1] - 1) ** 2 + np.maximum(variance[-1], 0)))
     good = np.setdiff1d(np.flatnonzero(rows.inside), stray)
     sensor, d33, noise = rows.sensor[good], rows.d33[good], rows.d33_uncertainty[good]
-    misfits, pilot = unfit(sensor, d33, noise, len(ids))
+    misfits, pilot = unfit(ids, sensor, d33, noise)
     mean, variance = mean[:, good], variance[:, good]
     measured = Rows(d33, noise, pilot[sensor], mean, variance)
     plain = np.array([number not in misfits for number in sensor])
@@ -233,7 +227,7 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
         model = mixed_model.fit(measured.part(plain), numbered)
     scatter = model.scatter if model else mixed_model.prior_scatter()
     cell, where, count = _cells(rows, good)
-    flags = [Flag(ids[number], *misfit) for number, misfit in misfits.items()]
+    flags = list(misfits.values())
     if model:
         expected = _expected_scatter(model, measured)[plain]
         flags += standing_out(ids, sensor[plain], rows, good[plain], pilot, expected)
@@ -251,7 +245,7 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
         spread=model.spread if model and len(set(sensor[plain])) > 1 else None,
         gain=model.gain if model else None,
         position=model.position if model else None,
-        left_out=_left_out(ids, rows, stray, misfits),
+        left_out=_left_out(rows, stray, list(misfits.values())),
         findings=(),
         declared_percent=100 * float(np.nanmedian(contact.declared[good])),
     )  # fmt: skip
@@ -279,9 +273,9 @@ def _cells(rows: RecordingD33, good: NDArray[np.intp]) -> tuple[NDArray[np.intp]
     return cell.reshape(-1), good[where], count
 
 
-def _left_out(
-    ids: tuple[str, ...], rows: RecordingD33, stray: NDArray[np.intp], misfits: dict[int, tuple[str, str]]
-) -> tuple[str, ...]:
+def _left_out(rows: RecordingD33, stray: NDArray[np.intp], misfits: Sequence[Flag]) -> tuple[Finding | Flag, ...]:
     d33 = to_lab("d33_pc_per_n", rows.d33)
-    off = [f"recording {rows.ids[row]}: its d33 of {d33[row]:.3g} pC/N is grossly off all others" for row in stray]
-    return (*off, *(f"sensor {ids[number]}: {reason}" for number, (_, reason) in misfits.items()))
+    outliers = [
+        Finding(Reason.OUTLIER, rows.ids[row], "d33_pc_per_n", {"d33_pc_per_n": float(d33[row])}) for row in stray
+    ]
+    return (*outliers, *misfits)

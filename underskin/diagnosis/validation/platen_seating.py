@@ -13,8 +13,9 @@ import numpy as np
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference.explanation import Workbench
 from underskin.diagnosis.selection.search import SHOWS
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign, CompressionRecording, Recording
-from underskin.recordings.finding import Finding
 from underskin.surrogate.sigma_table import SigmaTable
 
 _BEGINNING = 0.1  # of each curve's displacement
@@ -39,11 +40,7 @@ def without_seating(campaign: Campaign, names: Sequence[str], table: SigmaTable)
     assert plain is not None
     if stiffer.log_evidence - plain.log_evidence > SHOWS:
         return None
-    text = (
-        f"only the first {100 * _BEGINNING:.0f} % of the displacement speaks for strain_stiffening: a platen that is "
-        "tilted, or an uneven end, seats like that. It was left out; a small preload before zeroing avoids it"
-    )
-    return bench, Finding("seating", "", "displacement_mm", text)
+    return bench, Finding(Reason.SEATING, "", "displacement_mm", {"percent": 100 * _BEGINNING})
 
 
 def _is_pressed(entry: Recording) -> bool:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.signal import get_window
 
 from underskin.errors import InvalidInput
+from underskin.findings import english
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.periodic import period_of, without_drift
 from underskin.recordings.frf.signal_checks import Defect, damaged, defects_of_pair
@@ -37,7 +38,7 @@ class Frf:
     """Lines of a measured FRF: `frequency` [Hz], `values` [C/N], and γ² and the number of averages where known.
 
     `averages` counts independent blocks (overlapping ones count for less than one each); NaN coherence where a line
-    was averaged over one block. `found` says what was wrong with the time series. `force_power` [N²] and
+    was averaged over one block. `defects` are those of the time series. `force_power` [N²] and
     `charge_power` [C²] are mean squared amplitudes, and `passes` is in how many blocks the force has its power at a
     line, (Σ p)²/Σ p²; None of tones. `independent`: whether neighbouring lines' noise is.
     """
@@ -46,7 +47,7 @@ class Frf:
     values: Complexes
     coherence: Floats | None = None
     averages: Floats | None = None
-    found: tuple[Defect, ...] = ()
+    defects: tuple[Defect, ...] = ()
     force_power: Floats | None = None
     charge_power: Floats | None = None
     independent: bool = True
@@ -141,19 +142,19 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
     """
     _check(force, charge, sample_rate)
     steps = find_steps(force, sample_rate)
-    found = [
+    defects = [
         defect
         for defect in defects_of_pair(force, charge)
         if any(settled(step, sample_rate) <= defect.first_sample < step.last - 1 for step in steps)
     ]  # between the steps a jump is the step itself
-    bad = damaged(found, len(force))
+    bad = damaged(defects, len(force))
     lines: dict[float, list[tuple[Complexes, Complexes]]] = {}
     for step in steps:
         pair = step_amplitudes(force, charge, sample_rate, step, bad)
         if len(pair[0]):
             lines.setdefault(_same_line(step.frequency, lines), []).append(pair)
     if not lines:
-        raise InvalidInput("force_n", f"{len(found)} defects", "must dwell on a tone for some undamaged cycles")
+        raise InvalidInput("force_n", f"{len(defects)} defects", "must dwell on a tone for some undamaged cycles")
     frequency = np.array(sorted(lines))
     values, coherence, averages = np.empty(len(lines), complex), np.empty(len(lines)), np.empty(len(lines))
     for index, line in enumerate(frequency):
@@ -161,7 +162,7 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
         value, gamma2 = _ratio(blocks[0], blocks[1], estimator)
         values[index], averages[index] = value[0], len(blocks[0])
         coherence[index] = gamma2[0] if len(blocks[0]) > 1 else np.nan
-    return Frf(frequency, values, coherence, averages, tuple(found))
+    return Frf(frequency, values, coherence, averages, tuple(defects))
 
 
 @dataclass(frozen=True)
@@ -185,11 +186,13 @@ class _Blocks:
 
 def _averaged(force: Floats, charge: Floats, blocks: _Blocks, estimator: Estimator) -> Frf:
     """The average over the undamaged blocks, its frequencies in cycles per sample."""
-    found = defects_of_pair(force, charge)
-    whole = ~blocks.of(damaged(found, len(force))).any(axis=1)
+    defects = defects_of_pair(force, charge)
+    whole = ~blocks.of(damaged(defects, len(force))).any(axis=1)
     count = int(whole.sum())
     if not count:
-        raise InvalidInput(found[0].channel, f"{len(found)} defects", f"no undamaged block: {found[0].statement}")
+        first = defects[0]
+        words = english.defect(first.kind, first.channel, first.samples, first.first_sample)
+        raise InvalidInput(first.channel, f"{len(defects)} defects", f"no undamaged block: {words}")
     force_spectra, charge_spectra = (blocks.spectra(signal)[whole] for signal in (force, charge))
     frequency: Floats = np.fft.rfftfreq(len(blocks.taper))[blocks.lines].astype(np.float64)
     averages = _independent_blocks(count, blocks.taper, blocks.step)
@@ -201,7 +204,7 @@ def _averaged(force: Floats, charge: Floats, blocks: _Blocks, estimator: Estimat
         values,
         coherence if count > 1 else np.full_like(coherence, np.nan),
         np.full(len(frequency), averages),
-        tuple(found),
+        tuple(defects),
         force_power.mean(axis=0),
         charge_power.mean(axis=0),
         passes=force_power.sum(axis=0) ** 2 / np.maximum((force_power**2).sum(axis=0), _TINY),
