@@ -95,7 +95,7 @@ def _rig(store: Database, uploads: Sequence[Upload], terms: Terms) -> RigDescrip
                 raise InvalidInput(RIG, upload.label, f"{error.place}: {error.reason}".lstrip(": ")) from None
             except InvalidInput as error:
                 label = f"{upload.label}: " if upload.label else f"{RIG}."
-                raise InvalidInput(f"{label}{error.field}", error.value, error.allowed) from None
+                raise error.at(f"{label}{error.field}") from None
     with store.reading() as connection:
         names = [terms.skin] if terms.skin is not None else []
         if terms.corrects is not None:

@@ -11,7 +11,7 @@ from service.store import skins
 from service.unique_keys import require_unique_keys
 from service.uploads import Upload
 from underskin import InvalidInput
-from underskin.errors import FileError
+from underskin.errors import ErrorCode, FileError
 from underskin.recordings import join
 from underskin.recordings.campaign import Campaign, from_dict
 from underskin.recordings.channels import Contents
@@ -89,7 +89,7 @@ def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> Lo
         _require_usable(found.campaign)
     except FileError as error:
         allowed = ": ".join(part for part in (error.place, error.reason) if part)
-        return Look(kind, contents, [Found(upload.label, errors=[_error("file", upload.label, allowed)])])
+        return Look(kind, contents, [Found(upload.label, errors=[_error("file", upload.label, allowed, error.code)])])
     except InvalidInput as error:
         return Look(kind, contents, [Found(upload.label, errors=[_invalid(error)])])
     return Look(kind, contents, [Found(upload.label, found, by_rig=rig is not None)])
@@ -105,7 +105,7 @@ def arrived_as(found: Found) -> Arrived:
     for number, problem in enumerate(found.reading.problems):
         told = refused.setdefault(problem.recording, [])
         if number < _MOST_ERRORS:
-            told.append(_error(problem.field, problem.value, problem.allowed))
+            told.append(_error(problem.field, problem.value, problem.allowed, problem.code))
     count = len(found.reading.problems)
     untold = max(0, count - _MOST_ERRORS)
     if untold:
@@ -158,14 +158,17 @@ def _read_json(upload: Upload, most_bytes: int) -> list[Found]:
                 400, f"The body is not JSON: line {error.lineno}, column {error.colno}: {error.msg}."
             ) from None
         allowed = f"must be JSON; line {error.lineno}, column {error.colno}: {error.msg}"
-        return [Found(upload.label, errors=[_error("file", upload.label, allowed)])]
+        return [Found(upload.label, errors=[_error("file", upload.label, allowed, ErrorCode.UNREADABLE_FILE)])]
     try:
         require_unique_keys(content)
     except Refusal as twice:
         return [
             Found(
                 upload.label,
-                errors=[_error(error["field"], error["value"], error["allowed"]) for error in twice.errors],
+                errors=[
+                    _error(error["field"], error["value"], error["allowed"], ErrorCode.NOT_UNIQUE)
+                    for error in twice.errors
+                ],
             )
         ]
     if not isinstance(document, list):
@@ -190,13 +193,15 @@ def _checked(label: str | None, document: Any) -> Found:
 
 
 def _nothing(refused: int) -> dict[str, Any]:
-    return _error("recordings", f"{refused} refused", "must hold at least one recording without errors")
+    return _error(
+        "recordings", f"{refused} refused", "must hold at least one recording without errors", ErrorCode.TOO_FEW
+    )
 
 
 def _invalid(error: InvalidInput) -> dict[str, Any]:
     place = error.field if error.index is None else f"{error.field}[{error.index}]"
-    return _error(place, error.value, error.allowed)
+    return _error(place, error.value, error.allowed, error.code)
 
 
-def _error(name: str, value: Any, allowed: str) -> dict[str, Any]:
-    return {"field": name, "value": value, "allowed": allowed}
+def _error(name: str, value: Any, allowed: str, code: ErrorCode) -> dict[str, Any]:
+    return {"code": str(code), "field": name, "value": value, "allowed": allowed}

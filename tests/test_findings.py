@@ -6,14 +6,18 @@ import re
 import string
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from underskin.errors import ErrorCode, FileError, InvalidInput
 from underskin.findings import english
 from underskin.findings.arguments import D33Doubt, DefectKind, UnitGuess
 from underskin.findings.codes import FindingCode, Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
+from underskin.recordings.campaign import from_dict, parse
+from underskin.units import checked
 
 ROOT = Path(__file__).parent.parent
 SOURCES = [
@@ -39,8 +43,10 @@ def names_of(words: english.Words) -> tuple[set[str], set[str]]:
 
 
 def test_the_page_explains_each_code_once() -> None:
-    explained = re.findall(r"^\| `(\w+)` \|", PAGE, flags=re.MULTILINE)
-    assert sorted(explained) == sorted(FindingCode)
+    findings, _, errors = PAGE.partition("## Errors")
+    for part, codes in ((findings, FindingCode), (errors, ErrorCode)):
+        explained = re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE)
+        assert sorted(explained) == sorted(codes)
 
 
 def test_each_code_has_a_reason_and_each_reason_words() -> None:
@@ -125,3 +131,54 @@ def test_a_lack_says_what_was_refused_before() -> None:
         "3 recording(s) were refused for their preload_n and force_n (see findings), which leaves no recording can be "
         "used"
     )
+
+
+def test_errors_carry_codes_that_survive_a_new_name() -> None:
+    with pytest.raises(InvalidInput) as unlikely:
+        checked("thickness_mm", 2500.0)
+    assert unlikely.value.code == ErrorCode.UNLIKELY_MAGNITUDE
+    again = unlikely.value.at("skin.thickness_mm")
+    assert (again.field, again.code, again.allowed) == (
+        "skin.thickness_mm",
+        ErrorCode.UNLIKELY_MAGNITUDE,
+        unlikely.value.allowed,
+    )
+    assert FileError("a.tdms", "", "is empty").code == ErrorCode.UNREADABLE_FILE
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [
+        ({"preload_n": None}, ErrorCode.REQUIRED),
+        ({"preload_n": "1 N"}, ErrorCode.WRONG_TYPE),
+        ({"preload_n": -1.0}, ErrorCode.OUT_OF_RANGE),
+        ({"preload_n": 1e6}, ErrorCode.UNLIKELY_MAGNITUDE),
+        ({"preload": 1.0}, ErrorCode.UNKNOWN_FIELD),
+        ({"frequency_hz": [2.0, 1.0, 3.0]}, ErrorCode.NOT_INCREASING),
+        ({"frf_re_pc_per_n": [1.0, 2.0]}, ErrorCode.UNEQUAL_LENGTHS),
+        ({"frf_re_pc_per_n": [1.0, 2.0, float("nan")]}, ErrorCode.NOT_FINITE),
+        ({"sample_rate_hz": 1000.0}, ErrorCode.CONFLICTING),
+        ({"kind": "tension"}, ErrorCode.NOT_ONE_OF),
+        ({"sensor": "s9"}, ErrorCode.NOT_ONE_OF),
+    ],
+)
+def test_what_is_wrong_with_a_recording_has_a_code(change: dict[str, Any], code: ErrorCode) -> None:
+    recording = {
+        "id": "r",
+        "sensor": "s0",
+        "indenter_radius_mm": 5.0,
+        "preload_n": 1.0,
+        "dynamic_force_n": 0.1,
+        "frequency_hz": [1.0, 2.0, 3.0],
+        "frf_re_pc_per_n": [1.0, 1.0, 1.0],
+        "frf_im_pc_per_n": [0.0, 0.0, 0.0],
+        **change,
+    }
+    skin = {"thickness_mm": 2.5, "youngs_modulus_mpa": 3.0, "sensor_radius_mm": 1.5, "poisson_ratio": 0.5}
+    sensors = [{"id": "s0", "x_mm": 0.0, "y_mm": 0.0}]
+    document = {"schema": "campaign/1", "name": "c", "skin": {**skin, "sensors": sensors}, "recordings": [recording]}
+    _, problems = from_dict(document)
+    assert [problem.code for problem in problems] == [code]
+    with pytest.raises(InvalidInput) as refusal:
+        parse(document)
+    assert refusal.value.code == code

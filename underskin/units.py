@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from underskin.errors import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput
 from underskin.findings import english
 from underskin.findings.arguments import UnitGuess
 from underskin.findings.codes import Reason
@@ -18,6 +18,8 @@ from underskin.findings.finding import Finding
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+
+CONFIRM_UNITS = " (or set units_checked to true)"  # how a request confirms an unlikely magnitude
 
 
 @dataclass(frozen=True)
@@ -95,31 +97,35 @@ def checked(name: str, value: ArrayLike, *, units_checked: bool = False) -> Floa
     values = np.asarray(value, dtype=float)
     size = np.abs(values) if field.signed else values
     positive = "finite and not zero" if field.signed else "finite and greater than 0"
-    _refuse(name, values, ~(np.isfinite(values) & (size > 0)), f"must be {positive} ({field.unit})")
+    _refuse(
+        name, values, ~(np.isfinite(values) & (size > 0)), f"must be {positive} ({field.unit})", ErrorCode.OUT_OF_RANGE
+    )
     if field.likely is not None and not units_checked:
         low, high = field.likely
         unlikely = (size < low) | (size > high)
         if unlikely.any():
             first = float(size.flat[int(np.argmax(unlikely))])
-            _refuse(name, values, unlikely, _slip(field, first))
+            _refuse(name, values, unlikely, _slip(field, first), ErrorCode.UNLIKELY_MAGNITUDE)
     return values * field.to_si
 
 
 def non_negative(name: str, values: Floats) -> Floats:
     """`values`, after refusing what is not finite or below 0 (InvalidInput with the first such row)."""
-    return _accepted(name, values, np.isfinite(values) & (values >= 0), "must be finite and at least 0")
+    return _accepted(
+        name, values, np.isfinite(values) & (values >= 0), "must be finite and at least 0", ErrorCode.OUT_OF_RANGE
+    )
 
 
 def finite(name: str, values: Floats) -> Floats:
     """`values`, after refusing what is not finite (InvalidInput with the first such row)."""
-    return _accepted(name, values, np.isfinite(values), "must be finite")
+    return _accepted(name, values, np.isfinite(values), "must be finite", ErrorCode.NOT_FINITE)
 
 
-def _accepted(name: str, values: Floats, good: NDArray[np.bool_], allowed: str) -> Floats:
+def _accepted(name: str, values: Floats, good: NDArray[np.bool_], allowed: str, code: ErrorCode) -> Floats:
     if not good.all():
         first = int(np.argmin(good.ravel()))
         row = int(np.unravel_index(first, values.shape)[0]) if values.ndim else None
-        raise InvalidInput(name, float(values.flat[first]), allowed, index=row)
+        raise InvalidInput(name, float(values.flat[first]), allowed, index=row, code=code)
     return values
 
 
@@ -146,17 +152,17 @@ def unusual(name: str, value: ArrayLike) -> list[Finding]:
     return [Finding(Reason.UNUSUAL_MAGNITUDE, "", name, arguments, index=first if values.ndim else None)]
 
 
-def _refuse(name: str, values: Floats, bad: NDArray[np.bool_], allowed: str) -> None:
+def _refuse(name: str, values: Floats, bad: NDArray[np.bool_], allowed: str, code: ErrorCode) -> None:
     if bad.any():
         first = int(np.argmax(bad))
-        raise InvalidInput(name, float(values.flat[first]), allowed, index=first if values.ndim else None)
+        raise InvalidInput(name, float(values.flat[first]), allowed, index=first if values.ndim else None, code=code)
 
 
 def _slip(field: LabField, size: float) -> str:
     """What is allowed, and the unit that was probably meant."""
     assert field.likely is not None
     low, high = field.likely
-    text = f"must be {low:g} to {high:g} {field.unit} in magnitude (or set units_checked to true)"
+    text = f"must be {low:g} to {high:g} {field.unit} in magnitude{CONFIRM_UNITS}"
     return f"{text}; {english.unit_guess(_guess(field, size))}"
 
 

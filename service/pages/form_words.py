@@ -4,12 +4,12 @@ import re
 from collections.abc import Mapping, Sequence
 
 from underskin import InvalidInput, UnderskinError
+from underskin.units import CONFIRM_UNITS
 
 _CONTACT = re.compile(r"contacts\[(\d+)\](?:\.(\w+))?(?:\[(\d)\])?")
 _OF_LOAD = {"x_mm": "x", "y_mm": "y", "indenter_radius_mm": "R", "normal_force_n": "F"}
 _TANGENTIAL = ("Fx", "Fy")
 _EVERYDAY = ("rows", "columns")  # names that mean what they say, within a sentence
-FOR_REQUESTS = " (or set units_checked to true)"  # which is for requests
 
 
 def said(error: UnderskinError, labels: Mapping[str, str], lines: Sequence[int] = (), unlikely: str = "") -> str:
@@ -18,7 +18,7 @@ def said(error: UnderskinError, labels: Mapping[str, str], lines: Sequence[int] 
     if not isinstance(error, InvalidInput):
         return str(error)
     names = {name: label for name, label in labels.items() if name not in _EVERYDAY}
-    allowed = _in_words(error.allowed.replace(FOR_REQUESTS, f" ({unlikely})" if unlikely else ""), names, lines)
+    allowed = _in_words(error.allowed.replace(CONFIRM_UNITS, f" ({unlikely})" if unlikely else ""), names, lines)
     field = _in_words(error.field, labels, lines)
     came = "" if error.value is None else f": {error.value}"
     return f"{field}{came} – {allowed}"

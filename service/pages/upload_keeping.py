@@ -14,7 +14,7 @@ from service.store.engine import Database
 from service.store.errors import Conflict, Missing
 from service.uploads import Upload
 from underskin import InvalidInput
-from underskin.errors import FileError
+from underskin.errors import ErrorCode, FileError
 
 SKIN_FIELD, CORRECTS = "skin", "corrects"
 
@@ -54,7 +54,7 @@ def _rig_upload(shelved: Shelved) -> list[Upload]:
 
 
 def _told(error: InvalidInput) -> dict[str, Any]:
-    return {"field": error.field, "value": error.value, "allowed": error.allowed}
+    return {"code": str(error.code), "field": error.field, "value": error.value, "allowed": error.allowed}
 
 
 def all_told(error: Exception) -> list[dict[str, Any]]:
@@ -64,5 +64,7 @@ def all_told(error: Exception) -> list[dict[str, Any]]:
     if isinstance(error, Refusal) and error.errors:
         return [dict(entry) for entry in error.errors]
     if isinstance(error, FileError):
-        return [{"field": error.file, "value": None, "allowed": f"{error.place} {error.reason}".strip()}]
-    return [{"field": "upload", "value": None, "allowed": error.detail if isinstance(error, Refusal) else str(error)}]
+        allowed = f"{error.place} {error.reason}".strip()
+        return [{"code": str(error.code), "field": error.file, "value": None, "allowed": allowed}]
+    detail = error.detail if isinstance(error, Refusal) else str(error)
+    return [{"code": str(ErrorCode.INVALID_VALUE), "field": "upload", "value": None, "allowed": detail}]

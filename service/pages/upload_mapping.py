@@ -5,11 +5,12 @@ from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
-from service.pages.form_words import FOR_REQUESTS
 from service.pages.upload_seen import ChannelSeen
 from underskin import InvalidInput
+from underskin.errors import ErrorCode
 from underskin.recordings.readers.unit_labels import lab_field, unit
 from underskin.recordings.rig_description import SCHEMA, channel_fields
+from underskin.units import CONFIRM_UNITS
 
 KINDS = {
     "frf": "FRF: charge against a shaken force",
@@ -84,8 +85,8 @@ def field_words(field: str) -> str:
 
 def what_to_do(error: Mapping[str, Any]) -> str:
     """What is allowed; for what the form asks, where to say it."""
-    if error["allowed"] != "required" or field_words(error["field"]) == error["field"]:
-        allowed = str(error["allowed"]).replace(FOR_REQUESTS, " (or tick “Take unlikely magnitudes as they are”)")
+    if error["code"] != ErrorCode.REQUIRED or field_words(error["field"]) == error["field"]:
+        allowed = str(error["allowed"]).replace(CONFIRM_UNITS, " (or tick “Take unlikely magnitudes as they are”)")
         return _UNQUOTED_FIELD.sub(lambda found: field_words(found[0]), allowed)
     if error["field"] == _RATE:
         return "required: fill it in below, or say which channel is the time"

@@ -78,13 +78,13 @@ def test_both_parts_of_an_frf_are_guessed_and_complex_ones_and_the_sample_rate()
 
 def test_what_is_missing_is_said_in_the_form_s_words() -> None:
     assert field_words("frf_im_pc_per_n") == "FRF, imaginary part"
-    missing = {"field": "frf_im_pc_per_n", "value": None, "allowed": "required"}
+    missing = {"code": "required", "field": "frf_im_pc_per_n", "value": None, "allowed": "required"}
     assert what_to_do(missing) == "required: say below which channel it is"
     refused = "channel 'force_n': its unit 'V' is one of voltage; force_n needs one of force, such as N"
-    told = what_to_do({"field": "file", "value": "x.csv", "allowed": refused})
+    told = what_to_do({"code": "unreadable_file", "field": "file", "value": "x.csv", "allowed": refused})
     assert told == "channel 'force_n': its unit 'V' is one of voltage; force needs one of force, such as N"
     unlikely = "must be 0.01 to 100 mm in magnitude (or set units_checked to true)"
-    told = what_to_do({"field": "skin.thickness_mm", "value": 2500, "allowed": unlikely})
+    told = what_to_do({"code": "unlikely_magnitude", "field": "skin.thickness_mm", "value": 2500, "allowed": unlikely})
     assert told.endswith("(or tick “Take unlikely magnitudes as they are”)")
     assert "fill it in below" in what_to_do({**missing, "field": "sample_rate_hz"})
 

@@ -61,7 +61,7 @@ class Told:
             why = f"none of the {refused} recordings can be used" if all_refused else self.found
             notes.append(f"no d33: {why}")
         for problem in self.reading.problems:
-            said = InvalidInput(problem.field, problem.value, problem.allowed)
+            said = problem.as_error(problem.field)
             notes.append(f"left out: recording {problem.recording}: {said}")
         for modulus in self.moduli:
             if isinstance(modulus.found, InvalidInput):

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from underskin.errors import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput
 from underskin.recordings import validation as field
 from underskin.recordings.validation import named, shown
 
@@ -28,12 +28,14 @@ class Sensor:
 
 def _sensors(name: str, value: Any, units_checked: bool) -> tuple[Sensor, ...]:
     if not isinstance(value, list | tuple):
-        raise InvalidInput(name, shown(value), "must be a list of sensors")
+        raise InvalidInput(name, shown(value), "must be a list of sensors", code=ErrorCode.WRONG_TYPE)
     sensors = [field.build(Sensor, f"{name}[{index}]", entry, units_checked) for index, entry in enumerate(value)]
     seen: set[str] = set()
     for index, sensor in enumerate(sensors):
         if sensor.id in seen:
-            raise InvalidInput(f"{name}[{index}].id", sensor.id, "must differ from every other sensor's")
+            raise InvalidInput(
+                f"{name}[{index}].id", sensor.id, "must differ from every other sensor's", code=ErrorCode.NOT_UNIQUE
+            )
         seen.add(sensor.id)
     return tuple(sensors)
 
@@ -156,6 +158,11 @@ class RecordingProblem:
     field: str
     value: Any
     allowed: str
+    code: ErrorCode = ErrorCode.INVALID_VALUE
+
+    def as_error(self, field: str) -> InvalidInput:
+        """The problem as an error of a field."""
+        return InvalidInput(field, self.value, self.allowed, code=self.code)
 
 
 def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
@@ -166,27 +173,35 @@ def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
     document = field.mapping("campaign", document)
     for name in document:
         if name not in ("schema", "name", "skin", "recordings", "units_checked"):
-            raise InvalidInput(named(name), shown(document[name]), "unknown field of a campaign")
+            raise InvalidInput(
+                named(name), shown(document[name]), "unknown field of a campaign", code=ErrorCode.UNKNOWN_FIELD
+            )
     if document.get("schema") != SCHEMA:
-        raise InvalidInput("schema", shown(document.get("schema")), f"must be {SCHEMA}")
+        raise InvalidInput("schema", shown(document.get("schema")), f"must be {SCHEMA}", code=ErrorCode.NOT_ONE_OF)
     units_checked = field.flag("units_checked", document.get("units_checked", False), False)
     name = field.name("name", document.get("name"), units_checked)
     skin = field.build(SkinDescription, "skin", document.get("skin"), units_checked)
     entries = document.get("recordings")
     if not isinstance(entries, list) or not entries:
-        raise InvalidInput("recordings", shown(entries), "must be a list of at least one recording")
+        raise InvalidInput(
+            "recordings", shown(entries), "must be a list of at least one recording", code=ErrorCode.WRONG_TYPE
+        )
     good: dict[str, Recording] = {}
     problems: list[RecordingProblem] = []
     for index, entry in enumerate(entries):
         recording, refused = _recording(entry, skin, units_checked)
         if recording is not None and recording.id in good:
-            refused = [InvalidInput("id", recording.id, "must differ from every other recording's")]
+            refused = [
+                InvalidInput("id", recording.id, "must differ from every other recording's", code=ErrorCode.NOT_UNIQUE)
+            ]
         if recording is not None and not refused:
             good[recording.id] = recording
         label = recording.id if recording is not None else _label(entry, index)
-        problems += [RecordingProblem(label, _place(error), error.value, error.allowed) for error in refused]
+        problems += [
+            RecordingProblem(label, _place(error), error.value, error.allowed, error.code) for error in refused
+        ]
     if not good and all(problem.field.startswith("skin.") for problem in problems):
-        raise InvalidInput(problems[0].field, problems[0].value, problems[0].allowed)
+        raise problems[0].as_error(problems[0].field)
     return Campaign(name, skin, tuple(good.values()), units_checked), problems
 
 
@@ -195,7 +210,7 @@ def parse(document: Any) -> Campaign:
     campaign, problems = from_dict(document)
     if problems:
         first = problems[0]
-        raise InvalidInput(f"recordings[{first.recording}].{first.field}", first.value, first.allowed)
+        raise first.as_error(f"recordings[{first.recording}].{first.field}")
     return campaign
 
 
@@ -235,7 +250,9 @@ def _recording(entry: Any, skin: SkinDescription, units_checked: bool) -> tuple[
         return None, [refusal]
     kind = document.get("kind") or "frf"
     if not isinstance(kind, str) or kind not in KINDS:
-        return None, [InvalidInput("kind", shown(kind), f"must be one of {', '.join(KINDS)}")]
+        return None, [
+            InvalidInput("kind", shown(kind), f"must be one of {', '.join(KINDS)}", code=ErrorCode.NOT_ONE_OF)
+        ]
     values, refused = field.check_fields(KINDS[kind], document, units_checked=units_checked)
     if refused:
         return None, refused
@@ -248,10 +265,12 @@ def _unmet_needs(recording: Recording, skin: SkinDescription) -> list[InvalidInp
     refused = []
     sensor = None if isinstance(recording, CompressionRecording) else recording.sensor
     if sensor is not None and sensor not in (known.id for known in skin.sensors):
-        refused.append(InvalidInput("sensor", sensor, "must be the id of one of the skin's sensors"))
+        refused.append(
+            InvalidInput("sensor", sensor, "must be the id of one of the skin's sensors", code=ErrorCode.NOT_ONE_OF)
+        )
     if isinstance(recording, FrfRecording):
         refused += [
-            InvalidInput(f"skin.{name}", None, "required by a recording of kind frf")
+            InvalidInput(f"skin.{name}", None, "required by a recording of kind frf", code=ErrorCode.REQUIRED)
             for name in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm")
             if getattr(skin, name) is None
         ]
@@ -268,9 +287,15 @@ def _not_one_of_two_forms(recording: FrfRecording) -> list[InvalidInput]:
     series = [name for name in _TIME_SERIES if getattr(recording, name) is not None]
     lines = [name for name in (*_LINES, "coherence") if getattr(recording, name) is not None]
     if series and lines:
-        return [InvalidInput(series[0], "given", "must be absent where the FRF itself is given")]
+        return [
+            InvalidInput(series[0], "given", "must be absent where the FRF itself is given", code=ErrorCode.CONFLICTING)
+        ]
     needed = _TIME_SERIES if series else _LINES
-    return [InvalidInput(name, None, "required") for name in needed if getattr(recording, name) is None]
+    return [
+        InvalidInput(name, None, "required", code=ErrorCode.REQUIRED)
+        for name in needed
+        if getattr(recording, name) is None
+    ]
 
 
 def _unequal_lengths(recording: Recording) -> list[InvalidInput]:
@@ -283,7 +308,9 @@ def _unequal_lengths(recording: Recording) -> list[InvalidInput]:
         return []
     first, length = next(iter(columns.items()))
     return [
-        InvalidInput(name, f"{size} entries", f"must have {length} entries, as many as {first}")
+        InvalidInput(
+            name, f"{size} entries", f"must have {length} entries, as many as {first}", code=ErrorCode.UNEQUAL_LENGTHS
+        )
         for name, size in columns.items()
         if size != length
     ]

@@ -14,7 +14,7 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from underskin.errors import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.units import Floats, checked
 
@@ -38,7 +38,12 @@ def check_fields(
     known = _checks(model)
     unknown = (name for name in document if name not in known)
     refused = [
-        InvalidInput(named(name), shown(document[name]), f"unknown field; known: {', '.join(known)}")
+        InvalidInput(
+            named(name),
+            shown(document[name]),
+            f"unknown field; known: {', '.join(known)}",
+            code=ErrorCode.UNKNOWN_FIELD,
+        )
         for name in islice(unknown, _MOST_UNKNOWN)
     ]
     values: dict[str, Any] = {}
@@ -46,7 +51,7 @@ def check_fields(
         value = document.get(name)
         try:
             if value is None and default is MISSING:
-                raise InvalidInput(name, None, "required")
+                raise InvalidInput(name, None, "required", code=ErrorCode.REQUIRED)
             values[name] = default if value is None else field_check(name, value, units_checked)
         except InvalidInput as refusal:
             refused.append(refusal)
@@ -56,7 +61,7 @@ def check_fields(
 def mapping(field: str, value: Any) -> Mapping[str, Any]:
     """A JSON object."""
     if not isinstance(value, Mapping):
-        raise InvalidInput(field, shown(value), "must be an object with named fields")
+        raise _wrong_type(field, value, "must be an object with named fields")
     return value
 
 
@@ -64,7 +69,7 @@ def build(model: type[Model], prefix: str, document: Any, units_checked: bool) -
     """A model of a document; raises InvalidInput at the first field refused, its name led by `prefix`."""
     values, refused = check_fields(model, mapping(prefix, document), units_checked=units_checked)
     if refused:
-        raise InvalidInput(f"{prefix}.{refused[0].field}", refused[0].value, refused[0].allowed, refused[0].index)
+        raise refused[0].at(f"{prefix}.{refused[0].field}")
     return model(**values)
 
 
@@ -83,27 +88,27 @@ def _annotated_check(hint: Any) -> Check:
 def name(field: str, value: Any, units_checked: bool) -> str:  # noqa: ARG001
     """A short printable text, such as an id."""
     if not isinstance(value, str) or not value.strip() or len(value) > LONGEST_NAME or not value.isprintable():
-        raise InvalidInput(field, shown(value), f"must be a printable text of 1 to {LONGEST_NAME} characters")
+        raise _wrong_type(field, value, f"must be a printable text of 1 to {LONGEST_NAME} characters")
     return value
 
 
 def flag(field: str, value: Any, units_checked: bool) -> bool:  # noqa: ARG001
     """true or false."""
     if not isinstance(value, bool):
-        raise InvalidInput(field, shown(value), "must be true or false")
+        raise _wrong_type(field, value, "must be true or false")
     return value
 
 
 def number(field: str, value: Any, units_checked: bool = False) -> float:  # noqa: ARG001
     """A finite number."""
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
-        raise InvalidInput(field, shown(value), "must be a number")
+        raise _wrong_type(field, value, "must be a number")
     try:
         result = float(value)
     except OverflowError:
         result = math.inf
     if not math.isfinite(result):
-        raise InvalidInput(field, shown(result), "must be finite")
+        raise InvalidInput(field, shown(result), "must be finite", code=ErrorCode.NOT_FINITE)
     return result
 
 
@@ -111,7 +116,7 @@ def positive(field: str, value: Any, units_checked: bool) -> float:  # noqa: ARG
     """A measured or chosen quantity greater than 0, of any magnitude."""
     result = number(field, value)
     if result <= 0:
-        raise InvalidInput(field, result, "must be greater than 0")
+        raise InvalidInput(field, result, "must be greater than 0", code=ErrorCode.OUT_OF_RANGE)
     return result
 
 
@@ -119,7 +124,7 @@ def not_negative(field: str, value: Any, units_checked: bool) -> float:  # noqa:
     """A number that is 0 or greater."""
     result = number(field, value)
     if result < 0:
-        raise InvalidInput(field, result, "must be 0 or greater")
+        raise InvalidInput(field, result, "must be 0 or greater", code=ErrorCode.OUT_OF_RANGE)
     return result
 
 
@@ -134,7 +139,7 @@ def poisson_ratio(field: str, value: Any, units_checked: bool) -> float:  # noqa
     """0 to 0.5."""
     result = number(field, value)
     if not 0 <= result <= INCOMPRESSIBLE:
-        raise InvalidInput(field, result, f"must be 0 to {INCOMPRESSIBLE}")
+        raise InvalidInput(field, result, f"must be 0 to {INCOMPRESSIBLE}", code=ErrorCode.OUT_OF_RANGE)
     return result
 
 
@@ -142,7 +147,7 @@ def count(field: str, value: Any, units_checked: bool) -> int:  # noqa: ARG001
     """A whole number, 0 to 2⁵³: as far as floats, and so JSON, hold every one."""
     result = number(field, value)
     if result < 0 or not result.is_integer() or int(value) > _LARGEST_COUNT:
-        raise InvalidInput(field, shown(value), f"must be a whole number, 0 to {_LARGEST_COUNT}")
+        raise _wrong_type(field, value, f"must be a whole number, 0 to {_LARGEST_COUNT}")
     return int(value)
 
 
@@ -152,7 +157,9 @@ def time_of_day(field: str, value: Any, units_checked: bool) -> str:
     try:
         datetime.fromisoformat(text)
     except ValueError:
-        raise InvalidInput(field, text, "must be a date and time like 2017-05-03T09:00:00Z") from None
+        raise InvalidInput(
+            field, text, "must be a date and time like 2017-05-03T09:00:00Z", code=ErrorCode.WRONG_TYPE
+        ) from None
     return text
 
 
@@ -164,7 +171,7 @@ def position(field: str, value: Any, units_checked: bool) -> tuple[float, float]
 
 def _pair(field: str, value: Any) -> tuple[Any, Any]:
     if not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
-        raise InvalidInput(field, shown(value), "must be two numbers, x and y")
+        raise _wrong_type(field, value, "must be two numbers, x and y")
     return value[0], value[1]
 
 
@@ -172,72 +179,102 @@ def series(field: str, value: Any, units_checked: bool) -> Floats:  # noqa: ARG0
     """A column of at least one finite number."""
     column = _column(field, value)
     if column.size == 0:
-        raise InvalidInput(field, shown(value), "must hold at least one number")
-    _refuse_where(field, column, ~np.isfinite(column), "must be finite")
+        raise InvalidInput(field, shown(value), "must hold at least one number", code=ErrorCode.TOO_FEW)
+    _refuse_where(field, column, ~np.isfinite(column), "must be finite", ErrorCode.NOT_FINITE)
     return column
 
 
 def increasing(field: str, value: Any, units_checked: bool) -> Floats:
     """A column of finite numbers, each greater than the one before."""
     column = series(field, value, units_checked)
-    _refuse_where(field, column, np.diff(column, prepend=-math.inf) <= 0, "must be greater than the entry before")
+    _refuse_where(
+        field,
+        column,
+        np.diff(column, prepend=-math.inf) <= 0,
+        "must be greater than the entry before",
+        ErrorCode.NOT_INCREASING,
+    )
     return column
 
 
 def rows(field: str, value: Any, units_checked: bool) -> Floats:
     """Rows of finite numbers, equally many in each: (rows, columns)."""
     if not isinstance(value, list | tuple) or not value:
-        raise InvalidInput(field, shown(value), "must be a list of rows of numbers")
+        raise _wrong_type(field, value, "must be a list of rows of numbers")
     found = [series(f"{field}[{index}]", row, units_checked) for index, row in enumerate(value)]
     for index, row in enumerate(found):
         if row.size != found[0].size:
-            raise InvalidInput(field, f"{row.size} columns", f"must have as many as row 0 ({found[0].size})", index)
+            raise InvalidInput(
+                field,
+                f"{row.size} columns",
+                f"must have as many as row 0 ({found[0].size})",
+                index,
+                code=ErrorCode.UNEQUAL_LENGTHS,
+            )
     return np.stack(found)
 
 
 def frequencies(field: str, value: Any, units_checked: bool) -> Floats:
     """An increasing column of frequencies above 0, from far below to far above what any instrument records."""
     column = increasing(field, value, units_checked)
-    _refuse_where(field, column, column <= 0, "must be greater than 0 (leave out the line at 0 Hz)")
+    _refuse_where(
+        field, column, column <= 0, "must be greater than 0 (leave out the line at 0 Hz)", ErrorCode.OUT_OF_RANGE
+    )
     low, high = _FREQUENCIES_HZ
-    _refuse_where(field, column, (column < low) | (column > high), f"must be {low:g} to {high:g} Hz")
+    _refuse_where(
+        field, column, (column < low) | (column > high), f"must be {low:g} to {high:g} Hz", ErrorCode.OUT_OF_RANGE
+    )
     return column
 
 
 def not_falling(field: str, value: Any, units_checked: bool) -> Floats:
     """A column of times: none before the one above it."""
     column = series(field, value, units_checked)
-    _refuse_where(field, column, np.diff(column, prepend=-math.inf) < 0, "must not be before the entry above it")
+    _refuse_where(
+        field,
+        column,
+        np.diff(column, prepend=-math.inf) < 0,
+        "must not be before the entry above it",
+        ErrorCode.NOT_INCREASING,
+    )
     return column
 
 
 def coherence(field: str, value: Any, units_checked: bool) -> Floats:
     """A column of coherences γ², 0 to 1."""
     column = series(field, value, units_checked)
-    _refuse_where(field, column, (column < 0) | (column > 1 + _COHERENCE_ROUNDING), "must be 0 to 1")
+    _refuse_where(
+        field, column, (column < 0) | (column > 1 + _COHERENCE_ROUNDING), "must be 0 to 1", ErrorCode.OUT_OF_RANGE
+    )
     return column
 
 
 def _column(field: str, value: Any) -> Floats:
     if isinstance(value, np.ndarray):
         if value.ndim != 1 or value.dtype.kind not in "iuf":
-            raise InvalidInput(field, shown(value), "must be a list of numbers")
+            raise _wrong_type(field, value, "must be a list of numbers")
         return value.astype(np.float64)
     if not isinstance(value, list | tuple):
-        raise InvalidInput(field, shown(value), "must be a list of numbers")
+        raise _wrong_type(field, value, "must be a list of numbers")
     for index, entry in enumerate(value):
         if type(entry) is not float and type(entry) is not int:
-            raise InvalidInput(field, shown(entry), "must be a number", index=index)
+            raise _wrong_type(field, entry, "must be a number", index)
     try:
         return np.array(value, dtype=np.float64)
     except OverflowError:
-        raise InvalidInput(field, shown(value), "holds a number too large to keep") from None
+        raise InvalidInput(
+            field, shown(value), "holds a number too large to keep", code=ErrorCode.OUT_OF_RANGE
+        ) from None
 
 
-def _refuse_where(field: str, column: Floats, bad: Any, allowed: str) -> None:
+def _refuse_where(field: str, column: Floats, bad: Any, allowed: str, code: ErrorCode) -> None:
     if bad.any():
         first = int(np.argmax(bad))
-        raise InvalidInput(field, shown(float(column[first])), allowed, index=first)
+        raise InvalidInput(field, shown(float(column[first])), allowed, index=first, code=code)
+
+
+def _wrong_type(field: str, value: Any, allowed: str, index: int | None = None) -> InvalidInput:
+    return InvalidInput(field, shown(value), allowed, index, code=ErrorCode.WRONG_TYPE)
 
 
 def shown(value: Any) -> Any:

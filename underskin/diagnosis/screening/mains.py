@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.recordings.frf.estimation import Frf
+from underskin.recordings.frf.mains import HARMONICS, MAINS_HZ
 from underskin.units import Floats
 
-_MAINS_HZ, _HARMONICS = (50.0, 60.0), 5
 _BETWEEN, _AROUND = 2.5, 12.5  # lines from a multiple of the mains: what is usual there
 _LEAST_AROUND = 10
 _ANSWER = 4.0  # times the power that the usual FRF gives: an answer to the force
@@ -49,7 +49,7 @@ def pickup(measured: Frf, powerful: NDArray[np.bool_]) -> Pickup | None:
             (*_off_course(measured, np.flatnonzero(powerful)), stray / measured.averages),
             (beside, beside, stray),
         ]
-    found = [_of_mains(measured, mains, signs) for mains in _MAINS_HZ]
+    found = [_of_mains(measured, mains, signs) for mains in MAINS_HZ]
     outstanding, strongest = max(found, key=lambda one: one[0])
     return strongest if outstanding >= _STANDS_OUT else None
 
@@ -61,11 +61,11 @@ def _of_mains(measured: Frf, mains: float, signs: list[tuple[Floats, Floats, Flo
     spacing = measured.frequency[0]
     reach, spread = (0.999, 0.999) if measured.independent else (1.0, _SPREAD)
     highest, power, spoilt = 0.0, 0.0, np.zeros(len(measured.frequency), dtype=bool)
-    for multiple in mains * np.arange(1, _HARMONICS + 1):
+    for multiple in mains * HARMONICS:
         away = np.abs(measured.frequency - multiple) / spacing
         spoilt |= away <= spread
         near, around = away <= reach, (away > _BETWEEN) & (away <= _AROUND)
-        if not near.any() or not around.any() or (_BETWEEN * spacing >= np.ptp(_MAINS_HZ) and away.min() > 0.01):
+        if not near.any() or not around.any() or (_BETWEEN * spacing >= np.ptp(MAINS_HZ) and away.min() > 0.01):
             continue
         of_force = max(float(measured.force_power[near].max() / np.median(measured.force_power[around])), 1.0)
         outstanding = max(_beyond(sign, noise, near, around) for sign, _, noise in signs) / of_force

@@ -23,13 +23,11 @@ from underskin.mechanisms.models.frf_design import FrfDesign, frf_recordings
 from underskin.mechanisms.models.pickup import Pickup
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.frf.estimation import Frf, lines_of
+from underskin.recordings.frf.mains import HARMONICS, MAINS_HZ, REACH_HZ
 from underskin.units import Floats
 
-_MAINS_HZ = (50.0, 60.0)
-_HARMONICS = np.arange(1, 6)
 _WIDTH_HZ = 1.5  # where it is asked which mains stand out
 _FURTHEST_HZ = 20.0  # beyond which no line reaches, and short of half way from one harmonic to the next
-_REACH_HZ = 3.0
 _REACHED = 0.05  # of the shape
 _LEAST_LINES = 3
 _BESIDE = 9  # lines, the next in frequency, that say what is usual
@@ -83,15 +81,15 @@ class MainsPickup(Mechanism):
         """Lines near the mains are needed."""
         for entry in frf_recordings(campaign):
             frequency = lines_of(entry).frequency
-            if any(np.abs(frequency - mains).min() < _REACH_HZ for mains in _MAINS_HZ):
+            if any(np.abs(frequency - mains).min() < REACH_HZ for mains in MAINS_HZ):
                 return None
         return "no line lies within 3 Hz of 50 or 60 Hz (frequency_hz)"
 
     def pickup(self, campaign: Campaign, design: FrfDesign) -> Pickup:
         """Of the lines within the reach of the mains that stand out, each by the nearest multiple."""
-        away = np.abs(design.row_frequency[:, None] - self._outstanding(campaign) * _HARMONICS)
+        away = np.abs(design.row_frequency[:, None] - self._outstanding(campaign) * HARMONICS)
         rows = np.flatnonzero(away.min(axis=1) < _FURTHEST_HZ)
-        harmonic = _HARMONICS[away[rows].argmin(axis=1)]
+        harmonic = HARMONICS[away[rows].argmin(axis=1)]
         half_square, force = 0.5 * away[rows].min(axis=1) ** 2, design.row_dynamic_force[rows]
 
         def deviation(values: Mapping[str, Floats]) -> Floats:
@@ -107,8 +105,8 @@ class MainsPickup(Mechanism):
         last = self._last
         if last is None or last[0] is not campaign:
             lines = [lines_of(entry) for entry in frf_recordings(campaign)]
-            nearest = {mains: min(float(np.abs(one.frequency - mains).min()) for one in lines) for mains in _MAINS_HZ}
-            last = campaign, max(_MAINS_HZ, key=lambda mains: (_excess(lines, mains), -nearest[mains]))
+            nearest = {mains: min(float(np.abs(one.frequency - mains).min()) for one in lines) for mains in MAINS_HZ}
+            last = campaign, max(MAINS_HZ, key=lambda mains: (_excess(lines, mains), -nearest[mains]))
             self._last = last
         return last[1]
 
@@ -140,5 +138,5 @@ def _stray(lines: Frf, size: Floats, rows: NDArray[np.intp], beside: NDArray[np.
 
 
 def _shape(frequency: Floats, mains: float) -> Floats:
-    distance = (frequency[:, None] - mains * _HARMONICS) / _WIDTH_HZ
-    return np.asarray((np.exp(-0.5 * distance**2) / _HARMONICS).sum(axis=1))
+    distance = (frequency[:, None] - mains * HARMONICS) / _WIDTH_HZ
+    return np.asarray((np.exp(-0.5 * distance**2) / HARMONICS).sum(axis=1))

@@ -93,7 +93,7 @@ def _nuisances(recordings: Sequence[CompressionRecording], campaign: Campaign) -
         try:
             estimates.append(elastomer.of_compression(entry).modulus)
         except InvalidInput as refusal:
-            raise InvalidInput(f"recordings[{entry.id}].{refusal.field}", refusal.value, refusal.allowed) from refusal
+            raise refusal.at(f"recordings[{entry.id}].{refusal.field}") from refusal
         height = float(to_si("sample_height_mm", entry.sample_height_mm))
         unloaded = int(np.abs(entry.force_n).argmin())
         begins = float(to_si("displacement_mm", entry.displacement_mm[unloaded]))

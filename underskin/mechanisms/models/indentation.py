@@ -161,7 +161,7 @@ def _nuisances(recordings: Sequence[IndentationRecording], campaign: Campaign) -
             modulus, begins = _hertz(*columns, entry.indenter_radius_mm, campaign.skin.poisson_ratio)
             estimates.append(modulus)
         except InvalidInput as refusal:
-            refused = InvalidInput(f"recordings[{entry.id}].{refusal.field}", refusal.value, refusal.allowed)
+            refused = refusal.at(f"recordings[{entry.id}].{refusal.field}")
             begins = float(to_si("displacement_mm", entry.displacement_mm[int(np.abs(entry.force_n).argmin())]))
         span = float(np.ptp(to_si("displacement_mm", entry.displacement_mm)))
         if refused is not None and span == 0:

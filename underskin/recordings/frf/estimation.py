@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import get_window
 
-from underskin.errors import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput
 from underskin.findings import english
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.periodic import period_of, without_drift
@@ -111,9 +111,11 @@ def broadband(
     _check(force, charge, sample_rate)
     size = block_samples or max(8, 2 * len(force) // (_BLOCKS + 1))
     if not 8 <= size <= len(force):
-        raise InvalidInput("block_samples", size, f"must be 8 to {len(force)}, the length of the signals")
+        raise InvalidInput(
+            "block_samples", size, f"must be 8 to {len(force)}, the length of the signals", code=ErrorCode.OUT_OF_RANGE
+        )
     if not 0 <= overlap < 1:
-        raise InvalidInput("overlap", overlap, "must be 0 or greater and less than 1")
+        raise InvalidInput("overlap", overlap, "must be 0 or greater and less than 1", code=ErrorCode.OUT_OF_RANGE)
     step = max(1, round(size * (1 - overlap)))
     taper = np.asarray(get_window(window, size), dtype=np.float64)
     averaged = _averaged(force, charge, _Blocks(taper, step, slice(1, (size + 1) // 2), _without_line), estimator)
@@ -128,7 +130,9 @@ def periodic(force: Floats, charge: Floats, sample_rate: float, *, estimator: Es
     _check(force, charge, sample_rate)
     period = period_of(force)
     if not period:
-        raise InvalidInput("force_n", f"{len(force)} samples", "must repeat itself at least four times")
+        raise InvalidInput(
+            "force_n", f"{len(force)} samples", "must repeat itself at least four times", code=ErrorCode.UNUSABLE_SIGNAL
+        )
     taper = np.asarray(get_window("hann", 2 * period), dtype=np.float64)
     averaged = _averaged(force, charge, _Blocks(taper, period, slice(2, period, 2), without_drift), estimator)
     return replace(averaged, frequency=averaged.frequency * sample_rate)
@@ -154,7 +158,12 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
         if len(pair[0]):
             lines.setdefault(_same_line(step.frequency, lines), []).append(pair)
     if not lines:
-        raise InvalidInput("force_n", f"{len(defects)} defects", "must dwell on a tone for some undamaged cycles")
+        raise InvalidInput(
+            "force_n",
+            f"{len(defects)} defects",
+            "must dwell on a tone for some undamaged cycles",
+            code=ErrorCode.UNUSABLE_SIGNAL,
+        )
     frequency = np.array(sorted(lines))
     values, coherence, averages = np.empty(len(lines), complex), np.empty(len(lines)), np.empty(len(lines))
     for index, line in enumerate(frequency):
@@ -192,7 +201,9 @@ def _averaged(force: Floats, charge: Floats, blocks: _Blocks, estimator: Estimat
     if not count:
         first = defects[0]
         words = english.defect(first.kind, first.channel, first.samples, first.first_sample)
-        raise InvalidInput(first.channel, f"{len(defects)} defects", f"no undamaged block: {words}")
+        raise InvalidInput(
+            first.channel, f"{len(defects)} defects", f"no undamaged block: {words}", code=ErrorCode.UNUSABLE_SIGNAL
+        )
     force_spectra, charge_spectra = (blocks.spectra(signal)[whole] for signal in (force, charge))
     frequency: Floats = np.fft.rfftfreq(len(blocks.taper))[blocks.lines].astype(np.float64)
     averages = _independent_blocks(count, blocks.taper, blocks.step)
@@ -214,7 +225,7 @@ def _averaged(force: Floats, charge: Floats, blocks: _Blocks, estimator: Estimat
 def _ratio(force: Complexes, charge: Complexes, estimator: Estimator) -> tuple[Complexes, Floats]:
     """H and γ² of spectra (blocks, lines)."""
     if estimator not in ("H1", "H2", "Hv"):
-        raise InvalidInput("estimator", estimator, "must be H1, H2 or Hv")
+        raise InvalidInput("estimator", estimator, "must be H1, H2 or Hv", code=ErrorCode.NOT_ONE_OF)
     ff, qq = (np.mean(np.abs(blocks) ** 2, axis=0) for blocks in (force, charge))
     fq = np.mean(np.conj(force) * charge, axis=0)
     coherence = np.minimum(np.abs(fq) ** 2 / np.maximum(ff * qq, _TINY), 1.0)
@@ -255,12 +266,21 @@ def _same_line(frequency: float, lines: dict[float, list[tuple[Complexes, Comple
 
 def _check(force: Floats, charge: Floats, sample_rate: float) -> None:
     if len(force) != len(charge):
-        raise InvalidInput("charge_pc", f"{len(charge)} samples", f"must have {len(force)}, as many as force_n")
+        raise InvalidInput(
+            "charge_pc",
+            f"{len(charge)} samples",
+            f"must have {len(force)}, as many as force_n",
+            code=ErrorCode.UNEQUAL_LENGTHS,
+        )
     if len(force) < 8:
-        raise InvalidInput("force_n", f"{len(force)} samples", "must have at least 8")
+        raise InvalidInput("force_n", f"{len(force)} samples", "must have at least 8", code=ErrorCode.TOO_FEW)
     if not (np.isfinite(sample_rate) and sample_rate > 0):
-        raise InvalidInput("sample_rate_hz", sample_rate, "must be finite and greater than 0")
+        raise InvalidInput(
+            "sample_rate_hz", sample_rate, "must be finite and greater than 0", code=ErrorCode.NOT_FINITE
+        )
     for name, signal in (("force_n", force), ("charge_pc", charge)):
         bad: NDArray[np.bool_] = ~np.isfinite(signal)
         if bad.any():
-            raise InvalidInput(name, "not finite", "must be finite", index=int(np.argmax(bad)))
+            raise InvalidInput(
+                name, "not finite", "must be finite", index=int(np.argmax(bad)), code=ErrorCode.NOT_FINITE
+            )

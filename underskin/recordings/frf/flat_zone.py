@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from underskin.errors import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput
 from underskin.recordings.frf.estimation import Frf
 from underskin.recordings.frf.flat_zone_reason import levels_of, reason_of
+from underskin.recordings.frf.mains import HARMONICS, MAINS_HZ, REACH_HZ
 from underskin.units import Complexes, Floats
 
 FLATNESS = 0.02
@@ -24,7 +25,6 @@ STEEPEST = 0.1  # fall of ln FRF with ln f that relaxation may have (a loss tang
 _BINS_PER_DECADE = 12
 _BEYOND_NOISE = 3.0
 _OUTSTANDING = 4.0  # scatter of a mains line over that of its neighbours
-_MAINS_HZ, _HARMONICS, _MAINS_WIDTH_HZ = (50.0, 60.0), 5, 3.0
 _NEIGHBOURS = 11
 
 Condition = tuple[float, float]  # indenter radius [mm], preload [N]
@@ -94,6 +94,7 @@ def flat_zone(
                 "band_hz",
                 list(band_hz),
                 f"must hold at least one line; they lie at {frequencies[0]:g} to {frequencies[-1]:g} Hz",
+                code=ErrorCode.TOO_FEW,
             )
         return FlatZone(*band_hz, "the band given by the user", mains, chosen_by_user=True)
     edges = _edges(frequencies)
@@ -160,10 +161,10 @@ def _line_weights(coherence: Floats) -> Floats:
 
 def _mains_lines(stacks: Sequence[Stack]) -> tuple[float, ...]:
     """Lines at mains harmonics that scatter far more about their neighbours than those do."""
-    harmonics = np.outer(_MAINS_HZ, np.arange(1, _HARMONICS + 1)).ravel()
+    harmonics = np.outer(MAINS_HZ, HARMONICS).ravel()
     found: set[float] = set()
     for stack in stacks:
-        near = np.abs(stack.frequency[:, None] - harmonics).min(axis=1) <= _MAINS_WIDTH_HZ
+        near = np.abs(stack.frequency[:, None] - harmonics).min(axis=1) <= REACH_HZ
         if not near.any() or len(near) < _NEIGHBOURS:
             continue
         smooth = median_filter(stack.values.real, (1, _NEIGHBOURS), mode="nearest") + 1j * median_filter(

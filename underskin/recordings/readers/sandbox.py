@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 import numpy as np
 import orjson
 
-from underskin.errors import FileError
+from underskin.errors import ErrorCode, FileError
 from underskin.recordings.channels import Block, Channel, Contents
 from underskin.recordings.readers.formats import parse
 from underskin.recordings.validation import shown
@@ -103,7 +103,8 @@ def _understood(answer: bytes, file: str) -> dict[str, Any]:
     header = orjson.loads(answer[_LENGTH.size : _LENGTH.size + size])
     told = header["told"]
     if "error" in told:
-        raise FileError(file, told["error"]["place"], told["error"]["reason"])
+        error = told["error"]
+        raise FileError(file, error["place"], error["reason"], code=ErrorCode(error["code"]))
     return dict(_with_arrays(told, header["mark"], memoryview(answer)[_LENGTH.size + size :]))
 
 
@@ -135,10 +136,10 @@ def _main() -> None:
         if sum(memoryview(part).nbytes for part in answer) > int(longest):
             raise FileError("", "", f"it unfolds to more than {int(longest) >> 20} MB, too much for a file of its size")
     except FileError as error:
-        answer = _encoded({"error": {"place": error.place, "reason": error.reason}})
+        answer = _encoded({"error": {"place": error.place, "reason": error.reason, "code": error.code}})
     except MemoryError:
         reason = f"reading it takes more than {int(memory_bytes) / (1 << 30):.3g} GB of memory"
-        answer = _encoded({"error": {"place": "", "reason": reason}})
+        answer = _encoded({"error": {"place": "", "reason": reason, "code": ErrorCode.UNREADABLE_FILE}})
     with os.fdopen(1, "wb") as out:
         for part in answer:
             out.write(part)
