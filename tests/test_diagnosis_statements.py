@@ -13,7 +13,7 @@ from underskin.diagnosis.inference.evidence import laplace
 from underskin.diagnosis.inference.explanation import Explanation, Workbench
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.localisation.effect_size import Effect, effect
-from underskin.diagnosis.localisation.permutation_test import AxisResult
+from underskin.diagnosis.localisation.permutation_test import AxisResult, Undecidable
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.html_report import page
@@ -68,7 +68,7 @@ def test_noise_alone_is_no_effect(recorded: Lines) -> None:
     assert abs(found.percent) < 2.0
 
 
-AXES = [AxisResult("preload_n", 0.001, 0.5), AxisResult("load_cycles", None, 0.0, "the others determine it")]
+AXES = [AxisResult("preload_n", 0.001, 0.5), AxisResult("load_cycles", None, 0.0, Undecidable.ALIASED)]
 
 
 def test_a_location_has_units_and_leaves_out_what_spans_a_whole_axis() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from underskin.errors import ErrorCode, FileError, InvalidInput
-from underskin.findings import english
+from underskin.findings import english, sentences
 from underskin.findings.arguments import D33Doubt, DefectKind, UnitGuess
 from underskin.findings.codes import FindingCode, Reason
 from underskin.findings.finding import Finding
@@ -53,8 +53,8 @@ def test_each_code_has_a_reason_and_each_reason_words() -> None:
     assert {reason.code for reason in Reason} == set(FindingCode)
     assert set(english.ENGLISH) == set(Reason)
     assert set(english.LACKING) == set(Lack)
-    assert set(english.D33_DOUBTS) == set(D33Doubt)
-    assert set(english.DEFECTS) == set(DefectKind)
+    assert set(sentences.D33_DOUBTS) == set(D33Doubt)
+    assert set(sentences.DEFECTS) == set(DefectKind)
 
 
 def test_findings_are_made_of_reasons_not_of_texts() -> None:
@@ -68,7 +68,7 @@ def test_findings_are_made_of_reasons_not_of_texts() -> None:
 
 def test_each_reason_is_used() -> None:
     """As `Reason.NAME` somewhere beside the enumeration and the words."""
-    own = {"codes.py", "english.py"}
+    own = {"codes.py", "english.py", "sentences.py"}
     text = "".join(path.read_text(encoding="utf-8") for path in SOURCES if path.name not in own)
     assert [reason.name for reason in Reason if f"Reason.{reason.name}" not in text] == []
 
@@ -120,7 +120,7 @@ def test_a_finding_states_its_arguments() -> None:
     ],
 )
 def test_a_guess_at_the_unit(guess: UnitGuess, words: str) -> None:
-    assert english.unit_guess(guess) == words
+    assert sentences.unit_guess(guess) == words
 
 
 def test_a_lack_says_what_was_refused_before() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from underskin.errors import ErrorCode, InvalidInput
-from underskin.findings import english
+from underskin.findings import sentences
 from underskin.findings.arguments import UnitGuess
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -163,7 +163,7 @@ def _slip(field: LabField, size: float) -> str:
     assert field.likely is not None
     low, high = field.likely
     text = f"must be {low:g} to {high:g} {field.unit} in magnitude{CONFIRM_UNITS}"
-    return f"{text}; {english.unit_guess(_guess(field, size))}"
+    return f"{text}; {sentences.unit_guess(_guess(field, size))}"
 
 
 def _guess(field: LabField, size: float) -> UnitGuess:

@@ -13,7 +13,8 @@ from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference.explanation import Workbench
 from underskin.diagnosis.inference.residuals import residuals, whole_prediction
 from underskin.diagnosis.localisation.effect_size import effect
-from underskin.diagnosis.localisation.permutation_test import SEED, in_region, locate, region
+from underskin.diagnosis.localisation.permutation_test import SEED, locate
+from underskin.diagnosis.localisation.region import in_region, region
 from underskin.diagnosis.localisation.residual_shape import (
     above_noise,
     contradicts,

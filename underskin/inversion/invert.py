@@ -34,12 +34,12 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_lab, to_si
 
 _LEAST_CHARGE = 1e-24  # FRF [C/N] that can be a measured one
-_MOST_REASONS = 3  # told where no recording can be used
+_MOST_REASONS = 3  # quoted where no recording can be used
 _MODULUS_UNSURE, _THICKNESS_UNSURE = 0.02, 0.01  # what a declared value may be off by
 
 
 class NoD33(InvalidInput):
-    """A campaign of which no d33 can be told; as text it is the reason."""
+    """A campaign from which no d33 can be computed; as text it is the reason."""
 
     def __str__(self) -> str:
         return self.allowed
@@ -97,7 +97,8 @@ class Inversion:
 def invert(
     campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] | None = None, zone: FlatZone | None = None
 ) -> Inversion:
-    """The d33 of a campaign's `frf` recordings, over its flat zone or the band given; `zone`: as it was found before.
+    """The d33 of a campaign's `frf` recordings, over its flat zone or the band given; `zone`: a zone
+    that is known already.
 
     Raises InvalidInput where no line lies in that band; NoD33 where the campaign has no frf recording, none within the
     table's domain, none with a line in the flat zone, or none with any charge.
@@ -112,14 +113,14 @@ def invert(
     zone = zone or flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
     contact = _Contact.of(campaign, recorded, table)
-    inside = usable(level, noise, contact.positioned.sigma, contact.felt)
-    reasons = domain_checks.reasons(recorded, campaign.skin, contact.felt, level, table)
+    inside = usable(level, noise, contact.positioned.sigma, contact.transmitted)
+    reasons = domain_checks.reasons(recorded, campaign.skin, contact.transmitted, level, table)
     left_out += [reason for reason, good in zip(reasons, inside, strict=True) if not good]
     if not inside.any():
         raise _none_usable(campaign, left_out)
     if np.abs(level[inside]).max() < _LEAST_CHARGE:
         raise NoD33("recordings", campaign.name, "there is no charge in any recording")
-    seen = gain(contact.positioned.sigma, contact.felt.rt_over_h)
+    seen = gain(contact.positioned.sigma, contact.transmitted.rt_over_h)
     d33, uncertainty = level / seen, noise / np.abs(seen)
     ids = tuple(dict.fromkeys(item.sensor for item in recorded))
     sensor = np.array([ids.index(item.sensor) for item in recorded])
@@ -132,7 +133,7 @@ def invert(
         frf_uncertainty=noise,
         line_scatter=scatter,
         sigma=np.where(inside, contact.positioned.sigma, np.nan),
-        rel_error=contact.felt.rel_error,
+        rel_error=contact.transmitted.rel_error,
         d33=np.where(inside, d33, np.nan),
         d33_uncertainty=np.where(inside, uncertainty, np.nan),
         inside=inside,
@@ -168,7 +169,7 @@ def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfReco
 class _Contact:
     """What the base model says of each recording's contact."""
 
-    felt: Transmission
+    transmitted: Transmission
     positioned: PositionedSigma
     thickness: float
     declared: Floats  # relative change of FRF for E and h off
@@ -188,7 +189,7 @@ class _Contact:
         )
         indenter = Indenter(to_si("indenter_radius_mm", [item.indenter_radius_mm for item in recorded]))
         preload = to_si("preload_n", [item.preload_n for item in recorded])
-        felt = transmission(table, skin, indenter, preload)
+        transmitted = transmission(table, skin, indenter, preload)
         centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in described.sensors}
         offset = [
             np.hypot(*np.subtract(item.position_mm or centres[item.sensor], centres[item.sensor])) for item in recorded
@@ -196,19 +197,19 @@ class _Contact:
         thickness = float(skin.thickness)
         positioned = positioned_sigma(
             table,
-            felt.a_over_h,
+            transmitted.a_over_h,
             float(skin.rt_over_h),
-            felt.load_parameter,
+            transmitted.load_parameter,
             to_si("thickness_mm", offset) / thickness,
             float(mixed_model.POSITIONS[-1]) / thickness,
         )
         slopes = frf_gradient(table, skin, indenter, preload, 1.0)
-        size = felt.frf(1.0)
+        size = transmitted.frf(1.0)
         declared = np.hypot(
             slopes["youngs_modulus"] * skin.youngs_modulus * _MODULUS_UNSURE / size,
             slopes["thickness"] * thickness * _THICKNESS_UNSURE / size,
         )
-        return cls(felt, positioned, thickness, declared)
+        return cls(transmitted, positioned, thickness, declared)
 
 
 def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone: FlatZone) -> Inversion:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from underskin.errors import InvalidInput
-from underskin.findings import english
+from underskin.findings import sentences
 from underskin.mechanisms.base import Mechanism, Parameter
 from underskin.mechanisms.models.composition import chosen, parameters_together
 from underskin.mechanisms.models.frf import FrfModel
@@ -182,7 +182,7 @@ def implausible_d33(report: Mapping[str, Any]) -> str | None:
         return None
     d33 = float(np.sqrt(interval["low"] * interval["high"]))
     doubt = plausibility.doubt_of(d33)
-    return None if doubt is None else f"{d33:.4g} pC/N, {english.D33_DOUBTS[doubt]}"
+    return None if doubt is None else f"{d33:.4g} pC/N, {sentences.D33_DOUBTS[doubt]}"
 
 
 def pressed_campaign(

@@ -12,7 +12,7 @@ import numpy as np
 
 from underskin.errors import ErrorCode, InvalidInput
 from underskin.recordings import validation as field
-from underskin.recordings.validation import named, shown
+from underskin.recordings.shown_values import named, shown
 
 SCHEMA = "campaign/1"
 

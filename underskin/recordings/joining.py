@@ -13,6 +13,7 @@ from underskin.recordings import validation as field
 from underskin.recordings.campaign import Campaign, Recording, SkinDescription
 from underskin.recordings.reading import Reading
 from underskin.recordings.repeats import digest
+from underskin.recordings.shown_values import LONGEST_NAME
 
 _ROUNDING = 1e-6  # relative, and of positions [mm]: single precision, and conversions of units
 _MOST_LISTED = 5  # repeats in a warning
@@ -115,7 +116,7 @@ def _free(label: str, name: str, taken: set[str]) -> str:
     """An id that no recording has: the file's label and the id, and where that is not enough a number."""
     named = f" {name}" if name else ""
     ends = (named if number == 1 else f"{named} ({number})" for number in itertools.count(1))
-    all_free = ((label[: max(0, field.LONGEST_NAME - len(end))] + end)[-field.LONGEST_NAME :].strip() for end in ends)
+    all_free = ((label[: max(0, LONGEST_NAME - len(end))] + end)[-LONGEST_NAME:].strip() for end in ends)
     return next(free for free in all_free if free not in taken)
 
 

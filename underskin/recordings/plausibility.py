@@ -1,8 +1,8 @@
-"""What looks wrong in what a campaign states of its times and its sensors' places, and is used all the same.
+"""Findings on the times of recordings and the places of sensors that a campaign states; both are used all the same.
 
-These findings are the same wherever a campaign is told of: with its d33, when it comes in, in its diagnosis. The clock
-enters only to see that a recording is still to come, by more than time zones differ. No statement holds today's date: a
-campaign whose times have passed is told of alike on every later day.
+They are the same with the d33 of a campaign, on its import and in its diagnosis. The clock is only used to see whether
+a recording lies in the future by more than time zones differ. No statement holds today's date, so that a campaign whose
+times have passed has the same findings on every later day.
 """
 
 from collections.abc import Iterator

@@ -23,7 +23,8 @@ from underskin.errors import ErrorCode, FileError, InvalidInput
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import COLUMNS, KINDS, SkinDescription
 from underskin.recordings.readers import json_file, text
-from underskin.recordings.validation import mapping, named, shown
+from underskin.recordings.shown_values import named, shown
+from underskin.recordings.validation import mapping
 
 SCHEMA = "rig/1"
 LARGEST_BYTES = 1_000_000

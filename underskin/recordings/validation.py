@@ -16,15 +16,15 @@ import numpy as np
 
 from underskin.errors import ErrorCode, InvalidInput
 from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.recordings.shown_values import LONGEST_NAME, named, shown
 from underskin.units import Floats, checked
 
 Model = TypeVar("Model")
 Check = Callable[[str, Any, bool], Any]  # name, value, units_checked
 
-LONGEST_NAME = 200
 _LARGEST_COUNT = 2**53
 _FREQUENCIES_HZ = (1e-6, 1e9)
-_MOST_UNKNOWN = 20  # unknown fields of one object that are told; a document may hold millions
+_MOST_UNKNOWN = 20  # unknown fields of one object that are listed; a document may hold millions
 _COHERENCE_ROUNDING = 1e-6  # single-precision instruments write 1.0000001
 
 
@@ -201,17 +201,17 @@ def rows(field: str, value: Any, units_checked: bool) -> Floats:
     """Rows of finite numbers, equally many in each: (rows, columns)."""
     if not isinstance(value, list | tuple) or not value:
         raise _wrong_type(field, value, "must be a list of rows of numbers")
-    found = [series(f"{field}[{index}]", row, units_checked) for index, row in enumerate(value)]
-    for index, row in enumerate(found):
-        if row.size != found[0].size:
+    columns = [series(f"{field}[{index}]", row, units_checked) for index, row in enumerate(value)]
+    for index, row in enumerate(columns):
+        if row.size != columns[0].size:
             raise InvalidInput(
                 field,
                 f"{row.size} columns",
-                f"must have as many as row 0 ({found[0].size})",
+                f"must have as many as row 0 ({columns[0].size})",
                 index,
                 code=ErrorCode.UNEQUAL_LENGTHS,
             )
-    return np.stack(found)
+    return np.stack(columns)
 
 
 def frequencies(field: str, value: Any, units_checked: bool) -> Floats:
@@ -275,35 +275,6 @@ def _refuse_where(field: str, column: Floats, bad: Any, allowed: str, code: Erro
 
 def _wrong_type(field: str, value: Any, allowed: str, index: int | None = None) -> InvalidInput:
     return InvalidInput(field, shown(value), allowed, index, code=ErrorCode.WRONG_TYPE)
-
-
-def shown(value: Any) -> Any:
-    """A value as an error may show it: short, and plain JSON."""
-    if value is None or isinstance(value, bool):
-        return value
-    if isinstance(value, int | float | np.integer | np.floating):
-        return _shown_number(value)
-    if isinstance(value, str):
-        short = value if len(value) <= LONGEST_NAME else value[:LONGEST_NAME] + "…"
-        return short.encode("utf-8", "replace").decode("utf-8")
-    if isinstance(value, list | tuple):
-        return f"a list of {len(value)}"
-    return f"a value of type {type(value).__name__}"
-
-
-def named(name: Any) -> str:
-    """A field's name as an error may show it, an empty one too."""
-    return str(shown(name)) or '""'
-
-
-def _shown_number(value: Any) -> Any:
-    try:
-        as_float = float(value)
-    except OverflowError:
-        return "a whole number beyond the range of floats"
-    if not math.isfinite(as_float):
-        return str(as_float)
-    return int(value) if as_float.is_integer() and abs(as_float) < 2**53 else as_float
 
 
 Name = Annotated[str, name]

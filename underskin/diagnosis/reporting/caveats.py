@@ -22,7 +22,7 @@ _DECISIVE = (
     FindingCode.REMAINDER,
     FindingCode.HELD_OUT_NO_BETTER,
 )
-_MOST = 6  # findings of one code that are told in full
+_MOST = 6  # findings of one code that are quoted in full
 
 
 def caveats(findings: Sequence[Mapping[str, str]]) -> str:
@@ -43,6 +43,6 @@ def _sentences(alike: Sequence[Mapping[str, str]]) -> list[str]:
 
 def _sentence(entry: Mapping[str, str]) -> str:
     text = entry["statement"].rstrip(".")
-    if entry["recording"] and "recordings of sensor" not in text:
+    if entry["recording"]:
         return f"Recording {entry['recording']!r}: {text}."
     return f"{text[0].upper()}{text[1:]}."

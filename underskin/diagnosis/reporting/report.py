@@ -1,4 +1,4 @@
-"""The report (`report/1`): what the steps found, in one document with numbers rounded to stated digits.
+"""The report (`report/1`): the results of all steps as one document, its numbers rounded to stated digits.
 
 Four significant digits for values, three decimals for probabilities and p-values: enough for any use. The same input
 gives the same report on one machine; on a processor that rounds differently a last digit may differ.
@@ -11,7 +11,8 @@ from typing import Any
 from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, Workbench, own_places
 from underskin.diagnosis.localisation.effect_size import Effect
-from underskin.diagnosis.localisation.permutation_test import AxisResult, reaches_all_along
+from underskin.diagnosis.localisation.permutation_test import AxisResult
+from underskin.diagnosis.localisation.region import reaches_all_along
 from underskin.diagnosis.localisation.residual_shape import REACHES_NOISE, Shape
 from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
@@ -19,6 +20,7 @@ from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_
 from underskin.diagnosis.reporting.numbers import parameter, place_of, probability, rounded
 from underskin.diagnosis.reporting.statements import (
     EXPLAINED,
+    UNDECIDABLE,
     answer_statement,
     location_statement,
     nothing_told,
@@ -176,7 +178,7 @@ def _location(diagnosis: Diagnosis, bench: Workbench, agrees: bool) -> dict[str,
                 "axis": entry.axis,
                 "p_value": None if entry.p_value is None else round(entry.p_value, 3),
                 "share_percent": round(100 * float(entry.share), 1),
-                **({"undecidable": entry.reason} if entry.reason else {}),
+                **({"undecidable": UNDECIDABLE[entry.reason]} if entry.reason else {}),
             }
             for entry in diagnosis.axes
         ],

@@ -8,7 +8,7 @@ import numpy as np
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import SIMPLEST, in_words
 from underskin.diagnosis.localisation.effect_size import Effect
-from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT, AxisResult
+from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT, AxisResult, Undecidable
 from underskin.diagnosis.localisation.residual_shape import (
     ALONG_CURVES,
     ORDER,
@@ -146,6 +146,14 @@ def why_not(answer: Answer, leader: Answer) -> str:
 
 def _round(value: float) -> str:
     return f"{float(f'{value:.1g}'):.0f}" if value >= 10 else f"{value:.1g}"
+
+
+UNDECIDABLE: Mapping[Undecidable, str] = {
+    Undecidable.FEW_EXCHANGEABLE: "too few recordings that could be exchanged",
+    Undecidable.FEW_RECORDINGS: "too few recordings to tell it from the other axes",
+    Undecidable.ALIASED: "the other axes determine it in this design",
+    Undecidable.FEW_SIGNS: "fewer than 6 recordings, whose signs could be changed",
+}
 
 
 def location_statement(

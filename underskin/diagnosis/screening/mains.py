@@ -49,8 +49,8 @@ def pickup(measured: Frf, powerful: NDArray[np.bool_]) -> Pickup | None:
             (*_off_course(measured, np.flatnonzero(powerful)), stray / measured.averages),
             (beside, beside, stray),
         ]
-    found = [_of_mains(measured, mains, signs) for mains in MAINS_HZ]
-    outstanding, strongest = max(found, key=lambda one: one[0])
+    candidates = [_of_mains(measured, mains, signs) for mains in MAINS_HZ]
+    outstanding, strongest = max(candidates, key=lambda one: one[0])
     return strongest if outstanding >= _STANDS_OUT else None
 
 

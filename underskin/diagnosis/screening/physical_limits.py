@@ -2,7 +2,7 @@
 
 The bounds lie far beyond any slip of units: from a picometre to a kilometre, from a millionth of a pascal to that of
 neutron stars. `units_checked` says nothing against them. A recording with such a number is left out; where the skin has
-one, nothing can be told.
+one, nothing can be concluded.
 """
 
 from collections.abc import Iterator

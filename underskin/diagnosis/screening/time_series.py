@@ -64,14 +64,14 @@ def as_lines(entries: Sequence[FrfRecording], *, units_checked: bool) -> Estimat
     return Estimated(usable, findings, uneven=uneven)
 
 
-def as_given(entries: Sequence[FrfRecording], found: Sequence[Finding]) -> list[Finding]:
+def as_given(entries: Sequence[FrfRecording], findings: Sequence[Finding]) -> list[Finding]:
     """The findings with the fields that a recording was given by: a time series has no frequencies of its own."""
     series = {entry.id for entry in entries if entry.sample_rate_hz is not None}
     if len(series) == len(entries):
         series.add("")
     return [
         replace(entry, field=_GIVEN_AS.get(entry.field, entry.field)) if entry.recording in series else entry
-        for entry in found
+        for entry in findings
     ]
 
 

@@ -48,9 +48,9 @@ def over_lines(bench: Workbench, explanation: Explanation) -> dict[str, float]:
     for length in _LINE_LENGTHS:
         root = np.linalg.cholesky(matern(distance / length) + 1e-9 * np.eye(len(centres)))
         each += noise.gains(root.T @ (total[:, None] * root), root.T @ sums)
-    found = {"frequency_hz": float(logsumexp(each) - np.log(len(each)) - plain)}
+    gains = {"frequency_hz": float(logsumexp(each) - np.log(len(each)) - plain)}
     if lines.recordings < _LEAST_RECORDINGS:
-        return found
+        return gains
     shapes = features(normalised(np.log(lines.frequency)[:, None]), _INTERPLAY_LENGTH, _INTERPLAY_LANDMARKS)
     moments = np.add.reduceat(shapes * (weight * relative)[:, None], lines.first)
     products = (shapes[:, :, None] * shapes[:, None, :] * weight[:, None, None]).reshape(len(shapes), -1)
@@ -60,10 +60,10 @@ def over_lines(bench: Workbench, explanation: Explanation) -> dict[str, float]:
         size = along.shape[1] * shapes.shape[1]
         gram = np.einsum("ra,rb,rfg->afbg", along, along, grams, optimize=True).reshape(size, size)
         moment = (along.T @ moments).reshape(size)
-        found[f"frequency_hz and {name}"] = float(
+        gains[f"frequency_hz and {name}"] = float(
             logsumexp(noise.gains(gram, moment)) - np.log(len(AMPLITUDES)) - plain
         )
-    return found
+    return gains
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,8 @@ class _LineNoise:
             value = 0.5 * self.chi2 / k2 + self.freedom * log_level - self.prior.log_density(log_level)
             return float(value - 0.5 * (square / inner).sum() / k2**2 + np.log(inner).sum())
 
-        found = minimize_scalar(cost, bounds=(-1.0, 5.0), method="bounded", options={"xatol": 1e-3})
-        return -float(found.fun)
+        optimum = minimize_scalar(cost, bounds=(-1.0, 5.0), method="bounded", options={"xatol": 1e-3})
+        return -float(optimum.fun)
 
 
 def frequency_bins(frequency: Floats) -> tuple[NDArray[np.intp], Floats]:

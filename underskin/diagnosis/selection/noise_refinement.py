@@ -45,10 +45,10 @@ def _best_along_frequency(bench: Workbench) -> Explanation | None:
         if "frf" not in mechanism.kinds or not needs_lines(name):
             continue
         try:
-            found = bench.explain((name,))
+            single = bench.explain((name,))
         except Unsupported:
             continue
-        if found is not None and not any(entry.name in PICKUP_NAMES for entry in found.model.parameters):
-            singles.append(found)
+        if single is not None and not any(entry.name in PICKUP_NAMES for entry in single.model.parameters):
+            singles.append(single)
     best = max(singles, key=lambda entry: entry.log_evidence, default=nothing)
     return best if best.log_evidence > nothing.log_evidence + _SPEAKS else None

@@ -54,14 +54,14 @@ def _unusual_scatter(explanation: Explanation) -> dict[str, float]:
     """What scatter beyond the usual gains; looked for where the fit went beyond the usual itself."""
     levels = explanation.best.at.marginal.levels
     usual = explanation.best.fitter.hypothesis
-    found = {}
+    evidence = {}
     if levels.gain > GAIN[1]:
         wider = replace(usual, gain=UNUSUAL_GAIN)
-        found["scatter of gain"] = _refitted(wider, explanation, 0, UNUSUAL_GAIN.low)
+        evidence["scatter of gain"] = _refitted(wider, explanation, 0, UNUSUAL_GAIN.low)
     if levels.position > POSITION[1]:
         wider = replace(usual, position=UNUSUAL_POSITION)
-        found["scatter of position"] = _refitted(wider, explanation, 2, UNUSUAL_POSITION.low)
-    return {name: log_evidence - explanation.log_evidence for name, log_evidence in found.items()}
+        evidence["scatter of position"] = _refitted(wider, explanation, 2, UNUSUAL_POSITION.low)
+    return {name: log_evidence - explanation.log_evidence for name, log_evidence in evidence.items()}
 
 
 def _refitted(hypothesis: Hypothesis, explanation: Explanation, place: int, least: float) -> float:
@@ -74,7 +74,7 @@ def _refitted(hypothesis: Hypothesis, explanation: Explanation, place: int, leas
 
 def _along_curves(bench: Workbench, explanation: Explanation) -> Discrepancy:
     """The smooth error that every hypothesis has of curves, large: everything is fitted again beneath it."""
-    found = _refitted(
+    log_evidence = _refitted(
         replace(bench.hypothesis(explanation.names, placed=False), smooth=UNNAMED), explanation, 2, UNNAMED.low
     )
-    return Discrepancy(found, {"displacement_mm": found - explanation.log_evidence})
+    return Discrepancy(log_evidence, {"displacement_mm": log_evidence - explanation.log_evidence})
