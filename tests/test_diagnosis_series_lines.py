@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from tests.series_campaigns import codes, recorded
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.screening.inspection import inspect
-from underskin.diagnosis.screening.select_lines import telling
+from underskin.diagnosis.screening.select_lines import choose_lines
 from underskin.mechanisms.models.frf_design import frf_recordings
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.estimation import Frf, lines_of
@@ -192,7 +192,7 @@ def test_mains_that_spoil_every_line_are_said() -> None:
     coherence = np.where(at_mains, 0.5, np.where(frequency > 10, 0.9999, 0.1))
     averages = np.full(len(frequency), 14.0)
     measured = Frf(frequency, np.ones(27, complex), coherence, averages, (), force, charge, independent=False)
-    choice = telling(measured)
+    choice = choose_lines(measured)
     assert choice.lines == []
     assert choice.mains is not None
     assert choice.mains.mains == 50

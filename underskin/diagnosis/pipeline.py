@@ -24,7 +24,7 @@ from underskin.diagnosis.localisation.residual_shape import (
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import Limits
 from underskin.diagnosis.reporting.report import Diagnosis, report
-from underskin.diagnosis.screening.curve_unit_errors import without_slips
+from underskin.diagnosis.screening.curve_unit_errors import without_inconsistent
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.physical_limits import without_extremes
 from underskin.diagnosis.screening.unusable_curves import without_unusable
@@ -72,7 +72,7 @@ def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits
         if all(entry.kind != kind for entry in campaign.recordings):
             continue
         usable, unusable = without_unusable(campaign, kind)
-        curves = without_slips(usable, kind)
+        curves = without_inconsistent(usable, kind)
         findings += [*unusable, *curves.findings]
         if curves.findings and curves.lacking:
             return Diagnosis(campaign.name, findings, provenance, lacking=curves.lacking)

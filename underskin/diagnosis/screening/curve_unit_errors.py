@@ -27,7 +27,7 @@ _REVERSED = -0.5  # correlation of force and displacement
 Curve = IndentationRecording | CompressionRecording
 
 
-def without_slips(campaign: Campaign, kind: Kind) -> Inspected:
+def without_inconsistent(campaign: Campaign, kind: Kind) -> Inspected:
     """The curves of one kind that agree with each other, reversed forces put right; findings for the others.
 
     Copies and single curves of other magnitudes are left out. Where all curves contradict what is declared nothing is

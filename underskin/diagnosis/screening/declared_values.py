@@ -1,8 +1,8 @@
-"""What a campaign declares of its skin, and of all its recordings alike, that no skin and no rig has.
+"""Declared values of the skin, and values shared by all recordings, that no skin and no rig has.
 
-An unlikely magnitude looks like a slip of units: nothing in the campaign says otherwise, and every law of contact would
-be tried on a wrong force or modulus. It is named in any case, and nothing is concluded from it, until it is corrected
-or `units_checked` says that it is meant.
+An unlikely magnitude looks like a slip of units. Nothing else in the campaign would show it, and every law of contact
+would be fitted with a wrong force or modulus. So it is a finding, and nothing is concluded until it is corrected or
+`units_checked` confirms it.
 """
 
 from collections.abc import Sequence

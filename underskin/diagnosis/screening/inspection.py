@@ -1,7 +1,7 @@
-"""What is wrong with a campaign's recordings themselves, by name, before any physics is blamed for it.
+"""What is wrong with the recordings of a campaign themselves, before any physics is held responsible.
 
-Recordings that cannot belong with the others (copies, reversed signs, units off by 1000, silence, no finite line) are
-reported, and left out of the diagnosis, or put right where that is plain (a sensor whose sign is reversed).
+Recordings that contradict the others (copies, reversed signs, units off by 1000, no response, no finite line) are
+findings. They are left out of the diagnosis, or corrected where the error is plain (a sensor of reversed sign).
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from underskin.diagnosis.screening.declared_values import unlikely
 from underskin.diagnosis.screening.model_consistency import against_model
 from underskin.diagnosis.screening.position_errors import at_sensors, misplaced
 from underskin.diagnosis.screening.time_series import as_given, as_lines
-from underskin.diagnosis.screening.unit_errors import faint_oscillation, lone_slips, loose_sphere
+from underskin.diagnosis.screening.unit_errors import faint_oscillation, loose_sphere, single_unit_errors
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
@@ -45,7 +45,7 @@ def inspect(campaign: Campaign, table: SigmaTable) -> Inspected:
 def _inspect_lines(campaign: Campaign, recorded: Sequence[FrfRecording], table: SigmaTable) -> Inspected:
     with_lines, of_lines = _with_lines(recorded)
     entries, copies = _without_copies(with_lines)
-    off, slips = lone_slips(entries)
+    off, slips = single_unit_errors(entries)
     astray, of_places, misgiven = misplaced(campaign, entries)
     findings = [*of_lines, *copies, *slips, *of_places]
     entries = [entry for entry, wrong in zip(entries, off | astray, strict=True) if not wrong]

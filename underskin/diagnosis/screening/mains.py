@@ -1,10 +1,10 @@
 """Mains on the charge of a time series: how much, and the lines that they spoil.
 
-Where mains are not in step with the force, the part of the charge that does not follow it, 1 − γ² of its power, stands
-out at their multiples. Where they are, since both begin anew together, charge follows force there all the same and γ²
-says nothing; the FRF alone does: one line is off the course of those around it, by the mains' charge over the force
-that this line has. That is no law of a skin: none is as narrow as one line. Beside the band of such a force, what
-is more than an answer to it counts.
+Where mains are not synchronous with the force, the part of the charge that is not coherent with it, 1 − γ² of its
+power, stands out at their multiples. Where they are synchronous, because both start anew together, charge is coherent
+with force there all the same and γ² shows nothing. Then only the FRF does: one line is off the course of its
+neighbours, by the charge of the mains over the force at this line. No law of a skin is as narrow as one line. Outside
+the band of such a force, power of the charge beyond the response to the force counts.
 """
 
 from dataclasses import dataclass

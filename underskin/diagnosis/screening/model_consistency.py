@@ -1,7 +1,7 @@
-"""What single recordings say against the base model before any fit: silent, off by 1000, reversed.
+"""Single recordings against the base model before any fit: no response, off by 1000, reversed.
 
-All that is compared is each recording's level over what the base model predicts: its apparent d33. Recordings that are
-silent, or where little is predicted (near a crossing of zero), have none.
+Only the level of each recording over the prediction of the base model is compared: its apparent d33. Recordings without
+a response, or where little is predicted (near a zero crossing), have none.
 """
 
 from dataclasses import dataclass, replace

@@ -1,8 +1,8 @@
-"""Numbers that no instrument writes and no skin has, whatever their unit: products and powers of them overflow.
+"""Numbers beyond any instrument and any skin, whatever their unit: their products and powers overflow.
 
-The bounds lie far beyond any slip of units: from a picometre to a kilometre, from a millionth of a pascal to that of
-neutron stars. `units_checked` says nothing against them. A recording with such a number is left out; where the skin has
-one, nothing can be concluded.
+The bounds lie far beyond any slip of units: from a picometre to a kilometre, from a millionth of a pascal to the
+pressure in neutron stars. `units_checked` does not confirm such numbers. A recording that holds one is left out; where
+the skin has one, nothing can be concluded.
 """
 
 from collections.abc import Iterator

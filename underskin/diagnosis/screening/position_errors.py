@@ -1,7 +1,7 @@
-"""Places that contradict the sensors they belong to: given in m, or in µm, beside sensors in mm.
+"""Places of contacts that contradict the sensors they belong to: given in m or µm beside sensors in mm.
 
-A place p is taken for a slip where f·p, with f = 1000 or 1/1000, lies far nearer to its own sensor than p does. At a
-sensor in the origin a slip cannot be seen, and does little.
+A place p counts as a slip of units where f·p, with f = 1000 or 1/1000, lies far nearer to its own sensor than p does.
+At a sensor in the origin a slip cannot be seen, and does little.
 """
 
 from collections.abc import Sequence

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
-from underskin.diagnosis.screening.select_lines import Choice, telling
+from underskin.diagnosis.screening.select_lines import Choice, choose_lines
 from underskin.diagnosis.screening.time_series_units import contradiction_of
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
@@ -95,7 +95,7 @@ def _estimated(entry: FrfRecording) -> tuple[FrfRecording | None, Choice | None,
         first, *others = measured.defects
         arguments = {**asdict(first), "more": len(others)}
         findings.append(Finding(Reason.DEFECTS_LEFT_OUT, entry.id, first.channel, arguments))
-    choice = telling(measured)
+    choice = choose_lines(measured)
     chosen = choice.lines
     if not chosen:
         if choice.mains is None:

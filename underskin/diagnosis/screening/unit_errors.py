@@ -1,6 +1,7 @@
-"""Slips of units among the recordings: a force in kN, a sphere in m, a frequency in kHz, beside the others'.
+"""Slips of units among the recordings: a force in kN, a sphere in m or a frequency in kHz beside the others.
 
-A value that is alone is left out with its recording. Forces that contradict each other in all recordings are named.
+A recording with a single such value is left out. Where the forces of all recordings contradict each other, that is a
+finding.
 """
 
 from collections.abc import Callable, Sequence
@@ -38,7 +39,7 @@ _FIELDS = (
 )
 
 
-def lone_slips(entries: Sequence[FrfRecording]) -> tuple[NDArray[np.bool_], list[Finding]]:
+def single_unit_errors(entries: Sequence[FrfRecording]) -> tuple[NDArray[np.bool_], list[Finding]]:
     """Which recordings have a value about 1000 × off all others, and the findings on them."""
     off = np.zeros(len(entries), dtype=bool)
     findings: list[Finding] = []

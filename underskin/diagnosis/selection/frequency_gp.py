@@ -1,4 +1,4 @@
-"""Something that no mechanism here describes, along frequency: a complex process that changes the shape of lines.
+"""An unmodelled discrepancy along frequency: a complex process that changes the shape of the lines.
 
 A Matérn-3/2 process over log frequency, that all recordings share or that changes along an axis of the campaign, on top
 of each recording's own best real multiple of the model.
@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, Workbench
 from underskin.diagnosis.inference.residuals import line_residuals
-from underskin.diagnosis.noise.noise_priors import Bell, level_prior
+from underskin.diagnosis.noise.noise_priors import LogNormal, level_prior
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, matern, normalised
 from underskin.mechanisms.autodiff import Array
 from underskin.units import Floats
@@ -72,7 +72,7 @@ class _LineNoise:
 
     chi2: float
     freedom: int
-    prior: Bell
+    prior: LogNormal
 
     def gains(self, gram: Array, moment: Array) -> list[float]:
         """log p of the lines with a process of each amplitude, at the level that suits it best."""

@@ -1,9 +1,10 @@
-"""Something that no mechanism here describes, as a full rival, with the noise and the parameters of every hypothesis.
+"""Unmodelled discrepancies as rivals of the mechanisms, with the noise and the parameters of every hypothesis.
 
-- δ of a recording, FRF = model · (1 + δ): see `recording_gp`; of a line: see `frequency_gp`; or both;
-- scatter from recording to recording far beyond what rigs have: what scatters by 20 % has a cause that nobody named;
-- of curves, a smooth error far beyond what laws of contact have.
-An amplitude of δ below 1.5 % is not looked for: a law that is right to that is not missing physics.
+- δ of a recording, FRF = model · (1 + δ), see `recording_gp`; of a line, see `frequency_gp`; or both;
+- scatter from recording to recording far beyond that of rigs: 20 % have a cause that no mechanism names;
+- of curves, a smooth error far beyond that of laws of contact.
+
+Amplitudes of δ below 1.5 % are not considered: a law that is right to that misses no physics.
 """
 
 from dataclasses import dataclass, replace
