@@ -112,7 +112,7 @@ def view_of(report: Report) -> View:
     )
     # Of what is explained the laws stand under What.
     lead = caveats(report["findings"]) if report["verdict"] == "explained" else rest
-    return View(readable(first), verdict, readable(lead), [section for section in sections if section.blocks])
+    return View(readable(first), verdict, readable(lead), sections)
 
 
 def provenance_of(report: Report) -> list[tuple[str, str]]:
