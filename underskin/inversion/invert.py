@@ -18,8 +18,8 @@ from underskin.findings.finding import Finding
 from underskin.inversion import mixed_model
 from underskin.inversion.findings import findings_of
 from underskin.inversion.mixed_model import Estimate, MixedModel, Rows
-from underskin.inversion.outliers import strays
-from underskin.inversion.sensor_flags import Flag, standing_out, unfit
+from underskin.inversion.outliers import outlying
+from underskin.inversion.sensor_flags import Flag, population_flags, scatter_flags
 from underskin.physics.charge_response import gain
 from underskin.physics.skin import Indenter, Skin
 from underskin.prediction import domain_checks
@@ -215,23 +215,23 @@ class _Contact:
 def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone: FlatZone) -> Inversion:
     moments = [contact.positioned.scattered(p / contact.thickness) for p in mixed_model.POSITIONS]
     mean, variance = (np.array(part) for part in zip(*moments, strict=True))
-    stray = _strays(rows, np.sqrt((mean[-1] - 1) ** 2 + np.maximum(variance[-1], 0)))
-    good = np.setdiff1d(np.flatnonzero(rows.inside), stray)
+    outliers = _outliers(rows, np.sqrt((mean[-1] - 1) ** 2 + np.maximum(variance[-1], 0)))
+    good = np.setdiff1d(np.flatnonzero(rows.inside), outliers)
     sensor, d33, noise = rows.sensor[good], rows.d33[good], rows.d33_uncertainty[good]
-    misfits, pilot = unfit(ids, sensor, d33, noise)
+    unfit, pilot = population_flags(ids, sensor, d33, noise)
     mean, variance = mean[:, good], variance[:, good]
     measured = Rows(d33, noise, pilot[sensor], mean, variance)
-    plain = np.array([number not in misfits for number in sensor])
+    plain = np.array([number not in unfit for number in sensor])
     model = None
     if plain.any():
         numbered = np.unique(sensor[plain], return_inverse=True)[1]
         model = mixed_model.fit(measured.part(plain), numbered)
     scatter = model.scatter if model else mixed_model.prior_scatter()
     cell, where, count = _cells(rows, good)
-    flags = list(misfits.values())
+    flags = list(unfit.values())
     if model:
         expected = _expected_scatter(model, measured)[plain]
-        flags += standing_out(ids, sensor[plain], rows, good[plain], pilot, expected)
+        flags += scatter_flags(ids, sensor[plain], rows, good[plain], pilot, expected)
     return Inversion(
         sensor_ids=ids,
         recordings=rows,
@@ -246,17 +246,17 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
         spread=model.spread if model and len(set(sensor[plain])) > 1 else None,
         gain=model.gain if model else None,
         position=model.position if model else None,
-        left_out=_left_out(rows, stray, list(misfits.values())),
+        left_out=_left_out(rows, outliers, list(unfit.values())),
         findings=(),
         declared_percent=100 * float(np.nanmedian(contact.declared[good])),
     )  # fmt: skip
 
 
-def _strays(rows: RecordingD33, position: Floats) -> NDArray[np.intp]:
-    """The rows inside that are grossly off; `position` as `strays` takes it."""
+def _outliers(rows: RecordingD33, position: Floats) -> NDArray[np.intp]:
+    """The rows inside whose d33 is far off all others; `position` as for `outlying`."""
     good = np.flatnonzero(rows.inside)
     condition = np.unique(np.column_stack([rows.indenter_radius, rows.preload])[good], axis=0, return_inverse=True)[1]
-    far = strays(rows.sensor[good], condition.reshape(-1), rows.d33[good], rows.d33_uncertainty[good], position[good])
+    far = outlying(rows.sensor[good], condition.reshape(-1), rows.d33[good], rows.d33_uncertainty[good], position[good])
     return good[far]
 
 
@@ -274,9 +274,9 @@ def _cells(rows: RecordingD33, good: NDArray[np.intp]) -> tuple[NDArray[np.intp]
     return cell.reshape(-1), good[where], count
 
 
-def _left_out(rows: RecordingD33, stray: NDArray[np.intp], misfits: Sequence[Flag]) -> tuple[Finding | Flag, ...]:
+def _left_out(rows: RecordingD33, outliers: NDArray[np.intp], unfit: Sequence[Flag]) -> tuple[Finding | Flag, ...]:
     d33 = to_lab("d33_pc_per_n", rows.d33)
-    outliers = [
-        Finding(Reason.OUTLIER, rows.ids[row], "d33_pc_per_n", {"d33_pc_per_n": float(d33[row])}) for row in stray
+    findings = [
+        Finding(Reason.OUTLIER, rows.ids[row], "d33_pc_per_n", {"d33_pc_per_n": float(d33[row])}) for row in outliers
     ]
-    return (*outliers, *misfits)
+    return (*findings, *unfit)

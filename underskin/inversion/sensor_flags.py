@@ -66,10 +66,26 @@ def typical_size(d33: Floats) -> float:
     return float(np.median(size[size >= 1e-9 * size.max()]))
 
 
-def unfit(ids: Sequence[str], sensor: NDArray[np.intp], d33: Floats, noise: Floats) -> tuple[dict[int, Flag], Floats]:
-    """Sensors that do not belong to the array's population, flags by number, and each sensor's pilot d33.
+def population_flags(
+    ids: Sequence[str], sensor: NDArray[np.intp], d33: Floats, noise: Floats
+) -> tuple[dict[int, Flag], Floats]:
+    """Sensors that do not belong to the array's population, and each sensor's pilot d33.
 
-    The pilot is the array's median for those that do belong, the sensor's own magnitude for the others.
+    Parameters
+    ----------
+    ids : (sensors,) texts
+        The ids of the sensors.
+    sensor : (recordings,) array of int
+        The number of each recording's sensor.
+    d33, noise : (recordings,) arrays
+        d33 of each recording and its standard uncertainty by line noise [C/N].
+
+    Returns
+    -------
+    flags : dict
+        By the number of a sensor that is dead, inverted, weak or strong.
+    pilot : (sensors,) array
+        [C/N]: the array's median for the sensors that belong to it, the sensor's own magnitude for the others.
     """
     count = len(ids)
     typical = typical_size(d33)
@@ -102,7 +118,7 @@ def unfit(ids: Sequence[str], sensor: NDArray[np.intp], d33: Floats, noise: Floa
     return flags, pilot
 
 
-def standing_out(
+def scatter_flags(
     ids: tuple[str, ...],
     sensor: NDArray[np.intp],
     rows: Measured,
