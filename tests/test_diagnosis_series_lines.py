@@ -195,4 +195,4 @@ def test_mains_that_spoil_every_line_are_said() -> None:
     choice = choose_lines(measured)
     assert choice.lines == []
     assert choice.mains is not None
-    assert choice.mains.mains == 50
+    assert choice.mains.mains_hz == 50

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.diagnosis.screening.mains import Pickup, pickup
+from underskin.diagnosis.screening.mains import MainsOnCharge, mains_on_charge
 from underskin.recordings.frf.estimation import Frf
 from underskin.units import Floats
 
@@ -41,7 +41,7 @@ class Choice:
     measured: int
     faint: int = 0
     beside: int = 0
-    mains: Pickup | None = None
+    mains: MainsOnCharge | None = None
     uneven: Floats | None = None
     once: bool = False
 
@@ -60,7 +60,7 @@ def choose_lines(measured: Frf) -> Choice:
     best = float(np.quantile(uncertainty[powerful], _BEST))
     if best > _UNSURE:
         return Choice([], len(lines))
-    mains = pickup(measured, powerful)
+    mains = mains_on_charge(measured, powerful)
     powerful |= (uncertainty <= min(_SURE, _BESIDE_BEST * best)) & _beyond_chance(measured)
     strong = np.flatnonzero(powerful if mains is None else powerful & ~mains.spoilt)
     shared = not measured.independent and len(strong) >= _LEAST_LINES

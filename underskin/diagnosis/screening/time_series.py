@@ -101,7 +101,7 @@ def _estimated(entry: FrfRecording) -> tuple[FrfRecording | None, Choice | None,
         if choice.mains is None:
             unusable = Finding(Reason.INCOHERENT, entry.id, "charge_pc")
         else:
-            unusable = Finding(Reason.MAINS_SPOIL_ALL, entry.id, "charge_pc", {"mains_hz": choice.mains.mains})
+            unusable = Finding(Reason.MAINS_SPOIL_ALL, entry.id, "charge_pc", {"mains_hz": choice.mains.mains_hz})
         return None, None, [*findings, unusable]
     values = to_lab("frf_pc_per_n", measured.values[chosen].real), to_lab("frf_pc_per_n", measured.values[chosen].imag)
     estimated = replace(
@@ -140,8 +140,8 @@ def _mains(choices: Mapping[str, Choice]) -> list[Finding]:
     """Where charge stands out at the mains' multiples and force does not, within the band or beside it."""
     pickups = {name: choice.mains for name, choice in choices.items() if choice.mains is not None}
     findings = []
-    for mains in sorted({entry.mains for entry in pickups.values()}):
-        own = {name: entry.charge for name, entry in pickups.items() if entry.mains == mains}
+    for mains in sorted({entry.mains_hz for entry in pickups.values()}):
+        own = {name: entry.charge for name, entry in pickups.items() if entry.mains_hz == mains}
         arguments = {
             "affected": len(own),
             "recordings": len(choices),
