@@ -97,11 +97,30 @@ class Inversion:
 def invert(
     campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] | None = None, zone: FlatZone | None = None
 ) -> Inversion:
-    """The d33 of a campaign's `frf` recordings, over its flat zone or the band given; `zone`: a zone
-    that is known already.
+    """The d33 of an array, Re FRF / ((3/2) ρ² σ) with ρ = rT/h, from the `frf` recordings of a campaign.
 
-    Raises InvalidInput where no line lies in that band; NoD33 where the campaign has no frf recording, none within the
-    table's domain, none with a line in the flat zone, or none with any charge.
+    Parameters
+    ----------
+    campaign : Campaign
+        The skin and its recordings.
+    table : SigmaTable
+        σ of a/h, rT/h and the load parameter L.
+    band_hz : (low, high), optional
+        The band that Re FRF is averaged over [Hz]; without it the flat zone.
+    zone : FlatZone, optional
+        The flat zone, where it is known.
+
+    Returns
+    -------
+    Inversion
+        d33 of recordings, cells, sensors and array in SI, the recordings and sensors left out, and findings.
+
+    Raises
+    ------
+    InvalidInput
+        No line lies in the band.
+    NoD33
+        No frf recording lies within the domain of the table, has a line in the flat zone, and any charge.
     """
     recorded = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
     if not recorded:

@@ -14,8 +14,11 @@ _NAMED = re.compile(rf"\b({'|'.join(sorted(_NAMES, key=len, reverse=True))})\b")
 
 
 def readable(text: str) -> str:
-    """A statement with the names of mechanisms and axes as words: contact resonance for contact_resonance."""
-    return _NAMED.sub(lambda found: _NAMES[found[0]], text)
+    """A statement with the names of mechanisms and axes as words: contact resonance for contact_resonance.
+
+    A stored report has sentences alone. This is for display; nothing is decided by it.
+    """
+    return _NAMED.sub(lambda name: _NAMES[name[0]], text)
 
 
 def words(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Which contacts the tables hold as they are declared, and which slip of units would explain that none of them does."""
+"""Which contacts lie within the tables as declared, and the slip of units that would explain that none does."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -23,7 +23,7 @@ Undo = Callable[[Campaign, float], Campaign]
 def within_tables(
     campaign: Campaign, entries: list[FrfRecording], model: Model, table: SigmaTable
 ) -> tuple[Mask, list[Finding]]:
-    """Which contacts the tables hold as declared, and the findings on the others."""
+    """Which contacts lie within the tables as declared, and the findings on the others."""
     inside = _inside(model, len(entries))
     skin = campaign.skin
     assert skin.thickness_mm is not None
