@@ -166,8 +166,7 @@ def _none_usable(campaign: Campaign, left_out: Sequence[Finding]) -> NoD33:
     """Of a campaign whose recordings are all left out: the first reasons that differ."""
     by_reason = {finding.statement: finding.sentence for finding in reversed(left_out)}
     reasons = list(by_reason.values())[::-1][:_MOST_REASONS]
-    others = len(left_out) - len(reasons)
-    more = f"; and {others} more" if others > 0 else ""
+    more = f"; and {len(left_out) - len(reasons)} more" if len(left_out) > len(reasons) else ""
     allowed = f"none of the {len(left_out)} recordings can be used: {'; '.join(reasons)}{more}"
     return NoD33("recordings", campaign.name, allowed)
 

@@ -275,8 +275,7 @@ def _frf(average: Average, sample_rate: float, *, independent: bool) -> Frf:
 
 def _same_line(frequency: float, lines: dict[float, list[tuple[Complexes, Complexes]]]) -> float:
     """The line already seen that this frequency repeats, or itself."""
-    near = [line for line in lines if abs(line - frequency) < 1e-3 * frequency]
-    return near[0] if near else frequency
+    return next((line for line in lines if abs(line - frequency) < 1e-3 * frequency), frequency)
 
 
 def _check(force: Floats, charge: Floats, sample_rate: float) -> None:
