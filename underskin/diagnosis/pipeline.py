@@ -43,7 +43,6 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 _CURVES: tuple[Kind, ...] = ("indentation", "compression")
 _LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
-_GAIN = 0.022  # the scatter that is expected of recordings before any explanation
 
 Progress = Callable[[float], None]
 NO_LIMITS = Limits()
