@@ -12,7 +12,7 @@ from enum import StrEnum
 import numpy as np
 
 from underskin.diagnosis.data.axes import order, preload_before, recording_axes
-from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import Residuals, residuals, whole_prediction
 from underskin.diagnosis.selection.frequency_gp import frequency_bins
 from underskin.diagnosis.selection.recording_gp import relative_place_slopes
@@ -79,19 +79,19 @@ class Shape:
     of_curves: bool
 
 
-def describe(bench: Workbench, explanation: Explanation) -> Shape:
+def describe(problem: FittingProblem, explanation: Explanation) -> Shape:
     """The form on the axis where it takes away most."""
-    forms = (_along_curves if bench.lines.curves else _over_axes)(bench, explanation)
+    forms = (_along_curves if problem.lines.curves else _over_axes)(problem, explanation)
     best = max(forms, key=lambda form: form.gain, default=None)
-    return Shape(explanation.names, best, bench.lines.curves)
+    return Shape(explanation.names, best, problem.lines.curves)
 
 
-def above_noise(bench: Workbench, explanation: Explanation, groups: Sequence[HeldOut]) -> list[Finding]:
+def above_noise(problem: FittingProblem, explanation: Explanation, groups: Sequence[HeldOut]) -> list[Finding]:
     """Of curves: a residual above the noise, and held-out parts that are predicted no better than by the base model."""
-    if bench.lines.smooth is None:
+    if problem.lines.smooth is None:
         return []
     findings = []
-    smooth, noise = _smooth_part(bench, explanation)
+    smooth, noise = _smooth_part(problem, explanation)
     if _is_above_noise(smooth, noise):
         findings.append(Finding(Reason.REMAINDER, "", "force_n", {"percent": 100 * smooth, "times": smooth / noise}))
     before, after = total(groups)
@@ -106,23 +106,23 @@ def above_noise(bench: Workbench, explanation: Explanation, groups: Sequence[Hel
     return findings
 
 
-def contradicts(bench: Workbench, null: Explanation) -> bool:
+def contradicts(problem: FittingProblem, null: Explanation) -> bool:
     """Whether the recordings contradict the null hypothesis, however improbable its rivals are: its residual keeps
     structure above the noise. Of curves that is a smooth part, of FRFs lines that scatter about the model more than
     about their neighbours by as much as those do."""
-    if bench.lines.smooth is not None:
-        return _is_above_noise(*_smooth_part(bench, null))
+    if problem.lines.smooth is not None:
+        return _is_above_noise(*_smooth_part(problem, null))
     return null.best.at.marginal.levels.level > _STRUCTURED
 
 
-def largest_floor_percent(bench: Workbench, null: Explanation, groups: Sequence[HeldOut]) -> float:
+def largest_floor_percent(problem: FittingProblem, null: Explanation, groups: Sequence[HeldOut]) -> float:
     """What noise alone would make of the error, in the recordings and in each group held out, the largest [%]."""
-    return max(entry.floor_percent for entry in (in_sample(bench, null), *(entry.before for entry in groups)))
+    return max(entry.floor_percent for entry in (in_sample(problem, null), *(entry.before for entry in groups)))
 
 
-def _smooth_part(bench: Workbench, explanation: Explanation) -> tuple[float, float]:
+def _smooth_part(problem: FittingProblem, explanation: Explanation) -> tuple[float, float]:
     """Of curves: the size of what is left smoothly, and a sample's noise, both relative to the largest force."""
-    lines, levels = bench.lines, explanation.best.at.marginal.levels
+    lines, levels = problem.lines, explanation.best.at.marginal.levels
     assert lines.smooth is not None
     return levels.smooth, levels.level * float(np.median(lines.deviation / lines.smooth.scale))
 
@@ -131,11 +131,11 @@ def _is_above_noise(smooth: float, noise: float) -> bool:
     return smooth > max(_ABOVE_NOISE * noise, _LEAST_REMAINDER)
 
 
-def _along_curves(bench: Workbench, explanation: Explanation) -> list[Form]:
+def _along_curves(problem: FittingProblem, explanation: Explanation) -> list[Form]:
     """The best forms of the residual, relative to each curve's largest force, over displacement and over time."""
-    lines = bench.lines
+    lines = problem.lines
     assert lines.smooth is not None
-    relative = (lines.value - whole_prediction(bench, explanation)).real / lines.smooth.scale
+    relative = (lines.value - whole_prediction(problem, explanation)).real / lines.smooth.scale
     weight = (lines.smooth.scale / lines.deviation) ** 2
     forms = []
     for name in ALONG_CURVES:
@@ -145,18 +145,18 @@ def _along_curves(bench: Workbench, explanation: Explanation) -> list[Form]:
     return forms
 
 
-def _over_axes(bench: Workbench, explanation: Explanation) -> list[Form]:
+def _over_axes(problem: FittingProblem, explanation: Explanation) -> list[Form]:
     """The best forms over each of the recordings' axes, and over the lines'."""
     levels = explanation.best.at.marginal.levels
-    left = residuals(bench, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
+    left = residuals(problem, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
     forms: list[Form] = []
-    for name, column in _axes(bench.lines.campaign).items():
+    for name, column in _axes(problem.lines.campaign).items():
         for index in range(column.shape[1]):
             component = None if column.shape[1] == 1 else index
             best = _best_form(column[:, index], left.gain[:, None], left.gain_deviation**-2, name)
             forms += [replace(form, component=component) for form in best]
-    forms += _circling(bench, explanation, left)
-    line, centres = frequency_bins(bench.lines.frequency)
+    forms += _circling(problem, explanation, left)
+    line, centres = frequency_bins(problem.lines.frequency)
     if len(centres) >= 6:
         total = np.bincount(line, left.line_weight, len(centres)).astype(float)
         parts = [
@@ -176,9 +176,9 @@ def _axes(campaign: Campaign) -> dict[str, Floats]:
     return {**axes, ORDER: order(campaign)[:, None]}
 
 
-def _circling(bench: Workbench, explanation: Explanation, left: Residuals) -> list[Form]:
+def _circling(problem: FittingProblem, explanation: Explanation, left: Residuals) -> list[Form]:
     """A contact that circles about its place while recordings are made, with the period that fits best."""
-    rank = order(bench.lines.campaign)
+    rank = order(problem.lines.campaign)
     slopes = 1e-3 * relative_place_slopes(explanation.best.at).T  # per mm
     if not np.abs(slopes).max() > 0 or len(rank) < _LEAST_IN_ORDER:
         return []

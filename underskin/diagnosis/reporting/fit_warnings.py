@@ -3,15 +3,15 @@
 import numpy as np
 
 from underskin.diagnosis.data.names import SIMPLEST, in_words
-from underskin.diagnosis.inference.explanation import Explanation, Workbench, at_recording, own_places
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, at_recording, own_places
 from underskin.diagnosis.localisation.residual_shape import NOISY
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 
 
-def fit_warnings(bench: Workbench, explanation: Explanation) -> list[Finding]:
+def fit_warnings(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
     """Parameters at their bounds, recordings beyond the tables, noise that is larger than the lines' own."""
-    return [*_at_bounds(explanation), *_beyond_tables(bench, explanation), *_noisy(bench, explanation)]
+    return [*_at_bounds(explanation), *_beyond_tables(problem, explanation), *_noisy(problem, explanation)]
 
 
 def _at_bounds(explanation: Explanation) -> list[Finding]:
@@ -31,19 +31,19 @@ def _at_bounds(explanation: Explanation) -> list[Finding]:
     return findings
 
 
-def _beyond_tables(bench: Workbench, explanation: Explanation) -> list[Finding]:
+def _beyond_tables(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
     at = explanation.best.at
-    outside = np.unique(at_recording(bench, at)[~at.prediction.inside])
-    answer = in_words(explanation.names) or SIMPLEST[bench.kind]
-    entries = bench.lines.campaign.recordings
+    outside = np.unique(at_recording(problem, at)[~at.prediction.inside])
+    answer = in_words(explanation.names) or SIMPLEST[problem.kind]
+    entries = problem.lines.campaign.recordings
     return [
         Finding(Reason.OUT_OF_TABLES_FITTED, entries[number].id, "preload_n", {"answer": answer})
         for number in outside.tolist()
     ]
 
 
-def _noisy(bench: Workbench, explanation: Explanation) -> list[Finding]:
+def _noisy(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
     level = explanation.best.at.marginal.levels.level
-    if bench.lines.curves or level < NOISY:
+    if problem.lines.curves or level < NOISY:
         return []
     return [Finding(Reason.LINE_NOISE_LEVEL, "", "frf_re_pc_per_n", {"level": level})]

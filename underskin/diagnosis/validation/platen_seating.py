@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.inference.explanation import Workbench
+from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.selection.search import SHOWS
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -22,7 +22,9 @@ _BEGINNING = 0.1  # of each curve's displacement
 _STIFFENING = "strain_stiffening"
 
 
-def without_seating(campaign: Campaign, names: Sequence[str], table: SigmaTable) -> tuple[Workbench, Finding] | None:
+def without_seating(
+    campaign: Campaign, names: Sequence[str], table: SigmaTable
+) -> tuple[FittingProblem, Finding] | None:
     """The rest of the curves and the finding, where the rest speaks no more for the stiffening among `names`.
 
     Relaxation needs a curve's whole history: with contact_creep nothing is tried.
@@ -34,13 +36,16 @@ def without_seating(campaign: Campaign, names: Sequence[str], table: SigmaTable)
     rows = curve_lines(_without_beginning(campaign), "compression")
     if rows.recordings < len(campaign.recordings):
         return None
-    bench = Workbench(rows, table)
-    stiffer, plain = bench.explain(tuple(names)), bench.explain(tuple(name for name in names if name != _STIFFENING))
+    problem = FittingProblem(rows, table)
+    stiffer, plain = (
+        problem.explain(tuple(names)),
+        problem.explain(tuple(name for name in names if name != _STIFFENING)),
+    )
     assert stiffer is not None
     assert plain is not None
     if stiffer.log_evidence - plain.log_evidence > SHOWS:
         return None
-    return bench, Finding(Reason.SEATING, "", "displacement_mm", {"percent": 100 * _BEGINNING})
+    return problem, Finding(Reason.SEATING, "", "displacement_mm", {"percent": 100 * _BEGINNING})
 
 
 def _is_pressed(entry: Recording) -> bool:
