@@ -54,7 +54,7 @@ class Likelihood:
 
     def __init__(self, recorded: RecordedLines) -> None:
         self.recorded = recorded
-        self.noise = recorded.problem.experiment.noise
+        self.noise = recorded.bench.experiment.noise
 
     def __call__(self, effects: dict[str, Values]) -> float:
         """The logarithm, −∞ where the rig cannot carry the effects out."""
@@ -64,14 +64,10 @@ class Likelihood:
             return -np.inf
 
     def _log(self, effects: dict[str, Values]) -> float:
-        problem = self.recorded.problem
-        experiment = replace(
-            problem.experiment, effects=effects, skin=replace(problem.experiment.skin, d33_pc_per_n=1.0)
-        )
-        nowhere = np.zeros_like(problem.missed_mm)
-        plain = replace(
-            problem, experiment=experiment, missed_mm=nowhere, sensor_gains=np.ones_like(problem.sensor_gains)
-        )
+        bench = self.recorded.bench
+        experiment = replace(bench.experiment, effects=effects, skin=replace(bench.experiment.skin, d33_pc_per_n=1.0))
+        nowhere = np.zeros_like(bench.missed_mm)
+        plain = replace(bench, experiment=experiment, missed_mm=nowhere, sensor_gains=np.ones_like(bench.sensor_gains))
         mean, variance = plain.level, np.zeros(len(nowhere))
         shape = plain.lines(self.recorded.frequency_hz) / mean[:, None]
         if self.noise.position_mm:
@@ -86,7 +82,7 @@ class Likelihood:
             return found.rest + float(
                 logsumexp(self._at(_SCALES, mean, scatter, found).sum(axis=0)) - np.log(len(_SCALES))
             )
-        sensors, index = np.unique(problem.plan.sensor, return_inverse=True)
+        sensors, index = np.unique(bench.plan.sensor, return_inverse=True)
         each = np.zeros((len(sensors), len(_WIDE)))
         np.add.at(each, index, self._at(_WIDE, mean, scatter, found))
         top = each.max(axis=1, keepdims=True)
@@ -111,7 +107,7 @@ class Likelihood:
         if "mains_pickup" in effects:
             frequency, mains = self.recorded.frequency_hz, of(effects, "mains_pickup", "mains_hz")
             p = sum(k / (1 + ((frequency - n * mains) / _PICKUP_WIDTH_HZ) ** 2) for n, k in ((1, 1.0), (3, 1 / 3)))
-            half = 0.5 * (of(effects, "mains_pickup", "charge_pc") / self.recorded.problem.plan.dynamic_n) ** 2
+            half = 0.5 * (of(effects, "mains_pickup", "charge_pc") / self.recorded.bench.plan.dynamic_n) ** 2
             pp, ps, py = (weight * p * p).sum(axis=1), (weight * p * shape).sum(axis=1), (weight * p * y).sum(axis=1)
             inner = pp + 1 / half
             ss, sy, yy = ss - np.abs(ps) ** 2 / inner, sy - ps.conj() * py / inner, yy - np.abs(py) ** 2 / inner
@@ -134,7 +130,7 @@ def diagnosed(case: DrawnCase) -> dict[str, Any]:
     the truth is more than that of any other answer; None where nothing is hidden."""
     description = drawn(case.seed, case.number, case.what)
     recorded = record(description)
-    truth: dict[str, Values] = {name: dict(values) for name, values in recorded.problem.on.items()}
+    truth: dict[str, Values] = {name: dict(values) for name, values in recorded.bench.on.items()}
     likelihood = Likelihood(recorded)
     sets = _sets(tuple(truth))
     ranges = of_frf(description)

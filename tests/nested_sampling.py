@@ -1,4 +1,4 @@
-"""One hypothesis' evidence by nested sampling (dynesty), against which Laplace's method is checked: tests and problem.
+"""One hypothesis' evidence by nested sampling (dynesty), against which Laplace's method is checked: tests and bench.
 
 Likelihood and priors are those of the diagnosis; no density is taken as normal, and no most probable point is sought.
 """

@@ -85,7 +85,7 @@ def own_places(names: Sequence[str], lines: Lines) -> dict[str, slice]:
     return places
 
 
-class FittingProblem:
+class Workbench:
     """The lines of one campaign, whole and collapsed, and what fitting any set to them needs."""
 
     def __init__(self, lines: Lines, table: SigmaTable) -> None:
@@ -190,11 +190,9 @@ def _is_lowest(index: tuple[int, ...], tried: dict[tuple[int, ...], Evaluated]) 
     return all(tried[index].cost <= tried[other].cost for other in around if other in tried)
 
 
-def at_recording(problem: FittingProblem, at: Evaluated) -> np.ndarray:
+def at_recording(bench: Workbench, at: Evaluated) -> np.ndarray:
     """The recording of each row of an evaluated prediction."""
-    return (
-        problem.lines.recording if len(at.prediction.value) == len(problem.lines.value) else problem.collapsed.recording
-    )
+    return bench.lines.recording if len(at.prediction.value) == len(bench.lines.value) else bench.collapsed.recording
 
 
 def needs_lines(name: str) -> bool:

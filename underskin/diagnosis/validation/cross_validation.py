@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.explanation import Explanation, Workbench
 from underskin.diagnosis.selection.search import log_prior
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Unsupported
@@ -114,15 +114,13 @@ def _parts_of_curves(lines: Lines) -> dict[str, NDArray[np.bool_]]:
     return {f"force_n above {_FURTHEST:.0%}": force > _FURTHEST * highest}
 
 
-def hold_out(
-    problem: FittingProblem, ranked: Sequence[Explanation], nothing: Explanation, supported: int
-) -> list[HeldOut]:
+def hold_out(bench: Workbench, ranked: Sequence[Explanation], nothing: Explanation, supported: int) -> list[HeldOut]:
     """Predict each group from the rest; `ranked` are the sets found on everything, the best first."""
     weights = [entry.log_evidence + log_prior(len(entry.names), supported) for entry in ranked]
     rivals = [entry for entry, w in zip(ranked, weights, strict=True) if w > weights[0] - _BEHIND][:_BEST]
     found = []
-    for name, rows in groups(problem.lines).items():
-        smaller = FittingProblem(problem.lines.part(~rows), problem.table)
+    for name, rows in groups(bench.lines).items():
+        smaller = Workbench(bench.lines.part(~rows), bench.table)
         fits: dict[tuple[str, ...], Explanation] = {}
         for entry in (nothing, *rivals):
             if entry.names in fits:
@@ -136,17 +134,15 @@ def hold_out(
         if nothing.names not in fits:
             continue
         chosen = max(fits.values(), key=lambda entry: entry.log_evidence + log_prior(len(entry.names), supported))
-        before, after = (_predict(smaller, fits[names], problem, rows) for names in (nothing.names, chosen.names))
+        before, after = (_predict(smaller, fits[names], bench, rows) for names in (nothing.names, chosen.names))
         found.append(HeldOut(name, chosen.names, before, after))
     return found
 
 
-def _predict(
-    smaller: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: NDArray[np.bool_]
-) -> Prediction:
+def _predict(smaller: Workbench, explanation: Explanation, bench: Workbench, rows: NDArray[np.bool_]) -> Prediction:
     """Some of the rows from a fit to others; sensors that were seen keep the gain that was found for them."""
-    left = problem.lines.part(rows)
-    model = compose(explanation.names, problem.lines.campaign, problem.table, problem.kind)
+    left = bench.lines.part(rows)
+    model = compose(explanation.names, bench.lines.campaign, bench.table, bench.kind)
     point, levels = explanation.point, explanation.best.at.marginal.levels
     whole = model.predict(point.fit)
     prediction, pickup_variance = _some(whole, rows), whole.pickup_variance
@@ -155,7 +151,7 @@ def _predict(
     found = explanation.best.at.marginal.sensor_gains
     gains[: len(found)] = found
     # A contact on an extremum of σ feels positioning scatter in second order, as in the likelihood
-    p2, curvature, recording = levels.position**2, problem.curvature, problem.lines.recording[rows]
+    p2, curvature, recording = levels.position**2, bench.curvature, bench.lines.recording[rows]
     value = prediction.value * np.exp(gains[left.sensor])[left.recording]
     value = value * np.exp(0.5 * p2 * curvature.laplacian)[recording]
     scatter = levels.gain**2 + np.where(seen, 0.0, levels.spread**2)
@@ -186,9 +182,9 @@ def total(found: Sequence[HeldOut]) -> tuple[Prediction, Prediction]:
     return before, after
 
 
-def in_sample(problem: FittingProblem, explanation: Explanation) -> Prediction:
+def in_sample(bench: Workbench, explanation: Explanation) -> Prediction:
     """The recordings that the explanation was fitted to."""
-    return _predict(problem, explanation, problem, np.ones(len(problem.lines.value), dtype=bool))
+    return _predict(bench, explanation, bench, np.ones(len(bench.lines.value), dtype=bool))
 
 
 def _some(whole: Predicted, rows: NDArray[np.bool_]) -> Predicted:
