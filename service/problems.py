@@ -11,6 +11,7 @@ import orjson
 from pydantic import BaseModel, Field, ValidationError
 
 from underskin import InvalidInput
+from underskin.errors import ErrorCode
 
 _MOST_LOGGED = 3
 RETRY_LATER = {"Retry-After": "5"}  # seconds
@@ -20,6 +21,7 @@ MEDIA_TYPE = "application/problem+json"
 class FieldError(BaseModel):
     """What is wrong with one value."""
 
+    code: ErrorCode = Field(description="The kind of error; docs/findings.md explains each.", examples=["out_of_range"])
     field: str = Field(description="Name of the field.", examples=["preload_n"])
     index: int | None = Field(description="Row in the column, from 0; null for a single value.", examples=[3])
     value: Any = Field(description="What was sent; null where nothing was.", examples=[-1.0])
@@ -107,11 +109,17 @@ def _is_umbridge(path: str) -> bool:
 def invalid_input(errors: Iterable[InvalidInput]) -> Refusal:
     """The problem of values that cannot be used: 422."""
     shortened = [
-        InvalidInput(_brief(error.field), _brief(error.value), _writable(error.allowed), error.index)
+        InvalidInput(_brief(error.field), _brief(error.value), _writable(error.allowed), error.index, code=error.code)
         for error in errors
     ]
     entries = [
-        {"field": error.field, "index": error.index, "value": _in_json(error.value), "allowed": error.allowed}
+        {
+            "code": str(error.code),
+            "field": error.field,
+            "index": error.index,
+            "value": _in_json(error.value),
+            "allowed": error.allowed,
+        }
         for error in shortened
     ]
     return Refusal(422, "; ".join(str(error) for error in shortened), title="Invalid input", errors=entries)
@@ -121,7 +129,7 @@ def given_twice(field: str, place: str) -> Refusal:
     """The problem of a key that comes again in its JSON object, at `place`: 422."""
     name = _brief(field)
     allowed = f"is given twice: must be given once in its object; it comes again at {place}"
-    error = {"field": name, "index": None, "value": None, "allowed": allowed}
+    error = {"code": str(ErrorCode.NOT_UNIQUE), "field": name, "index": None, "value": None, "allowed": allowed}
     return Refusal(422, f"{name} {allowed}", title="Invalid input", errors=[error])
 
 
@@ -149,6 +157,22 @@ _WORDS = {
     "bool_parsing": "must be true or false",
     "bool_type": "must be true or false",
 }
+_CODES = {
+    "greater_than": ErrorCode.OUT_OF_RANGE,
+    "greater_than_equal": ErrorCode.OUT_OF_RANGE,
+    "less_than": ErrorCode.OUT_OF_RANGE,
+    "less_than_equal": ErrorCode.OUT_OF_RANGE,
+    "missing": ErrorCode.REQUIRED,
+    "extra_forbidden": ErrorCode.UNKNOWN_FIELD,
+    "float_type": ErrorCode.WRONG_TYPE,
+    "float_parsing": ErrorCode.WRONG_TYPE,
+    "model_type": ErrorCode.WRONG_TYPE,
+    "bool_type": ErrorCode.WRONG_TYPE,
+    "bool_parsing": ErrorCode.WRONG_TYPE,
+    "finite_number": ErrorCode.NOT_FINITE,
+    "literal_error": ErrorCode.NOT_ONE_OF,
+    "too_short": ErrorCode.TOO_FEW,
+}
 _NOT_FIELDS = {"body", "query", "scalar", "column"}
 
 
@@ -162,6 +186,7 @@ def _as_invalid_input(detail: Mapping[str, Any]) -> InvalidInput:
         None if detail["type"] == "missing" else detail.get("input"),
         _WORDS.get(detail["type"], message[:1].lower() + message[1:]),
         index=indices[0] if indices else None,
+        code=_CODES.get(detail["type"], ErrorCode.INVALID_VALUE),
     )
 
 

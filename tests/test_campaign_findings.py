@@ -14,7 +14,7 @@ from tests.conftest import UNDERSKIN, Server, running
 from tests.pages.test_pages_security import BROWSING, token_of
 from tests.store.server import campaign
 from underskin.recordings.campaign import parse
-from underskin.recordings.plausibility import in_words
+from underskin.recordings.plausibility import implausible
 
 YEAR = "recording s0-1N: recorded_at is 3017-05-03T09:00:00Z, which is still to come: is the year a slip?"
 PLACE = "sensors s0 and s1 lie at one place, x 0 mm, y 0 mm: is it a slip?"
@@ -75,7 +75,7 @@ COMPRESSION: dict[str, Any] = {
     ],
 )
 def test_what_is_told_of_times_and_places(document: dict[str, Any], told: Sequence[str]) -> None:
-    found = in_words(parse(document))
+    found = [finding.sentence for finding in implausible(parse(document))]
     assert bool(found) == bool(told)
     for words in told:
         assert any(words in finding for finding in found), (words, found)

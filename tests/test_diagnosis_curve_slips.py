@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from underskin.diagnosis.pipeline import diagnosis_report
-from underskin.diagnosis.screening.curve_unit_errors import without_slips
+from underskin.diagnosis.screening.curve_unit_errors import without_inconsistent
 from underskin.recordings.campaign import Campaign, CompressionRecording
 from underskin.recordings.conditions import SkinDescription
 from underskin.surrogate.sigma_table import load_table
@@ -59,10 +59,10 @@ ONE = [
 def test_what_is_wrong_with_one_curve_is_named(
     change: Change, finding: tuple[str, str, str], left: int, pads: Campaign
 ) -> None:
-    found = without_slips(changed(pads, change, "c1"), "compression")
-    assert codes(found.found) == {finding}
+    found = without_inconsistent(changed(pads, change, "c1"), "compression")
+    assert codes(found.findings) == {finding}
     assert len(found.campaign.recordings) == left
-    assert found.lacking == ""
+    assert found.lacking is None
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e-3])
@@ -73,14 +73,14 @@ def test_where_all_curves_are_off_nothing_is_concluded(factor: float, field: str
     assert report["verdict"] == "insufficient_data"
     assert "units_off_by_1000" in {entry["code"] for entry in report["findings"]}
     if (field, factor) != ("displacement_mm", 1e3):  # pressed through the sample: nobody can mean that
-        meant = without_slips(replace(wrong, units_checked=True), "compression")
-        assert (meant.lacking, codes(meant.found)) == ("", {("units_off_by_1000", "", "force_n")})
+        meant = without_inconsistent(replace(wrong, units_checked=True), "compression")
+        assert (meant.lacking, codes(meant.findings)) == (None, {("units_off_by_1000", "", "force_n")})
 
 
 def test_curves_far_from_the_declared_modulus_are_named(pads: Campaign) -> None:
     skin = replace(pads.skin, youngs_modulus_mpa=1000 * MODULUS_MPA)
-    found = without_slips(replace(pads, skin=skin), "compression")
-    assert codes(found.found) == {("units_off_by_1000", "", "force_n")}
+    found = without_inconsistent(replace(pads, skin=skin), "compression")
+    assert codes(found.findings) == {("units_off_by_1000", "", "force_n")}
     assert found.lacking
 
 
@@ -88,15 +88,15 @@ def test_curves_far_from_the_declared_modulus_are_named(pads: Campaign) -> None:
 def test_of_two_curves_the_declared_modulus_tells_which_is_off(change: Change, pads: Campaign) -> None:
     two = replace(pads, recordings=pads.recordings[:2])
     wrong = changed(two, change, "c1")
-    found = without_slips(wrong, "compression")
-    assert {entry.code for entry in found.found} == {"units_off_by_1000"}
+    found = without_inconsistent(wrong, "compression")
+    assert {entry.code for entry in found.findings} == {"units_off_by_1000"}
     by_reach = {entry.id for entry in found.campaign.recordings} == {"c0"}  # pressed through its own height
     assert by_reach or found.lacking
     declared = replace(wrong, skin=replace(pads.skin, youngs_modulus_mpa=1.2 * MODULUS_MPA))
-    told = without_slips(declared, "compression")
-    assert {(entry.code, entry.recording) for entry in told.found} == {("units_off_by_1000", "c1")}
-    assert (told.lacking, [entry.id for entry in told.campaign.recordings]) == ("", ["c0"])
-    assert without_slips(two, "compression").found == []
+    told = without_inconsistent(declared, "compression")
+    assert {(entry.code, entry.recording) for entry in told.findings} == {("units_off_by_1000", "c1")}
+    assert (told.lacking, [entry.id for entry in told.campaign.recordings]) == (None, ["c0"])
+    assert without_inconsistent(two, "compression").findings == []
 
 
 def test_reversed_forces_are_put_right_and_invent_nothing(pads: Campaign) -> None:
@@ -116,7 +116,7 @@ def test_a_curve_that_does_not_move_is_left_out(pads: Campaign) -> None:
 
 def test_a_copy_of_a_curve_is_left_out(pads: Campaign) -> None:
     whole = replace(pads, recordings=(*pads.recordings, replace(pads.recordings[0], id="copy")))
-    found = without_slips(whole, "compression")
-    assert codes(found.found) == {("duplicated_recording", "copy", "force_n")}
+    found = without_inconsistent(whole, "compression")
+    assert codes(found.findings) == {("duplicated_recording", "copy", "force_n")}
     assert len(found.campaign.recordings) == len(pads.recordings)
-    assert without_slips(pads, "compression").found == []
+    assert without_inconsistent(pads, "compression").findings == []

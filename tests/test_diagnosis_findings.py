@@ -10,6 +10,8 @@ import pytest
 from tests.diagnosis_campaigns import Made, added, campaign
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.screening.inspection import inspect
+from underskin.findings import english
+from underskin.findings.lacking import Lack
 from underskin.recordings.campaign import Campaign, FrfRecording, from_dict, to_dict
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Complexes, Floats
@@ -107,9 +109,9 @@ def test_what_is_wrong_is_named_and_left_out(
     table: SigmaTable,
 ) -> None:
     inspected = inspect(changed(good, change, which), table)
-    assert finding in codes(inspected.found)
-    assert {entry[0] for entry in codes(inspected.found)} == {finding[0]}
-    assert inspected.lacking == ""
+    assert finding in codes(inspected.findings)
+    assert {entry[0] for entry in codes(inspected.findings)} == {finding[0]}
+    assert inspected.lacking is None
     assert len(inspected.campaign.recordings) == len(good.recordings) - left_out
 
 
@@ -170,11 +172,12 @@ def test_a_skin_in_other_units_is_named_and_tells_nothing(
     wrong = replace(good, skin=replace(good.skin, **{name: factor * getattr(good.skin, name)}))
     found = ("units_off_by_1000", "", f"skin.{name}")
     inspected = inspect(wrong, table)
-    assert found in codes(inspected.found)
-    assert "units_checked" in inspected.lacking
+    assert found in codes(inspected.findings)
+    assert inspected.lacking is not None
+    assert "units_checked" in english.lacking(inspected.lacking)
     meant = inspect(replace(wrong, units_checked=True), table)
-    assert found in codes(meant.found)
-    assert "units_checked" not in meant.lacking
+    assert found in codes(meant.findings)
+    assert meant.lacking is None or "units_checked" not in english.lacking(meant.lacking)
 
 
 def test_a_modulus_that_was_checked_is_diagnosed_with_the_suspicion_beside(good: Campaign, table: SigmaTable) -> None:
@@ -192,19 +195,19 @@ def test_sensors_in_other_units_are_named(factor: float, good: Campaign, table: 
     )
     inspected = inspect(replace(changed(good, away(factor), of_all), skin=replace(good.skin, sensors=sensors)), table)
     assert inspected.lacking
-    assert {entry[2] for entry in codes(inspected.found)} <= {"skin.sensors", "skin.sensor_radius_mm"}
+    assert {entry[2] for entry in codes(inspected.findings)} <= {"skin.sensors", "skin.sensor_radius_mm"}
 
 
 def test_offsets_in_metres_at_the_only_sensor_are_named(table: SigmaTable) -> None:
     made = campaign(Made(sensors=1, offsets_mm=(0.0, 1.0, 2.0), lines=8), table)
     inspected = inspect(changed(made, away(1e-3), of_all), table)
-    assert ("units_off_by_1000", "", "position_mm") in codes(inspected.found)
+    assert ("units_off_by_1000", "", "position_mm") in codes(inspected.findings)
     assert inspected.lacking
 
 
 def test_what_would_bring_contacts_into_the_tables_is_named(good: Campaign, table: SigmaTable) -> None:
     inspected = inspect(replace(changed(good, times(1e3, "indenter_radius_mm"), of_all), units_checked=True), table)
-    named = {entry.field: entry.statement for entry in inspected.found if "within the tables" in entry.statement}
+    named = {entry.field: entry.statement for entry in inspected.findings if "within the tables" in entry.statement}
     assert "µm" in named["indenter_radius_mm"]
     assert "GPa" in named["skin.youngs_modulus_mpa"]
     assert inspected.lacking
@@ -222,7 +225,7 @@ def test_copies_are_found_through_rounding(good: Campaign, table: SigmaTable) ->
     copies = changed(good, times(1 + 1e-6, *LINES), of_all).recordings[:4]
     whole = replace(good, recordings=(*good.recordings, *(replace(entry, id=f"{entry.id} copy") for entry in copies)))
     inspected = inspect(whole, table)
-    assert codes(inspected.found) == {
+    assert codes(inspected.findings) == {
         ("duplicated_recording", f"r{number} copy", "frf_re_pc_per_n") for number in range(4)
     }
     assert len(inspected.campaign.recordings) == len(good.recordings)
@@ -242,11 +245,12 @@ def test_of_three_recordings_the_one_that_is_off_is_named_and_of_two_neither(fac
     wrong = changed(made, times(factor, *LINES), lambda entry: entry.id == "r1")
     code = "units_off_by_1000" if factor > 0 else "sign_flipped"
     of_three = inspect(wrong, table)
-    assert codes(of_three.found) == {(code, "r1", "frf_re_pc_per_n")}
-    assert of_three.lacking == ""
+    assert codes(of_three.findings) == {(code, "r1", "frf_re_pc_per_n")}
+    assert of_three.lacking is None
     of_two = inspect(replace(wrong, recordings=wrong.recordings[:2]), table)
-    assert codes(of_two.found) == {(code, "", "frf_re_pc_per_n")}
-    assert "a third" in of_two.lacking
+    assert codes(of_two.findings) == {(code, "", "frf_re_pc_per_n")}
+    assert of_two.lacking is not None
+    assert of_two.lacking.lack == Lack.TWO_RECORDINGS_CONTRADICT
 
 
 def test_a_period_that_does_not_fit_between_recordings_is_named(good: Campaign, table: SigmaTable) -> None:
@@ -257,16 +261,16 @@ def test_a_period_that_does_not_fit_between_recordings_is_named(good: Campaign, 
         return replace(entry, recorded_at=f"2020-01-01T10:{number // 3:02d}:{20 * (number % 3):02d}Z")
 
     slow = changed(good, times(0.03, "frequency_hz"), of_all)
-    assert inspect(slow, table).found == inspect(good, table).found
+    assert inspect(slow, table).findings == inspect(good, table).findings
     found = inspect(changed(slow, dated, of_all), table)
-    assert codes(found.found) == {("units_off_by_1000", "", "frequency_hz")}
-    assert "20 s" in " ".join(entry.statement for entry in found.found)
+    assert codes(found.findings) == {("units_off_by_1000", "", "frequency_hz")}
+    assert "20 s" in " ".join(entry.statement for entry in found.findings)
     assert found.lacking
 
 
 def test_units_that_were_checked_are_believed(good: Campaign, table: SigmaTable) -> None:
     slow = replace(changed(good, times(1e-3, "frequency_hz"), of_all), units_checked=True)
-    assert inspect(slow, table).lacking == ""
+    assert inspect(slow, table).lacking is None
 
 
 def test_a_resonance_is_not_taken_for_noise(table: SigmaTable) -> None:
@@ -275,7 +279,7 @@ def test_a_resonance_is_not_taken_for_noise(table: SigmaTable) -> None:
     for parameters in ((6.0, 0.05), (30.0, 0.05), (6.0, 0.02)):
         resonant = campaign(replace(made, parameters=parameters), table)
         inspected = inspect(changed(resonant, times(-1.0, *LINES), of_r3), table)
-        assert codes(inspected.found) == {("sign_flipped", "r3", "frf_re_pc_per_n")}
+        assert codes(inspected.findings) == {("sign_flipped", "r3", "frf_re_pc_per_n")}
         assert len(inspected.campaign.recordings) == len(resonant.recordings)
 
 
@@ -289,5 +293,5 @@ def test_where_little_is_expected_silence_is_kept(table: SigmaTable) -> None:
 
     noisy = added(far, noise)
     inspected = inspect(noisy, table)
-    assert codes(inspected.found) == set()
+    assert codes(inspected.findings) == set()
     assert len(inspected.campaign.recordings) == len(far.recordings)

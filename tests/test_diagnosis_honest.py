@@ -31,8 +31,8 @@ def test_places_that_rounding_leaves_where_zero_is_meant_are_no_impossible_numbe
     scanned = [replace(entry, position_mm=(float(x), 0.0)) for entry, x in zip(frfs(made), places, strict=True)]
     sensor = replace(made.skin.sensors[0], x_mm=0.1 + 0.2 - 0.3)
     found = without_extremes(replace(made, recordings=tuple(scanned), skin=replace(made.skin, sensors=(sensor,))))
-    assert found.found == []
-    assert found.lacking == ""
+    assert found.findings == []
+    assert found.lacking is None
     assert len(found.campaign.recordings) == 3
 
 
@@ -55,7 +55,7 @@ def test_an_array_stamped_as_it_is_saved_is_not_slow(table: SigmaTable) -> None:
     made = campaign(Made(sensors=3, spheres_mm=(4.0,), preloads_n=(1.0,), lines=40), table)
     stamped = [replace(entry, recorded_at=f"2020-01-01T10:00:0{n}Z") for n, entry in enumerate(frfs(made))]
     slow = [replace(entry, frequency_hz=np.geomspace(0.5, 200.0, 40)) for entry in stamped]
-    assert inspect(replace(made, recordings=tuple(slow)), table).lacking == ""
+    assert inspect(replace(made, recordings=tuple(slow)), table).lacking is None
 
 
 def test_three_bands_are_no_slip(table: SigmaTable) -> None:
@@ -65,7 +65,7 @@ def test_three_bands_are_no_slip(table: SigmaTable) -> None:
         replace(entry, frequency_hz=np.linspace(*band, 40)) for entry, band in zip(frfs(made), bands, strict=True)
     ]
     inspected = inspect(replace(made, recordings=tuple(entries)), table)
-    assert "units_off_by_1000" not in {entry.code for entry in inspected.found}
+    assert "units_off_by_1000" not in {entry.code for entry in inspected.findings}
     assert len(inspected.campaign.recordings) == 3
 
 
@@ -84,7 +84,7 @@ def test_a_d33_far_from_the_declared_one_is_named(factor: float, word: str, tabl
     ]
     wrong = replace(weak, recordings=tuple(entries))
     slip = ("units_off_by_1000", "", "frf_re_pc_per_n")
-    assert slip not in {(entry.code, entry.recording, entry.field) for entry in inspect(wrong, table).found}
-    told = inspect(replace(wrong, skin=replace(weak.skin, d33_pc_per_n=-d33)), table).found
+    assert slip not in {(entry.code, entry.recording, entry.field) for entry in inspect(wrong, table).findings}
+    told = inspect(replace(wrong, skin=replace(weak.skin, d33_pc_per_n=-d33)), table).findings
     assert slip in {(entry.code, entry.recording, entry.field) for entry in told}
     assert any(f"1000 × too {word}" in entry.statement for entry in told)

@@ -42,11 +42,11 @@ def test_a_slip_of_one_recording_is_named_and_left_out(
     field: str, factor: float, quiet: Campaign, table: SigmaTable
 ) -> None:
     found = inspect(times(quiet, field, factor, "r003"), table)
-    assert codes(found.found) == {("units_off_by_1000", "r003", field)}
+    assert codes(found.findings) == {("units_off_by_1000", "r003", field)}
     assert [entry.id for entry in found.campaign.recordings] == [
         entry.id for entry in quiet.recordings if entry.id != "r003"
     ]
-    assert found.lacking == ""
+    assert found.lacking is None
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e-3])
@@ -54,8 +54,8 @@ def test_a_slip_of_one_recording_is_named_and_left_out(
 def test_a_slip_of_all_is_named(field: str, factor: float, quiet: Campaign, table: SigmaTable) -> None:
     """A charge in other units only scales d33; on other fields nothing is concluded."""
     found = inspect(times(quiet, field, factor), table)
-    assert codes(found.found) == {("units_off_by_1000", "", field)}
-    assert (found.lacking == "") == (field == "charge_pc")
+    assert codes(found.findings) == {("units_off_by_1000", "", field)}
+    assert (found.lacking is None) == (field == "charge_pc")
 
 
 def test_a_force_without_its_mean_is_told_by_its_oscillation(quiet: Campaign, table: SigmaTable) -> None:
@@ -66,9 +66,9 @@ def test_a_force_without_its_mean_is_told_by_its_oscillation(quiet: Campaign, ta
         assert entry.force_n is not None
         entries.append(replace(entry, force_n=entry.force_n - entry.force_n.mean()))
     coupled = replace(quiet, recordings=tuple(entries))
-    assert codes(inspect(coupled, table).found) == set()
+    assert codes(inspect(coupled, table).findings) == set()
     found = inspect(times(coupled, "force_n", 1e3), table)
-    assert codes(found.found) == {("units_off_by_1000", "", "force_n")}
+    assert codes(found.findings) == {("units_off_by_1000", "", "force_n")}
     assert found.lacking
 
 
@@ -106,9 +106,9 @@ def relaxing(quiet: Campaign) -> Campaign:
 @pytest.mark.parametrize("excited", [struck, relaxing])
 def test_neither_a_blow_nor_drift_of_the_force_is_a_slip(excited: Any, quiet: Campaign, table: SigmaTable) -> None:
     right = excited(quiet)
-    assert "units_off_by_1000" not in {entry.code for entry in inspect(right, table).found}
+    assert "units_off_by_1000" not in {entry.code for entry in inspect(right, table).findings}
     found = inspect(times(right, "force_n", 1e-3), table)
-    assert codes(found.found) == {("units_off_by_1000", "", "force_n")}
+    assert codes(found.findings) == {("units_off_by_1000", "", "force_n")}
     assert found.lacking
 
 
@@ -116,15 +116,15 @@ def test_a_force_said_to_be_right_is_used_all_the_same(quiet: Campaign, table: S
     slipped = times(quiet, "dynamic_force_n", 1e-3)
     assert not inspect(slipped, table).campaign.recordings
     found = inspect(replace(slipped, units_checked=True), table)
-    assert ("units_off_by_1000", "", "dynamic_force_n") in codes(found.found)
+    assert ("units_off_by_1000", "", "dynamic_force_n") in codes(found.findings)
     assert len(found.campaign.recordings) == len(quiet.recordings)
-    assert found.lacking == ""
+    assert found.lacking is None
 
 
 def test_slips_of_different_fields_are_each_told(quiet: Campaign, table: SigmaTable) -> None:
     slipped = times(times(quiet, "force_n", 1e3, "r001", "r002"), "preload_n", 1e-3, "r003", "r004")
     found = inspect(slipped, table)
-    assert codes(found.found) == {
+    assert codes(found.findings) == {
         ("units_off_by_1000", name, field)
         for name, field in (("r001", "force_n"), ("r002", "force_n"), ("r003", "preload_n"), ("r004", "preload_n"))
     }
@@ -136,20 +136,20 @@ def test_exchanged_channels_are_told(quiet: Campaign, table: SigmaTable) -> None
     exchanged = forces(quiet, force_n=lambda entry: entry.charge_pc, charge_pc=lambda entry: entry.force_n)
     fourth = exchanged.recordings[3]
     found = inspect(exchanged, table)
-    assert codes(found.found) == {("channels_swapped", "", "force_n")}
+    assert codes(found.findings) == {("channels_swapped", "", "force_n")}
     assert found.lacking
     one = inspect(replace(quiet, recordings=(*quiet.recordings[:3], fourth, *quiet.recordings[4:])), table)
-    assert codes(one.found) == {("channels_swapped", "r004", "force_n")}
+    assert codes(one.findings) == {("channels_swapped", "r004", "force_n")}
     assert len(one.campaign.recordings) == len(quiet.recordings) - 1
-    assert one.lacking == ""
+    assert one.lacking is None
 
 
 def test_an_overload_of_the_charge_is_told_of_the_charge(quiet: Campaign, table: SigmaTable) -> None:
     clipped = forces(quiet, charge_pc=lambda entry: np.clip(entry.charge_pc, -0.1, 0.1))
     found = inspect(clipped, table)
-    assert {entry.code for entry in found.found} == {"series_not_usable"}
-    assert {entry.field for entry in found.found} == {"charge_pc"}
-    assert "overload" in found.found[0].statement
+    assert {entry.code for entry in found.findings} == {"series_not_usable"}
+    assert {entry.field for entry in found.findings} == {"charge_pc"}
+    assert "overload" in found.findings[0].statement
     assert found.lacking
 
 
@@ -162,5 +162,5 @@ def test_series_that_make_no_frf_are_left_out(quiet: Campaign, table: SigmaTable
     short = replace(first, force_n=first.force_n[:5], charge_pc=first.charge_pc[:5])
     silent = replace(second, charge_pc=0.02 * np.random.default_rng(3).normal(size=len(first.force_n)))
     found = inspect(replace(quiet, recordings=(short, silent, *others)), table)
-    assert codes(found.found) == {("series_not_usable", "r001", "force_n"), ("no_response", "r002", "charge_pc")}
+    assert codes(found.findings) == {("series_not_usable", "r001", "force_n"), ("no_response", "r002", "charge_pc")}
     assert len(found.campaign.recordings) == len(others)

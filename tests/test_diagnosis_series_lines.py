@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from tests.series_campaigns import codes, recorded
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.screening.inspection import inspect
-from underskin.diagnosis.screening.select_lines import telling
+from underskin.diagnosis.screening.select_lines import choose_lines
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.surrogate.sigma_table import SigmaTable, load_table
@@ -62,8 +62,8 @@ def test_mains_are_told_and_their_lines_left_out(drive: dict[str, Any], table: S
 def test_mains_beside_the_excited_band_are_said(kind: str, table: SigmaTable) -> None:
     drive = {"kind": kind, "low_hz": 70.0, "high_hz": 140.0, "duration_s": 8.0}
     campaign = recorded(effects={"mains_pickup": {"charge_pc": 0.1, "mains_hz": 60.0}}, drive=drive)
-    assert ("mains_in_charge", "", "charge_pc") in codes(inspect(campaign, table).found)
-    assert "mains_in_charge" not in {entry.code for entry in inspect(recorded(drive=drive), table).found}
+    assert ("mains_in_charge", "", "charge_pc") in codes(inspect(campaign, table).findings)
+    assert "mains_in_charge" not in {entry.code for entry in inspect(recorded(drive=drive), table).findings}
 
 
 def shaken(quiet: Campaign, table: SigmaTable, rate: float, made: Any) -> Campaign:
@@ -98,7 +98,7 @@ def test_a_resonance_on_a_multiple_of_the_mains_is_none(quiet: Campaign, table: 
         return sixteen_times(force), charge + 1e-3 * random.normal(size=len(charge))
 
     found = inspect(shaken(quiet, table, 2048.0, made), table)
-    assert "mains_in_charge" not in {entry.code for entry in found.found}
+    assert "mains_in_charge" not in {entry.code for entry in found.findings}
     assert all(300.0 in lines_of(entry).frequency for entry in frf_recordings(found.campaign))
 
 
@@ -191,7 +191,7 @@ def test_mains_that_spoil_every_line_are_said() -> None:
     coherence = np.where(at_mains, 0.5, np.where(frequency > 10, 0.9999, 0.1))
     averages = np.full(len(frequency), 14.0)
     measured = Frf(frequency, np.ones(27, complex), coherence, averages, (), force, charge, independent=False)
-    choice = telling(measured)
+    choice = choose_lines(measured)
     assert choice.lines == []
     assert choice.mains is not None
-    assert choice.mains.mains == 50
+    assert choice.mains.mains_hz == 50

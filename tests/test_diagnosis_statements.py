@@ -13,9 +13,9 @@ from underskin.diagnosis.inference.evidence import laplace
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.localisation.effect_size import Effect, effect
-from underskin.diagnosis.localisation.permutation_test import AxisResult
+from underskin.diagnosis.localisation.permutation_test import AxisResult, Undecidable
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting.fit_warnings import doubts
+from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.html_report import page
 from underskin.diagnosis.reporting.report import report
 from underskin.diagnosis.reporting.statements import answer_statement, location_statement, why_not
@@ -68,7 +68,7 @@ def test_noise_alone_is_no_effect(recorded: Lines) -> None:
     assert abs(found.percent) < 2.0
 
 
-AXES = [AxisResult("preload_n", 0.001, 0.5), AxisResult("load_cycles", None, 0.0, "the others determine it")]
+AXES = [AxisResult("preload_n", 0.001, 0.5), AxisResult("load_cycles", None, 0.0, Undecidable.ALIASED)]
 
 
 def test_a_location_has_units_and_leaves_out_what_spans_a_whole_axis() -> None:
@@ -123,12 +123,12 @@ def test_agreement_names_what_it_does_not_rule_out(table: SigmaTable) -> None:
     adhesion, misalignment = answers_of(table, {("adhesion",): 0.32, ("misalignment",): 0.01})
     nothing = replace(adhesion.explanation, names=()) if adhesion.explanation is not None else None
     torn = [Answer(nothing, 0.61), adhesion, misalignment]
-    said = answer_statement(torn, "no_mismatch", "")
+    said = answer_statement(torn, "no_mismatch")
     assert said.startswith(
         "Recordings and the paper's model agree within the noise (probability 61 %), but they do not rule out: "
         "adhesion (32 %). Adhesion: The skin sticks"
     )
-    assert "nothing needs to be added" in answer_statement([Answer(nothing, 0.97), adhesion], "no_mismatch", "")
+    assert "nothing needs to be added" in answer_statement([Answer(nothing, 0.97), adhesion], "no_mismatch")
 
 
 @pytest.mark.parametrize(
@@ -136,7 +136,7 @@ def test_agreement_names_what_it_does_not_rule_out(table: SigmaTable) -> None:
 )
 def test_the_model_that_lacks_something_is_called_by_its_name(table: SigmaTable, kind: Kind, named: str) -> None:
     (only,) = answers_of(table, {("thickness_error",): 0.9})
-    said = answer_statement([only], "explained", "", kind)
+    said = answer_statement([only], "explained", kind=kind)
     assert said.startswith(f"{named} lacks thickness error (probability 90 %). Thickness error: ")
     assert "_" not in said
 
@@ -230,7 +230,7 @@ def test_contacts_beyond_the_tables_at_the_fitted_values_are_named(table: SigmaT
     soft = moved(explanation, **{entry.name: entry.low})
     inside = soft.best.at.prediction.inside
     assert not inside.all()
-    found = {one.recording for one in doubts(problem, soft) if one.code == "out_of_domain"}
+    found = {one.recording for one in fit_warnings(problem, soft) if one.code == "out_of_domain"}
     assert found == {f"r{number}" for number in np.flatnonzero(~inside)}
 
 
@@ -238,9 +238,9 @@ def test_noise_larger_than_the_lines_own_is_named(table: SigmaTable) -> None:
     problem = FittingProblem(lines(campaign(Made(), table)), table)
     explanation = problem.explain(())
     assert explanation is not None
-    assert "line_noise_level" not in {one.code for one in doubts(problem, explanation)}
+    assert "line_noise_level" not in {one.code for one in fit_warnings(problem, explanation)}
     fitter, point = explanation.best.fitter, explanation.point
     loud = fitter.evaluate(replace(point, covariance=point.covariance + np.array([0.0, np.log(3.0)])))
     noisy = replace(explanation, best=laplace(fitter, loud))
     noisy = replace(noisy, best=replace(noisy.best, at=loud))
-    assert "line_noise_level" in {one.code for one in doubts(problem, noisy)}
+    assert "line_noise_level" in {one.code for one in fit_warnings(problem, noisy)}

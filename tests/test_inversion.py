@@ -74,7 +74,9 @@ def test_a_contact_outside_the_table_is_left_out_and_said_so(table: SigmaTable) 
     assert 0 < outside.sum() < len(outside)
     assert len(found.left_out) == outside.sum()
     assert np.isnan(found.recordings.d33[outside]).all()
-    assert all(re.search(r"L = (\S+) exceeds 0.1: at most 1.44 N with this sphere$", line) for line in found.left_out)
+    assert all(
+        re.search(r"L = (\S+) exceeds 0.1: at most 1.44 N with this sphere$", left.sentence) for left in found.left_out
+    )
 
 
 def refusal(campaign: Campaign, table: SigmaTable) -> str:
@@ -113,7 +115,7 @@ def test_a_recording_without_a_line_in_the_band_is_told_apart(table: SigmaTable)
     assert isinstance(first, FrfRecording)
     assert first.frequency_hz is not None
     found = invert(moved(campaign, 0, frequency_hz=first.frequency_hz + 5000), table, (1.0, 100.0))
-    assert found.left_out == ("recording r0: it has no line in the band",)
+    assert [left.sentence for left in found.left_out] == ["recording r0: it has no line in the band"]
 
 
 def test_a_skin_much_thinner_than_the_scatter_of_positions_is_inverted(table: SigmaTable) -> None:
@@ -180,9 +182,9 @@ def test_time_series_are_inverted_and_what_is_wrong_with_them_is_said(table: Sig
     )
     np.testing.assert_allclose(found.recordings.d33 * 1e12, 14, rtol=0.01)
     assert len(found.findings) == 1
-    assert found.findings[0].startswith("recording r0")
+    assert found.findings[0].sentence.startswith("recording r0")
     assert len(found.left_out) == 1
-    assert found.left_out[0].startswith("recording r1")
+    assert found.left_out[0].sentence.startswith("recording r1")
 
 
 @NEEDS_CAMPAIGNS

@@ -7,6 +7,7 @@ import pytest
 
 from tests.inverted_campaigns import covered, drawn, moved, scaled
 from tests.simulated_campaign import Rig, simulate
+from underskin.findings.codes import FindingCode
 from underskin.inversion.invert import Inversion, invert
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable, load_table
@@ -57,7 +58,7 @@ def test_a_sensor_that_stands_out_is_named_with_the_reason(table: SigmaTable, ch
     assert found.flags[0].reason.startswith(change)
     assert found.campaign_d33 is not None
     assert covered(found.campaign_d33, np.array(14.0))
-    named = any("s4" in line for line in found.left_out)
+    named = any("s4" in left.sentence for left in found.left_out)
     assert named == (change in ("weak", "strong", "dead", "inverted"))
 
 
@@ -86,8 +87,8 @@ def test_a_slip_that_the_whole_array_shows_is_a_finding(table: SigmaTable, facto
     for row in range(len(campaign.recordings)):
         slipped = scaled(slipped, row, factor)
     (finding,) = invert(slipped, table).findings
-    assert asks in finding
-    assert f"{14 * factor:.2g}"[:3] in finding
+    assert asks in finding.statement
+    assert f"{14 * factor:.2g}"[:3] in finding.statement
 
 
 @pytest.mark.parametrize("x_mm", [19.0, 250.0, 1e9, 1e308])
@@ -99,7 +100,7 @@ def test_a_recording_far_off_its_sensor_costs_only_itself(table: SigmaTable, x_m
     assert rest.campaign_d33 is not None
     assert float(found.campaign_d33.value) == pytest.approx(float(rest.campaign_d33.value), rel=1e-6)
     assert found.recordings.inside.tolist() == [False] + 9 * [True]
-    assert [line.split(":")[0] for line in found.left_out] == ["recording r0"]
+    assert [left.sentence.split(":")[0] for left in found.left_out] == ["recording r0"]
 
 
 @pytest.mark.parametrize("factor", [1000.0, 10.0, -1.0, 1e-3])
@@ -111,7 +112,7 @@ def test_a_recording_grossly_off_is_set_aside_and_named(table: SigmaTable, facto
     assert found.campaign_d33 is not None
     assert covered(found.campaign_d33, np.array(14.0))
     assert covered(found.sensors, rig.d33).all()
-    assert [line.split(":")[0] for line in found.left_out] == ["recording r0"]
+    assert [left.sentence.split(":")[0] for left in found.left_out] == ["recording r0"]
     assert found.flags == ()
 
 
@@ -152,4 +153,4 @@ def test_a_force_whose_mean_contradicts_the_preload_is_a_finding(table: SigmaTab
     for means, accused in (((1.0, 0.0), []), ((0.05, 2.5), []), ((4.0, 0.2), ["r0", "r1"]), ((1.0, -1000.0), ["r1"])):
         series = tuple(as_series(item, mean) for item, mean in zip(recorded, means, strict=True))
         found = invert(replace(campaign, recordings=series), table).findings
-        assert [line.split(":")[0].split()[1] for line in found if "but preload_n is 1" in line] == accused
+        assert [one.recording for one in found if one.code == FindingCode.FORCE_CONTRADICTS_PRELOAD] == accused

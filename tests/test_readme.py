@@ -1,11 +1,10 @@
 """README, CONTRIBUTING and the pages by task: their commands print what is shown, their lists are complete."""
 
-import ast
 import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -125,29 +124,3 @@ def test_every_setting_is_listed_with_its_meaning() -> None:
     listed = text("docs/deploy.md")
     names = [f"`UNDERSKIN_{name.upper()}`" for name in Settings.model_fields]
     assert [name for name in names if f"| {name} |" not in listed] == []
-
-
-def finding_codes() -> set[str]:
-    """The codes of a report's findings as they stand in the code: of `Finding` (code, recording, field, statement), of
-    a `Slip`, and of what the service adds to a report."""
-    codes: set[str] = set()
-    for source in (*(ROOT / "underskin").rglob("*.py"), *(ROOT / "service").rglob("*.py")):
-        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
-            candidates: Sequence[ast.expr | None] = ()
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 4:
-                candidates = {"Finding": node.args[:1], "Slip": node.args[3:]}.get(node.func.id, ())
-            elif isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "code":
-                candidates = [node.value]
-            elif isinstance(node, ast.Dict):
-                keys = [ast.unparse(key) for key in node.keys if key is not None]
-                if {"'code'", "'recording'", "'statement'"} <= set(keys):
-                    candidates = [node.values[keys.index("'code'")]]
-            values = (entry.value for entry in candidates if isinstance(entry, ast.Constant))
-            codes |= {value for value in values if isinstance(value, str) and value}
-    return codes
-
-
-def test_every_finding_code_is_explained() -> None:
-    explained = re.findall(r"^\| `(\w+)` \|", text("docs/findings.md"), flags=re.MULTILINE)
-    assert len(explained) == len(set(explained))
-    assert set(explained) == finding_codes()

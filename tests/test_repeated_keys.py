@@ -131,7 +131,9 @@ def test_a_problem_says_what_comes_twice(http: httpx.Client) -> None:
     problem = http.post("/v1/frf", content=body, headers={"Content-Type": "application/json"}).json()
     said = "is given twice: must be given once in its object; it comes again at line 1, column 23"
     assert problem["detail"] == f"thickness_mm {said}"
-    assert problem["errors"] == [{"field": "thickness_mm", "index": None, "value": None, "allowed": said}]
+    assert problem["errors"] == [
+        {"code": "not_unique", "field": "thickness_mm", "index": None, "value": None, "allowed": said}
+    ]
 
 
 def test_the_command_line_names_file_line_and_column(tmp_path: Path) -> None:

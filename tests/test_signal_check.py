@@ -14,7 +14,6 @@ def test_overload_is_seen_where_it_is_and_nowhere_else() -> None:
     found = defects("charge_pc", np.minimum(charge, ceiling))
     assert {defect.kind for defect in found} == {"overload"}
     assert all(charge[defect.first_sample : defect.first_sample + defect.samples].min() >= ceiling for defect in found)
-    assert "overload" in found[0].statement
     assert defects("charge_pc", charge) == []
 
 
@@ -24,7 +23,7 @@ def test_broadband_leaves_damaged_blocks_out() -> None:
     damaged[30_000:30_100] = damaged[30_000]
     frf = broadband(force, damaged, RATE, block_samples=2000)
     whole = broadband(force, charge, RATE, block_samples=2000)
-    assert [defect.kind for defect in frf.found] == ["held_samples"]
+    assert [defect.kind for defect in frf.defects] == ["held_samples"]
     assert rms_error(frf) < 1.2 * rms_error(whole)
     assert frf.averages is not None
     assert whole.averages is not None
@@ -74,7 +73,7 @@ def test_damage_is_named_and_left_out(kind: str) -> None:
     else:
         charge = np.concatenate([charge[:7010], charge[7030:], charge[-20:]])
     frf = stepped_sine(force, charge, RATE)
-    assert kind in {defect.kind for defect in frf.found}
+    assert kind in {defect.kind for defect in frf.defects}
     if kind != "jump":  # after lost samples of one channel, the phase is off for good
         np.testing.assert_allclose(frf.values, known_frf(frf.frequency), rtol=5e-3)
 
@@ -95,9 +94,9 @@ def test_a_spike_is_a_defect_and_a_blow_is_not() -> None:
     force = 0.001 * random.standard_normal(8192)
     spiked = force.copy()
     spiked[3000] = 5.0
-    assert [defect.kind for defect in broadband(spiked, 1e-12 * force, RATE).found] == ["jump"]
+    assert [defect.kind for defect in broadband(spiked, 1e-12 * force, RATE).defects] == ["jump"]
     force[3000:3005] += np.hanning(7)[1:-1]
     frf = broadband(force, answer_to(force), RATE, block_samples=8192, window="boxcar")
-    assert frf.found == ()
+    assert frf.defects == ()
     struck = frf.frequency < 300  # the blow's own spectrum ends at 670 Hz
     assert rms_error(Frf(frf.frequency[struck], frf.values[struck])) < 0.03

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from underskin import Indenter, InvalidInput, Skin
-from underskin.units import LAB, checked, findings, to_lab, to_si
+from underskin.units import LAB, checked, to_lab, to_si, unusual
 
 GOOD: dict[str, Any] = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16.0, "sensor_radius_mm": 1.5}
 
@@ -68,8 +68,8 @@ def test_poisson_ratio_is_bounded() -> None:
 
 
 def test_measured_magnitudes_are_findings_not_errors() -> None:
-    assert findings("frf_pc_per_n", [7.4, -7.4]) == []
-    found = findings("frf_pc_per_n", [7.4, 7.4e-12, 7e-12])
+    assert unusual("frf_pc_per_n", [7.4, -7.4]) == []
+    found = unusual("frf_pc_per_n", [7.4, 7.4e-12, 7e-12])
     assert [(finding.field, finding.index) for finding in found] == [("frf_pc_per_n", 1)]
     assert "7.4 pC/N: was it given in C/N? (1 more rows like it)" in found[0].statement
-    assert "dead sensor" in findings("frf_pc_per_n", 0.0)[0].statement
+    assert "dead sensor" in unusual("frf_pc_per_n", 0.0)[0].statement

@@ -10,7 +10,29 @@ UnderskinError
 └── Unreachable       no answer from the server: nothing listens there, or time ran out (raised by the client)
 """
 
+from enum import StrEnum
 from typing import Any
+
+
+class ErrorCode(StrEnum):
+    """What kind of error a value or a file has; docs/findings.md explains each."""
+
+    INVALID_VALUE = "invalid_value"
+    REQUIRED = "required"
+    UNKNOWN_FIELD = "unknown_field"
+    WRONG_TYPE = "wrong_type"
+    NOT_FINITE = "not_finite"
+    OUT_OF_RANGE = "out_of_range"
+    UNLIKELY_MAGNITUDE = "unlikely_magnitude"
+    NOT_ONE_OF = "not_one_of"
+    NOT_UNIQUE = "not_unique"
+    NOT_INCREASING = "not_increasing"
+    UNEQUAL_LENGTHS = "unequal_lengths"
+    TOO_FEW = "too_few"
+    CONFLICTING = "conflicting"
+    UNUSABLE_SIGNAL = "unusable_signal"
+    UNREADABLE_FILE = "unreadable_file"
+    WHOLE_SKIN = "whole_skin"
 
 
 class UnderskinError(Exception):
@@ -21,29 +43,43 @@ class InvalidInput(UnderskinError, ValueError):
     """A value that cannot be used.
 
     Attributes: `field` (the name the user knows), `index` (row in a column, or None), `value`, `allowed`
-    (what would be accepted, in words).
+    (what would be accepted, in words), `code` (what kind of error it is).
     """
 
-    def __init__(self, field: str, value: Any, allowed: str, index: int | None = None) -> None:
+    def __init__(
+        self,
+        field: str,
+        value: Any,
+        allowed: str,
+        index: int | None = None,
+        *,
+        code: ErrorCode = ErrorCode.INVALID_VALUE,
+    ) -> None:
         self.field = field
         self.value = value
         self.allowed = allowed
         self.index = index
+        self.code = code
         place = field if index is None else f"{field}[{index}]"
         super().__init__(f"{place} = {value!r}: {allowed}")
+
+    def at(self, field: str) -> "InvalidInput":
+        """The same error of a field that is called differently from outside."""
+        return InvalidInput(field, self.value, self.allowed, self.index, code=self.code)
 
 
 class FileError(UnderskinError):
     """A file that cannot be read.
 
     Attributes: `file` (the name the user knows), `place` (line, field or byte; empty where the whole file is meant),
-    `reason`.
+    `reason`, `code` (what kind of error it is).
     """
 
-    def __init__(self, file: str, place: str, reason: str) -> None:
+    def __init__(self, file: str, place: str, reason: str, *, code: ErrorCode = ErrorCode.UNREADABLE_FILE) -> None:
         self.file = file
         self.place = place
         self.reason = reason
+        self.code = code
         super().__init__(": ".join(part for part in (file, place, reason) if part))
 
 

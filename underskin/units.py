@@ -10,11 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from underskin.errors import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput
+from underskin.findings import sentences
+from underskin.findings.arguments import UnitGuess
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.requirement import UNITS_CHECKED, Requirement
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+
+CONFIRM_UNITS = " (or set units_checked to true)"  # how a request confirms an unlikely magnitude
 
 
 @dataclass(frozen=True)
@@ -109,45 +115,40 @@ def checked(name: str, value: ArrayLike, *, units_checked: bool = False) -> Floa
     values = np.asarray(value, dtype=float)
     size = np.abs(values) if field.signed else values
     positive = "finite and not zero" if field.signed else "finite and greater than 0"
-    _refuse(name, values, ~(np.isfinite(values) & (size > 0)), f"must be {positive} ({field.unit})")
+    _refuse(
+        name, values, ~(np.isfinite(values) & (size > 0)), f"must be {positive} ({field.unit})", ErrorCode.OUT_OF_RANGE
+    )
     if field.likely is not None and not units_checked:
         low, high = field.likely
         unlikely = (size < low) | (size > high)
         if unlikely.any():
             first = float(size.flat[int(np.argmax(unlikely))])
-            _refuse(name, values, unlikely, _slip(field, first))
+            _refuse(name, values, unlikely, _slip(field, first), ErrorCode.UNLIKELY_MAGNITUDE)
     return values * field.to_si
 
 
 def non_negative(name: str, values: Floats) -> Floats:
     """`values`; raises InvalidInput at the first row that is not finite or below 0."""
-    return _accepted(name, values, np.isfinite(values) & (values >= 0), "must be finite and at least 0")
+    return _accepted(
+        name, values, np.isfinite(values) & (values >= 0), "must be finite and at least 0", ErrorCode.OUT_OF_RANGE
+    )
 
 
 def finite(name: str, values: Floats) -> Floats:
     """`values`; raises InvalidInput at the first row that is not finite."""
-    return _accepted(name, values, np.isfinite(values), "must be finite")
+    return _accepted(name, values, np.isfinite(values), "must be finite", ErrorCode.NOT_FINITE)
 
 
-def _accepted(name: str, values: Floats, good: NDArray[np.bool_], allowed: str) -> Floats:
+def _accepted(name: str, values: Floats, good: NDArray[np.bool_], allowed: str, code: ErrorCode) -> Floats:
     if not good.all():
         first = int(np.argmin(good.ravel()))
         row = int(np.unravel_index(first, values.shape)[0]) if values.ndim else None
-        raise InvalidInput(name, float(values.flat[first]), allowed, index=row)
+        raise InvalidInput(name, float(values.flat[first]), allowed, index=row, code=code)
     return values
 
 
-@dataclass(frozen=True)
-class Finding:
-    """A measured value that looks wrong but is used all the same: the row, and what to look at."""
-
-    field: str
-    index: int | None
-    statement: str
-
-
-def findings(name: str, value: ArrayLike) -> list[Finding]:
-    """The first entry of a measured field of unlikely magnitude, if any: a wrong unit, or a dead sensor.
+def unusual(name: str, value: ArrayLike) -> list[Finding]:
+    """The first entry of a measured field whose magnitude looks like a slip of units or a dead sensor, if any.
 
     Measured values are never rejected for their magnitude, unlike declared ones (`checked`).
     """
@@ -160,16 +161,19 @@ def findings(name: str, value: ArrayLike) -> list[Finding]:
         return []
     first = int(np.argmax(unlikely))
     number = float(values.flat[first])
-    guess = "a dead sensor?" if number == 0 else _guess(field, abs(number))
-    more = int(unlikely.sum()) - 1
-    others = f" ({more} more rows like it)" if more else ""
-    return [Finding(name, first if values.ndim else None, f"{number:g} {field.unit} is unusual: {guess}{others}")]
+    arguments = {
+        "value": number,
+        "unit": field.unit,
+        "guess": _guess(field, abs(number)),
+        "more": int(unlikely.sum()) - 1,
+    }
+    return [Finding(Reason.UNUSUAL_MAGNITUDE, "", name, arguments, index=first if values.ndim else None)]
 
 
-def _refuse(name: str, values: Floats, bad: NDArray[np.bool_], allowed: str) -> None:
+def _refuse(name: str, values: Floats, bad: NDArray[np.bool_], allowed: str, code: ErrorCode) -> None:
     if bad.any():
         first = int(np.argmax(bad))
-        raise InvalidInput(name, float(values.flat[first]), allowed, index=first if values.ndim else None)
+        raise InvalidInput(name, float(values.flat[first]), allowed, index=first if values.ndim else None, code=code)
 
 
 def _slip(field: LabField, size: float) -> Requirement:
@@ -177,20 +181,22 @@ def _slip(field: LabField, size: float) -> Requirement:
     assert field.likely is not None
     low, high = field.likely
     text = f"must be {low:g} to {high:g} {field.unit} in magnitude"
-    return Requirement(text, UNITS_CHECKED, f"; {_guess(field, size)}")
+    return Requirement(text, UNITS_CHECKED, f"; {sentences.unit_guess(_guess(field, size))}")
 
 
-def _guess(field: LabField, size: float) -> str:
+def _guess(field: LabField, size: float) -> UnitGuess:
     """The wrong unit that would explain a magnitude outside the likely range."""
     assert field.likely is not None
     low, high = field.likely
+    if size == 0:
+        return UnitGuess(size, field.unit)
     for factor, unit in _NEIGHBOURS[field.unit].items():
         if _usual(size * factor, low, high):
-            return f"{size:g} {unit} is {size * factor:g} {field.unit}: was it given in {unit}?"
+            return UnitGuess(size, field.unit, size * factor, given_in=unit)
     for power in (3, 6, 9, 12, -3, -6, -9, -12):
         if _usual(size * 10.0**power, low, high):
-            return f"off by a factor of 10^{-power}? {size * 10.0**power:g} {field.unit} would be usual"
-    return "no unit that we know explains it"
+            return UnitGuess(size, field.unit, size * 10.0**power, off_by=-power)
+    return UnitGuess(size, field.unit)
 
 
 def _usual(size: float, low: float, high: float) -> bool:

@@ -95,7 +95,7 @@ def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> 
                 raise InvalidInput(RIG, upload.label, f"{error.place}: {error.reason}".lstrip(": ")) from None
             except InvalidInput as error:
                 label = f"{upload.label}: " if upload.label else f"{RIG}."
-                raise InvalidInput(f"{label}{error.field}", error.value, error.allowed) from None
+                raise error.at(f"{label}{error.field}") from None
     with store.reading() as connection:
         names = [options.skin] if options.skin is not None else []
         if options.corrects is not None:
@@ -154,7 +154,7 @@ def _kept(
     connection: Connection, checked: CheckedCampaign, options: IngestOptions, rig: RigDescription | None
 ) -> dict[str, Any]:
     refused = [{"id": entry["id"], "status": "refused", "errors": entry["errors"]} for entry in checked.refused]
-    findings = [] if checked.campaign is None else list(plausibility.in_words(checked.campaign))
+    findings = [] if checked.campaign is None else [one.sentence for one in plausibility.implausible(checked.campaign)]
     result: dict[str, Any] = {
         "file": checked.file,
         "errors": checked.errors,

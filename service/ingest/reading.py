@@ -12,7 +12,7 @@ from service.middleware.unique_keys import require_unique_keys
 from service.problems import Refusal
 from service.store import skins
 from underskin import InvalidInput
-from underskin.errors import FileError
+from underskin.errors import ErrorCode, FileError
 from underskin.recordings import join
 from underskin.recordings.campaign import Campaign, from_dict
 from underskin.recordings.channels import Contents
@@ -94,9 +94,8 @@ def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> In
         _require_usable(reading.campaign)
     except FileError as error:
         allowed = Requirement(Mention(error.place), ": ", error.reason) if error.place else error.reason
-        return InspectedFile(
-            kind, contents, [ReadCampaign(upload.label, errors=[_error("file", upload.label, allowed)])]
-        )
+        errors = [_error("file", upload.label, allowed, error.code)]
+        return InspectedFile(kind, contents, [ReadCampaign(upload.label, errors=errors)])
     except InvalidInput as error:
         return InspectedFile(kind, contents, [ReadCampaign(upload.label, errors=[_invalid(error)])])
     return InspectedFile(kind, contents, [ReadCampaign(upload.label, reading, by_rig=rig is not None)])
@@ -112,7 +111,7 @@ def checked(read: ReadCampaign) -> CheckedCampaign:
     for number, problem in enumerate(read.reading.problems):
         errors = refused.setdefault(problem.recording, [])
         if number < _MOST_ERRORS:
-            errors.append(_error(problem.field, problem.value, problem.allowed))
+            errors.append(_error(problem.field, problem.value, problem.allowed, problem.code))
     count = len(read.reading.problems)
     unlisted = max(0, count - _MOST_ERRORS)
     if unlisted:
@@ -165,14 +164,17 @@ def _read_json(upload: Upload, most_bytes: int) -> list[ReadCampaign]:
                 400, f"The body is not JSON: line {error.lineno}, column {error.colno}: {error.msg}."
             ) from None
         allowed = f"must be JSON; line {error.lineno}, column {error.colno}: {error.msg}"
-        return [ReadCampaign(upload.label, errors=[_error("file", upload.label, allowed)])]
+        return [ReadCampaign(upload.label, errors=[_error("file", upload.label, allowed, ErrorCode.UNREADABLE_FILE)])]
     try:
         require_unique_keys(content)
     except Refusal as twice:
         return [
             ReadCampaign(
                 upload.label,
-                errors=[_error(error["field"], error["value"], error["allowed"]) for error in twice.errors],
+                errors=[
+                    _error(error["field"], error["value"], error["allowed"], ErrorCode.NOT_UNIQUE)
+                    for error in twice.errors
+                ],
             )
         ]
     if not isinstance(document, list):
@@ -197,13 +199,15 @@ def _checked(label: str | None, document: Any) -> ReadCampaign:
 
 
 def _nothing(refused: int) -> dict[str, Any]:
-    return _error("recordings", f"{refused} refused", "must hold at least one recording without errors")
+    return _error(
+        "recordings", f"{refused} refused", "must hold at least one recording without errors", ErrorCode.TOO_FEW
+    )
 
 
 def _invalid(error: InvalidInput) -> dict[str, Any]:
     place = error.field if error.index is None else f"{error.field}[{error.index}]"
-    return _error(place, error.value, error.allowed)
+    return _error(place, error.value, error.allowed, error.code)
 
 
-def _error(name: str, value: Any, allowed: str) -> dict[str, Any]:
-    return {"field": name, "value": value, "allowed": allowed}
+def _error(name: str, value: Any, allowed: str, code: ErrorCode) -> dict[str, Any]:
+    return {"code": str(code), "field": name, "value": value, "allowed": allowed}

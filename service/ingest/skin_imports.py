@@ -117,7 +117,7 @@ def _naming_the_part(upload: Upload, place: str) -> Iterator[None]:
     try:
         yield
     except InvalidInput as error:
-        raise InvalidInput(f"{place}{error.field}", error.value, error.allowed, error.index) from None
+        raise error.at(f"{place}{error.field}") from None
     except FileError as error:
         raise InvalidInput("file", upload.label, f"{error.place}: {error.reason}".lstrip(": ")) from None
     except (ValidationError, KeyError, TypeError) as error:

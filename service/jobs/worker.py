@@ -68,6 +68,8 @@ def _work(job: Job, campaign: bytes, say: Callable[[dict[str, Any]], None]) -> N
     from underskin.diagnosis.reporting.figures import figures
     from underskin.diagnosis.reporting.report import report
     from underskin.errors import TableError
+    from underskin.findings.codes import Reason
+    from underskin.findings.finding import Finding
     from underskin.process_limits import limit_process
     from underskin.recordings.campaign import parse
     from underskin.surrogate.sigma_table import load_table
@@ -83,8 +85,7 @@ def _work(job: Job, campaign: bytes, say: Callable[[dict[str, Any]], None]) -> N
         return
     document = report(diagnosis)
     left_out = [
-        {"code": "excluded", "recording": name, "field": "", "statement": f"Left out: {reason}"}
-        for name, reason in job.excluded
+        Finding(Reason.EXCLUDED, name, "", {"excluded_for": reason}).in_report() for name, reason in job.excluded
     ]
     say({"report": {**document, "findings": left_out + list(document["findings"])}})
     say({"figures": {name: figure.to_json() for name, figure in figures(diagnosis, document).items()}})

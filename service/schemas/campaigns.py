@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from underskin import InvalidInput
+from underskin.errors import ErrorCode
 
 State = Literal["current", "corrected", "withdrawn"]
 
@@ -45,6 +46,9 @@ class SendOptions(BaseModel):
 class Refused(BaseModel):
     """What is wrong with one value."""
 
+    code: ErrorCode = Field(
+        default=ErrorCode.INVALID_VALUE, description="The kind of error; docs/findings.md explains each."
+    )
     field: str = Field(description="The field, with its row where it is a column.", examples=["preload_n"])
     value: Any = Field(description="What was sent; null where nothing was.")
     allowed: str = Field(description="What would be accepted.")

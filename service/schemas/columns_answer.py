@@ -11,6 +11,7 @@ from pydantic import BaseModel, Field
 
 from service.schemas.columns import Status
 from underskin.columns import statuses, to_csv
+from underskin.findings.codes import FindingCode
 from underskin.units import Floats
 
 
@@ -27,6 +28,7 @@ class AnswerInColumns(BaseModel):
 class FindingModel(BaseModel):
     """A value that looks wrong."""
 
+    code: FindingCode = Field(description="The kind of finding; docs/findings.md explains each.")
     field: str = Field(description="Name of the field.")
     index: int | None = Field(description="First such row, from 0; null for a single value.")
     statement: str = Field(description="What is unusual, and a guess at the reason.")

@@ -174,9 +174,9 @@ def _inverted(
     except InvalidInput as error:
         if band_hz is not None and error.field == "band_hz":
             raise
-        findings = list(plausibility.in_words(campaign))
+        findings = [finding.sentence for finding in plausibility.implausible(campaign)]
         return {**_none(str(error)), "findings": findings, "moduli": moduli, "left_out": silent}, None
-    left_out = [{"recording": None, "reason": reason} for reason in inversion.left_out]
+    left_out = [{"recording": None, "reason": left.sentence} for left in inversion.left_out]
     return {**of_inversion(inversion), "moduli": moduli, "left_out": left_out + silent}, inversion
 
 

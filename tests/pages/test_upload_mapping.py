@@ -10,7 +10,7 @@ from service.pages.upload.file_summary import ChannelSummary
 from service.pages.upload.mapping import CHANNELS, KINDS, document_of, field_words, guessed, sensors_text, what_to_do
 from underskin import InvalidInput
 from underskin.recordings import rig_description
-from underskin.requirement import REQUIRED, Mention, Requirement
+from underskin.requirement import Mention, Requirement
 from underskin.units import checked
 
 RIGS = sorted((Path(__file__).parents[2] / "examples" / "formats" / "rigs").glob("*.yaml"))
@@ -81,16 +81,16 @@ def test_both_parts_of_an_frf_are_guessed_and_complex_ones_and_the_sample_rate()
 
 def test_what_is_missing_is_said_in_the_form_s_words() -> None:
     assert field_words("frf_im_pc_per_n") == "FRF, imaginary part"
-    missing = {"field": "frf_im_pc_per_n", "value": None, "allowed": REQUIRED}
+    missing = {"code": "required", "field": "frf_im_pc_per_n", "value": None, "allowed": "required"}
     assert what_to_do(missing) == "required: say below which channel it is"
     needs = " needs one of force, such as N"
     refused = Requirement("channel 'force_n': its unit 'V' is one of voltage; ", Mention("force_n"), needs)
-    told = what_to_do({"field": "file", "value": "x.csv", "allowed": refused})
+    told = what_to_do({"code": "unreadable_file", "field": "file", "value": "x.csv", "allowed": refused})
     assert told == "channel 'force_n': its unit 'V' is one of voltage; force needs one of force, such as N"
     with pytest.raises(InvalidInput) as error:
         checked("thickness_mm", 2500.0)
     unlikely = error.value.allowed
-    told = what_to_do({"field": "skin.thickness_mm", "value": 2500, "allowed": unlikely})
+    told = what_to_do({"code": "unlikely_magnitude", "field": "skin.thickness_mm", "value": 2500, "allowed": unlikely})
     assert "(or tick “Take unlikely magnitudes as they are”)" in told
     assert "units_checked" not in told
     assert "fill it in below" in what_to_do({**missing, "field": "sample_rate_hz"})

@@ -15,7 +15,7 @@ from underskin.errors import InvalidInput
 from underskin.recordings import validation as field
 from underskin.recordings.conditions import Sensors
 from underskin.recordings.readers import json_file
-from underskin.recordings.validation import shown
+from underskin.recordings.shown_values import shown
 from underskin.requirement import Mention, Requirement
 from underskin.units import Floats
 

@@ -4,16 +4,18 @@ Where the skin's length and width are given, it is taken to be centred on the mi
 """
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from underskin.array_stress.request import LabContact, LoadCase, PressureMap
 from underskin.errors import InvalidInput
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.physics import hertz
 from underskin.requirement import Mention, Requirement
-from underskin.units import Finding, Floats, to_lab, to_si
-from underskin.units import findings as unusual
+from underskin.units import Floats, to_lab, to_si, unusual
 
 MOST_PAIRS = 50_000_000  # of a sensor and a point force: about ten seconds
 _WIDEST_CELL = 12.0  # thicknesses; no sensor is influenced from further away
@@ -96,15 +98,8 @@ def findings(request: LoadCase) -> list[Finding]:
     slipping = [(_shear(contact) / contact.normal_force_n, i) for i, contact in enumerate(request.contacts)]
     return [
         *_about_sensors(request),
-        *_worst(
-            ((load, i) for load, i in strained if load > _LINEAR),
-            "L = F/(R²E) is {:.2g}: the layer is linear here, and finite strain is left out; "
-            "it adds up to 1.3 % at L = 0.01 and 3 % at L = 0.1 to the stress on a sensor beneath a sphere",
-        ),
-        *_worst(
-            ((ratio, i) for ratio, i in slipping if ratio > 1),
-            "the tangential force is {:.3g} times the normal one: it slips unless friction is stronger",
-        ),
+        *_worst(Reason.LOAD_NOT_LINEAR, "load_parameter", ((load, i) for load, i in strained if load > _LINEAR)),
+        *_worst(Reason.CONTACT_SLIPS, "ratio", ((ratio, i) for ratio, i in slipping if ratio > 1)),
     ]
 
 
@@ -118,26 +113,28 @@ def _about_sensors(request: LoadCase) -> Iterator[Finding]:
     first = int(np.argmin(distance))
     other = next(int(i) for i in nearest[first] if i != first)
     if distance[first] < 2 * request.sensor_radius_mm * (1 - _ROUNDING):
-        pair = f"{request.sensors[first].id} and {request.sensors[other].id}"
-        statement = f"{pair} lie over one another, their centres {distance[first]:g} mm apart: are x and y in mm?"
-        yield Finding(f"sensors[{first}]", None, statement)
+        arguments = {
+            "first": request.sensors[first].id,
+            "second": request.sensors[other].id,
+            "distance_mm": float(distance[first]),
+        }
+        yield Finding(Reason.SENSORS_OVERLAP, "", f"sensors[{first}]", arguments)
 
 
-def _worst(cases: Iterable[tuple[float, int]], statement: str) -> Iterator[Finding]:
-    """One finding about the worst of all such contacts."""
-    several = sorted(cases, reverse=True)
-    if several:
-        value, index = several[0]
-        others = f" ({len(several) - 1} more contacts like it)" if len(several) > 1 else ""
-        yield Finding(f"contacts[{index}]", None, statement.format(value) + others)
+def _worst(reason: Reason, name: str, contacts: Iterable[tuple[float, int]]) -> Iterator[Finding]:
+    """One finding for all contacts alike, about the worst of them; `name` is the argument that holds its value."""
+    ranked = sorted(contacts, reverse=True)
+    if ranked:
+        value, index = ranked[0]
+        yield Finding(reason, "", f"contacts[{index}]", {name: value, "more": len(ranked) - 1})
 
 
 def _about_places(given: PressureMap, sensor_radius_mm: float) -> Iterator[Finding]:
     for name, positions in (("x_mm", given.x_mm), ("y_mm", given.y_mm)):
         span = float(np.ptp(positions))
         if span < _NARROW * sensor_radius_mm:
-            statement = f"the map spans {span:g} mm, on sensors {2 * sensor_radius_mm:g} mm across: is it in mm?"
-            yield Finding(f"pressure_map.{name}", None, statement)
+            arguments = {"span_mm": span, "diameter_mm": 2 * sensor_radius_mm}
+            yield Finding(Reason.NARROW_MAP, "", f"pressure_map.{name}", arguments)
 
 
 def _about_map(given: PressureMap, modulus: float | None) -> Iterator[Finding]:
@@ -147,10 +144,9 @@ def _about_map(given: PressureMap, modulus: float | None) -> Iterator[Finding]:
     if highest == 0:
         return
     if modulus is not None and highest > modulus:
-        statement = f"{highest:g} MPa is more than the layer's modulus, {modulus:g} MPa: it is far from linear there"
-        yield Finding(place, None, statement)
+        yield Finding(Reason.PRESSURE_NOT_LINEAR, "", place, {"pressure_mpa": highest, "modulus_mpa": modulus})
     for finding in unusual("pressure_mpa", highest):
-        yield Finding(place, None, finding.statement)
+        yield replace(finding, field=place)
 
 
 def _load_parameter(contact: LabContact, modulus: float) -> float:

@@ -53,21 +53,22 @@ class InvertedFile:
         """Findings in words, and each recording or sensor that is left out."""
         notes = [f"look at: {warning}" for warning in self.reading.warnings]
         campaign = self.reading.campaign
-        findings = self.inversion.findings if isinstance(self.inversion, Inversion) else plausibility.in_words(campaign)
-        notes += [f"look at: {finding}" for finding in findings]
+        findings = (
+            self.inversion.findings if isinstance(self.inversion, Inversion) else plausibility.implausible(campaign)
+        )
+        notes += [f"look at: {finding.sentence}" for finding in findings]
         if not isinstance(self.inversion, Inversion) and not self.moduli:
             refused = len(self.reading.problems)
             all_refused = refused and not campaign.recordings
             why = f"none of the {refused} recordings can be used" if all_refused else self.inversion
             notes.append(f"no d33: {why}")
         for problem in self.reading.problems:
-            error = InvalidInput(problem.field, problem.value, problem.allowed)
-            notes.append(f"left out: recording {problem.recording}: {error}")
+            notes.append(f"left out: recording {problem.recording}: {problem.as_error(problem.field)}")
         for modulus in self.moduli:
             if isinstance(modulus.found, InvalidInput):
                 notes.append(f"left out: recording {modulus.recording}: {modulus.found}")
         if isinstance(self.inversion, Inversion):
-            notes += [f"left out: {left}" for left in self.inversion.left_out]
+            notes += [f"left out: {left.sentence}" for left in self.inversion.left_out]
         return notes
 
 

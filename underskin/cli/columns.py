@@ -12,8 +12,9 @@ from rich.text import Text
 
 from underskin.columns import CsvError, from_csv, statuses, to_csv
 from underskin.errors import InvalidInput, UnderskinError
+from underskin.findings.finding import Finding
 from underskin.formatting import significant
-from underskin.units import LAB, Finding, Floats
+from underskin.units import LAB, Floats
 
 STANDARD_INPUT = "-"
 

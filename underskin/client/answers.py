@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from underskin.units import Finding, Floats
+from underskin.units import Floats
 
 
 @dataclass(frozen=True)
@@ -17,6 +17,16 @@ class ServiceAnswer:
     model: str
     table_sha256: str | None
     status: NDArray[np.str_]
+
+
+@dataclass(frozen=True)
+class FindingAnswer:
+    """A value that looks wrong: its field, the first such row (None for a single value), in words, and its code."""
+
+    field: str
+    index: int | None
+    statement: str
+    code: str = ""  # older servers send none
 
 
 @dataclass(frozen=True)
@@ -59,7 +69,7 @@ class D33Answer(PressedSkinAnswer):
     frf_uncertainty_pc_per_n: Floats
     d33_pc_per_n: Floats
     d33_uncertainty_pc_per_n: Floats
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[FindingAnswer, ...] = ()
     model_id: str | None = None
     frf_im_pc_per_n: Floats | None = None
 
@@ -79,7 +89,7 @@ class StressAnswer(ServiceAnswer):
     mean_stress_mpa: Floats
     reach_mm: float
     contact_radius_mm: Floats
-    findings: tuple[Finding, ...]
+    findings: tuple[FindingAnswer, ...]
 
 
 @dataclass(frozen=True)

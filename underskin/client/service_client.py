@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from underskin.client.answers import (
     Adopted,
     D33Answer,
+    FindingAnswer,
     FrfAnswer,
     ServiceAnswer,
     SigmaAnswer,
@@ -32,7 +33,7 @@ from underskin.client.answers import (
 from underskin.client.campaigns import Campaigns, Skins
 from underskin.client.diagnoses import Diagnoses
 from underskin.client.http_session import Session
-from underskin.units import Finding, Floats
+from underskin.units import Floats
 
 _Answer = TypeVar("_Answer", bound=ServiceAnswer)
 
@@ -218,7 +219,7 @@ def _field(name: str, document: Mapping[str, Any], single: bool) -> Any:
     """A field of the answer: an array, without its rows' axis where single numbers were given."""
     value = document.get(name)
     if name == "findings":
-        return tuple(Finding(**finding) for finding in value or ())
+        return tuple(FindingAnswer(**finding) for finding in value or ())
     if not isinstance(value, list):
         return value
     array = np.array(value) if name in ("status", "sensor") else np.array(value, dtype=float)  # None becomes NaN

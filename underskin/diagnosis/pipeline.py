@@ -13,17 +13,18 @@ from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.inference.residuals import residuals, whole_prediction
 from underskin.diagnosis.localisation.effect_size import effect
-from underskin.diagnosis.localisation.permutation_test import SEED, in_region, locate, region
+from underskin.diagnosis.localisation.permutation_test import SEED, locate
+from underskin.diagnosis.localisation.region import in_region, region
 from underskin.diagnosis.localisation.residual_shape import (
+    above_noise,
     contradicts,
     describe,
     largest_floor_percent,
-    worth_telling,
 )
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import Limits
 from underskin.diagnosis.reporting.report import Diagnosis, report
-from underskin.diagnosis.screening.curve_unit_errors import without_slips
+from underskin.diagnosis.screening.curve_unit_errors import without_inconsistent
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.physical_limits import without_extremes
 from underskin.diagnosis.screening.unusable_curves import without_unusable
@@ -32,10 +33,12 @@ from underskin.diagnosis.selection.search import Search, search
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import confounding, left_open
 from underskin.diagnosis.validation.platen_seating import without_seating
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
-from underskin.recordings.finding import Finding
 from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -54,48 +57,48 @@ def diagnose(
     Deterministic, but for a campaign that states times to come (underskin.campaign_findings). Raises InvalidInput where
     the campaign has no FRF recording.
     """
-    found = _diagnosed(campaign, table, progress, limits)
-    return replace(found, findings=tuple(dict.fromkeys((*implausible(campaign), *found.findings))))
+    diagnosis = _diagnosed(campaign, table, progress, limits)
+    return replace(diagnosis, findings=tuple(dict.fromkeys((*implausible(campaign), *diagnosis.findings))))
 
 
 def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits: Limits) -> Diagnosis:
     provenance = _provenance(table)
     progress(0.05)
     possible = without_extremes(campaign)
-    if possible.found and possible.lacking:
-        return Diagnosis(campaign.name, possible.found, provenance, lacking=possible.lacking)
-    campaign, left_out = possible.campaign, list(possible.found)
+    if possible.findings and possible.lacking:
+        return Diagnosis(campaign.name, possible.findings, provenance, lacking=possible.lacking)
+    campaign, findings = possible.campaign, list(possible.findings)
     for kind in () if any(isinstance(entry, FrfRecording) for entry in campaign.recordings) else _CURVES:
         if all(entry.kind != kind for entry in campaign.recordings):
             continue
-        usable, found = without_unusable(campaign, kind)
-        curves = without_slips(usable, kind)
-        left_out += [*found, *curves.found]
-        if curves.found and curves.lacking:
-            return Diagnosis(campaign.name, left_out, provenance, lacking=curves.lacking)
+        usable, unusable = without_unusable(campaign, kind)
+        curves = without_inconsistent(usable, kind)
+        findings += [*unusable, *curves.findings]
+        if curves.findings and curves.lacking:
+            return Diagnosis(campaign.name, findings, provenance, lacking=curves.lacking)
         rows = curve_lines(curves.campaign, kind)
         if rows.recordings:
             problem = FittingProblem(rows, table)
             result = search(problem)
             seated = without_seating(curves.campaign, result.answers[0].names, table) if kind == "compression" else None
             if seated is not None:
-                problem, said = seated
-                left_out, result = [*left_out, said], search(problem)
-            return _work_out(campaign.name, problem, result, left_out, provenance, progress, limits)
+                problem, seating = seated
+                findings, result = [*findings, seating], search(problem)
+            return _work_out(campaign.name, problem, result, findings, provenance, progress, limits)
     frf = tuple(entry for entry in campaign.recordings if isinstance(entry, FrfRecording))
     inspected = inspect(replace(campaign, recordings=frf), table)
-    found = [*left_out, *inspected.found]
+    findings += inspected.findings
     if inspected.lacking:
-        return Diagnosis(campaign.name, found, provenance, lacking=inspected.lacking)
+        return Diagnosis(campaign.name, findings, provenance, lacking=inspected.lacking)
     problem = frf_problem(inspected.campaign, inspected.uneven, table)
-    return _work_out(campaign.name, problem, search(problem), found, provenance, progress, limits)
+    return _work_out(campaign.name, problem, search(problem), findings, provenance, progress, limits)
 
 
 def _work_out(
     name: str,
     problem: FittingProblem,
     result: Search,
-    found: Sequence[Finding],
+    findings: Sequence[Finding],
     provenance: dict[str, Any],
     progress: Progress,
     limits: Limits,
@@ -125,12 +128,11 @@ def _work_out(
         shown = result.shown_or_nothing(leader)
     floor = largest_floor_percent(problem, nothing, groups)
     if leader.explanation is nothing and floor > _LARGEST_FLOOR:
-        lacking = f"a response that stands out of its noise, which is {floor:.0f} % of what is predicted"
-        return Diagnosis(name, found, provenance, lacking=lacking)
-    shape = describe(problem, shown) if leader.explanation is None else ""
+        return Diagnosis(name, findings, provenance, lacking=Lacking(Lack.NOISE, {"floor_percent": floor}))
+    shape = describe(problem, shown) if leader.explanation is None else None
     return Diagnosis(
         name,
-        (*found, *worth_telling(problem, shown, groups)),
+        (*findings, *above_noise(problem, shown, groups)),
         provenance,
         search=result,
         problem=problem,
@@ -151,23 +153,30 @@ def diagnosis_report(
     refused: Sequence[RecordingProblem] = (),
 ) -> dict[str, Any]:
     """The report of a campaign's diagnosis (`report/1`); `refused` recordings are named among the findings."""
-    found = with_refused(diagnose(campaign, table, progress), refused)
+    diagnosis = with_refused(diagnose(campaign, table, progress), refused)
     progress(1.0)
-    return report(found)
+    return report(diagnosis)
 
 
-def with_refused(found: Diagnosis, refused: Sequence[RecordingProblem]) -> Diagnosis:
+def with_refused(diagnosis: Diagnosis, refused: Sequence[RecordingProblem]) -> Diagnosis:
     """The diagnosis with recordings that were refused when they were read named first among its findings."""
     problems = [
-        Finding("refused", entry.recording, entry.field, f"{entry.field} = {entry.value!r}: {entry.allowed}; left out")
+        Finding(
+            Reason.REFUSED,
+            entry.recording,
+            entry.field,
+            {"field": entry.field, "value": entry.value, "allowed": entry.allowed},
+        )
         for entry in refused
     ]
-    lacking = found.lacking
+    lacking = diagnosis.lacking
     if lacking and problems:
-        fields = " and ".join(dict.fromkeys(entry.field for entry in refused))
-        count = len({entry.recording for entry in refused})
-        lacking = f"{count} recording(s) were refused for their {fields} (see findings), which leaves {lacking}"
-    return replace(found, findings=(*problems, *found.findings), lacking=lacking)
+        lacking = replace(
+            lacking,
+            refused_recordings=len({entry.recording for entry in refused}),
+            refused_fields=tuple(dict.fromkeys(entry.field for entry in refused)),
+        )
+    return replace(diagnosis, findings=(*problems, *diagnosis.findings), lacking=lacking)
 
 
 def _provenance(table: SigmaTable) -> dict[str, Any]:

@@ -64,7 +64,7 @@ def page(campaign: Campaign, inversion: Inversion) -> str:
         figure.to_html(full_html=False, include_plotlyjs=number == 0, div_id=f"figure-{number}")
         for number, figure in enumerate(figures(campaign, inversion))
     ]
-    notes = "".join(f"<li>{escape(note)}</li>" for note in (*inversion.findings, *inversion.left_out))
+    notes = "".join(f"<li>{escape(note.sentence)}</li>" for note in (*inversion.findings, *inversion.left_out))
     return _PAGE.format(
         title=escape(campaign.name),
         band=escape(

@@ -1,40 +1,44 @@
-"""What looks wrong in a campaign's FRF recordings and their d33 and is used all the same, in words."""
+"""Findings on a campaign's FRF recordings and their d33, which are used all the same."""
 
 from collections.abc import Sequence
+from dataclasses import asdict, replace
 
 import numpy as np
 
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.inversion.mixed_model import Estimate
 from underskin.prediction import plausibility
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import Frf
-from underskin.units import Floats, findings, to_lab
+from underskin.recordings.frf.signal_checks import mean_of
+from underskin.units import Floats, to_lab, unusual
 
-_CLEAR = 3.0  # standard deviations that a force's mean must be from 0 to be a preload, not what a coupling left
 _CONTRADICTS = 3.0  # times
 
 
-def in_words(
+def findings_of(
     recorded: Sequence[FrfRecording], measured: Sequence[Frf], level: Floats, array: Estimate | None
-) -> tuple[str, ...]:
-    """Of time series defects and the mean force, of the level [C/N] and of the array's d33 slips of units and sign."""
+) -> tuple[Finding, ...]:
+    """Of time series: defects, and a mean force that contradicts the preload; of the level [C/N] and of the array's
+    d33 slips of units and sign."""
     defects = [
-        f"recording {item.id}: {defect.statement}"
+        Finding(Reason.DEFECT, item.id, defect.channel, asdict(defect))
         for item, frf in zip(recorded, measured, strict=True)
-        for defect in frf.found
+        for defect in frf.defects
     ]
-    forces = [f"recording {item.id}: {said}" for item in recorded if (said := _force(item)) is not None]
     typical = to_lab("frf_pc_per_n", np.nanmedian(np.abs(level)))
-    slips = [f"FRF, median of the recordings: {one.statement}" for one in findings("frf_pc_per_n", typical)]
-    found = () if array is None else plausibility.of_array(float(to_lab("d33_pc_per_n", array.value)))
-    return (*defects, *forces, *slips, *found)
+    slips = [replace(finding, reason=Reason.UNUSUAL_MEDIAN_FRF) for finding in unusual("frf_pc_per_n", typical)]
+    doubts = [] if array is None else plausibility.of_array(float(to_lab("d33_pc_per_n", array.value)))
+    return (*defects, *_preloads(recorded), *slips, *doubts)
 
 
-def _force(recording: FrfRecording) -> str | None:
-    """The mean of a force that has one, where it contradicts the preload."""
-    if recording.force_n is None:
-        return None
-    mean, scatter = float(np.mean(recording.force_n)), float(np.std(recording.force_n))
-    if abs(mean) <= _CLEAR * scatter or 1 / _CONTRADICTS <= abs(mean) / recording.preload_n <= _CONTRADICTS:
-        return None
-    return f"force_n is {mean:.3g} N in the mean, but preload_n is {recording.preload_n:g}: is one in another unit?"
+def _preloads(recorded: Sequence[FrfRecording]) -> list[Finding]:
+    """The recordings whose force has a mean that contradicts the preload."""
+    findings = []
+    for recording in recorded:
+        mean = None if recording.force_n is None else mean_of(recording.force_n)
+        if mean is not None and not 1 / _CONTRADICTS <= abs(mean) / recording.preload_n <= _CONTRADICTS:
+            arguments = {"mean_n": mean, "preload_n": recording.preload_n}
+            findings.append(Finding(Reason.FORCE_CONTRADICTS_PRELOAD, recording.id, "force_n", arguments))
+    return findings

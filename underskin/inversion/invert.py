@@ -13,30 +13,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.errors import InvalidInput
-from underskin.inversion import findings, mixed_model
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.inversion import mixed_model
+from underskin.inversion.findings import findings_of
 from underskin.inversion.mixed_model import Estimate, MixedModel, Rows
-from underskin.inversion.outliers import strays
-from underskin.inversion.sensor_flags import Flag, standing_out, unfit
+from underskin.inversion.outliers import outlying
+from underskin.inversion.sensor_flags import Flag, population_flags, scatter_flags
 from underskin.physics.charge_response import gain
 from underskin.physics.skin import Indenter, Skin
 from underskin.prediction import domain_checks
 from underskin.prediction.domain_checks import usable
 from underskin.prediction.pressed_skin import Transmission, frf_gradient, transmission
-from underskin.recordings import plausibility
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.recordings.frf.flat_zone import FlatZone, band_average, flat_zone, stacked
+from underskin.recordings.plausibility import implausible
 from underskin.surrogate.off_centre_sigma import PositionedSigma, positioned_sigma
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_lab, to_si
 
 _LEAST_CHARGE = 1e-24  # FRF [C/N] that can be a measured one
-_MOST_REASONS = 3  # told where no recording can be used
+_MOST_REASONS = 3  # quoted where no recording can be used
 _MODULUS_UNSURE, _THICKNESS_UNSURE = 0.02, 0.01  # what a declared value may be off by
 
 
 class NoD33(InvalidInput):
-    """A campaign of which no d33 can be told; as text it is the reason."""
+    """A campaign from which no d33 can be computed; as text it is the reason."""
 
     def __str__(self) -> str:
         return self.allowed
@@ -86,41 +89,57 @@ class Inversion:
     spread: Estimate | None
     gain: Estimate | None
     position: Estimate | None
-    left_out: tuple[str, ...]  # in words, each sensor or recording that the campaign's d33 does without
-    findings: tuple[str, ...]  # in words, what looked wrong and was used all the same
+    left_out: tuple[Finding | Flag, ...]  # each recording or sensor that the campaign's d33 does without
+    findings: tuple[Finding, ...]  # what looks wrong and is used all the same
     declared_percent: float  # change of d33 for E 2 % and h 1 % off, in quadrature
 
 
 def invert(
     campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] | None = None, zone: FlatZone | None = None
 ) -> Inversion:
-    """The d33 of a campaign's `frf` recordings, over its flat zone or the band given; `zone`: as it was found before.
+    """The d33 of an array, Re FRF / ((3/2) ρ² σ) with ρ = rT/h, from the `frf` recordings of a campaign.
 
-    Raises InvalidInput where no line lies in that band; NoD33 where the campaign has no frf recording, none within the
-    table's domain, none with a line in the flat zone, or none with any charge.
+    Parameters
+    ----------
+    campaign : Campaign
+        The skin and its recordings.
+    table : SigmaTable
+        σ of a/h, rT/h and the load parameter L.
+    band_hz : (low, high), optional
+        The band that Re FRF is averaged over [Hz]; without it the flat zone.
+    zone : FlatZone, optional
+        The flat zone, where it is known.
+
+    Returns
+    -------
+    Inversion
+        d33 of recordings, cells, sensors and array in SI, the recordings and sensors left out, and findings.
+
+    Raises
+    ------
+    InvalidInput
+        No line lies in the band.
+    NoD33
+        No frf recording lies within the domain of the table, has a line in the flat zone, and any charge.
     """
     recorded = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
     if not recorded:
         raise NoD33("recordings", campaign.name, "there is no recording of kind frf in it")
-    measured, recorded, refused = _measured(recorded)
+    measured, recorded, left_out = _measured(recorded)
     if not recorded:
-        raise _none_usable(campaign, refused)
+        raise _none_usable(campaign, left_out)
     frfs = stacked(measured)
     zone = zone or flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
     contact = _Contact.of(campaign, recorded, table)
-    inside = usable(level, noise, contact.positioned.sigma, contact.felt)
-    reasons = domain_checks.reasons(recorded, campaign.skin, contact.felt, level, table)
-    refused += [
-        f"recording {item.id}: {reason}"
-        for item, reason, good in zip(recorded, reasons, inside, strict=True)
-        if not good
-    ]
+    inside = usable(level, noise, contact.positioned.sigma, contact.transmitted)
+    reasons = domain_checks.reasons(recorded, campaign.skin, contact.transmitted, level, table)
+    left_out += [reason for reason, good in zip(reasons, inside, strict=True) if not good]
     if not inside.any():
-        raise _none_usable(campaign, refused)
+        raise _none_usable(campaign, left_out)
     if np.abs(level[inside]).max() < _LEAST_CHARGE:
         raise NoD33("recordings", campaign.name, "there is no charge in any recording")
-    seen = gain(contact.positioned.sigma, contact.felt.rt_over_h)
+    seen = gain(contact.positioned.sigma, contact.transmitted.rt_over_h)
     d33, uncertainty = level / seen, noise / np.abs(seen)
     ids = tuple(dict.fromkeys(item.sensor for item in recorded))
     sensor = np.array([ids.index(item.sensor) for item in recorded])
@@ -133,48 +152,42 @@ def invert(
         frf_uncertainty=noise,
         line_scatter=scatter,
         sigma=np.where(inside, contact.positioned.sigma, np.nan),
-        rel_error=contact.felt.rel_error,
+        rel_error=contact.transmitted.rel_error,
         d33=np.where(inside, d33, np.nan),
         d33_uncertainty=np.where(inside, uncertainty, np.nan),
         inside=inside,
     )
-    found = _estimated(ids, rows, contact, zone)
-    looked_at = [
-        *plausibility.in_words(campaign),
-        *findings.in_words(recorded, measured, level, found.campaign_d33),
-    ]
-    return replace(found, left_out=(*refused, *found.left_out), findings=tuple(looked_at))
+    inversion = _estimated(ids, rows, contact, zone)
+    findings = (*implausible(campaign), *findings_of(recorded, measured, level, inversion.campaign_d33))
+    return replace(inversion, left_out=(*left_out, *inversion.left_out), findings=findings)
 
 
-def _none_usable(campaign: Campaign, refused: Sequence[str]) -> NoD33:
-    """Of a campaign whose recordings are all refused, each with the reason: the first reasons that differ."""
-    different = list({line.partition(": ")[2]: line for line in reversed(refused)}.values())[::-1]
-    more = (
-        f"; and {len(refused) - len(different[:_MOST_REASONS])} more"
-        if len(refused) > len(different[:_MOST_REASONS])
-        else ""
-    )
-    said = "; ".join(different[:_MOST_REASONS])
-    return NoD33("recordings", campaign.name, f"none of the {len(refused)} recordings can be used: {said}{more}")
+def _none_usable(campaign: Campaign, left_out: Sequence[Finding]) -> NoD33:
+    """Of a campaign whose recordings are all left out: the first reasons that differ."""
+    by_reason = {finding.statement: finding.sentence for finding in reversed(left_out)}
+    reasons = list(by_reason.values())[::-1][:_MOST_REASONS]
+    more = f"; and {len(left_out) - len(reasons)} more" if len(left_out) > len(reasons) else ""
+    allowed = f"none of the {len(left_out)} recordings can be used: {'; '.join(reasons)}{more}"
+    return NoD33("recordings", campaign.name, allowed)
 
 
-def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfRecording], list[str]]:
-    """The FRF of each recording that has one, those recordings, and in words why the others have none."""
-    frfs, kept, refused = [], [], []
+def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfRecording], list[Finding]]:
+    """The FRF of each recording that has one, those recordings, and findings on the others."""
+    frfs, with_frf, left_out = [], [], []
     for recording in recorded:
         try:
             frfs.append(lines_of(recording))
-            kept.append(recording)
-        except InvalidInput as error:
-            refused.append(f"recording {recording.id}: {error}")
-    return frfs, kept, refused
+            with_frf.append(recording)
+        except InvalidInput as refusal:
+            left_out.append(Finding(Reason.NO_FRF, recording.id, refusal.field, {"refusal": refusal}))
+    return frfs, with_frf, left_out
 
 
 @dataclass(frozen=True)
 class _Contact:
     """What the base model says of each recording's contact."""
 
-    felt: Transmission
+    transmitted: Transmission
     positioned: PositionedSigma
     thickness: float
     declared: Floats  # relative change of FRF for E and h off
@@ -194,7 +207,7 @@ class _Contact:
         )
         indenter = Indenter(to_si("indenter_radius_mm", [item.indenter_radius_mm for item in recorded]))
         preload = to_si("preload_n", [item.preload_n for item in recorded])
-        felt = transmission(table, skin, indenter, preload)
+        transmitted = transmission(table, skin, indenter, preload)
         centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in described.sensors}
         offset = [
             np.hypot(*np.subtract(item.position_mm or centres[item.sensor], centres[item.sensor])) for item in recorded
@@ -202,41 +215,41 @@ class _Contact:
         thickness = float(skin.thickness)
         positioned = positioned_sigma(
             table,
-            felt.a_over_h,
+            transmitted.a_over_h,
             float(skin.rt_over_h),
-            felt.load_parameter,
+            transmitted.load_parameter,
             to_si("thickness_mm", offset) / thickness,
             float(mixed_model.POSITIONS[-1]) / thickness,
         )
         slopes = frf_gradient(table, skin, indenter, preload, 1.0)
-        size = felt.frf(1.0)
+        size = transmitted.frf(1.0)
         declared = np.hypot(
             slopes["youngs_modulus"] * skin.youngs_modulus * _MODULUS_UNSURE / size,
             slopes["thickness"] * thickness * _THICKNESS_UNSURE / size,
         )
-        return cls(felt, positioned, thickness, declared)
+        return cls(transmitted, positioned, thickness, declared)
 
 
 def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone: FlatZone) -> Inversion:
     moments = [contact.positioned.scattered(p / contact.thickness) for p in mixed_model.POSITIONS]
     mean, variance = (np.array(part) for part in zip(*moments, strict=True))
-    stray = _strays(rows, np.sqrt((mean[-1] - 1) ** 2 + np.maximum(variance[-1], 0)))
-    good = np.setdiff1d(np.flatnonzero(rows.inside), stray)
+    outliers = _outliers(rows, np.sqrt((mean[-1] - 1) ** 2 + np.maximum(variance[-1], 0)))
+    good = np.setdiff1d(np.flatnonzero(rows.inside), outliers)
     sensor, d33, noise = rows.sensor[good], rows.d33[good], rows.d33_uncertainty[good]
-    misfits, pilot = unfit(sensor, d33, noise, len(ids))
+    unfit, pilot = population_flags(ids, sensor, d33, noise)
     mean, variance = mean[:, good], variance[:, good]
     measured = Rows(d33, noise, pilot[sensor], mean, variance)
-    plain = np.array([number not in misfits for number in sensor])
+    plain = np.array([number not in unfit for number in sensor])
     model = None
     if plain.any():
         numbered = np.unique(sensor[plain], return_inverse=True)[1]
         model = mixed_model.fit(measured.part(plain), numbered)
     scatter = model.scatter if model else mixed_model.prior_scatter()
     cell, where, count = _cells(rows, good)
-    flags = [Flag(ids[number], *misfit) for number, misfit in misfits.items()]
+    flags = list(unfit.values())
     if model:
         expected = _expected_scatter(model, measured)[plain]
-        flags += standing_out(ids, sensor[plain], rows, good[plain], pilot, expected)
+        flags += scatter_flags(ids, sensor[plain], rows, good[plain], pilot, expected)
     return Inversion(
         sensor_ids=ids,
         recordings=rows,
@@ -251,17 +264,17 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
         spread=model.spread if model and len(set(sensor[plain])) > 1 else None,
         gain=model.gain if model else None,
         position=model.position if model else None,
-        left_out=_left_out(ids, rows, stray, misfits),
+        left_out=_left_out(rows, outliers, list(unfit.values())),
         findings=(),
         declared_percent=100 * float(np.nanmedian(contact.declared[good])),
     )  # fmt: skip
 
 
-def _strays(rows: RecordingD33, position: Floats) -> NDArray[np.intp]:
-    """The rows inside that are grossly off; `position` as `strays` takes it."""
+def _outliers(rows: RecordingD33, position: Floats) -> NDArray[np.intp]:
+    """The rows inside whose d33 is far off all others; `position` as for `outlying`."""
     good = np.flatnonzero(rows.inside)
     condition = np.unique(np.column_stack([rows.indenter_radius, rows.preload])[good], axis=0, return_inverse=True)[1]
-    far = strays(rows.sensor[good], condition.reshape(-1), rows.d33[good], rows.d33_uncertainty[good], position[good])
+    far = outlying(rows.sensor[good], condition.reshape(-1), rows.d33[good], rows.d33_uncertainty[good], position[good])
     return good[far]
 
 
@@ -279,9 +292,9 @@ def _cells(rows: RecordingD33, good: NDArray[np.intp]) -> tuple[NDArray[np.intp]
     return cell.reshape(-1), good[where], count
 
 
-def _left_out(
-    ids: tuple[str, ...], rows: RecordingD33, stray: NDArray[np.intp], misfits: dict[int, tuple[str, str]]
-) -> tuple[str, ...]:
+def _left_out(rows: RecordingD33, outliers: NDArray[np.intp], unfit: Sequence[Flag]) -> tuple[Finding | Flag, ...]:
     d33 = to_lab("d33_pc_per_n", rows.d33)
-    off = [f"recording {rows.ids[row]}: its d33 of {d33[row]:.3g} pC/N is grossly off all others" for row in stray]
-    return (*off, *(f"sensor {ids[number]}: {reason}" for number, (_, reason) in misfits.items()))
+    findings = [
+        Finding(Reason.OUTLIER, rows.ids[row], "d33_pc_per_n", {"d33_pc_per_n": float(d33[row])}) for row in outliers
+    ]
+    return (*findings, *unfit)

@@ -77,7 +77,22 @@ class Scatter:
     weights: Floats
 
     def d33(self, rows: Rows, group: NDArray[np.intp], count: int) -> Estimate:
-        """The d33 of each of `count` groups of recordings, from those alone."""
+        """The d33 of each group of recordings, from the recordings of that group alone.
+
+        Parameters
+        ----------
+        rows : Rows
+            The recordings [C/N].
+        group : (rows,) array of int
+            The number of each one's group, from 0.
+        count : int
+            Number of groups.
+
+        Returns
+        -------
+        Estimate
+            d33 with standard uncertainty and 95 % interval [C/N], (count,) each; NaN for a group without recordings.
+        """
         design, weight = rows.moments()
         information = _sum_by_group(weight * design**2, group, count)
         moment = _sum_by_group(weight * design * rows.z, group, count)
@@ -107,9 +122,23 @@ class MixedModel:
 
 
 def fit(rows: Rows, sensor: NDArray[np.intp]) -> MixedModel:
-    """The model of recordings of sensors numbered from 0.
+    """The mixed model of recordings of an array.
 
-    With one sensor there is no spread to speak of, and the mean is that sensor's own d33.
+    Parameters
+    ----------
+    rows : Rows
+        The recordings [C/N].
+    sensor : (rows,) array of int
+        The number of each one's sensor, from 0.
+
+    Returns
+    -------
+    MixedModel
+        The array's d33 [C/N] and the scatters. With one sensor the spread is 0 and the mean is that sensor's own d33.
+
+    Source
+    ------
+    Restricted likelihood with the priors of the module; Gelman 2006 for that of the spread.
     """
     count = int(sensor.max()) + 1
     spreads = SPREADS if count > 1 else SPREADS[:1]

@@ -1,8 +1,8 @@
-"""Recordings so far off their sensor's others that something went wrong with them: a slip of units, a wrong range.
+"""Recordings that are far off the others of their sensor: a slip of units, or a wrong range of an instrument.
 
-One of these would rule the array's d33, whose mixed model takes recordings to be log-normal about their sensor's.
-Anything that a skin may really do is kept: what all sensors do under a condition, the scatter that the array shows, and
-what a misplaced sphere makes of a recording beside the centre.
+One of them would dominate the array's d33, since the mixed model takes recordings to be log-normal about their sensor's
+d33. What a skin may really do is no outlier: an effect of a condition on all sensors, the scatter that the array shows,
+and the effect of a misplaced sphere on a recording beside the centre.
 """
 
 import numpy as np
@@ -16,13 +16,25 @@ _LEAST_DEVIATION = 0.1  # of the array's d33: only recordings that are off by 80
 _ENOUGH = 3  # recordings for a sensor, sensors for a condition, to have a median that one of them does not rule
 
 
-def strays(
+def outlying(
     sensor: NDArray[np.intp], condition: NDArray[np.intp], d33: Floats, noise: Floats, position: Floats
 ) -> NDArray[np.bool_]:
-    """Which recordings lie beyond 8 robust deviations of their sensor's d33, as its condition changes all sensors'.
+    """Which recordings lie more than 8 robust deviations from their sensor's d33, less the effect of their condition.
 
-    `position` is each recording's relative deviation if the sphere is misplaced as far as spheres are. A sensor all of
-    whose recordings are off is no matter of recordings: none of its is named.
+    Where all recordings of a sensor are, the sensor is off and none of its recordings is an outlier.
+
+    Parameters
+    ----------
+    sensor, condition : (recordings,) arrays of int
+        The number of each recording's sensor, and of its condition (indenter and preload).
+    d33, noise : (recordings,) arrays
+        d33 of each recording and its standard uncertainty by line noise [C/N].
+    position : (recordings,) array
+        Relative deviation of each recording where the sphere is misplaced as far as spheres are.
+
+    Returns
+    -------
+    (recordings,) array of bool
     """
     array = typical_size(d33)
     own = _over_usual(sensor, d33, array)

@@ -1,5 +1,6 @@
 """Sensors that stand out of their array, each with the reason: dead, inverted, weak, strong, noisy or bent."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -8,13 +9,15 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 from scipy.stats import t as student
 
+from underskin.findings import english
+from underskin.findings.codes import Reason
 from underskin.units import Floats
 
 _DEAD = 0.05  # of the array's d33
 _LEAST_PILOT = 1e-3  # of the array's d33: a dead sensor may give exact zeros
 _OUTLYING = 5.0  # robust deviations
 _WEAK, _STRONG = 0.6, 1 / 0.6  # of the array's d33, and outlying
-_LEAST_SPREAD = 0.03  # of the array's d33, below which sensors are not told apart
+_LEAST_SPREAD = 0.03  # of the array's d33, below which sensors are not distinguished
 _NOISY = 3.0  # times the array's
 _LEAST_BEND = 0.05  # of d33
 _FALSE_ALARMS = 1e-3  # per array
@@ -22,11 +25,26 @@ _FALSE_ALARMS = 1e-3  # per array
 
 @dataclass(frozen=True)
 class Flag:
-    """A sensor that stands out: `code` is dead, inverted, weak, strong, noisy or bent; `reason` has the numbers."""
+    """A sensor that stands out of its array, why, and the values that the sentence states."""
 
     sensor: str
-    code: str
-    reason: str
+    flagged_for: Reason
+    arguments: Mapping[str, float]
+
+    @property
+    def code(self) -> str:
+        """dead, inverted, weak, strong, noisy or bent."""
+        return str(self.flagged_for.code)
+
+    @property
+    def reason(self) -> str:
+        """Why, in words with the numbers."""
+        return english.statement(self.flagged_for, self.arguments)
+
+    @property
+    def sentence(self) -> str:
+        """Sensor and reason in words."""
+        return f"sensor {self.sensor}: {self.reason}"
 
 
 class Measured(Protocol):
@@ -48,13 +66,28 @@ def typical_size(d33: Floats) -> float:
     return float(np.median(size[size >= 1e-9 * size.max()]))
 
 
-def unfit(
-    sensor: NDArray[np.intp], d33: Floats, noise: Floats, count: int
-) -> tuple[dict[int, tuple[str, str]], Floats]:
-    """Sensors that do not belong to the array's population, (code, reason) by number, and each sensor's pilot d33.
+def population_flags(
+    ids: Sequence[str], sensor: NDArray[np.intp], d33: Floats, noise: Floats
+) -> tuple[dict[int, Flag], Floats]:
+    """Sensors that do not belong to the array's population, and each sensor's pilot d33.
 
-    The pilot is the array's median for those that do belong, the sensor's own magnitude for the others.
+    Parameters
+    ----------
+    ids : (sensors,) texts
+        The ids of the sensors.
+    sensor : (recordings,) array of int
+        The number of each recording's sensor.
+    d33, noise : (recordings,) arrays
+        d33 of each recording and its standard uncertainty by line noise [C/N].
+
+    Returns
+    -------
+    flags : dict
+        By the number of a sensor that is dead, inverted, weak or strong.
+    pilot : (sensors,) array
+        [C/N]: the array's median for the sensors that belong to it, the sensor's own magnitude for the others.
     """
+    count = len(ids)
     typical = typical_size(d33)
     weight = 1 / (noise**2 + (_LEAST_SPREAD * typical) ** 2)
     total = np.bincount(sensor, weight, count)
@@ -66,24 +99,26 @@ def unfit(
     alive = size > np.maximum(_DEAD * array, 3 * line)
     sign = 1.0 if np.sum(np.sign(value[alive])) >= 0 else -1.0
     spread = max(1.4826 * float(np.median(np.abs(size[alive] - array))) if alive.any() else 0.0, _LEAST_SPREAD * array)
-    found: dict[int, tuple[str, str]] = {}
+    flags: dict[int, Flag] = {}
     for number in np.flatnonzero(np.isfinite(value)).tolist():
-        percent = f"{100 * value[number] * sign / array:.0f} % of the array's d33"
         outlying = alive.sum() > 3 and abs(size[number] - array) > _OUTLYING * spread
         if not alive[number]:
-            found[number] = ("dead", f"dead: no charge beyond noise ({percent})")
+            reason = Reason.DEAD
         elif value[number] * sign < 0:
-            found[number] = ("inverted", f"inverted polarity: {percent}")
+            reason = Reason.INVERTED
         elif outlying and size[number] < _WEAK * array:
-            found[number] = ("weak", f"weak: {percent}")
+            reason = Reason.WEAK
         elif outlying and size[number] > _STRONG * array:
-            found[number] = ("strong", f"strong: {percent}")
+            reason = Reason.STRONG
+        else:
+            continue
+        flags[number] = Flag(ids[number], reason, {"percent": float(100 * value[number] * sign / array)})
     pilot = np.full(count, array)
-    pilot[list(found)] = np.maximum(size[list(found)], _LEAST_PILOT * array)
-    return found, pilot
+    pilot[list(flags)] = np.maximum(size[list(flags)], _LEAST_PILOT * array)
+    return flags, pilot
 
 
-def standing_out(
+def scatter_flags(
     ids: tuple[str, ...],
     sensor: NDArray[np.intp],
     rows: Measured,
@@ -108,12 +143,11 @@ def standing_out(
         own = member == index
         bend, chance, scatter, freedom = _bend(rest[own], rows.preload[good][own], expected[own])
         if chance < alarm and abs(bend) > _LEAST_BEND:
-            flags.append(Flag(name, "bent", f"bent: its d33 curves by {100 * bend:+.0f} % over the preloads"))
+            flags.append(Flag(name, Reason.BENT, {"percent": 100 * bend}))
         if len(numbers) > 2 and line_of[index] > _NOISY * usual:
-            times = f"{line_of[index] / usual:.1f} times"
-            flags.append(Flag(name, "noisy", f"noisy: its lines scatter {times} as much as those of the others"))
+            flags.append(Flag(name, Reason.NOISY_LINES, {"times": float(line_of[index] / usual)}))
         elif scatter > _NOISY and chi2.sf(freedom * scatter**2, freedom) < alarm:
-            flags.append(Flag(name, "noisy", f"noisy: its recordings scatter {scatter:.1f} times as much as expected"))
+            flags.append(Flag(name, Reason.NOISY_RECORDINGS, {"times": scatter}))
     return flags
 
 

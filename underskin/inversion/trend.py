@@ -20,10 +20,20 @@ class Trend:
 
 
 def trend(time: ArrayLike, value: ArrayLike, uncertainty: ArrayLike) -> Trend | None:
-    """Weighted least squares, weights 1/u²; None for fewer than three values or times that do not differ.
+    """A straight line by weighted least squares, weights 1/u².
 
     Where the values scatter more than u says, the uncertainty grows by the Birge ratio √(χ²/(n−2)); it never shrinks.
     The slope is tested two-sided against Student's t with n−2 degrees of freedom.
+
+    Parameters
+    ----------
+    time, value, uncertainty : (n,) arrays
+        Times, values and their standard uncertainties u, in any units.
+
+    Returns
+    -------
+    Trend or None
+        None for fewer than three values, or times that do not differ.
     """
     from scipy.special import stdtr
 
@@ -43,7 +53,7 @@ def trend(time: ArrayLike, value: ArrayLike, uncertainty: ArrayLike) -> Trend | 
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """The p-values adjusted for being as many (Holm 1979), in the order given."""
+    """The p-values adjusted for their number, in the order given (Holm 1979)."""
     order = np.argsort(p_values, kind="stable")
     adjusted = np.empty(len(p_values))
     factors = np.arange(len(p_values), 0, -1)

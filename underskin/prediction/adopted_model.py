@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from underskin.errors import InvalidInput
+from underskin.findings import sentences
 from underskin.mechanisms.base import Mechanism, Parameter, Stage
 from underskin.mechanisms.models.composed import forward_model
 from underskin.mechanisms.models.composition import chosen, parameters_together
@@ -171,8 +172,8 @@ def implausible_d33(report: Mapping[str, Any]) -> str | None:
     if not {"low", "high"} <= set(interval):
         return None
     d33 = float(np.sqrt(interval["low"] * interval["high"]))
-    reason = plausibility.implausible(d33)
-    return None if reason is None else f"{d33:.4g} pC/N, {reason}"
+    doubt = plausibility.doubt_of(d33)
+    return None if doubt is None else f"{d33:.4g} pC/N, {sentences.D33_DOUBTS[doubt]}"
 
 
 def _on_fit(parameter: Parameter, value: float) -> float:

@@ -7,12 +7,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.findings.finding import Finding
 from underskin.physics import half_space
 from underskin.physics.skin import Indenter, Skin
 from underskin.prediction import plausibility
 from underskin.prediction.pressed_skin import Transmission, transmission
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Finding, Floats, checked, finite, non_negative, to_lab, to_si
+from underskin.units import Floats, checked, finite, non_negative, to_lab, to_si
 
 Model = Literal["layer", "half_space"]
 _FRF_UNCERTAINTY = "frf_uncertainty_pc_per_n"

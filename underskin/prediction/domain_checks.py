@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.prediction.pressed_skin import Transmission
 from underskin.recordings.campaign import FrfRecording
@@ -34,7 +36,7 @@ def usable(level: Floats, noise: Floats, sigma: Floats, transmitted: Transmissio
 
 def reasons(
     recorded: Sequence[FrfRecording], skin: SkinDescription, transmitted: Transmission, level: Floats, table: SigmaTable
-) -> Iterator[str]:
+) -> Iterator[Finding]:
     """Of each recording that is not `usable` why; `level` is its averaged FRF [C/N], NaN without a line in the band."""
     for row, recording in enumerate(recorded):
         if skin.poisson_ratio != INCOMPRESSIBLE or not transmitted.inside[row]:
@@ -42,13 +44,15 @@ def reasons(
             pressed = Pressed(
                 recording.preload_n, recording.indenter_radius_mm, skin.youngs_modulus_mpa, skin.poisson_ratio
             )
-            yield beyond(pressed, [float(part[row]) for part in _numbers(transmitted)], table)
+            limit = beyond(pressed, [float(part[row]) for part in _numbers(transmitted)], table)
+            yield Finding(Reason.BEYOND_TABLE, recording.id, "preload_n", {"limit": limit})
         elif not np.isfinite(level[row]):
-            yield "it has no line in the band"
+            yield Finding(Reason.NO_LINE_IN_BAND, recording.id, "frequency_hz")
         elif not abs(level[row]) < _MOST_CHARGE:
-            yield f"its FRF of {1e12 * level[row]:.3g} pC/N, not below 1 C/N, can be none"
+            arguments = {"frf_pc_per_n": float(1e12 * level[row])}
+            yield Finding(Reason.IMPOSSIBLE_FRF, recording.id, "frf_pc_per_n", arguments)
         else:
-            yield "its position is farther from the sensor than the table reaches, or its lines scatter beyond measure"
+            yield Finding(Reason.PLACE_BEYOND_TABLE, recording.id, "position_mm")
 
 
 def _numbers(transmitted: Transmission) -> tuple[Floats, Floats, Floats]:

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from underskin.errors import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput
 from underskin.recordings import validation as field
 from underskin.recordings.conditions import (
     CompressionConditions,
@@ -19,7 +19,7 @@ from underskin.recordings.conditions import (
     IndentationConditions,
     SkinDescription,
 )
-from underskin.recordings.validation import named, shown
+from underskin.recordings.shown_values import named, shown
 from underskin.requirement import REQUIRED, Mention, Requirement
 from underskin.units import Complexes, Floats
 
@@ -99,6 +99,11 @@ class RecordingProblem:
     field: str
     value: Any
     allowed: str
+    code: ErrorCode = ErrorCode.INVALID_VALUE
+
+    def as_error(self, field: str) -> InvalidInput:
+        """The problem as an error of a field."""
+        return InvalidInput(field, self.value, self.allowed, code=self.code)
 
 
 def frf_recordings(campaign: Campaign) -> list[FrfRecording]:
@@ -117,27 +122,35 @@ def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
     document = field.mapping("campaign", document)
     for name in document:
         if name not in ("schema", "name", "skin", "recordings", "units_checked"):
-            raise InvalidInput(named(name), shown(document[name]), "unknown field of a campaign")
+            raise InvalidInput(
+                named(name), shown(document[name]), "unknown field of a campaign", code=ErrorCode.UNKNOWN_FIELD
+            )
     if document.get("schema") != SCHEMA:
-        raise InvalidInput("schema", shown(document.get("schema")), f"must be {SCHEMA}")
+        raise InvalidInput("schema", shown(document.get("schema")), f"must be {SCHEMA}", code=ErrorCode.NOT_ONE_OF)
     units_checked = field.flag("units_checked", document.get("units_checked", False), False)
     name = field.name("name", document.get("name"), units_checked)
     skin = field.build(SkinDescription, "skin", document.get("skin"), units_checked)
     entries = document.get("recordings")
     if not isinstance(entries, list) or not entries:
-        raise InvalidInput("recordings", shown(entries), "must be a list of at least one recording")
+        raise InvalidInput(
+            "recordings", shown(entries), "must be a list of at least one recording", code=ErrorCode.WRONG_TYPE
+        )
     good: dict[str, Recording] = {}
     problems: list[RecordingProblem] = []
     for index, entry in enumerate(entries):
         recording, refused = _recording(entry, skin, units_checked)
         if recording is not None and recording.id in good:
-            refused = [InvalidInput("id", recording.id, "must differ from every other recording's")]
+            refused = [
+                InvalidInput("id", recording.id, "must differ from every other recording's", code=ErrorCode.NOT_UNIQUE)
+            ]
         if recording is not None and not refused:
             good[recording.id] = recording
         label = recording.id if recording is not None else _label(entry, index)
-        problems += [RecordingProblem(label, _place(error), error.value, error.allowed) for error in refused]
+        problems += [
+            RecordingProblem(label, _place(error), error.value, error.allowed, error.code) for error in refused
+        ]
     if not good and all(problem.field.startswith("skin.") for problem in problems):
-        raise InvalidInput(problems[0].field, problems[0].value, problems[0].allowed)
+        raise problems[0].as_error(problems[0].field)
     return Campaign(name, skin, tuple(good.values()), units_checked), problems
 
 
@@ -146,7 +159,7 @@ def parse(document: Any) -> Campaign:
     campaign, problems = from_dict(document)
     if problems:
         first = problems[0]
-        raise InvalidInput(f"recordings[{first.recording}].{first.field}", first.value, first.allowed)
+        raise first.as_error(f"recordings[{first.recording}].{first.field}")
     return campaign
 
 
@@ -186,7 +199,9 @@ def _recording(entry: Any, skin: SkinDescription, units_checked: bool) -> tuple[
         return None, [refusal]
     kind = document.get("kind") or "frf"
     if not isinstance(kind, str) or kind not in KINDS:
-        return None, [InvalidInput("kind", shown(kind), f"must be one of {', '.join(KINDS)}")]
+        return None, [
+            InvalidInput("kind", shown(kind), f"must be one of {', '.join(KINDS)}", code=ErrorCode.NOT_ONE_OF)
+        ]
     values, refused = field.check_fields(KINDS[kind], document, units_checked=units_checked)
     if refused:
         return None, refused
@@ -199,10 +214,12 @@ def _unmet_needs(recording: Recording, skin: SkinDescription) -> list[InvalidInp
     refused = []
     sensor = None if isinstance(recording, CompressionRecording) else recording.sensor
     if sensor is not None and sensor not in (known.id for known in skin.sensors):
-        refused.append(InvalidInput("sensor", sensor, "must be the id of one of the skin's sensors"))
+        refused.append(
+            InvalidInput("sensor", sensor, "must be the id of one of the skin's sensors", code=ErrorCode.NOT_ONE_OF)
+        )
     if isinstance(recording, FrfRecording):
         refused += [
-            InvalidInput(f"skin.{name}", None, "required by a recording of kind frf")
+            InvalidInput(f"skin.{name}", None, "required by a recording of kind frf", code=ErrorCode.REQUIRED)
             for name in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm")
             if getattr(skin, name) is None
         ]
@@ -219,9 +236,15 @@ def _not_one_of_two_forms(recording: FrfRecording) -> list[InvalidInput]:
     series = [name for name in _TIME_SERIES if getattr(recording, name) is not None]
     lines = [name for name in (*_LINES, "coherence") if getattr(recording, name) is not None]
     if series and lines:
-        return [InvalidInput(series[0], "given", "must be absent where the FRF itself is given")]
+        return [
+            InvalidInput(series[0], "given", "must be absent where the FRF itself is given", code=ErrorCode.CONFLICTING)
+        ]
     needed = _TIME_SERIES if series else _LINES
-    return [InvalidInput(name, None, REQUIRED) for name in needed if getattr(recording, name) is None]
+    return [
+        InvalidInput(name, None, REQUIRED, code=ErrorCode.REQUIRED)
+        for name in needed
+        if getattr(recording, name) is None
+    ]
 
 
 def _unequal_lengths(recording: Recording) -> list[InvalidInput]:
@@ -234,7 +257,12 @@ def _unequal_lengths(recording: Recording) -> list[InvalidInput]:
         return []
     first, length = next(iter(columns.items()))
     return [
-        InvalidInput(name, f"{size} entries", Requirement(f"must have {length} entries, as many as ", Mention(first)))
+        InvalidInput(
+            name,
+            f"{size} entries",
+            Requirement(f"must have {length} entries, as many as ", Mention(first)),
+            code=ErrorCode.UNEQUAL_LENGTHS,
+        )
         for name, size in columns.items()
         if size != length
     ]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from underskin.errors import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput
 from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
 from underskin.requirement import Mention, Requirement
 from underskin.units import Floats, to_lab, to_si
@@ -182,7 +182,12 @@ def _amplification(jacobian: Floats) -> float:
     normal = shape.T @ shape
     if np.linalg.matrix_rank(normal, hermitian=True) < len(normal):
         allowed = "must tell the modulus from the contact point: more samples in contact"
-        raise InvalidInput("displacement_mm", f"{np.count_nonzero(jacobian[:, 0])} samples in contact", allowed)
+        raise InvalidInput(
+            "displacement_mm",
+            f"{np.count_nonzero(jacobian[:, 0])} samples in contact",
+            allowed,
+            code=ErrorCode.UNUSABLE_SIGNAL,
+        )
     return float(np.sqrt(np.linalg.inv(normal)[0, 0]) / size[0])
 
 
@@ -190,12 +195,16 @@ def _loading(along: Floats, load: Floats) -> tuple[Floats, Floats]:
     """The branch up to the largest load."""
     if len(along) != len(load):
         allowed = Requirement(f"must have {len(along)}, as many as ", Mention("displacement_mm"))
-        raise InvalidInput("force_n", f"{len(load)} entries", allowed)
+        raise InvalidInput("force_n", f"{len(load)} entries", allowed, code=ErrorCode.UNEQUAL_LENGTHS)
     top = int(np.argmax(np.abs(load - load[0])))
     if top + 1 < _FEWEST:
-        raise InvalidInput("force_n", f"largest at entry {top}", f"must load over at least {_FEWEST} entries")
+        raise InvalidInput(
+            "force_n", f"largest at entry {top}", f"must load over at least {_FEWEST} entries", code=ErrorCode.TOO_FEW
+        )
     if along[top] == along[0]:
-        raise InvalidInput("displacement_mm", float(along[top]), "must change while the force rises")
+        raise InvalidInput(
+            "displacement_mm", float(along[top]), "must change while the force rises", code=ErrorCode.UNUSABLE_SIGNAL
+        )
     return along[: top + 1], load[: top + 1]
 
 

@@ -8,12 +8,13 @@ from dataclasses import fields, replace
 from pathlib import PurePath
 from typing import Any
 
-from underskin.errors import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import Campaign, Recording
 from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.reading import Reading
 from underskin.recordings.repeats import digest
+from underskin.recordings.shown_values import LONGEST_NAME
 
 _ROUNDING = 1e-6  # relative, and of positions [mm]: single precision, and conversions of units
 _MOST_LISTED = 5  # repeats in a warning
@@ -32,7 +33,7 @@ def join(name: str, files: Files, skin_id: str | None = None) -> Reading:
     """
     name = field.name("name", name, False)
     if not files:
-        raise InvalidInput("files", "none", "must be at least one")
+        raise InvalidInput("files", "none", "must be at least one", code=ErrorCode.TOO_FEW)
     skin = _skin(files, skin_id)
     names = _names(files)
     recordings, repeats = _once(
@@ -62,7 +63,7 @@ def _skin(files: Files, skin_id: str | None) -> SkinDescription:
             first, other = said.setdefault(name, (value, file))
             if not _same(value, first):
                 allowed = f"in {file}; must be {first!r}, as in {other}: files are joined where they are of one skin"
-                raise InvalidInput(f"skin.{name}", value, allowed)
+                raise InvalidInput(f"skin.{name}", value, allowed, code=ErrorCode.CONFLICTING)
         sensors.update({sensor.id: sensor for sensor in skin.sensors if sensor.id not in sensors})
     known = {entry.name: said[entry.name][0] for entry in fields(SkinDescription) if entry.name in said}
     return SkinDescription(**known, sensors=tuple(sensors.values()))
@@ -116,7 +117,7 @@ def _free(label: str, name: str, taken: set[str]) -> str:
     """An id that no recording has: the file's label and the id, and where that is not enough a number."""
     named = f" {name}" if name else ""
     ends = (named if number == 1 else f"{named} ({number})" for number in itertools.count(1))
-    all_free = ((label[: max(0, field.LONGEST_NAME - len(end))] + end)[-field.LONGEST_NAME :].strip() for end in ends)
+    all_free = ((label[: max(0, LONGEST_NAME - len(end))] + end)[-LONGEST_NAME:].strip() for end in ends)
     return next(free for free in all_free if free not in taken)
 
 

@@ -1,8 +1,8 @@
-"""What looks wrong in what a campaign states of its times and its sensors' places, and is used all the same.
+"""Findings on the times of recordings and the places of sensors that a campaign states; both are used all the same.
 
-These findings are the same wherever a campaign is told of: with its d33, when it comes in, in its diagnosis. The clock
-enters only to see that a recording is still to come, by more than time zones differ. No statement holds today's date: a
-campaign whose times have passed is told of alike on every later day.
+They are the same with the d33 of a campaign, on its import and in its diagnosis. The clock is only used to see whether
+a recording lies in the future by more than time zones differ. No statement holds today's date, so that a campaign whose
+times have passed has the same findings on every later day.
 """
 
 from collections.abc import Iterator
@@ -11,14 +11,14 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 from scipy.spatial import KDTree
 
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign
-from underskin.recordings.finding import Finding
 from underskin.units import Floats
 
 _EARLIEST = datetime(1990, 1, 1, tzinfo=UTC)  # clocks that were never set begin in 1904, 1970 or 1980
 _ZONES = timedelta(days=1)  # a time without a zone is taken as UTC
 _IN_METRES = 1000.0
-_MOST_NAMED = 3
 _LARGEST_IN_METRES_MM = 0.1
 
 
@@ -27,28 +27,17 @@ def implausible(campaign: Campaign) -> list[Finding]:
     return [*_times(campaign), *overlapping_sensors(campaign)]
 
 
-def in_words(campaign: Campaign) -> tuple[str, ...]:
-    """The same in sentences that name the recording."""
-    return tuple(
-        f"recording {finding.recording}: {finding.statement}" if finding.recording else finding.statement
-        for finding in implausible(campaign)
-    )
-
-
 def _times(campaign: Campaign) -> Iterator[Finding]:
     """The first recording that is still to come, and the first from before there were such instruments."""
     latest = datetime.now(UTC) + _ZONES
     stated = [(entry.id, entry.recorded_at) for entry in campaign.recordings if entry.recorded_at is not None]
     to_come = [entry for entry in stated if _moment(entry[1]) > latest]
     too_old = [entry for entry in stated if _moment(entry[1]) < _EARLIEST]
-    for wrong, words in (
-        (to_come, "which is still to come: is the year a slip?"),
-        (too_old, f"before {_EARLIEST.year}: was the clock not set?"),
-    ):
+    limit = {"year": _EARLIEST.year}
+    for reason, wrong, bounds in ((Reason.TIME_TO_COME, to_come, {}), (Reason.TIME_TOO_OLD, too_old, limit)):
         if wrong:
             (recording, written), *others = wrong
-            statement = f"recorded_at is {written}, {words}{_like_it(len(others), 'recording')}"
-            yield Finding("unlikely_time", recording, "recorded_at", statement)
+            yield Finding(reason, recording, "recorded_at", {"written": written, "more": len(others), **bounds})
 
 
 def _moment(written: str) -> datetime:
@@ -64,18 +53,15 @@ def overlapping_sensors(campaign: Campaign) -> list[Finding]:
     shared = [(place, ids) for place, ids in places.items() if len(ids) > 1]
     if shared:
         ((x, y), ids), *others = shared
-        text = (
-            f"{_sensors(ids)} lie at one place, x {x:g} mm, y {y:g} mm: is it a slip?{_like_it(len(others), 'place')}"
-        )
-        return [Finding("impossible_geometry", "", "skin.sensors", text)]
+        arguments = {"sensors": ids, "x_mm": x, "y_mm": y, "more": len(others)}
+        return [Finding(Reason.SENSORS_AT_ONE_PLACE, "", "skin.sensors", arguments)]
     radius, nearest = campaign.skin.sensor_radius_mm, _nearest_mm(campaign)
     if radius is None or nearest is None or nearest[0] >= 2 * radius:
         return []
     pitch, pair = nearest
     in_metres = _IN_METRES * pitch >= 2 * radius and pitch < _LARGEST_IN_METRES_MM
-    guess = "were their places given in m" if in_metres else "is it the diameter"
-    text = f"{_sensors(pair)} of {radius:g} mm radius cannot lie {pitch:g} mm apart: {guess}, or a slip?"
-    return [Finding("impossible_geometry", "", "skin.sensor_radius_mm", text)]
+    arguments = {"sensors": pair, "radius_mm": radius, "pitch_mm": pitch, "in_metres": in_metres}
+    return [Finding(Reason.SENSORS_TOO_NEAR, "", "skin.sensor_radius_mm", arguments)]
 
 
 def pitch_mm(campaign: Campaign) -> float | None:
@@ -95,13 +81,3 @@ def _nearest_mm(campaign: Campaign) -> tuple[float, list[str]] | None:
     if not np.isfinite(distance[one]):
         return None
     return float(distance[one]), [sensors[number].id for number in sorted((one, int(neighbour[one])))]
-
-
-def _like_it(count: int, noun: str) -> str:
-    return f" ({count} more {noun}{'s' if count > 1 else ''} like it)" if count else ""
-
-
-def _sensors(ids: list[str]) -> str:
-    if len(ids) > _MOST_NAMED:
-        return f"sensors {', '.join(ids[:_MOST_NAMED])} and {len(ids) - _MOST_NAMED} more"
-    return f"sensors {', '.join(ids[:-1])} and {ids[-1]}"

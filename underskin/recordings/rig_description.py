@@ -19,12 +19,13 @@ from typing import Annotated, Any
 
 import yaml
 
-from underskin.errors import FileError, InvalidInput
+from underskin.errors import ErrorCode, FileError, InvalidInput
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import COLUMNS, KINDS
 from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.readers import json_file, text
-from underskin.recordings.validation import mapping, named, shown
+from underskin.recordings.shown_values import named, shown
+from underskin.recordings.validation import mapping
 from underskin.requirement import Mention, Requirement
 
 SCHEMA = "rig/1"
@@ -35,7 +36,7 @@ COMPLEX_FRF = "frf_pc_per_n"  # a channel of complex numbers, both parts of the 
 
 def _sign(name: str, value: Any, units_checked: bool) -> int:
     if field.number(name, value, units_checked) not in (1, -1):
-        raise InvalidInput(name, shown(value), "must be 1 or -1")
+        raise InvalidInput(name, shown(value), "must be 1 or -1", code=ErrorCode.NOT_ONE_OF)
     return int(value)
 
 
@@ -102,12 +103,14 @@ def from_dict(document: Any) -> RigDescription:
     document = mapping("rig", document)
     for name in document:
         if name not in ("schema", "name", "kind", "skin", "recording", "channels", "units_checked"):
-            raise InvalidInput(named(name), shown(document[name]), "unknown field of a rig description")
+            raise InvalidInput(
+                named(name), shown(document[name]), "unknown field of a rig description", code=ErrorCode.UNKNOWN_FIELD
+            )
     if document.get("schema") != SCHEMA:
-        raise InvalidInput("schema", shown(document.get("schema")), f"must be {SCHEMA}")
+        raise InvalidInput("schema", shown(document.get("schema")), f"must be {SCHEMA}", code=ErrorCode.NOT_ONE_OF)
     kind = document.get("kind", "frf")
     if not isinstance(kind, str) or kind not in KINDS:
-        raise InvalidInput("kind", shown(kind), f"must be one of {', '.join(KINDS)}")
+        raise InvalidInput("kind", shown(kind), f"must be one of {', '.join(KINDS)}", code=ErrorCode.NOT_ONE_OF)
     field.name("name", document.get("name", SCHEMA), False)
     known = {entry.name for entry in fields(KINDS[kind])} - {"kind"}
     recording = mapping("recording", document.get("recording", {}))
@@ -136,25 +139,39 @@ def _channels(kind: str, document: Any) -> dict[str, ChannelMapping]:
     for name, entry in channels.items():
         if (entry.sensitivity is None) != (entry.sensitivity_unit is None):
             raise InvalidInput(
-                f"channels.{name}.sensitivity", entry.sensitivity, "needs a sensitivity_unit, and it one"
+                f"channels.{name}.sensitivity",
+                entry.sensitivity,
+                "needs a sensitivity_unit, and it one",
+                code=ErrorCode.CONFLICTING,
             )
         if entry.labelled is not None and entry.unit is None:
-            raise InvalidInput(f"channels.{name}.unit", None, "required where labelled says that the label is wrong")
+            raise InvalidInput(
+                f"channels.{name}.unit",
+                None,
+                "required where labelled says that the label is wrong",
+                code=ErrorCode.REQUIRED,
+            )
         if entry.stiffness_n_per_mm is not None and (name != "displacement_mm" or "force_n" not in channels):
             raise InvalidInput(
                 f"channels.{name}.stiffness_n_per_mm",
                 entry.stiffness_n_per_mm,
                 Requirement("is for ", Mention("displacement_mm")),
+                code=ErrorCode.CONFLICTING,
             )
     if not channels:
-        raise InvalidInput("channels", "none", "must name at least one channel")
+        raise InvalidInput("channels", "none", "must name at least one channel", code=ErrorCode.TOO_FEW)
     return channels
 
 
 def _known(prefix: str, document: Mapping[str, Any], known: set[str]) -> Mapping[str, Any]:
     for name in document:
         if name not in known:
-            raise InvalidInput(f"{prefix}.{named(name)}", shown(document[name]), f"must be one of {sorted(known)}")
+            raise InvalidInput(
+                f"{prefix}.{named(name)}",
+                shown(document[name]),
+                f"must be one of {sorted(known)}",
+                code=ErrorCode.NOT_ONE_OF,
+            )
     return document
 
 

@@ -12,7 +12,7 @@ from underskin.recordings.channels import Block, Channel, Contents, Values
 from underskin.recordings.readers import text
 from underskin.recordings.readers.unit_labels import field_unit, labelled_unit, unit
 from underskin.recordings.rig_description import BLOCK_NAME, COMPLEX_FRF, ChannelMapping, Property, RigDescription
-from underskin.recordings.validation import LONGEST_NAME, shown
+from underskin.recordings.shown_values import LONGEST_NAME, shown
 from underskin.requirement import Mention, Requirement
 from underskin.units import LAB, Floats
 
@@ -45,9 +45,9 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> tuple[dict[str,
         stated = _stated(contents, block)
         common = {name: _common(name, value, stated, file) for name, value in rig.recording.items()}
         began = {} if block.recorded_at is None else {"recorded_at": block.recorded_at}
-        recordings.append(
-            {"id": label, "kind": rig.kind, **began, **common, **_Mapped(rig, block, file, warnings).fields()}
-        )
+        mapped_block = _MappedBlock(rig, block, file)
+        recordings.append({"id": label, "kind": rig.kind, **began, **common, **mapped_block.fields()})
+        warnings += mapped_block.warnings
     document = {"schema": SCHEMA, "name": stem, "skin": rig.skin, "recordings": recordings}
     return {**document, "units_checked": rig.units_checked}, list(dict.fromkeys(warnings))
 
@@ -75,10 +75,10 @@ def _common(name: str, value: Any | Property, stated: Mapping[str, str | float],
     if value.property not in stated:
         known = ", ".join(list(stated)[:20])
         raise FileError(file, f"property {value.property!r}", f"is not in the file, which states {known}")
-    found = stated[value.property]
-    number = text.number(found, ".") if isinstance(found, str) else found
+    given = stated[value.property]
+    number = text.number(given, ".") if isinstance(given, str) else given
     if number is None or name in _TEXTS:
-        return found
+        return given
     if name not in LAB:
         return number
     label = labelled_unit(value.property)
@@ -95,14 +95,14 @@ def _factor(label: str, field: str, file: str, place: str, hint: str = "") -> fl
     return known.to_si / LAB[field].to_si
 
 
-class _Mapped:
-    """The fields of one recording, out of one block."""
+class _MappedBlock:
+    """The fields of one recording, out of one block, and the `warnings` on them."""
 
-    def __init__(self, rig: RigDescription, block: Block, file: str, warnings: list[str]) -> None:
+    def __init__(self, rig: RigDescription, block: Block, file: str) -> None:
         self.rig = rig
         self.block = block
         self.file = file
-        self.warnings = warnings
+        self.warnings: list[str] = []
 
     def fields(self) -> dict[str, Any]:
         values = {field: self._values(field, mapping) for field, mapping in self.rig.channels.items()}
@@ -113,7 +113,7 @@ class _Mapped:
             only = Requirement("a channel of complex numbers can only be ", Mention(COMPLEX_FRF))
             raise FileError(self.file, "", only)
         columns: dict[str, Any] = {field: np.asarray(column, dtype=float) for field, column in values.items()}
-        self._subtract_instrument(columns)
+        columns = self._without_instrument(columns)
         self._require_known_sign(columns)
         if self.rig.kind == "frf":
             return self._frf(columns)
@@ -168,16 +168,16 @@ class _Mapped:
             )
         return given.to_si / divided.to_si / mapping.sensitivity * _factor(quantity, field, self.file, place)
 
-    def _subtract_instrument(self, columns: dict[str, Any]) -> None:
-        """Displacement without the instrument's own give, force over its stiffness."""
+    def _without_instrument(self, columns: Mapping[str, Any]) -> dict[str, Any]:
+        """The columns, their displacement without the instrument's own give, force over its stiffness."""
         stiffness = self.rig.channels.get("displacement_mm", ChannelMapping("")).stiffness_n_per_mm
         if stiffness is None:
-            return
+            return dict(columns)
         if len(columns["displacement_mm"]) != len(columns["force_n"]):
             both = (Mention("displacement_mm"), " and ", Mention("force_n"))
             reason = Requirement(*both, " differ in length: no stiffness can be applied")
             raise FileError(self.file, "", reason)
-        columns["displacement_mm"] = columns["displacement_mm"] - columns["force_n"] / stiffness
+        return {**columns, "displacement_mm": columns["displacement_mm"] - columns["force_n"] / stiffness}
 
     def _require_known_sign(self, columns: Mapping[str, Any]) -> None:
         """Force must rise with displacement, unless the rig says a sign for both."""
@@ -191,9 +191,10 @@ class _Mapped:
             how = (Mention("displacement_mm"), " and ", Mention("force_n"))
             raise FileError(self.file, "channels", Requirement(f"{reason}: say sign: 1 or sign: -1 for ", *how))
 
-    def _frf(self, columns: dict[str, Any]) -> dict[str, Any]:
+    def _frf(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """Without the line at 0 Hz; time series with their sample rate."""
-        time = columns.pop("time_s", None)
+        time = given.get("time_s")
+        columns = {name: column for name, column in given.items() if name != "time_s"}
         frequency = columns.get("frequency_hz")
         if frequency is not None and len(frequency) > 1 and frequency[0] == 0:
             self.warnings.append("the line at 0 Hz is left out")

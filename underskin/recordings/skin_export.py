@@ -101,8 +101,10 @@ def read_overview(stream: BinaryIO, file: str) -> Overview:
 
 def read_campaigns(stream: BinaryIO, file: str, names: Sequence[str]) -> list[ExportedCampaign]:
     """Some campaigns of an export, read in a child process; raises FileError."""
-    told = call_apart(f"{__name__}:_campaigns", stream, file, orjson.dumps(names).decode(), what=SCHEMA, limits=_LIMITS)
-    return [ExportedCampaign(**campaign) for campaign in told["campaigns"]]
+    content = call_apart(
+        f"{__name__}:_campaigns", stream, file, orjson.dumps(names).decode(), what=SCHEMA, limits=_LIMITS
+    )
+    return [ExportedCampaign(**campaign) for campaign in content["campaigns"]]
 
 
 def _is_export(stream: BinaryIO) -> dict[str, Any]:

@@ -14,18 +14,18 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from underskin.errors import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput
 from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.recordings.shown_values import LONGEST_NAME, named, shown
 from underskin.requirement import REQUIRED
 from underskin.units import Floats, checked
 
 Model = TypeVar("Model")
 Check = Callable[[str, Any, bool], Any]  # name, value, units_checked
 
-LONGEST_NAME = 200
 _LARGEST_COUNT = 2**53
 _FREQUENCIES_HZ = (1e-6, 1e9)
-_MOST_UNKNOWN = 20  # unknown fields of one object that are told; a document may hold millions
+_MOST_UNKNOWN = 20  # unknown fields of one object that are listed; a document may hold millions
 _COHERENCE_ROUNDING = 1e-6  # single-precision instruments write 1.0000001
 
 
@@ -39,7 +39,12 @@ def check_fields(
     known = _checks(model)
     unknown = (name for name in document if name not in known)
     refused = [
-        InvalidInput(named(name), shown(document[name]), f"unknown field; known: {', '.join(known)}")
+        InvalidInput(
+            named(name),
+            shown(document[name]),
+            f"unknown field; known: {', '.join(known)}",
+            code=ErrorCode.UNKNOWN_FIELD,
+        )
         for name in islice(unknown, _MOST_UNKNOWN)
     ]
     values: dict[str, Any] = {}
@@ -47,7 +52,7 @@ def check_fields(
         value = document.get(name)
         try:
             if value is None and default is MISSING:
-                raise InvalidInput(name, None, REQUIRED)
+                raise InvalidInput(name, None, REQUIRED, code=ErrorCode.REQUIRED)
             values[name] = default if value is None else field_check(name, value, units_checked)
         except InvalidInput as refusal:
             refused.append(refusal)
@@ -57,7 +62,7 @@ def check_fields(
 def mapping(field: str, value: Any) -> Mapping[str, Any]:
     """A JSON object."""
     if not isinstance(value, Mapping):
-        raise InvalidInput(field, shown(value), "must be an object with named fields")
+        raise _wrong_type(field, value, "must be an object with named fields")
     return value
 
 
@@ -65,7 +70,7 @@ def build(model: type[Model], prefix: str, document: Any, units_checked: bool) -
     """A model of a document; raises InvalidInput at the first field refused, its name led by `prefix`."""
     values, refused = check_fields(model, mapping(prefix, document), units_checked=units_checked)
     if refused:
-        raise InvalidInput(f"{prefix}.{refused[0].field}", refused[0].value, refused[0].allowed, refused[0].index)
+        raise refused[0].at(f"{prefix}.{refused[0].field}")
     return model(**values)
 
 
@@ -84,27 +89,27 @@ def _annotated_check(hint: Any) -> Check:
 def name(field: str, value: Any, units_checked: bool) -> str:  # noqa: ARG001
     """A short printable text, such as an id."""
     if not isinstance(value, str) or not value.strip() or len(value) > LONGEST_NAME or not value.isprintable():
-        raise InvalidInput(field, shown(value), f"must be a printable text of 1 to {LONGEST_NAME} characters")
+        raise _wrong_type(field, value, f"must be a printable text of 1 to {LONGEST_NAME} characters")
     return value
 
 
 def flag(field: str, value: Any, units_checked: bool) -> bool:  # noqa: ARG001
     """true or false."""
     if not isinstance(value, bool):
-        raise InvalidInput(field, shown(value), "must be true or false")
+        raise _wrong_type(field, value, "must be true or false")
     return value
 
 
 def number(field: str, value: Any, units_checked: bool = False) -> float:  # noqa: ARG001
     """A finite number."""
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
-        raise InvalidInput(field, shown(value), "must be a number")
+        raise _wrong_type(field, value, "must be a number")
     try:
         result = float(value)
     except OverflowError:
         result = math.inf
     if not math.isfinite(result):
-        raise InvalidInput(field, shown(result), "must be finite")
+        raise InvalidInput(field, shown(result), "must be finite", code=ErrorCode.NOT_FINITE)
     return result
 
 
@@ -112,7 +117,7 @@ def positive(field: str, value: Any, units_checked: bool) -> float:  # noqa: ARG
     """A measured or chosen quantity greater than 0, of any magnitude."""
     result = number(field, value)
     if result <= 0:
-        raise InvalidInput(field, result, "must be greater than 0")
+        raise InvalidInput(field, result, "must be greater than 0", code=ErrorCode.OUT_OF_RANGE)
     return result
 
 
@@ -120,7 +125,7 @@ def not_negative(field: str, value: Any, units_checked: bool) -> float:  # noqa:
     """A number that is 0 or greater."""
     result = number(field, value)
     if result < 0:
-        raise InvalidInput(field, result, "must be 0 or greater")
+        raise InvalidInput(field, result, "must be 0 or greater", code=ErrorCode.OUT_OF_RANGE)
     return result
 
 
@@ -135,7 +140,7 @@ def poisson_ratio(field: str, value: Any, units_checked: bool) -> float:  # noqa
     """0 to 0.5."""
     result = number(field, value)
     if not 0 <= result <= INCOMPRESSIBLE:
-        raise InvalidInput(field, result, f"must be 0 to {INCOMPRESSIBLE}")
+        raise InvalidInput(field, result, f"must be 0 to {INCOMPRESSIBLE}", code=ErrorCode.OUT_OF_RANGE)
     return result
 
 
@@ -143,7 +148,7 @@ def count(field: str, value: Any, units_checked: bool) -> int:  # noqa: ARG001
     """A whole number, 0 to 2⁵³: as far as floats, and so JSON, hold every one."""
     result = number(field, value)
     if result < 0 or not result.is_integer() or int(value) > _LARGEST_COUNT:
-        raise InvalidInput(field, shown(value), f"must be a whole number, 0 to {_LARGEST_COUNT}")
+        raise _wrong_type(field, value, f"must be a whole number, 0 to {_LARGEST_COUNT}")
     return int(value)
 
 
@@ -153,7 +158,9 @@ def time_of_day(field: str, value: Any, units_checked: bool) -> str:
     try:
         datetime.fromisoformat(text)
     except ValueError:
-        raise InvalidInput(field, text, "must be a date and time like 2017-05-03T09:00:00Z") from None
+        raise InvalidInput(
+            field, text, "must be a date and time like 2017-05-03T09:00:00Z", code=ErrorCode.WRONG_TYPE
+        ) from None
     return text
 
 
@@ -165,7 +172,7 @@ def position(field: str, value: Any, units_checked: bool) -> tuple[float, float]
 
 def _pair(field: str, value: Any) -> tuple[Any, Any]:
     if not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
-        raise InvalidInput(field, shown(value), "must be two numbers, x and y")
+        raise _wrong_type(field, value, "must be two numbers, x and y")
     return value[0], value[1]
 
 
@@ -173,101 +180,102 @@ def series(field: str, value: Any, units_checked: bool) -> Floats:  # noqa: ARG0
     """A column of at least one finite number."""
     column = _column(field, value)
     if column.size == 0:
-        raise InvalidInput(field, shown(value), "must hold at least one number")
-    _refuse_where(field, column, ~np.isfinite(column), "must be finite")
+        raise InvalidInput(field, shown(value), "must hold at least one number", code=ErrorCode.TOO_FEW)
+    _refuse_where(field, column, ~np.isfinite(column), "must be finite", ErrorCode.NOT_FINITE)
     return column
 
 
 def increasing(field: str, value: Any, units_checked: bool) -> Floats:
     """A column of finite numbers, each greater than the one before."""
     column = series(field, value, units_checked)
-    _refuse_where(field, column, np.diff(column, prepend=-math.inf) <= 0, "must be greater than the entry before")
+    _refuse_where(
+        field,
+        column,
+        np.diff(column, prepend=-math.inf) <= 0,
+        "must be greater than the entry before",
+        ErrorCode.NOT_INCREASING,
+    )
     return column
 
 
 def rows(field: str, value: Any, units_checked: bool) -> Floats:
     """Rows of finite numbers, equally many in each: (rows, columns)."""
     if not isinstance(value, list | tuple) or not value:
-        raise InvalidInput(field, shown(value), "must be a list of rows of numbers")
-    found = [series(f"{field}[{index}]", row, units_checked) for index, row in enumerate(value)]
-    for index, row in enumerate(found):
-        if row.size != found[0].size:
-            raise InvalidInput(field, f"{row.size} columns", f"must have as many as row 0 ({found[0].size})", index)
-    return np.stack(found)
+        raise _wrong_type(field, value, "must be a list of rows of numbers")
+    columns = [series(f"{field}[{index}]", row, units_checked) for index, row in enumerate(value)]
+    for index, row in enumerate(columns):
+        if row.size != columns[0].size:
+            raise InvalidInput(
+                field,
+                f"{row.size} columns",
+                f"must have as many as row 0 ({columns[0].size})",
+                index,
+                code=ErrorCode.UNEQUAL_LENGTHS,
+            )
+    return np.stack(columns)
 
 
 def frequencies(field: str, value: Any, units_checked: bool) -> Floats:
     """An increasing column of frequencies above 0, from far below to far above what any instrument records."""
     column = increasing(field, value, units_checked)
-    _refuse_where(field, column, column <= 0, "must be greater than 0 (leave out the line at 0 Hz)")
+    _refuse_where(
+        field, column, column <= 0, "must be greater than 0 (leave out the line at 0 Hz)", ErrorCode.OUT_OF_RANGE
+    )
     low, high = _FREQUENCIES_HZ
-    _refuse_where(field, column, (column < low) | (column > high), f"must be {low:g} to {high:g} Hz")
+    _refuse_where(
+        field, column, (column < low) | (column > high), f"must be {low:g} to {high:g} Hz", ErrorCode.OUT_OF_RANGE
+    )
     return column
 
 
 def not_falling(field: str, value: Any, units_checked: bool) -> Floats:
     """A column of times: none before the one above it."""
     column = series(field, value, units_checked)
-    _refuse_where(field, column, np.diff(column, prepend=-math.inf) < 0, "must not be before the entry above it")
+    _refuse_where(
+        field,
+        column,
+        np.diff(column, prepend=-math.inf) < 0,
+        "must not be before the entry above it",
+        ErrorCode.NOT_INCREASING,
+    )
     return column
 
 
 def coherence(field: str, value: Any, units_checked: bool) -> Floats:
     """A column of coherences γ², 0 to 1."""
     column = series(field, value, units_checked)
-    _refuse_where(field, column, (column < 0) | (column > 1 + _COHERENCE_ROUNDING), "must be 0 to 1")
+    _refuse_where(
+        field, column, (column < 0) | (column > 1 + _COHERENCE_ROUNDING), "must be 0 to 1", ErrorCode.OUT_OF_RANGE
+    )
     return column
 
 
 def _column(field: str, value: Any) -> Floats:
     if isinstance(value, np.ndarray):
         if value.ndim != 1 or value.dtype.kind not in "iuf":
-            raise InvalidInput(field, shown(value), "must be a list of numbers")
+            raise _wrong_type(field, value, "must be a list of numbers")
         return value.astype(np.float64)
     if not isinstance(value, list | tuple):
-        raise InvalidInput(field, shown(value), "must be a list of numbers")
+        raise _wrong_type(field, value, "must be a list of numbers")
     for index, entry in enumerate(value):
         if type(entry) is not float and type(entry) is not int:
-            raise InvalidInput(field, shown(entry), "must be a number", index=index)
+            raise _wrong_type(field, entry, "must be a number", index)
     try:
         return np.array(value, dtype=np.float64)
     except OverflowError:
-        raise InvalidInput(field, shown(value), "holds a number too large to keep") from None
+        raise InvalidInput(
+            field, shown(value), "holds a number too large to keep", code=ErrorCode.OUT_OF_RANGE
+        ) from None
 
 
-def _refuse_where(field: str, column: Floats, bad: Any, allowed: str) -> None:
+def _refuse_where(field: str, column: Floats, bad: Any, allowed: str, code: ErrorCode) -> None:
     if bad.any():
         first = int(np.argmax(bad))
-        raise InvalidInput(field, shown(float(column[first])), allowed, index=first)
+        raise InvalidInput(field, shown(float(column[first])), allowed, index=first, code=code)
 
 
-def shown(value: Any) -> Any:
-    """A value as an error may show it: short, and plain JSON."""
-    if value is None or isinstance(value, bool):
-        return value
-    if isinstance(value, int | float | np.integer | np.floating):
-        return _shown_number(value)
-    if isinstance(value, str):
-        short = value if len(value) <= LONGEST_NAME else value[:LONGEST_NAME] + "…"
-        return short.encode("utf-8", "replace").decode("utf-8")
-    if isinstance(value, list | tuple):
-        return f"a list of {len(value)}"
-    return f"a value of type {type(value).__name__}"
-
-
-def named(name: Any) -> str:
-    """A field's name as an error may show it, an empty one too."""
-    return str(shown(name)) or '""'
-
-
-def _shown_number(value: Any) -> Any:
-    try:
-        as_float = float(value)
-    except OverflowError:
-        return "a whole number beyond the range of floats"
-    if not math.isfinite(as_float):
-        return str(as_float)
-    return int(value) if as_float.is_integer() and abs(as_float) < 2**53 else as_float
+def _wrong_type(field: str, value: Any, allowed: str, index: int | None = None) -> InvalidInput:
+    return InvalidInput(field, shown(value), allowed, index, code=ErrorCode.WRONG_TYPE)
 
 
 Name = Annotated[str, name]

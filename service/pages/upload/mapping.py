@@ -6,9 +6,10 @@ from typing import Any
 
 from service.pages.upload.file_summary import ChannelSummary
 from underskin import InvalidInput
+from underskin.errors import ErrorCode
 from underskin.recordings.readers.unit_labels import lab_field, unit
 from underskin.recordings.rig_description import SCHEMA, channel_fields
-from underskin.requirement import REQUIRED, UNITS_CHECKED, Mention, Requirement
+from underskin.requirement import UNITS_CHECKED, Mention, Requirement
 
 KINDS = {
     "frf": "FRF: charge against a shaken force",
@@ -83,7 +84,7 @@ def field_words(field: str) -> str:
 def what_to_do(error: Mapping[str, Any]) -> str:
     """What is allowed; for what the form asks, where to say it."""
     allowed = error["allowed"]
-    if allowed != REQUIRED or field_words(error["field"]) == error["field"]:
+    if error["code"] != ErrorCode.REQUIRED or field_words(error["field"]) == error["field"]:
         return allowed.worded(_mention_words) if isinstance(allowed, Requirement) else str(allowed)
     if error["field"] == _RATE:
         return "required: fill it in below, or say which channel is the time"

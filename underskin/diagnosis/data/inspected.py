@@ -1,19 +1,22 @@
-"""The recordings that a diagnosis uses, and what was found on the way to them."""
+"""The recordings that a diagnosis uses, with the findings on all recordings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from underskin.findings.finding import Finding
+from underskin.findings.lacking import Lacking
 from underskin.recordings.campaign import Campaign
-from underskin.recordings.finding import Finding
 from underskin.units import Floats
 
 
 @dataclass(frozen=True)
 class Inspected:
-    """The recordings that can be used, what was found, what is lacking where nothing can be told from them, and by
-    their id how `uneven` the noise of the lines of time series is."""
+    """The recordings that can be used and the findings; what is `lacking` where nothing can be concluded from them.
+
+    `uneven` is how uneven the noise of the lines of time series is, by the recording's id.
+    """
 
     campaign: Campaign
-    found: Sequence[Finding]
-    lacking: str = ""
+    findings: Sequence[Finding]
+    lacking: Lacking | None = None
     uneven: Mapping[str, Floats] = field(default_factory=dict)

@@ -31,7 +31,26 @@ class Effect:
 
 
 def effect(lines: Lines, predicted: Array, rows: NDArray[np.bool_], gain: float, level: float) -> Effect:
-    """Of some rows against a prediction of all; `gain` (relative) and `level` (of the lines' deviations) are noise."""
+    """The size of the misfit on some rows.
+
+    Parameters
+    ----------
+    lines : Lines
+        The recordings.
+    predicted : (rows,) complex array
+        The base model's response, in the unit of the lines.
+    rows : (rows,) array of bool
+        Where the misfit lies.
+    gain : float
+        Scatter of a recording's gain, relative.
+    level : float
+        Noise of the lines over their deviations.
+
+    Returns
+    -------
+    Effect
+        The misfit with its 95 % interval, in percent of the base model's response.
+    """
     weight = lines.deviation[rows] ** -2.0
     off, model = (lines.value - predicted)[rows], predicted[rows]
     _, recording = np.unique(lines.recording[rows], return_inverse=True)

@@ -1,14 +1,14 @@
-"""What a curve deviates by, smoothly, under every hypothesis: no law of a soft contact holds to better than a percent.
+"""The smooth error of a curve under every hypothesis: no law of a soft contact holds to better than a percent.
 
-Zero and gain of a load cell, where a surface begins, friction in a stage and every law's own idealisation bend a curve
-a little. Its samples share that, so that sixty of them are not sixty independent witnesses against a law. Within each
-curve, with F_max its largest force, x the place along the curve from 0 to 1 and η the size,
+The zero and gain of a load cell, the position of the surface, friction in a stage and the idealisation of every law
+bend a curve a little. Neighbouring samples share that error, so they are not independent. Within each curve, with
+F_max its largest force, x the place along the curve from 0 to 1 and η the size,
 
     ε ~ N(0, η² B),  B = F_max² k(x − x'),
 
-k the mean of Matérn-3/2 of length 0.1 (where a contact begins, a grip that seats) and 0.4 (a law's idealisation).
-η is a parameter of every hypothesis: equal density of its logarithm from 0.1 to 1 %, falling off outside, more slowly
-downwards. Something without a name is the same process with η from 2 to 50 %.
+k the mean of Matérn-3/2 kernels of length 0.1 (the beginning of a contact, a grip that seats) and 0.4 (the
+idealisation of a law). η is a parameter of every hypothesis: log-uniform from 0.1 to 1 %, falling off outside, more
+slowly downwards. An unmodelled discrepancy is the same process with η from 2 to 50 %.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
-"""What every hypothesis assumes of the noise beside the lines' own, with the same priors.
+"""Priors of the noise that every hypothesis shares.
 
-- gain scatter of a recording, sd of its logarithm: equal density of the logarithm from 1 to 5 %,
-  falling off outside, more slowly downwards: a careful rig is better than 1 %;
-- positioning scatter, in x and y: none in most rigs (0.7), else equal density of the logarithm from 0.05 to 0.3 mm;
+- gain scatter of a recording (standard deviation of its logarithm): log-uniform from 1 to 5 %, falling off outside,
+  more slowly downwards, since a careful rig is better than 1 %;
+- positioning scatter, in x and y: zero with probability 0.7, else log-uniform from 0.05 to 0.3 mm;
 - line noise: its level as estimated from the lines' roughness, times a factor near 1.
 """
 
@@ -43,7 +43,7 @@ class Plateau:
 
 
 @dataclass(frozen=True)
-class Bell:
+class LogNormal:
     """A normal density of a logarithm."""
 
     mean: float
@@ -66,6 +66,6 @@ UNUSUAL_GAIN = Plateau.of((0.08, 0.5), (0.12, 0.12))
 UNUSUAL_POSITION = Plateau.of((0.4e-3, 2e-3), (0.15, 0.15))
 
 
-def level_prior(log_level_sd: float) -> Bell:
+def level_prior(log_level_sd: float) -> LogNormal:
     """Of the factor on the lines' deviations; wider than the estimate's own error: noise is not quite normal."""
-    return Bell(0.0, float(np.hypot(log_level_sd, 0.05)))
+    return LogNormal(0.0, float(np.hypot(log_level_sd, 0.05)))

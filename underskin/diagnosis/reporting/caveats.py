@@ -1,26 +1,28 @@
-"""What was left out or put right before the diagnosis, where that decides how far its statement can be trusted."""
+"""Findings that decide how far the statement of a report can be trusted, as sentences of that statement."""
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 
+from underskin.findings.codes import FindingCode
+
 _DECISIVE = (
-    "no_response",
-    "impossible_geometry",
-    "no_finite_line",
-    "refused",
-    "impossible_number",
-    "series_not_usable",
-    "curve_not_usable",
-    "units_off_by_1000",
-    "sign_flipped",
-    "mains_in_charge",
-    "out_of_domain",
-    "implausible_d33",
-    "duplicated_recording",
-    "remainder",
-    "held_out_no_better",
+    FindingCode.NO_RESPONSE,
+    FindingCode.IMPOSSIBLE_GEOMETRY,
+    FindingCode.NO_FINITE_LINE,
+    FindingCode.REFUSED,
+    FindingCode.IMPOSSIBLE_NUMBER,
+    FindingCode.SERIES_NOT_USABLE,
+    FindingCode.CURVE_NOT_USABLE,
+    FindingCode.UNITS_OFF_BY_1000,
+    FindingCode.SIGN_FLIPPED,
+    FindingCode.MAINS_IN_CHARGE,
+    FindingCode.OUT_OF_DOMAIN,
+    FindingCode.IMPLAUSIBLE_D33,
+    FindingCode.DUPLICATED_RECORDING,
+    FindingCode.REMAINDER,
+    FindingCode.HELD_OUT_NO_BETTER,
 )
-_MOST = 6  # findings of one code that are told in full
+_MOST = 6  # findings of one code that are quoted in full
 
 
 def caveats(findings: Sequence[Mapping[str, str]]) -> str:
@@ -30,7 +32,7 @@ def caveats(findings: Sequence[Mapping[str, str]]) -> str:
 
 
 def _rank(entry: Mapping[str, str]) -> int:
-    return _DECISIVE.index(entry["code"])
+    return _DECISIVE.index(FindingCode(entry["code"]))
 
 
 def _sentences(alike: Sequence[Mapping[str, str]]) -> list[str]:
@@ -41,6 +43,6 @@ def _sentences(alike: Sequence[Mapping[str, str]]) -> list[str]:
 
 def _sentence(entry: Mapping[str, str]) -> str:
     text = entry["statement"].rstrip(".")
-    if entry["recording"] and "recordings of sensor" not in text:
+    if entry["recording"]:
         return f"Recording {entry['recording']!r}: {text}."
     return f"{text[0].upper()}{text[1:]}."

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import whole_prediction
-from underskin.diagnosis.localisation.permutation_test import axis_values
+from underskin.diagnosis.localisation.region import axis_values
 from underskin.diagnosis.reporting.report import Diagnosis
 from underskin.mechanisms.autodiff import Array
 from underskin.mechanisms.registry import CATALOGUE
@@ -71,7 +71,7 @@ class Thinned:
         self._total = np.bincount(self._point, self._weight)
 
     def points(self, explanation: Explanation) -> Points:
-        """Measured, and predicted by an explanation with the sensors' gains that it found."""
+        """Measured, and predicted by an explanation with the sensors' fitted gains."""
         lines, best = self.lines, explanation.best.at
         levels = best.marginal.levels
         gains = np.exp(best.marginal.sensor_gains)[lines.sensor][lines.recording]

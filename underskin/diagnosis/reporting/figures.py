@@ -36,14 +36,14 @@ def figures(diagnosis: Diagnosis, document: Mapping[str, Any]) -> dict[str, go.F
     shown = diagnosis.search.shown_or_nothing(diagnosis.search.answers[0])
     thinned = Thinned(diagnosis, diagnosis.problem, shown)
     before, after = thinned.points(nothing), thinned.points(shown)
-    found = {
+    drawn = {
         "where": residual_map(diagnosis, thinned, before),
         "before_after": before_and_after(diagnosis, thinned, before, after, shown),
         "explanations": explanations(document),
     }
     if any(entry["parameters"] for entry in document["mechanisms"]):
-        found["parameters"] = parameter_intervals(diagnosis.problem, shown, document)
-    return found
+        drawn["parameters"] = parameter_intervals(diagnosis.problem, shown, document)
+    return drawn
 
 
 def explanations(document: Mapping[str, Any]) -> go.Figure:

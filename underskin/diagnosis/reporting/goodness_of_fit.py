@@ -50,7 +50,7 @@ def _share_of_variance(explanation: Explanation) -> float:
 def fit_summary(
     search: Search, problem: FittingProblem, groups: Sequence[cross_validation.HeldOut], explanation: Explanation
 ) -> dict[str, Any]:
-    """Errors before and after, held-out groups, the noise that was found, and of curves the modulus."""
+    """Errors before and after, held-out groups, the fitted noise, and of curves the modulus."""
     nothing = next(entry for entry in search.explanations if not entry.names)
     inside = [cross_validation.in_sample(problem, entry) for entry in (nothing, explanation)]
     outside = cross_validation.total(groups)
@@ -84,12 +84,12 @@ def fit_summary(
 
 def modulus(problem: FittingProblem, explanation: Explanation) -> dict[str, Any]:
     """Young's modulus under an explanation, with its 95 % interval; from a factor on what was declared, or free."""
-    found = parameter(explanation, place_of(explanation, "youngs_modulus"))
+    fitted = parameter(explanation, place_of(explanation, "youngs_modulus"))
     declared = problem.lines.campaign.skin.youngs_modulus_mpa
     if declared is None:
-        return found
-    scaled = {name: rounded(declared * found[name]) for name in ("value", "low", "high")}
-    return {**found, "unit": "MPa", **scaled}
+        return fitted
+    scaled = {name: rounded(declared * fitted[name]) for name in ("value", "low", "high")}
+    return {**fitted, "unit": "MPa", **scaled}
 
 
 def _noise(explanation: Explanation) -> dict[str, Any]:

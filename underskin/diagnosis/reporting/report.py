@@ -1,4 +1,4 @@
-"""The report (`report/1`): what the steps found, in one document with numbers rounded to stated digits.
+"""The report (`report/1`): the results of all steps as one document, its numbers rounded to stated digits.
 
 Four significant digits for values, three decimals for probabilities and p-values: enough for any use. The same input
 gives the same report on one machine; on a processor that rounds differently a last digit may differ.
@@ -11,18 +11,27 @@ from typing import Any
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, own_places
 from underskin.diagnosis.localisation.effect_size import Effect
-from underskin.diagnosis.localisation.permutation_test import AxisResult, reaches_all_along
-from underskin.diagnosis.localisation.residual_shape import REACHES_NOISE
+from underskin.diagnosis.localisation.permutation_test import AxisResult
+from underskin.diagnosis.localisation.region import reaches_all_along
+from underskin.diagnosis.localisation.residual_shape import REACHES_NOISE, Shape
 from underskin.diagnosis.reporting.caveats import caveats
-from underskin.diagnosis.reporting.fit_warnings import doubts
+from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
 from underskin.diagnosis.reporting.numbers import parameter, place_of, probability, rounded
-from underskin.diagnosis.reporting.statements import answer_statement, location_statement, why_not
+from underskin.diagnosis.reporting.statements import (
+    UNDECIDABLE,
+    answer_statement,
+    location_statement,
+    nothing_told,
+    why_not,
+)
 from underskin.diagnosis.selection.search import Answer, Search
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import Confounding
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.findings.lacking import Lacking
 from underskin.prediction import plausibility
-from underskin.recordings.finding import Finding
 
 SCHEMA = "report/1"
 _ALTERNATIVES = 6
@@ -36,7 +45,7 @@ class Diagnosis:
     name: str
     findings: Sequence[Finding]
     provenance: Mapping[str, Any]
-    lacking: str = ""  # what a campaign that is too small lacks
+    lacking: Lacking | None = None  # of a campaign from which nothing can be concluded
     search: Search | None = None
     problem: FittingProblem | None = None
     axes: Sequence[AxisResult] = ()
@@ -44,7 +53,7 @@ class Diagnosis:
     effect: Effect | None = None
     groups: Sequence[cross_validation.HeldOut] = ()
     confounded: Sequence[Confounding] = ()
-    shape: str = ""  # of what remains, where nothing here describes it
+    shape: Shape | None = None  # of what remains, where no mechanism describes it
     next_experiment: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -68,12 +77,12 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
         return {
             **document,
             "probability": 1.0,
-            "statement": f"The recordings cannot tell anything: {diagnosis.lacking}.",
+            "statement": nothing_told(diagnosis.lacking),
             "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "Nothing was located."},
             "mechanisms": [],
             "alternatives": [],
             "not_identifiable": [],
-            "findings": _findings(diagnosis.findings),
+            "findings": [finding.in_report() for finding in diagnosis.findings],
             "fit": None,
             "d33": None,
             "next_experiment": None,
@@ -85,7 +94,7 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
     fit = fit_summary(search, problem, diagnosis.groups, shown)
     named = leader.explanation if stated in ("explained", "ambiguous") else None
     d33, implausible = _d33(problem, shown, leader, fit)
-    findings = _findings([*diagnosis.findings, *doubts(problem, shown), *implausible])
+    findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *implausible)]
     modulus = fit["after"].get("youngs_modulus")
     statement = answer_statement(
         search.answers, stated, diagnosis.shape, problem.kind, modulus, caveats=caveats(findings)
@@ -120,17 +129,10 @@ def _d33(
     if problem.lines.curves or leader.explanation is None or leader.probability < EXPLAINED:
         return None, []
     d33 = parameter(shown, place_of(shown, "d33"))
-    slip = plausibility.implausible(d33["value"])
+    doubt = plausibility.doubt_of(d33["value"])
     reached = fit["after"]["rmse_percent"] <= REACHES_NOISE * fit["noise_floor_percent"]
-    findings = [Finding("implausible_d33", "", "d33_pc_per_n", f"d33 comes out as {d33['value']:.4g} pC/N, {slip}")]
-    return {**d33, "quotable": reached and slip is None}, findings if slip else []
-
-
-def _findings(found: Sequence[Finding]) -> list[dict[str, str]]:
-    return [
-        {"code": entry.code, "recording": entry.recording, "field": entry.field, "statement": entry.statement}
-        for entry in found
-    ]
+    finding = Finding(Reason.D33_FITTED, "", "d33_pc_per_n", {"d33_pc_per_n": d33["value"], "doubt": doubt})
+    return {**d33, "quotable": reached and doubt is None}, [finding] if doubt else []
 
 
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:
@@ -150,18 +152,19 @@ def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanatio
 
 def _alternatives(answers: Sequence[Answer]) -> list[dict[str, Any]]:
     leader = answers[0]
-    found: list[dict[str, Any]] = []
+    alternatives: list[dict[str, Any]] = []
     for answer in answers[1:]:
-        if len(found) >= _ALTERNATIVES or (answer.probability < _LEAST_PROBABILITY and len(found) > 1):
+        enough = answer.probability < _LEAST_PROBABILITY and len(alternatives) > 1
+        if enough or len(alternatives) >= _ALTERNATIVES:
             break
-        found.append(
+        alternatives.append(
             {
                 "mechanisms": list(answer.names),
                 "probability": probability(answer.probability),
                 "why_not": why_not(answer, leader),
             }
         )
-    return found
+    return alternatives
 
 
 def _location(diagnosis: Diagnosis, problem: FittingProblem, agrees: bool) -> dict[str, Any]:
@@ -174,7 +177,7 @@ def _location(diagnosis: Diagnosis, problem: FittingProblem, agrees: bool) -> di
                 "axis": entry.axis,
                 "p_value": None if entry.p_value is None else round(entry.p_value, 3),
                 "share_percent": round(100 * float(entry.share), 1),
-                **({"undecidable": entry.reason} if entry.reason else {}),
+                **({"undecidable": UNDECIDABLE[entry.reason]} if entry.reason else {}),
             }
             for entry in diagnosis.axes
         ],

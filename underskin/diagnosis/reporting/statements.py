@@ -8,21 +8,32 @@ import numpy as np
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import EXPLAINED, SIMPLEST, in_words
 from underskin.diagnosis.localisation.effect_size import Effect
-from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT, AxisResult
+from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT, AxisResult, Undecidable
+from underskin.diagnosis.localisation.residual_shape import (
+    ALONG_CURVES,
+    ORDER,
+    PRELOAD_BEFORE,
+    Form,
+    FormKind,
+    Shape,
+)
 from underskin.diagnosis.selection.search import Answer
+from underskin.findings.english import lacking
+from underskin.findings.lacking import Lacking
 from underskin.formatting import in_digits, in_percent
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE
 
 _WORTH_NAMING = 0.02
 _UNTHOUGHT_AT_MOST = 0.016  # of none_of_these, where no process shows
+_NOTHING_TOLD = "The recordings cannot tell anything: "
 _IN_PERCENT = 90.0  # beyond it an effect is said as a factor
 
 
 def answer_statement(
     answers: Sequence[Answer],
     verdict: str,
-    shape: str,
+    shape: Shape | None = None,
     kind: Kind = "frf",
     modulus: Mapping[str, Any] | None = None,
     caveats: str = "",
@@ -37,7 +48,26 @@ def answer_statement(
     return " ".join(part for part in parts if part)
 
 
-def _answer(answers: Sequence[Answer], verdict: str, shape: str, model: str, *, all_used: bool) -> tuple[str, str]:
+def nothing_told(what: Lacking | None) -> str:
+    """The statement on a campaign from which nothing can be concluded."""
+    assert what is not None
+    return f"{_NOTHING_TOLD}{lacking(what)}."
+
+
+def lacking_part(statement: str) -> str:
+    """What is lacking, with its full stop, out of the statement that `nothing_told` made."""
+    return statement.removeprefix(_NOTHING_TOLD)
+
+
+def first_and_rest(statement: str) -> tuple[str, str]:
+    """The first sentence of a statement, which is the verdict, without its full stop, and the other sentences."""
+    first, _, rest = statement.partition(". ")
+    return first.rstrip("."), rest
+
+
+def _answer(
+    answers: Sequence[Answer], verdict: str, shape: Shape | None, model: str, *, all_used: bool
+) -> tuple[str, str]:
     """The verdict in one sentence, and what else there is to say of it."""
     leader = answers[0]
     percent = in_percent(leader.probability)
@@ -50,7 +80,8 @@ def _answer(answers: Sequence[Answer], verdict: str, shape: str, model: str, *, 
             return f"{agree}; nothing needs to be added{'' if all_used else ' for those that were used'}.", ""
         return f"{agree}, but they do not rule out: {listed}.", _laws(tuple(mentioned))
     if verdict == "unexplained":
-        return f"Something is missing that none of the known mechanisms describes (probability {percent}).", shape
+        missing = f"Something is missing that none of the known mechanisms describes (probability {percent})."
+        return missing, shape_statement(shape)
     names = in_words(leader.names)
     if verdict == "explained":
         return f"{model[0].upper()}{model[1:]} lacks {names} (probability {percent}).", _laws(leader.names)
@@ -60,6 +91,39 @@ def _answer(answers: Sequence[Answer], verdict: str, shape: str, model: str, *, 
 def _laws(names: Sequence[str]) -> str:
     """What each mechanism is, a sentence each."""
     return " ".join(f"{in_words([name]).capitalize()}: {CATALOGUE[name].plain.rstrip('.')}." for name in names)
+
+
+def shape_statement(shape: Shape | None) -> str:
+    """What is known of a residual that no mechanism describes, as one sentence; empty where nothing was looked at."""
+    if shape is None:
+        return ""
+    beyond = f" beyond {in_words(shape.beyond)}" if shape.beyond else ""
+    form = "has no simple form over one axis" if shape.form is None else f"looks like {_form(shape.form, shape)}"
+    return f"What remains{beyond} {form}."
+
+
+def _form(form: Form, shape: Shape) -> str:
+    if form.kind == FormKind.CIRCLING:
+        return f"a place that runs round, up to {form.size:.2g} mm off, once in {form.at:.3g} recordings"
+    words = _FORMS[form.kind].format(at=form.at, unit=ALONG_CURVES.get(form.axis, ""))
+    size = f"{words}, up to {in_digits(form.size, 2)} %"
+    return f"{size} of the largest force over {form.axis}" if shape.of_curves else f"{size} over {_form_axis(form)}"
+
+
+_FORMS: Mapping[FormKind, str] = {
+    FormKind.POWER_LAW: "a power law",
+    FormKind.DRIFT: "a drift",
+    FormKind.STEP: "a step at {at:.4g}",
+    FormKind.PERIODIC: "a periodic change of period {at:.3g}",
+    FormKind.PEAK: "a peak or notch at {at:.3g} Hz",
+    FormKind.BUMP: "a bump at {at:.3g} {unit}",
+}
+_OWN_AXES = {PRELOAD_BEFORE: "the preload of the recording before over its own", ORDER: "the order of recordings"}
+
+
+def _form_axis(form: Form) -> str:
+    words = _OWN_AXES[form.axis] if form.axis in _OWN_AXES else WORDS[form.axis][0]
+    return words if form.component is None else f"{words} ({'xy'[form.component]})"
 
 
 def why_not(answer: Answer, leader: Answer) -> str:
@@ -81,6 +145,14 @@ def why_not(answer: Answer, leader: Answer) -> str:
 
 def _round(value: float) -> str:
     return f"{float(f'{value:.1g}'):.0f}" if value >= 10 else f"{value:.1g}"
+
+
+UNDECIDABLE: Mapping[Undecidable, str] = {
+    Undecidable.FEW_EXCHANGEABLE: "too few recordings that could be exchanged",
+    Undecidable.FEW_RECORDINGS: "too few recordings to tell it from the other axes",
+    Undecidable.ALIASED: "the other axes determine it in this design",
+    Undecidable.FEW_SIGNS: "fewer than 6 recordings, whose signs could be changed",
+}
 
 
 def location_statement(

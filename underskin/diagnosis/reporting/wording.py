@@ -12,7 +12,10 @@ from underskin.mechanisms.registry import CATALOGUE
 
 
 def readable(text: str) -> str:
-    """A statement with the names of mechanisms and axes as words: contact resonance for contact_resonance."""
+    """A statement with the names of mechanisms and axes as words: contact resonance for contact_resonance.
+
+    A stored report has sentences alone. This is for display; nothing is decided by it.
+    """
     pattern, names = _names()
     return pattern.sub(lambda match: names[match[0]], text)
 

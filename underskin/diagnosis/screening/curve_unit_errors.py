@@ -6,17 +6,20 @@ What is compared is the apparent modulus at the largest displacement u from the 
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from underskin.diagnosis.data.inspected import Inspected
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.base import Kind
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
 from underskin.recordings.conditions import SkinDescription
-from underskin.recordings.finding import Finding
 from underskin.units import Floats
 
-_SOFTEST_MPA, _HARDEST_MPA = 0.003, 300.0
+_RUBBER_MPA = 0.003, 300.0
 _IMPOSSIBLE_MPA = 1e-6, 1e6  # from foam's to diamond's
 _DEEPEST = 0.85  # of a cylinder's height: there the true stress is tens of moduli
 _FAR = 100.0  # times the declared modulus, or the other curves'
@@ -25,27 +28,27 @@ _REVERSED = -0.5  # correlation of force and displacement
 Curve = IndentationRecording | CompressionRecording
 
 
-def without_slips(campaign: Campaign, kind: Kind) -> Inspected:
-    """Reversed forces put right; copies and slips of single curves left out; slips of all named."""
-    found: list[Finding] = []
-    curves = [
-        _upright(entry, found)
+def without_inconsistent(campaign: Campaign, kind: Kind) -> Inspected:
+    """The curves of one kind that agree with each other, reversed forces put right; findings for the others.
+
+    Copies and single curves of other magnitudes are left out. Where all curves contradict what is declared nothing is
+    lacking only if `units_checked` confirms it.
+    """
+    recorded = [
+        entry
         for entry in campaign.recordings
         if isinstance(entry, IndentationRecording | CompressionRecording) and entry.kind == kind
     ]
-    curves = _within_reach(_once(curves, found), found)
-    curves = _with_others(curves, campaign.skin, found)
+    curves, findings = list(recorded), []
+    for step in (_upright, _once, _within_range, partial(_like_others, skin=campaign.skin)):
+        curves, step_findings = step(curves)
+        findings += step_findings
     left = replace(campaign, recordings=tuple(curves))
     shared = _shared(campaign, curves)
-    found += shared
+    findings += shared
     if shared and (not campaign.units_checked or not _possible(campaign, curves)):
-        return Inspected(
-            replace(left, recordings=()),
-            found,
-            "force, displacement and modulus cannot all be right as declared (see findings); if they are meant, say "
-            "units_checked",
-        )
-    return Inspected(left, found, "" if curves else "no curve can be used (see findings)")
+        return Inspected(replace(left, recordings=()), findings, Lacking(Lack.CURVES_CONTRADICT))
+    return Inspected(left, findings, None if curves else Lacking(Lack.NO_CURVE))
 
 
 def is_reversed(entry: Curve) -> bool:
@@ -57,68 +60,70 @@ def is_reversed(entry: Curve) -> bool:
     return float(np.corrcoef(place, force)[0, 1]) <= _REVERSED
 
 
-def _upright(entry: Curve, found: list[Finding]) -> Curve:
-    if not is_reversed(entry):
-        return entry
-    text = "its force falls as it is pressed, where compression counts positive: reversed"
-    found.append(Finding("sign_flipped", entry.id, "force_n", text))
-    return replace(entry, force_n=-entry.force_n)
+def _upright(curves: Sequence[Curve]) -> tuple[list[Curve], list[Finding]]:
+    """All curves, those whose force falls as they are pressed with the sign reversed."""
+    turned = {entry.id for entry in curves if is_reversed(entry)}
+    findings = [Finding(Reason.CURVE_REVERSED, entry.id, "force_n") for entry in curves if entry.id in turned]
+    return [replace(entry, force_n=-entry.force_n) if entry.id in turned else entry for entry in curves], findings
 
 
-def _once(curves: Sequence[Curve], found: list[Finding]) -> list[Curve]:
-    kept: dict[tuple[bytes, bytes], Curve] = {}
+def _once(curves: Sequence[Curve]) -> tuple[list[Curve], list[Finding]]:
+    """The curves without copies of earlier ones."""
+    originals: dict[tuple[bytes, bytes], Curve] = {}
+    findings = []
     for entry in curves:
-        first = kept.setdefault((entry.displacement_mm.tobytes(), entry.force_n.tobytes()), entry)
+        first = originals.setdefault((entry.displacement_mm.tobytes(), entry.force_n.tobytes()), entry)
         if first is not entry:
-            text = f"the same numbers as recording {first.id!r}: left out"
-            found.append(Finding("duplicated_recording", entry.id, "force_n", text))
-    return list(kept.values())
+            findings.append(Finding(Reason.DUPLICATED_RECORDING, entry.id, "force_n", {"original": first.id}))
+    return list(originals.values()), findings
 
 
-def _within_reach(curves: Sequence[Curve], found: list[Finding]) -> list[Curve]:
+def _within_range(curves: Sequence[Curve]) -> tuple[list[Curve], list[Finding]]:
     """Those not pressed through nearly the whole sample, or ten times as deep as the sphere is wide."""
-    kept = []
+    usable, findings = [], []
     for entry in curves:
         place = entry.displacement_mm[np.isfinite(entry.displacement_mm)]
-        most, what = (  # a sphere may come a long way through the air
-            (20 * entry.indenter_radius_mm, "ten times the sphere's width")
-            if isinstance(entry, IndentationRecording)
-            else (_DEEPEST * entry.sample_height_mm, f"{_DEEPEST:g} of its sample's height")
-        )
-        if place.max() - place[0] > most:
-            text = f"pressed {place.max() - place[0]:.3g} mm, more than {what} ({most:.3g} mm): given in µm? Left out"
-            found.append(Finding("units_off_by_1000", entry.id, "displacement_mm", text))
+        moved = float(place.max() - place[0])
+        if isinstance(entry, IndentationRecording):  # a sphere may come a long way through the air
+            most = 20 * entry.indenter_radius_mm
+            too_deep = Finding(
+                Reason.SPHERE_TOO_DEEP, entry.id, "displacement_mm", {"moved_mm": moved, "most_mm": most}
+            )
         else:
-            kept.append(entry)
-    return kept
+            most = _DEEPEST * entry.sample_height_mm
+            arguments = {"moved_mm": moved, "most_mm": most, "share": _DEEPEST}
+            too_deep = Finding(Reason.CURVE_TOO_DEEP, entry.id, "displacement_mm", arguments)
+        if moved > most:
+            findings.append(too_deep)
+        else:
+            usable.append(entry)
+    return usable, findings
 
 
-def _with_others(curves: Sequence[Curve], skin: SkinDescription, found: list[Finding]) -> list[Curve]:
+def _like_others(curves: Sequence[Curve], skin: SkinDescription) -> tuple[list[Curve], list[Finding]]:
     """Those whose apparent modulus is of the others' magnitude; of two, the one that is of the declared one's."""
     modulus = np.array([_apparent_mpa(entry, skin.poisson_ratio) for entry in curves])
     if len(curves) < 2 or not np.isfinite(modulus).any():
-        return list(curves)
+        return list(curves), []
     usual = float(np.nanmedian(modulus))
     if len(curves) == 2:
         if not np.nanmax(modulus) > _FAR * np.nanmin(modulus):
-            return list(curves)
+            return list(curves), []
         near = [own for own in modulus if skin.youngs_modulus_mpa and 1 / _FAR < own / skin.youngs_modulus_mpa < _FAR]
         if len(near) != 1:
-            return list(curves)
+            return list(curves), []
         usual = float(near[0])
-    reach = np.array([float(np.nanmax(np.abs(entry.displacement_mm))) for entry in curves])
-    kept = []
-    for entry, own, farthest in zip(curves, modulus, reach, strict=True):
+    deepest = np.array([float(np.nanmax(np.abs(entry.displacement_mm))) for entry in curves])
+    usable, findings = [], []
+    for entry, own, depth in zip(curves, modulus, deepest, strict=True):
         if not np.isfinite(own) or usual / _FAR < own < usual * _FAR:
-            kept.append(entry)
+            usable.append(entry)
             continue
-        moved = farthest / float(np.median(reach))
+        moved = depth / float(np.median(deepest))
         field = "force_n" if 1 / _FAR < moved < _FAR else "displacement_mm"
-        text = (
-            f"its apparent modulus of {own:.3g} MPa is {own / usual:.2g} times the others': a slip of units? Left out"
-        )
-        found.append(Finding("units_off_by_1000", entry.id, field, text))
-    return kept
+        arguments = {"modulus_mpa": float(own), "ratio": float(own / usual)}
+        findings.append(Finding(Reason.MODULUS_BESIDE_OTHERS, entry.id, field, arguments))
+    return usable, findings
 
 
 def _shared(campaign: Campaign, curves: Sequence[Curve]) -> list[Finding]:
@@ -127,21 +132,16 @@ def _shared(campaign: Campaign, curves: Sequence[Curve]) -> list[Finding]:
     if not np.isfinite(modulus).any():
         return []
     usual, declared = float(np.nanmedian(modulus)), campaign.skin.youngs_modulus_mpa
-    low, high = (_SOFTEST_MPA, _HARDEST_MPA) if declared is None else (declared / _FAR, declared * _FAR)
+    low, high = _RUBBER_MPA if declared is None else (declared / _FAR, declared * _FAR)
     if len(curves) == 2 and modulus.max() > _FAR * modulus.min():
-        text = (
-            f"the two curves' apparent moduli of {modulus[0]:.2g} and {modulus[1]:.2g} MPa contradict each other: is "
-            "force or displacement of one of them off by 1000?"
-        )
-        return [Finding("units_off_by_1000", "", "force_n", text)]
+        first, second = modulus.tolist()
+        return [Finding(Reason.TWO_MODULI, "", "force_n", {"first_mpa": first, "second_mpa": second})]
     if low <= usual <= high:
         return []
-    against = "rubber has 0.003 to 300 MPa" if declared is None else f"{declared:g} MPa is declared"
-    guess = "N for mN, or mm for m" if usual > high else "mN for N, or m for mm"
-    text = (
-        f"force and displacement would need a modulus of about {usual:.2g} MPa, where {against}: off by 1000 ({guess})?"
-    )
-    return [Finding("units_off_by_1000", "", "force_n", text)]
+    needed: dict[str, float] = {"modulus_mpa": usual, "too_large": usual > high}
+    if declared is not None:
+        return [Finding(Reason.MODULUS_BESIDE_DECLARED, "", "force_n", {**needed, "declared_mpa": declared})]
+    return [Finding(Reason.MODULUS_BESIDE_RUBBER, "", "force_n", {**needed, "low_mpa": low, "high_mpa": high})]
 
 
 def _possible(campaign: Campaign, curves: Sequence[Curve]) -> bool:

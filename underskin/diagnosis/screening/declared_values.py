@@ -1,20 +1,21 @@
-"""What a campaign declares of its skin, and of all its recordings alike, that no skin and no rig has.
+"""Declared values of the skin, and values shared by all recordings, that no skin and no rig has.
 
-An unlikely magnitude looks like a slip of units: nothing in the campaign says otherwise, and every law of contact would
-be tried on a wrong force or modulus. It is named in any case, and nothing is concluded from it, until it is corrected
-or `units_checked` says that it is meant.
+An unlikely magnitude looks like a slip of units. Nothing else in the campaign would show it, and every law of contact
+would be fitted with a wrong force or modulus. So it is a finding, and nothing is concluded until it is corrected or
+`units_checked` confirms it.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from underskin import units
 from underskin.diagnosis.data.axes import hours
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.finding import Finding
 from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.plausibility import pitch_mm
+from underskin.units import unusual
 
 _PRELOADS_N = (0.01, 150.0)  # the highest preload of a campaign, and the lowest
 _FREQUENCIES_HZ = (0.5, 2e4)  # the highest line of a campaign
@@ -34,56 +35,57 @@ def unlikely(campaign: Campaign, entries: Sequence[FrfRecording]) -> list[Findin
 def _of_skin(campaign: Campaign) -> list[Finding]:
     skin = campaign.skin
     assert skin.youngs_modulus_mpa is not None
-    found = []
+    findings = []
     low, high = _ELASTOMERS_MPA
     modulus = skin.youngs_modulus_mpa
     if not low <= modulus <= high:
-        word, guess = ("stiffer", "kPa") if modulus > high else ("softer", "GPa")
-        text = f"{modulus:g} MPa is {word} than elastomers are ({low:g} to {high:g} MPa): was it given in {guess}?"
-        found.append(_slip("skin.youngs_modulus_mpa", text))
+        arguments = {
+            "modulus_mpa": modulus,
+            "low_mpa": low,
+            "high_mpa": high,
+            "given_in": "kPa" if modulus > high else "GPa",
+        }
+        findings.append(Finding(Reason.MODULUS_OF_NO_ELASTOMER, "", "skin.youngs_modulus_mpa", arguments))
     for name in _GEOMETRY:
-        value = getattr(skin, name)
-        found += [_slip(f"skin.{name}", entry.statement) for entry in units.findings(name, value or 1.0)]
+        findings += _unusual(f"skin.{name}", unusual(name, getattr(skin, name) or 1.0))
     pitch = pitch_mm(campaign)
     if pitch is not None and pitch > _WIDEST_PITCH_MM:
-        found.append(_slip("skin.sensors", f"no two sensors lie nearer than {pitch:g} mm: were places given in µm?"))
-    return found
+        findings.append(Finding(Reason.WIDE_PITCH, "", "skin.sensors", {"pitch_mm": pitch}))
+    return findings
 
 
 def _of_recordings(entries: Sequence[FrfRecording]) -> list[Finding]:
     preload = np.array([entry.preload_n for entry in entries])
-    found = []
+    findings = []
     if preload.max() < _PRELOADS_N[0]:
-        text = f"no preload is above {preload.max():g} N: they look 1000 × too small; were they given in kN?"
-        found.append(_slip("preload_n", text))
+        findings.append(Finding(Reason.PRELOADS_SMALL, "", "preload_n", {"highest_n": float(preload.max())}))
     if preload.min() > _PRELOADS_N[1]:
-        text = f"no preload is below {preload.min():g} N: they look 1000 × too large; were they given in mN?"
-        found.append(_slip("preload_n", text))
+        findings.append(Finding(Reason.PRELOADS_LARGE, "", "preload_n", {"lowest_n": float(preload.min())}))
     sphere = float(np.median([entry.indenter_radius_mm for entry in entries]))
-    found += [_slip("indenter_radius_mm", entry.statement) for entry in units.findings("indenter_radius_mm", sphere)]
-    return [*found, *_of_frequencies(entries)]
+    findings += _unusual("indenter_radius_mm", unusual("indenter_radius_mm", sphere))
+    return [*findings, *_of_frequencies(entries)]
+
+
+def _unusual(field: str, findings: Sequence[Finding]) -> list[Finding]:
+    """Unusual magnitudes as slips of units of a declared field: nothing in the campaign says otherwise."""
+    return [Finding(Reason.DECLARED_UNUSUAL, "", field, entry.arguments) for entry in findings]
 
 
 def _of_frequencies(entries: Sequence[FrfRecording]) -> list[Finding]:
     lines = [lines_of(entry).frequency for entry in entries]
     lowest, highest = min(float(own.min()) for own in lines), max(float(own.max()) for own in lines)
     slow = lowest < _SLOW_HZ[0] and highest < _SLOW_HZ[1]
-    for wrong, word, unit in (
-        (highest > _FREQUENCIES_HZ[1], "large", "mHz"),
-        (slow or highest < _FREQUENCIES_HZ[0], "small", "kHz"),
+    for wrong, too_large, unit in (
+        (highest > _FREQUENCIES_HZ[1], True, "mHz"),
+        (slow or highest < _FREQUENCIES_HZ[0], False, "kHz"),
     ):
         if wrong:
-            text = (
-                f"frequencies are {lowest:g} to {highest:g} Hz: they look 1000 × too {word}; were they given in {unit}?"
-            )
-            return [_slip("frequency_hz", text)]
+            arguments = {"lowest_hz": lowest, "highest_hz": highest, "too_large": too_large, "given_in": unit}
+            return [Finding(Reason.FREQUENCIES, "", "frequency_hz", arguments)]
     pause = _pause_s(entries)
     if pause is not None and pause * lowest < 1 and _SLIP * highest <= _FREQUENCIES_HZ[1]:
-        text = (
-            f"no period of {lowest:g} Hz fits into the {pause:.3g} s after which, by recorded_at, the next recording "
-            "follows: are they 1000 × too small, given in kHz?"
-        )
-        return [_slip("frequency_hz", text)]
+        arguments = {"lowest_hz": lowest, "pause_s": pause}
+        return [Finding(Reason.PERIODS_TOO_LONG, "", "frequency_hz", arguments)]
     return []
 
 
@@ -97,7 +99,3 @@ def _pause_s(entries: Sequence[FrfRecording]) -> float | None:
     steps = np.concatenate([np.diff(np.sort(seconds[sensors == name])) for name in np.unique(sensors)])
     pauses = steps[steps >= _LEAST_PAUSE_S]
     return float(np.median(pauses)) if len(pauses) else None
-
-
-def _slip(field: str, text: str) -> Finding:
-    return Finding("units_off_by_1000", "", field, text)

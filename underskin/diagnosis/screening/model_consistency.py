@@ -1,24 +1,26 @@
-"""What single recordings say against the base model before any fit: silent, off by 1000, reversed.
+"""Single recordings against the base model before any fit: no response, off by 1000, reversed.
 
-All that is compared is each recording's level over what the base model predicts: its apparent d33. Recordings that are
-silent, or where little is predicted (near a crossing of zero), have none.
+Only the level of each recording over the prediction of the base model is compared: its apparent d33. Recordings without
+a response, or where little is predicted (near a zero crossing), have none.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.screening.no_response import dead, silence
-from underskin.diagnosis.screening.table_domain import in_reach
+from underskin.diagnosis.screening.table_domain import within_tables
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.models.composed import Model, compose
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.finding import Finding
 from underskin.recordings.frf.estimation import lines_of
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
-_SLIPS = {1e3: "1000 × too large: pC taken for nC, or N for mN?", 1e-3: "1000 × too small: nC taken for pC?"}
+_SLIPS = (1e3, 1e-3)
 _SLIP_WIDTH = np.log(12.0)
 _LIKELY_D33 = (0.3, 1000.0)  # pC/N; polymers have 5 to 40, ceramics up to some hundred
 _LEAST_RESPONSE = 0.2  # of the campaign's largest prediction: below it, near a crossing of zero, a sign says nothing
@@ -28,28 +30,38 @@ _D33 = 15.0  # pC/N: the prior's centre is what the prediction is made with
 Mask = NDArray[np.bool_]
 
 
-def against_model(
-    campaign: Campaign, entries: list[FrfRecording], table: SigmaTable, found: list[Finding]
-) -> tuple[list[FrfRecording], str]:
-    """The recordings that can be used, reversed ones put right, and what is lacking where none can."""
+@dataclass(frozen=True)
+class Consistent:
+    """The recordings that can be used, reversed ones put right, the findings, and what is `lacking` where none can."""
+
+    entries: list[FrfRecording]
+    findings: list[Finding]
+    lacking: Lacking | None = None
+
+
+def against_model(campaign: Campaign, entries: list[FrfRecording], table: SigmaTable) -> Consistent:
+    """The recordings held against the base model."""
     silent, variance = silence(entries)
     if silent.all():
-        text = f"none of the {len(entries)} recordings shows a response above its noise: is the sensor connected?"
-        found.append(Finding("no_response", "", "frf_re_pc_per_n", text))
-        return [], "no recording shows a response above its own noise"
+        finding = Finding(Reason.SILENT_CAMPAIGN, "", "frf_re_pc_per_n", {"recordings": len(entries)})
+        return Consistent([], [finding], Lacking(Lack.NO_RESPONSE))
     model = compose((), replace(campaign, recordings=tuple(entries)), table, "frf")
-    inside = in_reach(campaign, entries, model, table, found)
+    inside, findings = within_tables(campaign, entries, model, table)
     ratio, expected = _apparent(entries, model, inside & ~silent)
-    kept = inside & ~dead(entries, silent & inside, variance, expected, found)
+    lost, silent_findings = dead(entries, silent & inside, variance, expected)
+    findings += silent_findings
+    usable = inside & ~lost
     turned = np.where(_one_sided(entries), ratio, np.nan)
-    if len(entries) == 2 and _contradict(ratio, turned, found):
-        return [], "two recordings that contradict each other (see findings); a third would tell which is off"
-    ratio, turned = np.where(kept, ratio, np.nan), np.where(kept, turned, np.nan)
-    kept &= ~_off_by_1000(entries, ratio, found)
-    _of_all(ratio, campaign.skin.d33_pc_per_n, found)
-    signs = _signs(entries, turned, kept, found)
+    contradiction = _contradiction(ratio, turned) if len(entries) == 2 else None
+    if contradiction is not None:
+        return Consistent([], [*findings, contradiction], Lacking(Lack.TWO_RECORDINGS_CONTRADICT))
+    ratio, turned = np.where(usable, ratio, np.nan), np.where(usable, turned, np.nan)
+    off, off_findings = _off_by_1000(entries, ratio)
+    usable &= ~off
+    signs, sign_findings = _signs(entries, turned, usable)
+    findings += [*off_findings, *_of_all(ratio, campaign.skin.d33_pc_per_n), *sign_findings]
     entries = [entry if sign > 0 else _reversed(entry) for entry, sign in zip(entries, signs, strict=True)]
-    return [entry for entry, chosen in zip(entries, kept, strict=True) if chosen], ""
+    return Consistent([entry for entry, chosen in zip(entries, usable, strict=True) if chosen], findings)
 
 
 def _apparent(entries: list[FrfRecording], model: Model, usable: Mask) -> tuple[Floats, Floats]:
@@ -63,20 +75,23 @@ def _apparent(entries: list[FrfRecording], model: Model, usable: Mask) -> tuple[
     return ratio, np.abs(shape) * usual
 
 
-def _off_by_1000(entries: list[FrfRecording], ratio: Floats, found: list[Finding]) -> Mask:
-    """Which recordings' levels are about 1000 × off all others."""
+def _off_by_1000(entries: list[FrfRecording], ratio: Floats) -> tuple[Mask, list[Finding]]:
+    """Which recordings' levels are about 1000 × off all others, and the findings on them."""
     off = np.zeros(len(entries), dtype=bool)
+    findings: list[Finding] = []
     if not np.isfinite(ratio).any():
-        return off
+        return off, findings
     usual = float(np.nanmedian(np.abs(ratio)))
     slip = np.log(np.abs(ratio) / usual) if usual > 0 else np.full(len(ratio), np.nan)
     for number in np.flatnonzero(np.isfinite(slip)):
-        for factor, guess in _SLIPS.items():
+        for factor in _SLIPS:
             if abs(slip[number] - np.log(factor)) < _SLIP_WIDTH:
-                text = f"the response looks {guess} Left out"
-                found.append(Finding("units_off_by_1000", entries[number].id, "frf_re_pc_per_n", text))
+                arguments = {"too_large": factor > 1}
+                findings.append(
+                    Finding(Reason.RESPONSE_BESIDE_OTHERS, entries[number].id, "frf_re_pc_per_n", arguments)
+                )
                 off[number] = True
-    return off
+    return off, findings
 
 
 def _one_sided(entries: list[FrfRecording]) -> Mask:
@@ -92,62 +107,55 @@ def _one_sided(entries: list[FrfRecording]) -> Mask:
     return np.array(sides)
 
 
-def _contradict(ratio: Floats, turned: Floats, found: list[Finding]) -> bool:
-    """Whether two recordings' levels are about 1000 × apart, or of opposite signs; which of them is off, they hide."""
+def _contradiction(ratio: Floats, turned: Floats) -> Finding | None:
+    """Of two recordings whose levels are about 1000 × apart, or of opposite signs; which of them is off, they hide."""
     low, high = sorted(np.abs(ratio).tolist())
     if not low > 0:
-        return False
+        return None
     if np.prod(turned) < 0:
-        text = "the two recordings answer with opposite signs: one of them is reversed"
-        found.append(Finding("sign_flipped", "", "frf_re_pc_per_n", text))
-        return True
+        return Finding(Reason.TWO_SIGNS, "", "frf_re_pc_per_n")
     if abs(np.log(high / low) - np.log(1e3)) < _SLIP_WIDTH:
-        text = f"the two recordings' responses are {high / low:.3g} times as far apart as expected: a slip of units?"
-        found.append(Finding("units_off_by_1000", "", "frf_re_pc_per_n", text))
-        return True
-    return False
+        return Finding(Reason.TWO_RESPONSES, "", "frf_re_pc_per_n", {"ratio": high / low})
+    return None
 
 
-def _of_all(ratio: Floats, declared: float | None, found: list[Finding]) -> None:
-    """Name a d33 that no sensor has, or that is 1000 × off the declared one."""
+def _of_all(ratio: Floats, declared: float | None) -> list[Finding]:
+    """A d33 that no sensor has, or that is 1000 × off the declared one."""
     d33 = float(np.nanmedian(np.abs(ratio))) * _D33 if np.isfinite(ratio).any() else 0.0
     if d33 <= 0:
-        return
+        return []
     low, high = _LIKELY_D33
-    known = ""
     if declared:
         low, high = (abs(declared) * factor / np.exp(_SLIP_WIDTH) ** side for factor, side in ((1e-3, -1), (1e3, 1)))
-        known = f", where {declared:g} is declared"
-    if not low <= d33 <= high:
-        guess = _SLIPS[1e3] if d33 > high else _SLIPS[1e-3]
-        text = f"charge over force would need a d33 of {d33:.3g} pC/N{known}; it looks {guess}"
-        found.append(Finding("units_off_by_1000", "", "frf_re_pc_per_n", text))
+    if low <= d33 <= high:
+        return []
+    arguments = {"d33_pc_per_n": d33, "declared_pc_per_n": declared, "too_large": bool(d33 > high)}
+    return [Finding(Reason.D33_NEEDED, "", "frf_re_pc_per_n", arguments)]
 
 
-def _signs(entries: list[FrfRecording], turned: Floats, kept: Mask, found: list[Finding]) -> Floats:
-    """Of each recording: −1 where its sensor's polarity is reversed, or its own alone."""
-    negative = np.isfinite(turned) & (turned < 0) & kept
-    positive = np.isfinite(turned) & (turned > 0) & kept
+def _signs(entries: list[FrfRecording], turned: Floats, usable: Mask) -> tuple[Floats, list[Finding]]:
+    """Of each recording −1 where its sensor's polarity is reversed, or its own alone, else 1; and the findings."""
+    negative = np.isfinite(turned) & (turned < 0) & usable
+    positive = np.isfinite(turned) & (turned > 0) & usable
     signs = np.ones(len(entries))
+    findings = []
     if negative.sum() > positive.sum():
-        text = "charge is negative in compression: all signs were reversed (a negative d33, or the amplifier inverts)"
-        found.append(Finding("sign_flipped", "", "frf_re_pc_per_n", text))
+        findings.append(Finding(Reason.ALL_REVERSED, "", "frf_re_pc_per_n"))
         signs[:] = -1.0
         negative, positive = positive, negative
     sensors = np.array([entry.sensor for entry in entries])
     for name in dict.fromkeys(sensors.tolist()):
         own = sensors == name
         if (negative & own).sum() > max(1, (positive & own).sum()):
-            text = f"sensor {name!r} answers with the opposite sign of the others: reversed"
-            found.append(Finding("sign_flipped", entries[int(np.flatnonzero(own)[0])].id, "frf_re_pc_per_n", text))
+            first = entries[int(np.flatnonzero(own)[0])]
+            findings.append(Finding(Reason.SENSOR_REVERSED, first.id, "frf_re_pc_per_n", {"sensor": name}))
             signs[own] *= -1.0
             negative = negative & ~own
     if negative.sum() <= max(0.2 * positive.sum(), 1) and positive.sum() > 1:
         for number in np.flatnonzero(negative):
-            text = "its sign is the opposite of the others': reversed"
-            found.append(Finding("sign_flipped", entries[number].id, "frf_re_pc_per_n", text))
+            findings.append(Finding(Reason.RECORDING_REVERSED, entries[number].id, "frf_re_pc_per_n"))
             signs[number] *= -1.0
-    return signs
+    return signs, findings
 
 
 def _reversed(entry: FrfRecording) -> FrfRecording:

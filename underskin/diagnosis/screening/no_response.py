@@ -11,8 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.finding import Finding
 from underskin.recordings.frf.estimation import lines_of
 from underskin.units import Floats
 
@@ -42,21 +43,27 @@ def silence(entries: Sequence[FrfRecording]) -> tuple[Mask, Floats]:
 
 
 def dead(
-    entries: Sequence[FrfRecording], silent: Mask, variance: Floats, expected: Floats, found: list[Finding]
-) -> Mask:
-    """Which recordings are silent though the others let expect a response well above their noise; each is named, or
-    its sensor where that is silent in most of its recordings and faint in the others, which noise alone does."""
+    entries: Sequence[FrfRecording], silent: Mask, variance: Floats, expected: Floats
+) -> tuple[Mask, list[Finding]]:
+    """Which recordings are silent though the others predict a response well above their noise.
+
+    Each is a finding of its own, or its sensor is one, where that is silent in most of its recordings and faint in the
+    others, which noise alone does.
+    """
     lost: Mask = silent & (expected**2 > _AUDIBLE * variance)
+    findings = []
     sensors = np.array([entry.sensor for entry in entries])
     level = np.array([float(np.abs(np.nanmean(lines_of(entry).values))) for entry in entries])
     for name in dict.fromkeys(sensors[lost].tolist()):
         own = sensors == name
         if own.sum() > 1 and 2 * lost[own].sum() > own.sum() and (lost | (level < _FAINT * expected))[own].all():
-            text = f"none of the {own.sum()} recordings of sensor {name!r} shows a response above its noise: left out"
             lost = lost | own
-            found.append(Finding("no_response", entries[int(np.flatnonzero(own)[0])].id, "frf_re_pc_per_n", text))
+            first = entries[int(np.flatnonzero(own)[0])]
+            arguments = {"recordings": int(own.sum()), "sensor": name}
+            findings.append(Finding(Reason.SILENT_SENSOR, first.id, "frf_re_pc_per_n", arguments))
             continue
-        for number in np.flatnonzero(lost & own).tolist():
-            text = "no response above its noise, where the other recordings let expect one: left out"
-            found.append(Finding("no_response", entries[number].id, "frf_re_pc_per_n", text))
-    return lost
+        findings += [
+            Finding(Reason.SILENT_RECORDING, entries[number].id, "frf_re_pc_per_n")
+            for number in np.flatnonzero(lost & own).tolist()
+        ]
+    return lost, findings

@@ -1,8 +1,8 @@
-"""Numbers that no instrument writes and no skin has, whatever their unit: products and powers of them overflow.
+"""Numbers beyond any instrument and any skin, whatever their unit: their products and powers overflow.
 
-The bounds lie far beyond any slip of units: from a picometre to a kilometre, from a millionth of a pascal to that of
-neutron stars. `units_checked` says nothing against them. A recording with such a number is left out; where the skin has
-one, nothing can be told.
+The bounds lie far beyond any slip of units: from a picometre to a kilometre, from a millionth of a pascal to the
+pressure in neutron stars. `units_checked` does not confirm such numbers. A recording that holds one is left out; where
+the skin has one, nothing can be concluded.
 """
 
 from collections.abc import Iterator
@@ -11,9 +11,11 @@ from dataclasses import fields, replace
 import numpy as np
 
 from underskin.diagnosis.data.inspected import Inspected
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.findings.lacking import Lack, Lacking
 from underskin.recordings.campaign import Campaign, Recording
 from underskin.recordings.conditions import SkinDescription
-from underskin.recordings.finding import Finding
 
 _LENGTH, _FORCE, _TIME = (1e-9, 1e6), (1e-8, 1e8), (1e-12, 1e12)
 _PLACE = (0.0, 1e6)  # of what differences and rotations leave where 0 is meant, too
@@ -42,27 +44,34 @@ _WIDEST_SENSOR = 100.0  # radii over the thickness; tables end far below
 
 
 def without_extremes(campaign: Campaign) -> Inspected:
-    """The campaign without recordings that hold such numbers, each named; `lacking` where its skin does."""
-    skin = [Finding("impossible_number", "", f"skin.{name}", text) for name, text in _of_skin(campaign.skin)]
-    if skin:
-        what = " and ".join(entry.field for entry in skin)
-        return Inspected(replace(campaign, recordings=()), skin, f"{what} cannot be right as declared (see findings)")
-    found, kept = [], []
+    """The campaign without recordings that hold such numbers, each a finding; `lacking` where its skin does."""
+    of_skin = _of_skin(campaign.skin)
+    if of_skin:
+        arguments = {"fields": [entry.field for entry in of_skin], "confirmable": False}
+        return Inspected(replace(campaign, recordings=()), of_skin, Lacking(Lack.IMPOSSIBLE_DECLARATION, arguments))
+    findings, usable = [], []
     for entry in campaign.recordings:
-        wrong = list(_of(entry))
-        found += [Finding("impossible_number", entry.id, name, f"{text}: left out") for name, text in wrong]
-        kept += [] if wrong else [entry]
-    return Inspected(replace(campaign, recordings=tuple(kept)), found, "" if kept else "no recording can be used")
+        wrong = [
+            Finding(Reason.IMPOSSIBLE_RECORDING, entry.id, name, arguments) for name, arguments in _out_of_bounds(entry)
+        ]
+        findings += wrong
+        usable += [] if wrong else [entry]
+    lacking = None if usable else Lacking(Lack.NO_RECORDING)
+    return Inspected(replace(campaign, recordings=tuple(usable)), findings, lacking)
 
 
-def _of_skin(skin: SkinDescription) -> Iterator[tuple[str, str]]:
-    yield from _of(skin)
+def _of_skin(skin: SkinDescription) -> list[Finding]:
+    findings = [
+        Finding(Reason.IMPOSSIBLE_SKIN, "", f"skin.{name}", arguments) for name, arguments in _out_of_bounds(skin)
+    ]
     if skin.thickness_mm and skin.sensor_radius_mm and skin.sensor_radius_mm > _WIDEST_SENSOR * skin.thickness_mm:
-        yield "sensor_radius_mm", f"{skin.sensor_radius_mm:g} mm is beyond {_WIDEST_SENSOR:g} thicknesses"
+        arguments = {"radius_mm": skin.sensor_radius_mm, "thicknesses": _WIDEST_SENSOR}
+        findings.append(Finding(Reason.IMPOSSIBLE_SENSOR_RADIUS, "", "skin.sensor_radius_mm", arguments))
+    return findings
 
 
-def _of(model: SkinDescription | Recording) -> Iterator[tuple[str, str]]:
-    """Each field whose largest magnitude is neither 0 nor within its bounds, and how that is said."""
+def _out_of_bounds(model: SkinDescription | Recording) -> Iterator[tuple[str, dict[str, float]]]:
+    """Each field whose largest magnitude is neither 0 nor within its bounds, with that magnitude and the bounds."""
     for name in (entry.name for entry in fields(model) if entry.name in _BOUNDS):
         value = getattr(model, name)
         if name == "sensors":
@@ -73,4 +82,4 @@ def _of(model: SkinDescription | Recording) -> Iterator[tuple[str, str]]:
         size = np.abs(np.asarray(value, dtype=float))
         largest = float(np.nanmax(size)) if np.isfinite(size).any() else 0.0
         if largest and not low <= largest <= high:
-            yield name, f"{largest:.3g} is no number that can be meant ({low:g} to {high:g} in magnitude)"
+            yield name, {"largest": largest, "low": low, "high": high}

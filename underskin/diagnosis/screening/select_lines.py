@@ -1,16 +1,18 @@
-"""Which lines of a recording's time series a diagnosis uses.
+"""Which lines of the FRF of a time series a diagnosis uses.
 
-Lines where the force has little power (beside the excited band, between the lines of a periodic sweep) say next to
-nothing, and their noise is unlike that of the others. A line is left out where the force has less than a 25th of the
-power of those that hold most of it (the noise of an FRF goes as 1/√power), or less than lets expect a relative standard
-uncertainty √((1 − γ²)/(2nγ²)) below a fifth, unless charge follows force well there: to a twentieth and to five times
-that of the best, and not by chance. What is expected decides, since of lines chosen by how certain each came out the
-larger would be kept. A line that mains spoil is left out. Neighbouring lines of blocks of noise share theirs (a Hann
-window's by 4/9), two apart hardly (1/36): none is kept beside another, and the two next to 0 Hz are left out where
-others are enough: the straight line taken off each block is a part of them and the window mixes them with 0 Hz, so that
-beside an amplifier's high-pass their FRF is wrong. Of a force that acts once (a single sweep or blow) hardly more than
-one block holds a line, which the taper cuts short where a sweep begins: the first sixteen are left out, but not more
-than half. Lines of a periodic force have nothing of that.
+- Lines where the force has little power (outside the excited band, between the lines of a periodic sweep) are left
+  out: less than a 25th of the power of those lines that hold most of it (the noise of an FRF goes as 1/√power), or
+  less than is expected to give a relative standard uncertainty √((1 − γ²)/(2nγ²)) below a fifth. They are used where
+  charge follows force well all the same: to a twentieth, to five times the best, and not by chance. The expected
+  uncertainty decides, since choosing by the observed one would prefer lines that came out too large.
+- Lines that mains spoil are left out.
+- Neighbouring lines of blocks of noise are correlated (a Hann window's by 4/9; two apart by 1/36): of two neighbours
+  one is used.
+- The two lines next to 0 Hz are left out where enough others remain: the straight line removed from each block is a
+  part of them and the window mixes them with 0 Hz, so that their FRF is wrong beside the high-pass of an amplifier.
+- Of a force that acts once (a single sweep or blow) hardly more than one block holds a line, which the taper cuts
+  short where a sweep begins: the first sixteen lines are left out, but not more than half. Lines of a periodic force
+  have none of this.
 """
 
 from dataclasses import dataclass
@@ -18,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.diagnosis.screening.mains import Pickup, pickup
+from underskin.diagnosis.screening.mains import MainsOnCharge, mains_on_charge
 from underskin.recordings.frf.estimation import Frf
 from underskin.units import Floats
 
@@ -39,12 +41,12 @@ class Choice:
     measured: int
     faint: int = 0
     beside: int = 0
-    mains: Pickup | None = None
+    mains: MainsOnCharge | None = None
     uneven: Floats | None = None
     once: bool = False
 
 
-def telling(measured: Frf) -> Choice:
+def choose_lines(measured: Frf) -> Choice:
     """The choice; no line where charge follows force at none."""
     uncertainty, force = measured.relative_uncertainty, measured.force_power
     lines = list(range(len(measured.frequency)))
@@ -58,7 +60,7 @@ def telling(measured: Frf) -> Choice:
     best = float(np.quantile(uncertainty[powerful], _BEST))
     if best > _UNSURE:
         return Choice([], len(lines))
-    mains = pickup(measured, powerful)
+    mains = mains_on_charge(measured, powerful)
     powerful |= (uncertainty <= min(_SURE, _BESIDE_BEST * best)) & _beyond_chance(measured)
     strong = np.flatnonzero(powerful if mains is None else powerful & ~mains.spoilt)
     shared = not measured.independent and len(strong) >= _LEAST_LINES

@@ -1,71 +1,58 @@
-"""What the force of a time series contradicts: slips of units that an FRF hides, and channels that were exchanged.
+"""Contradictions between the force of a time series and what is declared: slips of units, and exchanged channels.
 
-The force's mean is the preload, unless a coupling took it away, and what shakes it the dynamic force, about: its peak
-for sines and blows, √2 times its deviation for sines and noise. Drift (a preload that relaxes) is no shaking: the
-straight line through each eighth of the record is taken off.
+The mean of the force is the preload, unless an AC coupling removed it. Its oscillation is the dynamic force, about: the
+peak for sines and blows, √2 times the standard deviation for sines and noise. Drift (a preload that relaxes) is not
+oscillation: the straight line through each eighth of the record is removed.
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import detrend
 
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.frf.signal_checks import mean_of
 from underskin.units import Floats
 
 _SLIP, _WITHIN = 1000.0, 30.0
-_CLEAR = 3.0  # standard deviations that a force's mean must be from 0 to be a preload, not what a coupling left
 _AS_DECLARED = float(np.log(1.4))
 _PARTS = 8  # of a record, of which drift is taken off; its analysis has blocks of that length
 _TINY = 1e-300
 
 
-@dataclass(frozen=True)
-class Slip:
-    """The `field` that is off by what the force itself says, how that is said, in which unit it may be, and the
-    finding's `code`."""
-
-    field: str
-    statement: str
-    unit: str
-    code: str = "units_off_by_1000"
-
-
-def slip_of(entry: FrfRecording) -> Slip | None:
-    """What the force itself contradicts."""
+def contradiction_of(entry: FrfRecording) -> Finding | None:
+    """What the force of a recording contradicts, if anything."""
     if entry.force_n is None or entry.charge_pc is None:
         return None
+    mean = float(np.mean(entry.force_n))
+    preload = mean_of(entry.force_n)
     if _declared(entry.charge_pc, entry) and not _declared(entry.force_n, entry):
-        text = (
-            f"its mean is {np.mean(entry.force_n):.3g} N, and that of charge_pc {np.mean(entry.charge_pc):.3g}, where "
-            f"preload_n is {entry.preload_n:g}: force and charge look exchanged"
-        )
-        return Slip("force_n", f"{text}.", "", "channels_swapped")
-    mean, scatter = float(np.mean(entry.force_n)), float(np.std(entry.force_n))
-    shaken = _shaking(entry.force_n) / entry.dynamic_force_n
-    agrees = any(_near(one, 1.0) for one in shaken)
-    nearest = shaken[int(np.argmin(np.abs(np.log(np.maximum(shaken, 1e-300)))))] * entry.dynamic_force_n
-    pressed = abs(mean) / entry.preload_n if abs(mean) > _CLEAR * scatter else None
+        means = {"force_mean_n": mean, "charge_mean_pc": float(np.mean(entry.charge_pc))}
+        return Finding(Reason.CHANNELS_SWAPPED, entry.id, "force_n", {**means, "preload_n": entry.preload_n})
+    oscillation = _oscillation(entry.force_n) / entry.dynamic_force_n
+    agrees = any(_near(one, 1.0) for one in oscillation)
+    nearest = oscillation[int(np.argmin(np.abs(np.log(np.maximum(oscillation, 1e-300)))))] * entry.dynamic_force_n
+    pressed = None if preload is None else abs(preload) / entry.preload_n
     for factor, own, other in ((_SLIP, "mN", "kN"), (1 / _SLIP, "kN", "mN")):
-        word, opposite = ("large", "small") if factor > 1 else ("small", "large")
-        off = any(_near(one, factor) for one in shaken)
+        off = any(_near(one, factor) for one in oscillation)
+        dynamic_force = {"dynamic_force_n": entry.dynamic_force_n}
         if off and (not agrees if pressed is None else _near(pressed, factor)):
-            text = f"it is shaken by {nearest:.3g} N, where dynamic_force_n is {entry.dynamic_force_n:g}"
-            return Slip("force_n", f"{text}: it looks 1000 × too {word}; was it given in {own}?", own)
+            arguments = {"oscillation_n": float(nearest), **dynamic_force, "too_large": factor > 1, "given_in": own}
+            return Finding(Reason.SERIES_FORCE, entry.id, "force_n", arguments)
         if off and not agrees and pressed is not None and _near(pressed, 1.0):
-            text = f"{entry.dynamic_force_n:g} N looks 1000 × too {opposite} beside the recorded force"
-            return Slip("dynamic_force_n", f"{text}: was it given in {other}?", other)
+            arguments = {**dynamic_force, "too_large": factor < 1, "given_in": other}
+            return Finding(Reason.SERIES_DYNAMIC_FORCE, entry.id, "dynamic_force_n", arguments)
         if agrees and pressed is not None and _near(pressed, factor):
-            text = f"{entry.preload_n:g} N looks 1000 × too {opposite} beside the recorded force's mean of {mean:.3g} N"
-            return Slip("preload_n", f"{text}: was it given in {other}?", other)
+            arguments = {"preload_n": entry.preload_n, "mean_n": mean, "too_large": factor < 1, "given_in": other}
+            return Finding(Reason.SERIES_PRELOAD, entry.id, "preload_n", arguments)
     return None
 
 
-def _shaking(force: Floats) -> Floats:
+def _oscillation(force: Floats) -> Floats:
     """√2 times the deviation of a force less its drift, and its peak [N]."""
     parts = np.arange(0, len(force), max(len(force) // _PARTS, _PARTS))
-    oscillation = detrend(force, bp=parts)
-    return np.array([np.sqrt(2.0) * np.std(oscillation), np.max(np.abs(oscillation))])
+    drift_free = detrend(force, bp=parts)
+    return np.array([np.sqrt(2.0) * np.std(drift_free), np.max(np.abs(drift_free))])
 
 
 def _near(ratio: float, factor: float) -> bool:
@@ -74,6 +61,6 @@ def _near(ratio: float, factor: float) -> bool:
 
 def _declared(signal: Floats, entry: FrfRecording) -> bool:
     """Whether the mean of a signal is the declared preload, and what shakes it the declared dynamic force."""
-    ratios = np.append(_shaking(signal) / entry.dynamic_force_n, np.mean(signal) / entry.preload_n)
+    ratios = np.append(_oscillation(signal) / entry.dynamic_force_n, np.mean(signal) / entry.preload_n)
     near = np.abs(np.log(np.maximum(ratios, _TINY))) < _AS_DECLARED
     return bool(near[:-1].any() and near[-1])

@@ -1,6 +1,7 @@
-"""Slips of units among the recordings: a force in kN, a sphere in m, a frequency in kHz, beside the others'.
+"""Slips of units among the recordings: a force in kN, a sphere in m or a frequency in kHz beside the others.
 
-A value that is alone is left out with its recording. Forces that contradict each other in all recordings are named.
+A recording with a single such value is left out. Where the forces of all recordings contradict each other, that is a
+finding.
 """
 
 from collections.abc import Callable, Sequence
@@ -9,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.finding import Finding
 from underskin.recordings.frf.estimation import lines_of
 
 _SLIP, _WITHIN = 1000.0, 3.0  # a value is back among the others, within this factor, once the slip is undone
@@ -37,15 +39,16 @@ _FIELDS = (
 )
 
 
-def lone_slips(entries: Sequence[FrfRecording], found: list[Finding]) -> NDArray[np.bool_]:
-    """Which recordings have a value about 1000 × off all others; each is named."""
+def single_unit_errors(entries: Sequence[FrfRecording]) -> tuple[NDArray[np.bool_], list[Finding]]:
+    """Which recordings have a value about 1000 × off all others, and the findings on them."""
     off = np.zeros(len(entries), dtype=bool)
+    findings: list[Finding] = []
     if not entries:
-        return off
+        return off, findings
     for field in _FIELDS:
         values = np.array([field.of(entry) for entry in entries])
         usual = float(np.median(values))
-        for factor, unit, word in ((_SLIP, field.too_large, "large"), (1 / _SLIP, field.too_small, "small")):
+        for factor, unit in ((_SLIP, field.too_large), (1 / _SLIP, field.too_small)):
             far = values / usual > _SLIP / 30 if factor > 1 else values / usual < 30 / _SLIP
             if not far.any() or far.sum() > max(_ALONE * len(entries), 1.0) or len(entries) < 3:
                 continue
@@ -55,21 +58,17 @@ def lone_slips(entries: Sequence[FrfRecording], found: list[Finding]) -> NDArray
             meant = values / factor
             back = far & (meant > others.min() / _WITHIN) & (meant < others.max() * _WITHIN)
             for number in np.flatnonzero(back & ~off).tolist():
-                text = f"{values[number]:g} looks 1000 × too {word} beside the others: was it given in {unit}? Left out"
-                found.append(Finding("units_off_by_1000", entries[number].id, field.name, text))
+                arguments = {"value": float(values[number]), "too_large": factor > 1, "given_in": unit}
+                findings.append(Finding(Reason.BESIDE_OTHERS, entries[number].id, field.name, arguments))
             off |= back
-    return off
+    return off, findings
 
 
 def loose_sphere(entries: Sequence[FrfRecording]) -> list[Finding]:
     """A dynamic force that reaches the preload in all recordings, so that the sphere would leave the skin."""
     if any(entry.dynamic_force_n < entry.preload_n for entry in entries):
         return []
-    text = (
-        "the dynamic force reaches the preload in all recordings, so the sphere would leave the skin: was it given in "
-        "mN, or the preload in kN?"
-    )
-    return [Finding("units_off_by_1000", "", "dynamic_force_n", text)]
+    return [Finding(Reason.DYNAMIC_FORCE_LARGE, "", "dynamic_force_n")]
 
 
 def faint_oscillation(entries: Sequence[FrfRecording]) -> list[Finding]:
@@ -77,8 +76,4 @@ def faint_oscillation(entries: Sequence[FrfRecording]) -> list[Finding]:
     ratio = max(entry.dynamic_force_n / entry.preload_n for entry in entries)
     if ratio > _FAINT:
         return []
-    text = (
-        f"it is at most {ratio:.1g} of the preload: it looks 1000 × too small; was it given in kN, or the preload in "
-        "mN?"
-    )
-    return [Finding("units_off_by_1000", "", "dynamic_force_n", text)]
+    return [Finding(Reason.DYNAMIC_FORCE_SMALL, "", "dynamic_force_n", {"ratio": ratio})]

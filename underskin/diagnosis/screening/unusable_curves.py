@@ -6,40 +6,43 @@ import numpy as np
 
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.screening.curve_unit_errors import is_reversed
-from underskin.errors import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.mechanisms.base import Kind
 from underskin.recordings import elastomer
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
-from underskin.recordings.finding import Finding
 
 
 def without_unusable(campaign: Campaign, kind: Kind) -> tuple[Campaign, list[Finding]]:
-    """The campaign without the curves of one kind that have too few samples or do not load, and what was found."""
+    """The campaign without the curves of one kind that have too few samples or do not load, and a finding on each."""
     thinned = {entry.id: entry for entry in curve_lines(campaign, kind).campaign.recordings}
-    found, kept = [], []
+    findings, usable = [], []
     for entry in campaign.recordings:
         lacking = None
         if entry.kind == kind:
             lacking = _lacking(thinned.get(entry.id), campaign.skin.poisson_ratio)
         if lacking is None:
-            kept.append(entry)
+            usable.append(entry)
         else:
-            found.append(Finding("curve_not_usable", entry.id, lacking.field, f"{lacking}: left out"))
-    return replace(campaign, recordings=tuple(kept)), found
+            findings.append(Finding(Reason.CURVE_NOT_USABLE, entry.id, lacking.field, {"refusal": lacking}))
+    return replace(campaign, recordings=tuple(usable)), findings
 
 
 def _lacking(entry: object, poisson_ratio: float) -> InvalidInput | None:
     if isinstance(entry, IndentationRecording | CompressionRecording) and not np.ptp(entry.displacement_mm):
-        return InvalidInput("displacement_mm", float(entry.displacement_mm[0]), "must change")
+        return InvalidInput(
+            "displacement_mm", float(entry.displacement_mm[0]), "must change", code=ErrorCode.UNUSABLE_SIGNAL
+        )
     try:
         if isinstance(entry, IndentationRecording):
             modulus = elastomer.of_indentation(entry, poisson_ratio).modulus
         elif isinstance(entry, CompressionRecording):
             modulus = elastomer.of_compression(entry).modulus
         else:
-            return InvalidInput("force_n", "too few finite samples", "must have at least 5")
+            return InvalidInput("force_n", "too few finite samples", "must have at least 5", code=ErrorCode.TOO_FEW)
     except InvalidInput as refusal:
         return refusal
     if modulus > 0 or is_reversed(entry):
         return None
-    return InvalidInput("force_n", "does not rise as it is pressed", "must rise")
+    return InvalidInput("force_n", "does not rise as it is pressed", "must rise", code=ErrorCode.UNUSABLE_SIGNAL)

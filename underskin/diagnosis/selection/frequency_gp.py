@@ -1,4 +1,4 @@
-"""Something that no mechanism here describes, along frequency: a complex process that changes the shape of lines.
+"""An unmodelled discrepancy along frequency: a complex process that changes the shape of the lines.
 
 A Matérn-3/2 process over log frequency, that all recordings share or that changes along an axis of the campaign, on top
 of each recording's own best real multiple of the model.
@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import line_residuals
-from underskin.diagnosis.noise.noise_priors import Bell, level_prior
+from underskin.diagnosis.noise.noise_priors import LogNormal, level_prior
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, matern, normalised
 from underskin.mechanisms.autodiff import Array
 from underskin.units import Floats
@@ -48,9 +48,9 @@ def over_lines(problem: FittingProblem, explanation: Explanation) -> dict[str, f
     for length in _LINE_LENGTHS:
         root = np.linalg.cholesky(matern(distance / length) + 1e-9 * np.eye(len(centres)))
         each += noise.gains(root.T @ (total[:, None] * root), root.T @ sums)
-    found = {"frequency_hz": float(logsumexp(each) - np.log(len(each)) - plain)}
+    gains = {"frequency_hz": float(logsumexp(each) - np.log(len(each)) - plain)}
     if lines.recordings < _LEAST_RECORDINGS:
-        return found
+        return gains
     shapes = features(normalised(np.log(lines.frequency)[:, None]), _INTERPLAY_LENGTH, _INTERPLAY_LANDMARKS)
     moments = np.add.reduceat(shapes * (weight * relative)[:, None], lines.first)
     products = (shapes[:, :, None] * shapes[:, None, :] * weight[:, None, None]).reshape(len(shapes), -1)
@@ -60,10 +60,10 @@ def over_lines(problem: FittingProblem, explanation: Explanation) -> dict[str, f
         size = along.shape[1] * shapes.shape[1]
         gram = np.einsum("ra,rb,rfg->afbg", along, along, grams, optimize=True).reshape(size, size)
         moment = (along.T @ moments).reshape(size)
-        found[f"frequency_hz and {name}"] = float(
+        gains[f"frequency_hz and {name}"] = float(
             logsumexp(noise.gains(gram, moment)) - np.log(len(AMPLITUDES)) - plain
         )
-    return found
+    return gains
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class _LineNoise:
 
     chi2: float
     freedom: int
-    prior: Bell
+    prior: LogNormal
 
     def gains(self, gram: Array, moment: Array) -> list[float]:
         """log p of the lines with a process of each amplitude, at the level that suits it best."""
@@ -90,8 +90,8 @@ class _LineNoise:
             value = 0.5 * self.chi2 / k2 + self.freedom * log_level - self.prior.log_density(log_level)
             return float(value - 0.5 * (square / inner).sum() / k2**2 + np.log(inner).sum())
 
-        found = minimize_scalar(cost, bounds=(-1.0, 5.0), method="bounded", options={"xatol": 1e-3})
-        return -float(found.fun)
+        optimum = minimize_scalar(cost, bounds=(-1.0, 5.0), method="bounded", options={"xatol": 1e-3})
+        return -float(optimum.fun)
 
 
 def frequency_bins(frequency: Floats) -> tuple[NDArray[np.intp], Floats]:

@@ -4,7 +4,7 @@ import numpy as np
 
 from underskin.units import Floats
 
-AMPLITUDES = np.array([0.015, 0.05, 0.15, 0.5])  # of a process without a name, relative to the model, equally probable
+AMPLITUDES = np.array([0.015, 0.05, 0.15, 0.5])  # of an unmodelled discrepancy, relative to the model, equally probable
 LANDMARKS = 24
 
 

@@ -1,11 +1,11 @@
-"""The lines' noise once more, without the course along frequency that a law describes.
+"""A second estimate of the lines' noise, without the course along frequency that a law describes.
 
-Between two lines on the flank of a resonance an FRF bends, and the noise that is read from how rough the lines are
+On the flank of a resonance an FRF bends between two lines, and noise that is estimated from the roughness of the lines
 (line_noise.py) comes out too large there, several times so where the flank moves with the preload. The level that all
 lines share then falls, the others seem too noisy, and a law that adds variance (`mains_pickup`) is credited with the
 difference. So the single mechanisms that act along frequency are fitted first; where one of them describes the lines,
-the roughness is that of what its prediction leaves. A prediction that is smooth takes nothing of the noise away; all
-mechanisms are then compared anew under this one noise, though it was estimated beside one of them.
+the roughness is that of its residual. A smooth prediction removes no noise. All mechanisms are then compared under this
+one estimate, though it was made beside one of them.
 """
 
 from collections.abc import Mapping
@@ -44,10 +44,10 @@ def _best_along_frequency(problem: FittingProblem) -> Explanation | None:
         if "frf" not in mechanism.kinds or not mechanism.needs_lines:
             continue
         try:
-            found = problem.explain((name,))
+            single = problem.explain((name,))
         except Unsupported:
             continue
-        if found is not None and not any(entry.acts_on == "line_variance" for entry in found.model.parameters):
-            singles.append(found)
+        if single is not None and not any(entry.acts_on == "line_variance" for entry in single.model.parameters):
+            singles.append(single)
     best = max(singles, key=lambda entry: entry.log_evidence, default=nothing)
     return best if best.log_evidence > nothing.log_evidence + _SPEAKS else None

@@ -1,14 +1,14 @@
-"""Explanations that only the widths of their priors tell apart, and what is done about it.
+"""Odds between explanations that differ only in the widths of their priors.
 
-The evidence of a set is how well it fits at best, times how usual the values are that it needs, times Occam's factor:
-the share of its priors' range that fits. The first is what the recordings say, the second what is known of materials
-and rigs. The third compares ranges that were chosen for this catalogue; between "nothing" and a mechanism, or one
-mechanism and two, it is what keeps freedom from being free, but where one law at its best does here what another of
-the same number of mechanisms does, it would decide between them by no more than how wide each range happens to be.
+The evidence of a set of mechanisms is the product of the likelihood at the best fit, the prior density of the values
+there, and Occam's factor: the share of the prior's range that fits. The likelihood is what the recordings say, the
+density what is known of materials and rigs. Occam's factor penalises extra parameters, and is needed where the null
+hypothesis is compared with a mechanism, or one mechanism with two. Between sets of equally many mechanisms that fit
+equally well, however, it would decide by the widths that were chosen for this catalogue.
 
-So no explanation is held to be less probable than the leading one, of as many mechanisms, by Occam's factor alone: its
-odds are at least e^(s − s_leader), at most 1, with s = log L + Σ log(prior/prior at its peak) at the best fit. Which of
-two leads whose evidences differ by less than these are good for, s decides.
+So among sets of as many mechanisms as the leading one, none is less probable than that by Occam's factor alone: its
+odds are at least e^(s − s_leader), at most 1, with s = log L + Σ log(prior/prior at its peak) at the best fit. Where
+the evidences of two candidates for the lead differ by less than their accuracy, s decides.
 """
 
 from collections.abc import Sequence

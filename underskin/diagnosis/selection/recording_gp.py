@@ -54,12 +54,12 @@ def over_recordings(problem: FittingProblem, explanation: Explanation) -> dict[s
     if before is not None:
         axes["preload_before"] = normalised(before)
     residual = GainResidual(problem, explanation)
-    found = {name: _smooth(residual, column) for name, column in axes.items()}
+    gains = {name: _smooth(residual, column) for name, column in axes.items()}
     rank = order(campaign)
     if len(rank) >= _LEAST_IN_ORDER:
-        found["order"] = mean_of_logs(residual.gains(_sines(rank), AMPLITUDES))
-        found["place"] = mean_of_logs([_smooth_place(residual, rank), _round(residual, rank)])
-    return found
+        gains["order"] = mean_of_logs(residual.gains(_sines(rank), AMPLITUDES))
+        gains["place"] = mean_of_logs([_smooth_place(residual, rank), _round(residual, rank)])
+    return gains
 
 
 def mean_of_logs(log_values: list[float] | Floats) -> float:
@@ -114,7 +114,7 @@ class GainResidual:
 
     def _scatters(self, positions: Floats) -> list[Scatter]:
         """No scatter of position and each of these [m], with each of gain; relative to the model's mean under it."""
-        moments, found = self._moments, []
+        moments, scatters = self._moments, []
         for position, share in _shares(positions).items():
             along, ur, _ = moments.at_position(position, moments.uu, moments.ur, moments.rr)
             size = self._not_faint(along * moments.uu)
@@ -122,8 +122,8 @@ class GainResidual:
             for gain in _GAINS:
                 log_weight = GAIN_PRIOR.log_density(float(np.log(gain))) + np.log(share) - np.log(np.abs(size)).sum()
                 variance = gain**2 + placed + moments.uu / size**2
-                found.append(Scatter(float(log_weight), ur / size - self._known, variance))
-        return found
+                scatters.append(Scatter(float(log_weight), ur / size - self._known, variance))
+        return scatters
 
     def moved(self, sets: Floats) -> Floats:
         """Features of a place's two coordinates, as what the response makes of them (sets, recordings, 2 features)."""

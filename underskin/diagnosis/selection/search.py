@@ -27,6 +27,9 @@ _WITHIN = 20.0  # nats behind the best within which evidence is worth integratin
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
 
 
+Explanations = dict[frozenset[str], Explanation]  # by the names of their mechanisms
+
+
 @dataclass(frozen=True)
 class Answer:
     """One of the rivals and its posterior probability: a set of mechanisms (maybe none), or `none_of_these`."""
@@ -129,7 +132,7 @@ def search(problem: FittingProblem) -> Search:
     """Fit nothing, every single, then what grows from the best."""
     nothing = problem.explain(())
     assert nothing is not None
-    found: dict[frozenset[str], Explanation] = {frozenset(): nothing}
+    explanations: Explanations = {frozenset(): nothing}
     unsupported: dict[str, str] = {}
     for name in CATALOGUE:
         try:
@@ -138,37 +141,42 @@ def search(problem: FittingProblem) -> Search:
             unsupported[name] = refusal.reason
             continue
         assert single is not None
-        found[frozenset((name,))] = single
+        explanations[frozenset((name,))] = single
     names = [name for name in CATALOGUE if name not in unsupported]
-    done: set[frozenset[str]] = set()
+    integrated: Explanations = {}
     for size in (2, 3):
-        _integrate(found, done, unsupported, 1)
-        for parent in _parents(Search(tuple(found.values()), (), unsupported), size):
+        integrated |= _integrated(explanations, frozenset(integrated), unsupported, 1)
+        explanations |= integrated
+        for parent in _parents(Search(tuple(explanations.values()), (), unsupported), size):
             for name in names:
                 chosen = frozenset((*parent.names, name))
-                if len(chosen) != size or chosen in found:
+                if len(chosen) != size or chosen in explanations:
                     continue
                 grown = problem.explain(tuple(chosen), parent)
                 if grown is not None:
-                    found[chosen] = grown
-    _integrate(found, done, unsupported, _BEST)
-    result = Search(tuple(found.values()), (), unsupported)
+                    explanations[chosen] = grown
+    explanations |= _integrated(explanations, frozenset(integrated), unsupported, _BEST)
+    result = Search(tuple(explanations.values()), (), unsupported)
     best = sorted((entry for entry in result.explanations if entry.names), key=result.log_weight, reverse=True)[:2]
     processes = tuple((entry, discrepancy(problem, entry)) for entry in (nothing, *best))
     return replace(result, discrepancies=processes)
 
 
-def _integrate(
-    found: dict[frozenset[str], Explanation], done: set[frozenset[str]], unsupported: dict[str, str], best: int
-) -> None:
-    """Integrate the evidences that may count, and the `best` anyhow, over loose parameters, once each."""
-    weight = Search(tuple(found.values()), (), unsupported).log_weight
-    ranked = sorted(found, key=lambda names: weight(found[names]), reverse=True)
-    least = weight(found[ranked[0]]) - _WITHIN
-    for place, names in enumerate(ranked):
-        if names not in done and (place < best or weight(found[names]) > least):
-            found[names] = found[names].integrated()
-            done.add(names)
+def _integrated(
+    explanations: Explanations, done: frozenset[frozenset[str]], unsupported: dict[str, str], best: int
+) -> Explanations:
+    """The explanations whose evidence may count, and the `best` anyhow, integrated over their loose parameters.
+
+    Those `done` are left out.
+    """
+    weight = Search(tuple(explanations.values()), (), unsupported).log_weight
+    ranked = sorted(explanations, key=lambda names: weight(explanations[names]), reverse=True)
+    least = weight(explanations[ranked[0]]) - _WITHIN
+    return {
+        names: explanations[names].integrated()
+        for place, names in enumerate(ranked)
+        if names not in done and (place < best or weight(explanations[names]) > least)
+    }
 
 
 def _parents(result: Search, size: int) -> list[Explanation]:

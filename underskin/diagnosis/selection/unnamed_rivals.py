@@ -1,9 +1,10 @@
-"""Something that no mechanism here describes, as a full rival, with the noise and the parameters of every hypothesis.
+"""Unmodelled discrepancies as rivals of the mechanisms, with the noise and the parameters of every hypothesis.
 
-- δ of a recording, FRF = model · (1 + δ): see `recording_gp`; of a line: see `frequency_gp`; or both;
-- scatter from recording to recording far beyond what rigs have: what scatters by 20 % has a cause that nobody named;
-- of curves, a smooth error far beyond what laws of contact have.
-An amplitude of δ below 1.5 % is not looked for: a law that is right to that is not missing physics.
+- δ of a recording, FRF = model · (1 + δ), see `recording_gp`; of a line, see `frequency_gp`; or both;
+- scatter from recording to recording far beyond that of rigs: 20 % have a cause that no mechanism names;
+- of curves, a smooth error far beyond that of laws of contact.
+
+Amplitudes of δ below 1.5 % are not considered: a law that is right to that misses no physics.
 """
 
 from dataclasses import dataclass, replace
@@ -19,7 +20,6 @@ from underskin.diagnosis.noise.correlated_error import UNNAMED
 from underskin.diagnosis.noise.noise_priors import UNUSUAL_GAIN, UNUSUAL_POSITION
 from underskin.diagnosis.selection.frequency_gp import over_lines
 from underskin.diagnosis.selection.recording_gp import over_recordings
-from underskin.recordings.usual_scatter import GAIN_RANGE, POSITION_RANGE
 
 _KINDS = {"recordings": 0.45, "lines": 0.4, "both": 0.05, "scatter": 0.1}
 
@@ -55,14 +55,14 @@ def _unusual_scatter(explanation: Explanation) -> dict[str, float]:
     """What scatter beyond the usual gains; looked for where the fit went beyond the usual itself."""
     levels = explanation.best.at.marginal.levels
     usual = explanation.best.fitter.hypothesis
-    found = {}
+    evidence = {}
     if levels.gain > GAIN_RANGE[1]:
         wider = replace(usual, gain=UNUSUAL_GAIN)
-        found["scatter of gain"] = _refitted(wider, explanation, 0, UNUSUAL_GAIN.low)
+        evidence["scatter of gain"] = _refitted(wider, explanation, 0, UNUSUAL_GAIN.low)
     if levels.position > POSITION_RANGE[1]:
         wider = replace(usual, position=UNUSUAL_POSITION)
-        found["scatter of position"] = _refitted(wider, explanation, 2, UNUSUAL_POSITION.low)
-    return {name: log_evidence - explanation.log_evidence for name, log_evidence in found.items()}
+        evidence["scatter of position"] = _refitted(wider, explanation, 2, UNUSUAL_POSITION.low)
+    return {name: log_evidence - explanation.log_evidence for name, log_evidence in evidence.items()}
 
 
 def _refitted(hypothesis: Hypothesis, explanation: Explanation, place: int, least: float) -> float:
@@ -75,7 +75,7 @@ def _refitted(hypothesis: Hypothesis, explanation: Explanation, place: int, leas
 
 def _along_curves(problem: FittingProblem, explanation: Explanation) -> Discrepancy:
     """The smooth error that every hypothesis has of curves, large: everything is fitted again beneath it."""
-    found = _refitted(
+    log_evidence = _refitted(
         replace(problem.hypothesis(explanation.names, placed=False), smooth=UNNAMED), explanation, 2, UNNAMED.low
     )
-    return Discrepancy(found, {"displacement_mm": found - explanation.log_evidence})
+    return Discrepancy(log_evidence, {"displacement_mm": log_evidence - explanation.log_evidence})

@@ -13,9 +13,10 @@ import numpy as np
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.selection.search import SHOWS
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, CompressionRecording, Recording
-from underskin.recordings.finding import Finding
 from underskin.surrogate.sigma_table import SigmaTable
 
 _BEGINNING = 0.1  # of each curve's displacement
@@ -43,11 +44,8 @@ def without_seating(
     assert plain is not None
     if stiffer.log_evidence - plain.log_evidence > SHOWS:
         return None
-    text = (
-        f"only the first {100 * _BEGINNING:.0f} % of the displacement speaks for {' and '.join(imitated)}: a platen "
-        "that is tilted, or an uneven end, seats like that. It was left out; a small preload before zeroing avoids it"
-    )
-    return problem, Finding("seating", "", "displacement_mm", text)
+    arguments = {"percent": 100 * _BEGINNING, "mechanisms": imitated}
+    return problem, Finding(Reason.SEATING, "", "displacement_mm", arguments)
 
 
 def _is_pressed(entry: Recording) -> bool:

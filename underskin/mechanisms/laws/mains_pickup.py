@@ -12,13 +12,11 @@ from underskin.mechanisms.models.pickup import Pickup
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.conditions import Conditions, frf_of
 from underskin.recordings.frf.estimation import Frf, lines_of
+from underskin.recordings.frf.mains import HARMONICS, MAINS_HZ, REACH_HZ
 from underskin.units import Floats
 
-_MAINS_HZ = (50.0, 60.0)
-_HARMONICS = np.arange(1, 6)
 _WIDTH_HZ = 1.5  # where it is asked which mains stand out
 _FURTHEST_HZ = 20.0  # beyond which no line reaches, and short of half way from one harmonic to the next
-_REACH_HZ = 3.0
 _REACHED = 0.05  # of the shape
 _LEAST_LINES = 3
 _BESIDE = 9  # lines, the next in frequency, that say what is usual
@@ -96,15 +94,15 @@ class MainsPickup(Mechanism):
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Lines near the mains are needed."""
         for entry in frf_of(conditions):
-            if any(np.abs(frequencies(entry) - mains).min() < _REACH_HZ for mains in _MAINS_HZ):
+            if any(np.abs(frequencies(entry) - mains).min() < REACH_HZ for mains in MAINS_HZ):
                 return None
         return "no line lies within 3 Hz of 50 or 60 Hz (frequency_hz)"
 
     def pickup(self, conditions: Conditions, design: FrfDesign) -> Pickup:
         """Of the lines within the reach of the mains that stand out, each by the nearest multiple."""
-        away = np.abs(design.row_frequency[:, None] - _outstanding_mains(conditions) * _HARMONICS)
+        away = np.abs(design.row_frequency[:, None] - _outstanding_mains(conditions) * HARMONICS)
         rows = np.flatnonzero(away.min(axis=1) < _FURTHEST_HZ)
-        harmonic = _HARMONICS[away[rows].argmin(axis=1)]
+        harmonic = HARMONICS[away[rows].argmin(axis=1)]
         half_square, force = 0.5 * away[rows].min(axis=1) ** 2, design.row_dynamic_force[rows]
 
         def deviation(values: Mapping[str, Floats]) -> Floats:
@@ -119,9 +117,9 @@ class MainsPickup(Mechanism):
 def _outstanding_mains(conditions: Conditions) -> float:
     """The mains frequency [Hz] whose lines stand out; where none does, the one that has a line nearest."""
     lines = np.concatenate([frequencies(entry) for entry in frf_of(conditions)])
-    nearest = {mains: float(np.abs(lines - mains).min()) for mains in _MAINS_HZ}
+    nearest = {mains: float(np.abs(lines - mains).min()) for mains in MAINS_HZ}
     measured = [lines_of(entry) for entry in conditions.recordings if isinstance(entry, FrfRecording)]
-    return max(_MAINS_HZ, key=lambda mains: (_excess(measured, mains), -nearest[mains]))
+    return max(MAINS_HZ, key=lambda mains: (_excess(measured, mains), -nearest[mains]))
 
 
 def _excess(recordings: Sequence[Frf], mains: float) -> float:
@@ -151,5 +149,5 @@ def _stray(lines: Frf, size: Floats, rows: NDArray[np.intp], beside: NDArray[np.
 
 
 def _shape(frequency: Floats, mains: float) -> Floats:
-    distance = (frequency[:, None] - mains * _HARMONICS) / _WIDTH_HZ
-    return np.asarray((np.exp(-0.5 * distance**2) / _HARMONICS).sum(axis=1))
+    distance = (frequency[:, None] - mains * HARMONICS) / _WIDTH_HZ
+    return np.asarray((np.exp(-0.5 * distance**2) / HARMONICS).sum(axis=1))

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from underskin.errors import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput
 from underskin.recordings.frf.estimation import Frf
 from underskin.recordings.frf.flat_zone_reason import levels_of, reason_of
+from underskin.recordings.frf.mains import HARMONICS, MAINS_HZ, REACH_HZ
 from underskin.units import Complexes, Floats
 
 FLATNESS = 0.02
@@ -24,7 +25,6 @@ STEEPEST = 0.1  # fall of ln FRF with ln f that relaxation may have (a loss tang
 _BINS_PER_DECADE = 12
 _BEYOND_NOISE = 3.0
 _OUTSTANDING = 4.0  # scatter of a mains line over that of its neighbours
-_MAINS_HZ, _HARMONICS, _MAINS_WIDTH_HZ = (50.0, 60.0), 5, 3.0
 _NEIGHBOURS = 11
 
 Condition = tuple[float, float]  # indenter radius [mm], preload [N]
@@ -81,9 +81,30 @@ def stacked(frfs: Sequence[Frf]) -> list[Stack]:
 def flat_zone(
     stacks: Sequence[Stack], conditions: Sequence[Condition], band_hz: tuple[float, float] | None = None
 ) -> FlatZone:
-    """The flat zone of a campaign's recordings (one condition each), or the user's band where given.
+    """The flat zone of a campaign's recordings, or the user's band where given.
 
-    Raises InvalidInput where no line lies in the user's band.
+    Parameters
+    ----------
+    stacks : sequence of Stack
+        The FRFs [C/N], put together where they have the same lines.
+    conditions : sequence of (indenter radius [mm], preload [N])
+        One for each recording.
+    band_hz : (low, high), optional
+        The user's band [Hz], limits included.
+
+    Returns
+    -------
+    FlatZone
+        The band [Hz] with the reason for it, and the lines in it that mains spoil.
+
+    Raises
+    ------
+    InvalidInput
+        No line lies in the user's band.
+
+    Source
+    ------
+    Seminara 2018, section 3.2.2.
     """
     frequencies = np.unique(np.concatenate([stack.frequency for stack in stacks]))
     mains = _mains_lines(stacks)
@@ -94,6 +115,7 @@ def flat_zone(
                 "band_hz",
                 list(band_hz),
                 f"must hold at least one line; they lie at {frequencies[0]:g} to {frequencies[-1]:g} Hz",
+                code=ErrorCode.TOO_FEW,
             )
         return FlatZone(*band_hz, "the band given by the user", mains, chosen_by_user=True)
     edges = _edges(frequencies)
@@ -115,11 +137,23 @@ def flat_zone(
 
 
 def band_average(stacks: Sequence[Stack], zone: FlatZone) -> tuple[Floats, Floats, Floats]:
-    """Re FRF averaged over the zone, its standard uncertainty by line noise, and the relative scatter of the lines.
+    """Re FRF averaged over the zone.
 
-    One entry a recording; NaN where it has no line in the zone. Lines weigh by their coherence where known; of each
-    recording those that stand out by 6 times its scatter are left out. The gain error that the lines share is not in
-    the uncertainty: it is the mixed model's.
+    Lines weigh by γ²/(1 − γ²) where their coherence γ² is known; of each recording those that stand out by 6 times its
+    scatter are left out. The gain error that the lines share is not in the uncertainty: it belongs to the mixed model.
+
+    Parameters
+    ----------
+    stacks : sequence of Stack
+        The FRFs [C/N].
+    zone : FlatZone
+        The band, and the lines that are left out.
+
+    Returns
+    -------
+    mean, uncertainty, scatter : (recordings,) arrays
+        The average [C/N], its standard uncertainty by line noise [C/N], and the relative scatter of the lines; NaN
+        where a recording has no line in the zone.
     """
     count = sum(len(stack.rows) for stack in stacks)
     mean, uncertainty, scatter = (np.full(count, np.nan) for _ in range(3))
@@ -160,10 +194,10 @@ def _line_weights(coherence: Floats) -> Floats:
 
 def _mains_lines(stacks: Sequence[Stack]) -> tuple[float, ...]:
     """Lines at mains harmonics that scatter far more about their neighbours than those do."""
-    harmonics = np.outer(_MAINS_HZ, np.arange(1, _HARMONICS + 1)).ravel()
-    found: set[float] = set()
+    harmonics = np.outer(MAINS_HZ, HARMONICS).ravel()
+    lines_hz: set[float] = set()
     for stack in stacks:
-        near = np.abs(stack.frequency[:, None] - harmonics).min(axis=1) <= _MAINS_WIDTH_HZ
+        near = np.abs(stack.frequency[:, None] - harmonics).min(axis=1) <= REACH_HZ
         if not near.any() or len(near) < _NEIGHBOURS:
             continue
         smooth = median_filter(stack.values.real, (1, _NEIGHBOURS), mode="nearest") + 1j * median_filter(
@@ -173,8 +207,8 @@ def _mains_lines(stacks: Sequence[Stack]) -> tuple[float, ...]:
         beside = median_filter(np.where(near, np.median(scatter[~near]), scatter), _NEIGHBOURS, mode="nearest")
         few = 1 + 1.5 / np.sqrt(len(stack.rows))  # scatter over few recordings is itself unsure
         lines = stack.frequency[near & (scatter > _OUTSTANDING * few * beside)]
-        found.update(np.round(lines, 6).tolist())
-    return tuple(sorted(found))
+        lines_hz.update(np.round(lines, 6).tolist())
+    return tuple(sorted(lines_hz))
 
 
 def _edges(frequencies: Floats) -> Floats:

@@ -1,6 +1,6 @@
-"""What may be wrong with a sampled signal: overload (clipping), held samples and jumps.
+"""Defects of a sampled signal: overload (clipping), held samples and jumps.
 
-A defect is a finding: the blocks it touches are left out of the FRF, and the rest is used.
+The blocks that a defect touches are left out of the FRF, and the rest is used.
 """
 
 from dataclasses import dataclass
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
+from underskin.findings.arguments import DefectKind
 from underskin.recordings.frf.periodic import period_of
 from underskin.units import Floats
 
@@ -19,43 +20,48 @@ _COARSE = 0.2  # share of samples that equal the one before, above which the lev
 _ONE_LEVEL = 1.5
 _BY_CHANCE = 1e-3  # runs as long in the whole signal
 _JUMP = 12.0  # second difference over its scale among neighbours; a sine stays below 1.5, noise below 6
-_BLOW, _ANSWER = 20.0, 6.0  # kurtosis; a sine has 1.5, noise 3, a hammer's blow hundreds, what rings after it tens
+_BLOW, _RINGING = 20.0, 6.0  # kurtosis; a sine has 1.5, noise 3, a hammer's blow hundreds, what rings after it tens
 _AS_SHARP = 0.5  # of a jump: the bend at its place in the next period, where a periodic signal begins anew
 _GIVE_OR_TAKE = 2  # samples: a period need not be a whole number of them
+_CLEAR = 3.0  # standard deviations from 0
 _LOCAL = 64  # samples that make a neighbourhood
 
 
 @dataclass(frozen=True)
 class Defect:
-    """A run of samples that cannot be trusted: `kind` is overload, held_samples or jump."""
+    """A run of `samples` from `first_sample` of a `channel` that cannot be trusted."""
 
-    kind: str
+    kind: DefectKind
     channel: str
-    first_sample: int
     samples: int
+    first_sample: int
 
-    @property
-    def statement(self) -> str:
-        """The defect in words."""
-        reason = {
-            "overload": "stay at the end of the range: overload",
-            "held_samples": "repeat one value: samples were dropped and the last one held",
-            "jump": "break the signal's course: samples were dropped, or a spike",
-        }[self.kind]
-        return f"{self.channel}: {self.samples} samples from sample {self.first_sample} {reason}"
+
+def mean_of(force: Floats) -> float | None:
+    """The mean of a force where it is a preload; None where an AC coupling may have removed that.
+
+    Then the mean lies within three standard deviations of 0.
+    """
+    mean, scatter = float(np.mean(force)), float(np.std(force))
+    return mean if abs(mean) > _CLEAR * scatter else None
 
 
 def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
-    """Every defect of force and charge; no defect are the jumps where the force is a blow that the charge answers, and
-    those where a periodic force, such as a sweep, begins anew, which recur in each period."""
-    found = [*defects("force_n", force), *defects("charge_pc", charge)]
-    if _kurtosis(force) > _BLOW and _kurtosis(charge) > _ANSWER:
-        return [defect for defect in found if defect.kind != "jump"]
-    if all(defect.kind != "jump" for defect in found):
-        return found
+    """Every defect of force and charge.
+
+    Jumps are no defects where the force is a blow that the charge answers, nor where a periodic force, such as a sweep,
+    begins anew: these recur in each period.
+    """
+    every = [*defects("force_n", force), *defects("charge_pc", charge)]
+    if _kurtosis(force) > _BLOW and _kurtosis(charge) > _RINGING:
+        return [defect for defect in every if defect.kind != DefectKind.JUMP]
+    if all(defect.kind != DefectKind.JUMP for defect in every):
+        return every
     period = period_of(force)
     recurs = {name: _recurs(signal, period) for name, signal in (("force_n", force), ("charge_pc", charge))}
-    return [defect for defect in found if defect.kind != "jump" or not recurs[defect.channel][defect.first_sample]]
+    return [
+        defect for defect in every if defect.kind != DefectKind.JUMP or not recurs[defect.channel][defect.first_sample]
+    ]
 
 
 def _recurs(signal: Floats, period: int) -> NDArray[np.bool_]:
@@ -83,17 +89,14 @@ def defects(channel: str, signal: Floats) -> list[Defect]:
     clipped = _overload(signal)
     held = _held(signal) & ~clipped
     jump = _jumps(signal) & ~clipped & ~held
-    return [
-        Defect(kind, channel, first, count)
-        for kind, mask in (("overload", clipped), ("held_samples", held), ("jump", jump))
-        for first, count in _runs(mask)
-    ]
+    kinds = ((DefectKind.OVERLOAD, clipped), (DefectKind.HELD_SAMPLES, held), (DefectKind.JUMP, jump))
+    return [Defect(kind, channel, count, first) for kind, mask in kinds for first, count in _runs(mask)]
 
 
-def damaged(found: list[Defect], samples: int) -> NDArray[np.bool_]:
+def damaged(every: list[Defect], samples: int) -> NDArray[np.bool_]:
     """Which of the samples any of the defects touches."""
     mask = np.zeros(samples, dtype=bool)
-    for defect in found:
+    for defect in every:
         mask[defect.first_sample : defect.first_sample + defect.samples] = True
     return mask
 

@@ -32,7 +32,20 @@ class Step:
 
 
 def find_steps(force: Floats, sample_rate: float) -> list[Step]:
-    """The dwells of a stepped-sine force in order of time; empty where it is not of that kind."""
+    """The dwells of a stepped-sine force.
+
+    Parameters
+    ----------
+    force : (samples,) array
+        [N].
+    sample_rate : float
+        [Hz].
+
+    Returns
+    -------
+    list of Step
+        In order of time; empty where the force does not dwell on tones for most of its time.
+    """
     crossings = _rising_crossings(force)
     if len(crossings) > 1 and np.median(np.diff(crossings)) < _FINE:  # too few samples a cycle to place a crossing
         crossings = _rising_crossings(resample_poly(force - np.median(force), _FINE, 1)) / _FINE
@@ -53,7 +66,26 @@ def settled(step: Step, sample_rate: float) -> int:
 def step_amplitudes(
     force: Floats, charge: Floats, sample_rate: float, step: Step, bad: NDArray[np.bool_]
 ) -> tuple[Complexes, Complexes]:
-    """Amplitudes of force and charge in each settled, undamaged block of whole cycles, as (blocks,) arrays."""
+    """Complex amplitudes of force and charge in each settled, undamaged block of whole cycles.
+
+    Amplitude X of a signal x at the angular frequency ω of the step means x = Re(X e^(iωt)).
+
+    Parameters
+    ----------
+    force, charge : (samples,) arrays
+        [N], [C].
+    sample_rate : float
+        [Hz].
+    step : Step
+        The samples, and the frequency [Hz] that the force dwells on.
+    bad : (samples,) array of bool
+        Which samples are damaged.
+
+    Returns
+    -------
+    force, charge : (blocks,) complex arrays
+        [N], [C]; empty where no block has settled.
+    """
     period = sample_rate / step.frequency
     first = settled(step, sample_rate)
     block = period * np.ceil(_BLOCK / period)

@@ -54,13 +54,13 @@ def lines_of(name: str, frf: Frf) -> FrfLines:
 
 def spreads(frfs: Sequence[Frf], conditions: Sequence[Condition]) -> list[FrfSpread]:
     """The spread over the recordings of each condition, by indenter and preload; one more for each grid of lines."""
-    found = []
+    every = []
     keys = np.array(conditions)
     for stack in stacked(frfs):
         for condition in np.unique(keys[stack.rows], axis=0):
             alike = (keys[stack.rows] == condition).all(axis=1)
-            found.append(_spread(stack, alike, condition))
-    return sorted(found, key=lambda spread: (spread.indenter_radius_mm, spread.preload_n))
+            every.append(_spread(stack, alike, condition))
+    return sorted(every, key=lambda spread: (spread.indenter_radius_mm, spread.preload_n))
 
 
 def _spread(stack: Stack, alike: NDArray[np.bool_], condition: Floats) -> FrfSpread:

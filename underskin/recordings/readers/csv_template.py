@@ -194,10 +194,10 @@ class _Template:
         """The field of a heading and the factor to its unit."""
         if heading in _KNOWN or f"skin.{heading}" in _SKIN_FIELDS:
             return heading, 1.0
-        found = lab_field(heading)
-        if found is None:
+        known = lab_field(heading)
+        if known is None:
             raise self._error(index, f"{heading!r} is no field, or its unit is not of the field")
-        return found
+        return known
 
     def _value(self, field: str, cell: str, place: tuple[int, int], factor: float = 1.0) -> Any:
         """The number in the cell at a place (row and column, from 0).

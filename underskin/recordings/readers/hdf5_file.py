@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 import h5py
 import numpy as np
 
-from underskin.errors import FileError
+from underskin.errors import ErrorCode, FileError
 from underskin.recordings.campaign import COLUMNS, SCHEMA, Campaign, to_dict
 from underskin.recordings.readers import hdf5_links
 from underskin.recordings.readers.hdf5_damage import damage
@@ -68,7 +68,7 @@ def _document(source: Any, file: str) -> dict[str, Any]:
     schema = about.get("schema")
     if str(schema).startswith("skin-export/"):
         how = "it comes in alone, on the upload page or by `underskin import FILE`"
-        raise FileError(file, "/", f"is a whole skin as `underskin export` writes it: {how}")
+        raise FileError(file, "/", f"is a whole skin as `underskin export` writes it: {how}", code=ErrorCode.WHOLE_SKIN)
     if schema != SCHEMA or "skin" not in source or "recordings" not in source:
         needed = f"it needs the attribute schema = {SCHEMA}, /skin and /recordings"
         raise FileError(file, "/", f"is HDF5, but no campaign: {needed}; other HDF5 is read from MATLAB 7.3 only")

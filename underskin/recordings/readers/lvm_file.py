@@ -166,11 +166,11 @@ def _entry(segment: _Segment, name: str, channel: int) -> str:
 
 def _moment(date: str, time: str) -> str | None:
     """A header's Date (year/month/day) and Time, without a zone as it is written; None where they are none."""
-    found = re.match(r"(\d\d:\d\d:\d\d)(?:[.,](\d{1,6}))?", time)
-    if found is None:
+    match = re.match(r"(\d\d:\d\d:\d\d)(?:[.,](\d{1,6}))?", time)
+    if match is None:
         return None
     try:
-        moment = datetime.fromisoformat(f"{date.replace('/', '-')}T{found[1]}.{(found[2] or '').ljust(6, '0')}")
+        moment = datetime.fromisoformat(f"{date.replace('/', '-')}T{match[1]}.{(match[2] or '').ljust(6, '0')}")
     except ValueError:
         return None
     return moment.isoformat() if moment.year >= FIRST_YEAR else None

@@ -36,7 +36,7 @@ def repeated_key(document: bytes) -> RepeatedKey | None:
     number = _number_of_repeated(document)
     if number is None:
         return None
-    string = next(found for place, found in enumerate(_STRING.finditer(document)) if place == number)
+    string = next(match for place, match in enumerate(_STRING.finditer(document)) if place == number)
     before = document[: string.start()].decode("utf-8", "replace")
     return RepeatedKey(_unescaped(string[1]), before.count("\n") + 1, len(before) - before.rfind("\n"))
 

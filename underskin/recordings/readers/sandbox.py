@@ -17,11 +17,11 @@ from typing import Any, BinaryIO
 import numpy as np
 import orjson
 
-from underskin.errors import FileError
+from underskin.errors import ErrorCode, FileError
 from underskin.process_limits import limit_process
 from underskin.recordings.channels import Block, Channel, Contents
 from underskin.recordings.readers.formats import parse
-from underskin.recordings.validation import shown
+from underskin.recordings.shown_values import shown
 
 
 @dataclass(frozen=True)
@@ -47,14 +47,14 @@ _LENGTH = struct.Struct("<Q")
 
 def parse_apart(name: str, stream: BinaryIO, file: str, limits: Limits = _DEFAULT) -> Contents | dict[str, Any]:
     """As formats.parse, in a child process; raises FileError also where the child dies or breaks a limit."""
-    told = call_apart(f"{__name__}:_parsed", stream, file, name, what=name, limits=limits)
-    if "document" in told:
-        return dict(told["document"])
+    contents = call_apart(f"{__name__}:_parsed", stream, file, name, what=name, limits=limits)
+    if "document" in contents:
+        return dict(contents["document"])
     blocks = [
         Block(**{**block, "channels": tuple(Channel(**channel) for channel in block["channels"])})
-        for block in told["blocks"]
+        for block in contents["blocks"]
     ]
-    return Contents(tuple(blocks), told["properties"], tuple(told["warnings"]))
+    return Contents(tuple(blocks), contents["properties"], tuple(contents["warnings"]))
 
 
 def call_apart(
@@ -101,22 +101,23 @@ def _end(status: int, said: BinaryIO) -> str:
 def _understood(answer: bytes, file: str) -> dict[str, Any]:
     (size,) = _LENGTH.unpack_from(answer)
     header = orjson.loads(answer[_LENGTH.size : _LENGTH.size + size])
-    told = header["told"]
-    if "error" in told:
-        raise FileError(file, told["error"]["place"], told["error"]["reason"])
-    return dict(_with_arrays(told, header["mark"], memoryview(answer)[_LENGTH.size + size :]))
+    contents = header["answer"]
+    if "error" in contents:
+        error = contents["error"]
+        raise FileError(file, error["place"], error["reason"], code=ErrorCode(error["code"]))
+    return dict(_with_arrays(contents, header["mark"], memoryview(answer)[_LENGTH.size + size :]))
 
 
-def _with_arrays(told: Any, mark: str, buffer: memoryview) -> Any:
-    """What was told, with the array that each {mark: [type, start, count]} stands for."""
-    if isinstance(told, list):
-        return [_with_arrays(entry, mark, buffer) for entry in told]
-    if not isinstance(told, dict):
-        return told
-    if told.keys() == {mark}:
-        kind, start, count = told[mark]
+def _with_arrays(contents: Any, mark: str, buffer: memoryview) -> Any:
+    """What was answered, with the array that each {mark: [type, start, count]} stands for."""
+    if isinstance(contents, list):
+        return [_with_arrays(entry, mark, buffer) for entry in contents]
+    if not isinstance(contents, dict):
+        return contents
+    if contents.keys() == {mark}:
+        kind, start, count = contents[mark]
         return np.frombuffer(buffer, dtype=kind, count=count, offset=start).copy()
-    return {name: _with_arrays(value, mark, buffer) for name, value in told.items()}
+    return {name: _with_arrays(value, mark, buffer) for name, value in contents.items()}
 
 
 def _parsed(stream: BinaryIO, name: str) -> dict[str, Any]:
@@ -135,10 +136,10 @@ def _main() -> None:
         if sum(memoryview(part).nbytes for part in answer) > int(longest):
             raise FileError("", "", f"it unfolds to more than {int(longest) >> 20} MB, too much for a file of its size")
     except FileError as error:
-        answer = _encoded({"error": {"place": error.place, "reason": error.reason}})
+        answer = _encoded({"error": {"place": error.place, "reason": error.reason, "code": error.code}})
     except MemoryError:
         reason = f"reading it takes more than {int(memory_bytes) / (1 << 30):.3g} GB of memory"
-        answer = _encoded({"error": {"place": "", "reason": reason}})
+        answer = _encoded({"error": {"place": "", "reason": reason, "code": ErrorCode.UNREADABLE_FILE}})
     with os.fdopen(1, "wb") as out:
         for part in answer:
             out.write(part)
@@ -159,7 +160,7 @@ def _encoded(answer: dict[str, Any]) -> list[Any]:
         start, position = position, position + array.nbytes
         return {mark: [array.dtype.str, start, array.size]}
 
-    header = orjson.dumps({"mark": mark, "told": answer}, default=plain)
+    header = orjson.dumps({"mark": mark, "answer": answer}, default=plain)
     return [_LENGTH.pack(len(header)), header, *arrays]
 
 

@@ -54,10 +54,10 @@ def cells(line: str, separator: str) -> list[str]:
     A cell in quotes may hold the separator, and quotes, doubled; it ends on its line. Raises ValueError where it does
     not.
     """
-    found = [cell.strip() for cell in (_quoted(line, separator) if '"' in line else line.split(separator))]
-    while len(found) > 1 and not found[-1]:
-        found.pop()
-    return found
+    split = [cell.strip() for cell in (_quoted(line, separator) if '"' in line else line.split(separator))]
+    while len(split) > 1 and not split[-1]:
+        split.pop()
+    return split
 
 
 def _quoted(line: str, separator: str) -> list[str]:

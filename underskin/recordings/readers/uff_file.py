@@ -69,13 +69,13 @@ def _function(universal: Any, index: int, file: str) -> dict[str, Any]:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             function: dict[str, Any] = universal.read_sets(index)
-        announced, found = int(function["num_pts"]), len(function["data"])
+        announced, stored = int(function["num_pts"]), len(function["data"])
     except MemoryError:
         raise
     except Exception as error:
         raise FileError(file, place, f"cannot be read: {error}") from None
-    if found < announced or len(function["x"]) < announced or announced < 1:
-        raise FileError(file, place, f"holds {found} of the {announced} points that it announces")
+    if stored < announced or len(function["x"]) < announced or announced < 1:
+        raise FileError(file, place, f"holds {stored} of the {announced} points that it announces")
     return {**function, "x": function["x"][:announced], "data": function["data"][:announced], "number": index + 1}
 
 

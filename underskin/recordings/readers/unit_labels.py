@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-from underskin.recordings.validation import LONGEST_NAME
+from underskin.recordings.shown_values import LONGEST_NAME
 from underskin.units import LAB
 
 _PREFIXES = {"": 1.0, "p": 1e-12, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}

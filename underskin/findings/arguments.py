@@ -1,0 +1,36 @@
+"""Arguments of findings that are more than a number or a name."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+@dataclass(frozen=True)
+class UnitGuess:
+    """The slip of units that brings an unusual magnitude back to what is usual.
+
+    `size` in the field's `unit` becomes `meant` either if it was given in `given_in`, or if it is off by ten to the
+    power of `off_by`. Without both no slip explains it; a size of 0 is a measured value of 0.
+    """
+
+    size: float
+    unit: str
+    meant: float = 0.0
+    given_in: str = ""
+    off_by: int = 0
+
+
+class D33Doubt(StrEnum):
+    """Why a d33 is implausible."""
+
+    TOO_LARGE = "too_large"
+    TOO_SMALL = "too_small"
+    NEGATIVE = "negative"
+    NOT_PVDF = "not_pvdf"
+
+
+class DefectKind(StrEnum):
+    """What is wrong with a run of samples."""
+
+    OVERLOAD = "overload"
+    HELD_SAMPLES = "held_samples"
+    JUMP = "jump"

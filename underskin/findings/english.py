@@ -1,0 +1,189 @@
+"""The sentences of findings in English: for each reason a template, or a function where words depend on the arguments.
+
+This table and `sentences` are the one place that knows them; another language is another such pair.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from underskin.findings import sentences
+from underskin.findings.codes import Reason
+from underskin.findings.lacking import Lack, Lacking
+
+Words = str | Callable[..., str]
+
+
+def statement(reason: Reason, arguments: Mapping[str, Any]) -> str:
+    """The sentence of a reason with its arguments."""
+    words = ENGLISH[reason]
+    return words.format(**arguments) if isinstance(words, str) else words(**arguments)
+
+
+def lacking(what: Lacking) -> str:
+    """What is lacking, as the end of a sentence."""
+    words = LACKING[what.lack]
+    text = words.format(**what.arguments) if isinstance(words, str) else words(**what.arguments)
+    if not what.refused_recordings:
+        return text
+    fields = " and ".join(what.refused_fields)
+    return f"{what.refused_recordings} recording(s) were refused for their {fields} (see findings), which leaves {text}"
+
+
+def _impossible_declaration(fields: Sequence[str], confirmable: bool) -> str:
+    meant = "; if it is meant, say units_checked" if confirmable else ""
+    return f"{' and '.join(fields)} cannot be right as declared (see findings){meant}"
+
+
+_IMPOSSIBLE = "{largest:.3g} is no number that can be meant ({low:g} to {high:g} in magnitude)"
+_OF_ARRAY = "{percent:.0f} % of the array's d33"
+
+LACKING: Mapping[Lack, Words] = {
+    Lack.CURVES_CONTRADICT: "force, displacement and modulus cannot all be right as declared (see findings); if they "
+    "are meant, say units_checked",
+    Lack.NO_CURVE: "no curve can be used (see findings)",
+    Lack.NO_RECORDING: "no recording can be used",
+    Lack.NO_RESPONSE: "no recording shows a response above its own noise",
+    Lack.TWO_RECORDINGS_CONTRADICT: "two recordings that contradict each other (see findings); a third would tell "
+    "which is off",
+    Lack.FEW_RECORDINGS: "usable recordings: {recordings}; at least {least} are needed, better at different preloads "
+    "or spheres",
+    Lack.MADE_ALIKE: "all recordings were made alike, at one frequency; different preloads, spheres or places are "
+    "needed",
+    Lack.IMPOSSIBLE_DECLARATION: _impossible_declaration,
+    Lack.NOISE: "a response that stands out of its noise, which is {floor_percent:.0f} % of what is predicted",
+}
+ENGLISH: Mapping[Reason, Words] = {
+    Reason.REFUSED: "{field} = {value!r}: {allowed}; left out",
+    Reason.NO_FRF: "{refusal}",
+    Reason.IMPOSSIBLE_SKIN: _IMPOSSIBLE,
+    Reason.IMPOSSIBLE_SENSOR_RADIUS: "{radius_mm:g} mm is beyond {thicknesses:g} thicknesses",
+    Reason.IMPOSSIBLE_RECORDING: f"{_IMPOSSIBLE}: left out",
+    Reason.IMPOSSIBLE_FRF: "its FRF of {frf_pc_per_n:.3g} pC/N, not below 1 C/N, can be none",
+    Reason.NO_FINITE_LINE: "no line is finite: left out",
+    Reason.NO_LINE_IN_BAND: "it has no line in the band",
+    Reason.LINES_NOT_FINITE: "{lines} lines left out",
+    Reason.SILENT_CAMPAIGN: "none of the {recordings} recordings shows a response above its noise: is the sensor "
+    "connected?",
+    Reason.SILENT_SENSOR: "sensor {sensor!r} shows no response above its noise in any of its {recordings} recordings: "
+    "left out",
+    Reason.SILENT_RECORDING: "no response above its noise, where the other recordings let expect one: left out",
+    Reason.ZERO_LINES: "every line is 0: left out",
+    Reason.INCOHERENT: "charge follows force at no frequency: left out",
+    Reason.MAINS_SPOIL_ALL: "mains of {mains_hz:g} Hz may spoil all lines where the force has its power: left out",
+    Reason.DUPLICATED_RECORDING: "the same numbers as recording {original!r}: left out",
+    Reason.SERIES_NOT_USABLE: "{refusal}: left out",
+    Reason.CURVE_NOT_USABLE: "{refusal}: left out",
+    Reason.OUT_OF_TABLES_DECLARED: "its contact (radius {radius_mm:.3g} mm on a layer of {thickness_mm:g} mm, at its "
+    "place beside the sensor) lies beyond the tables: left out",
+    Reason.OUT_OF_TABLES_FITTED: "with the values found for {answer} its contact lies beyond the tables: its "
+    "prediction is the table's edge",
+    Reason.BEYOND_TABLE: "{limit}",
+    Reason.PLACE_BEYOND_TABLE: "its position is farther from the sensor than the table reaches, or its lines scatter "
+    "beyond measure",
+    Reason.EXCLUDED: "Left out: {excluded_for}",
+    Reason.OUTLIER: "its d33 of {d33_pc_per_n:.3g} pC/N is grossly off all others",
+    Reason.CURVE_TOO_DEEP: "pressed {moved_mm:.3g} mm, more than {share:g} of its sample's height ({most_mm:.3g} mm): "
+    "given in µm? Left out",
+    Reason.SPHERE_TOO_DEEP: "pressed {moved_mm:.3g} mm, more than ten times the sphere's width ({most_mm:.3g} mm): "
+    "given in µm? Left out",
+    Reason.MODULUS_BESIDE_OTHERS: "its apparent modulus of {modulus_mpa:.3g} MPa is {ratio:.2g} times the others': a "
+    "slip of units? Left out",
+    Reason.TWO_MODULI: "the two curves' apparent moduli of {first_mpa:.2g} and {second_mpa:.2g} MPa contradict each "
+    "other: is force or displacement of one of them off by 1000?",
+    Reason.MODULUS_BESIDE_DECLARED: sentences.needed_modulus("{declared_mpa:g} MPa is declared"),
+    Reason.MODULUS_BESIDE_RUBBER: sentences.needed_modulus("rubber has {low_mpa:g} to {high_mpa:g} MPa"),
+    Reason.MODULUS_OF_NO_ELASTOMER: sentences.elastomer,
+    Reason.DECLARED_UNUSUAL: sentences.unusual,
+    Reason.WIDE_PITCH: "no two sensors lie nearer than {pitch_mm:g} mm: were places given in µm?",
+    Reason.PRELOADS_SMALL: "no preload is above {highest_n:g} N: they look 1000 × too small; were they given in kN?",
+    Reason.PRELOADS_LARGE: "no preload is below {lowest_n:g} N: they look 1000 × too large; were they given in mN?",
+    Reason.FREQUENCIES: sentences.frequencies,
+    Reason.PERIODS_TOO_LONG: "no period of {lowest_hz:g} Hz fits into the {pause_s:.3g} s after which, by recorded_at, "
+    "the next recording follows: are they 1000 × too small, given in kHz?",
+    Reason.RESPONSE_BESIDE_OTHERS: lambda too_large: (
+        f"the response looks {sentences.response_slip(too_large)} Left out"
+    ),
+    Reason.TWO_RESPONSES: "the two recordings' responses are {ratio:.3g} times as far apart as expected: a slip of "
+    "units?",
+    Reason.D33_NEEDED: sentences.d33_needed,
+    Reason.PLACES: lambda too_small, given_in, sensors_in: (
+        f"places lie at their own sensors only {sentences.thousandfold(too_small)}: were they given in {given_in}, "
+        f"or the sensors in {sensors_in}?"
+    ),
+    Reason.PLACE: lambda too_small, given_in: (
+        f"its place lies at its own sensor only {sentences.thousandfold(too_small)}: was it given in {given_in}? "
+        "Left out"
+    ),
+    Reason.PLACES_AT_SENSORS: "no place lies farther from its sensor than {farthest_mm:.2g} mm: were they given in m?",
+    Reason.WITHIN_TABLES: sentences.within_tables,
+    Reason.SERIES_FORCE: sentences.of_series(sentences.series_force),
+    Reason.SERIES_DYNAMIC_FORCE: sentences.of_series(sentences.series_dynamic_force),
+    Reason.SERIES_PRELOAD: sentences.of_series(sentences.series_preload),
+    Reason.BESIDE_OTHERS: sentences.beside_others,
+    Reason.DYNAMIC_FORCE_LARGE: "the dynamic force reaches the preload in all recordings, so the sphere would leave "
+    "the skin: was it given in mN, or the preload in kN?",
+    Reason.DYNAMIC_FORCE_SMALL: "it is at most {ratio:.1g} of the preload: it looks 1000 × too small; was it given in "
+    "kN, or the preload in mN?",
+    Reason.NARROW_MAP: "the map spans {span_mm:g} mm, on sensors {diameter_mm:g} mm across: is it in mm?",
+    Reason.UNUSUAL_MAGNITUDE: sentences.unusual,
+    Reason.UNUSUAL_MEDIAN_FRF: lambda **arguments: f"FRF, median of the recordings: {sentences.unusual(**arguments)}",
+    Reason.CURVE_REVERSED: "its force falls as it is pressed, where compression counts positive: reversed",
+    Reason.TWO_SIGNS: "the two recordings answer with opposite signs: one of them is reversed",
+    Reason.ALL_REVERSED: "charge is negative in compression: all signs were reversed (a negative d33, or the amplifier "
+    "inverts)",
+    Reason.SENSOR_REVERSED: "sensor {sensor!r} answers with the opposite sign of the others: reversed",
+    Reason.RECORDING_REVERSED: "its sign is the opposite of the others': reversed",
+    Reason.CHANNELS_SWAPPED: sentences.of_series(sentences.swapped),
+    Reason.FORCE_CONTRADICTS_PRELOAD: "force_n is {mean_n:.3g} N in the mean, but preload_n is {preload_n:g}: is one "
+    "in another unit?",
+    Reason.SENSORS_AT_ONE_PLACE: sentences.one_place,
+    Reason.SENSORS_TOO_NEAR: sentences.too_near,
+    Reason.SENSORS_OVERLAP: "{first} and {second} lie over one another, their centres {distance_mm:g} mm apart: are x "
+    "and y in mm?",
+    Reason.NO_CONTACT_WITHIN_TABLES: "no contact lies within the tables: contact radii would be {smallest:.3g} to "
+    "{largest:.3g} of the thickness, or the places lie far from their sensors; are preload, sphere, thickness, modulus "
+    "and places right?",
+    Reason.TIME_TO_COME: lambda written, more: (
+        f"recorded_at is {written}, which is still to come: is the year a slip?"
+        f"{sentences.more_alike(more, 'recording')}"
+    ),
+    Reason.TIME_TOO_OLD: lambda written, year, more: (
+        f"recorded_at is {written}, before {year}: was the clock not set?{sentences.more_alike(more, 'recording')}"
+    ),
+    Reason.D33_FITTED: lambda d33_pc_per_n, doubt: (
+        f"d33 comes out as {d33_pc_per_n:.4g} pC/N, {sentences.D33_DOUBTS[doubt]}"
+    ),
+    Reason.D33_OF_ARRAY: lambda d33_pc_per_n, doubt: (
+        f"d33 of the array is {d33_pc_per_n:.3g} pC/N, {sentences.D33_DOUBTS[doubt]}"
+    ),
+    Reason.D33_OF_ROW: lambda d33_pc_per_n, doubt, more: (
+        f"d33 is {d33_pc_per_n:.3g} pC/N, {sentences.D33_DOUBTS[doubt]}{sentences.more_rows(more)}"
+    ),
+    Reason.DEFECT: sentences.defect,
+    Reason.DEFECTS_LEFT_OUT: sentences.defects_left_out,
+    Reason.LINES_LEFT_OUT: sentences.lines_left_out,
+    Reason.FORCE_ACTS_ONCE: "in {affected} of {recordings} recordings the force acts at each frequency once, as a "
+    "single sweep or blow: the lowest lines are left out, and those beside a sharp resonance are off by parts of a "
+    "percent; a drive that repeats itself at least four times gives them all",
+    Reason.MAINS_IN_CHARGE: sentences.mains_in_charge,
+    Reason.CONSTANT_AXIS: "{axis} is the same in all recordings",
+    Reason.ONE_LINE: "one line a recording: nothing can be said about frequency",
+    Reason.PARAMETER_AT_BOUND: sentences.parameter_at_bound,
+    Reason.LINE_NOISE_LEVEL: sentences.line_noise,
+    Reason.REMAINDER: "a smooth part of about {percent:.2g} % of the largest force, {times:.0f} times a sample's "
+    "noise, is left that no mechanism here describes",
+    Reason.HELD_OUT_NO_BETTER: sentences.held_out,
+    Reason.SEATING: "only the first {percent:.0f} % of the displacement speaks for strain_stiffening: a platen that is "
+    "tilted, or an uneven end, seats like that. It was left out; a small preload before zeroing avoids it",
+    Reason.LOAD_NOT_LINEAR: sentences.load_not_linear,
+    Reason.PRESSURE_NOT_LINEAR: "{pressure_mpa:g} MPa is more than the layer's modulus, {modulus_mpa:g} MPa: it is far "
+    "from linear there",
+    Reason.CONTACT_SLIPS: sentences.contact_slips,
+    Reason.DEAD: f"dead: no charge beyond noise ({_OF_ARRAY})",
+    Reason.INVERTED: f"inverted polarity: {_OF_ARRAY}",
+    Reason.WEAK: f"weak: {_OF_ARRAY}",
+    Reason.STRONG: f"strong: {_OF_ARRAY}",
+    Reason.NOISY_LINES: "noisy: its lines scatter {times:.1f} times as much as those of the others",
+    Reason.NOISY_RECORDINGS: "noisy: its recordings scatter {times:.1f} times as much as expected",
+    Reason.BENT: "bent: its d33 curves by {percent:+.0f} % over the preloads",
+}

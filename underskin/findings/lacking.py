@@ -1,0 +1,31 @@
+"""What data lack from which nothing can be concluded."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+
+class Lack(StrEnum):
+    """Why nothing can be concluded."""
+
+    CURVES_CONTRADICT = "curves_contradict"
+    NO_CURVE = "no_curve"
+    NO_RECORDING = "no_recording"
+    NO_RESPONSE = "no_response"
+    TWO_RECORDINGS_CONTRADICT = "two_recordings_contradict"
+    FEW_RECORDINGS = "few_recordings"
+    MADE_ALIKE = "made_alike"
+    IMPOSSIBLE_DECLARATION = "impossible_declaration"
+    NOISE = "noise"
+
+
+@dataclass(frozen=True)
+class Lacking:
+    """A lack with the values that its sentence states, and how many recordings were refused for which fields."""
+
+    lack: Lack
+    arguments: Mapping[str, Any] = dataclasses.field(default_factory=dict, hash=False)
+    refused_recordings: int = 0
+    refused_fields: Sequence[str] = ()

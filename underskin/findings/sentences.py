@@ -1,0 +1,222 @@
+"""English sentences of findings whose words depend on their arguments, for the table in `english`."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from underskin.findings.arguments import D33Doubt, DefectKind, UnitGuess
+from underskin.formatting import in_digits, significant
+
+_MOST_SENSORS = 3  # named one by one
+
+D33_DOUBTS: Mapping[D33Doubt, str] = {
+    D33Doubt.TOO_LARGE: "more than sensors have: was mV/pC meant, not mV/nC, or N, not mN, or fC, not pC?",
+    D33Doubt.TOO_SMALL: "less than sensors have: was mV/nC meant, not mV/pC, or mN, not N, or nC, not pC?",
+    D33Doubt.NEGATIVE: "negative: is the sign of charge or force turned?",
+    D33Doubt.NOT_PVDF: "which PVDF cannot have: it and its copolymers have 10 to 40",
+}
+DEFECTS: Mapping[DefectKind, str] = {
+    DefectKind.OVERLOAD: "stay at the end of the range: overload",
+    DefectKind.HELD_SAMPLES: "repeat one value: samples were dropped and the last one held",
+    DefectKind.JUMP: "break the signal's course: samples were dropped, or a spike",
+}
+
+
+def unit_guess(guess: UnitGuess) -> str:
+    """The slip that would explain an unusual magnitude."""
+    if guess.size == 0:
+        return "a dead sensor?"
+    if guess.given_in:
+        was = f"{guess.size:g} {guess.given_in} is {guess.meant:g} {guess.unit}"
+        return f"{was}: was it given in {guess.given_in}?"
+    if guess.off_by:
+        return f"off by a factor of 10^{guess.off_by}? {guess.meant:g} {guess.unit} would be usual"
+    return "no unit that we know explains it"
+
+
+def defect(kind: DefectKind, channel: str, samples: int, first_sample: int) -> str:
+    """A run of damaged samples."""
+    return f"{channel}: {samples} samples from sample {first_sample} {DEFECTS[kind]}"
+
+
+def defects_left_out(kind: DefectKind, channel: str, samples: int, first_sample: int, more: int) -> str:
+    """The first of some runs of damaged samples, and how many more there are."""
+    others = f"; {more} more like it" if more else ""
+    return f"{defect(kind, channel, samples, first_sample)}{others}: those parts were left out"
+
+
+def size(too_large: bool) -> str:
+    """The direction of a slip."""
+    return "large" if too_large else "small"
+
+
+def more_alike(count: int, noun: str) -> str:
+    """How many more are alike, in brackets."""
+    return f" ({count} more {noun}{'s' if count > 1 else ''} like it)" if count else ""
+
+
+def more_rows(count: int, noun: str = "rows") -> str:
+    """How many more rows are alike, in brackets."""
+    return f" ({count} more {noun} like it)" if count else ""
+
+
+def listed_sensors(ids: Sequence[str]) -> str:
+    """Some sensors by their ids."""
+    if len(ids) > _MOST_SENSORS:
+        return f"sensors {', '.join(ids[:_MOST_SENSORS])} and {len(ids) - _MOST_SENSORS} more"
+    return f"sensors {', '.join(ids[:-1])} and {ids[-1]}"
+
+
+def unusual(value: float, unit: str, guess: UnitGuess, more: int) -> str:
+    """A value of unusual magnitude."""
+    return f"{value:g} {unit} is unusual: {unit_guess(guess)}{more_rows(more)}"
+
+
+def elastomer(modulus_mpa: float, low_mpa: float, high_mpa: float, given_in: str) -> str:
+    """A modulus that no elastomer has."""
+    word = "stiffer" if modulus_mpa > high_mpa else "softer"
+    usual = f"({low_mpa:g} to {high_mpa:g} MPa)"
+    return f"{modulus_mpa:g} MPa is {word} than elastomers are {usual}: was it given in {given_in}?"
+
+
+def needed_modulus(against: str) -> Callable[..., str]:
+    """Words for curves whose modulus is far from what is known."""
+
+    def words(modulus_mpa: float, too_large: bool, **bounds: float) -> str:
+        guess = "N for mN, or mm for m" if too_large else "mN for N, or m for mm"
+        needed = f"force and displacement would need a modulus of about {modulus_mpa:.2g} MPa"
+        return f"{needed}, where {against.format(**bounds)}: off by 1000 ({guess})?"
+
+    return words
+
+
+def frequencies(lowest_hz: float, highest_hz: float, too_large: bool, given_in: str) -> str:
+    """Frequencies of an unlikely magnitude."""
+    range_ = f"frequencies are {lowest_hz:g} to {highest_hz:g} Hz"
+    return f"{range_}: they look 1000 × too {size(too_large)}; were they given in {given_in}?"
+
+
+def response_slip(too_large: bool) -> str:
+    """A response of the wrong magnitude."""
+    return "1000 × too large: pC taken for nC, or N for mN?" if too_large else "1000 × too small: nC taken for pC?"
+
+
+def d33_needed(d33_pc_per_n: float, declared_pc_per_n: float | None, too_large: bool) -> str:
+    """A d33 that the response would need."""
+    known = f", where {declared_pc_per_n:g} is declared" if declared_pc_per_n else ""
+    needed = f"charge over force would need a d33 of {d33_pc_per_n:.3g} pC/N{known}"
+    return f"{needed}; it looks {response_slip(too_large)}"
+
+
+def thousandfold(too_small: bool) -> str:
+    """The factor that corrects a place."""
+    return "a thousandfold" if too_small else "divided by 1000"
+
+
+def within_tables(larger: bool, given_in: str) -> str:
+    """A field that would bring the contacts within the tables."""
+    word = "larger" if larger else "smaller"
+    return f"were it 1000 × {word}, contacts would lie within the tables: was it given in {given_in}?"
+
+
+def beside_others(value: float, too_large: bool, given_in: str) -> str:
+    """A value of another magnitude than those of the other recordings."""
+    return f"{value:g} looks 1000 × too {size(too_large)} beside the others: was it given in {given_in}? Left out"
+
+
+def of_series(words: Callable[..., str]) -> Callable[..., str]:
+    """A contradiction within a time series: of a recording left out, of one used, or of all as in an `example`."""
+
+    def in_scope(*, left_out: bool = False, example: str = "", **arguments: Any) -> str:
+        text = words(**arguments)
+        return f"in all recordings, as in {example}: {text}" if example else f"{text} Left out" if left_out else text
+
+    return in_scope
+
+
+def swapped(force_mean_n: float, charge_mean_pc: float, preload_n: float) -> str:
+    """Force and charge exchanged."""
+    return (
+        f"its mean is {force_mean_n:.3g} N, and that of charge_pc {charge_mean_pc:.3g}, where preload_n is "
+        f"{preload_n:g}: force and charge look exchanged."
+    )
+
+
+def series_force(oscillation_n: float, dynamic_force_n: float, too_large: bool, given_in: str) -> str:
+    """A force whose oscillation contradicts the dynamic force."""
+    text = f"it is shaken by {oscillation_n:.3g} N, where dynamic_force_n is {dynamic_force_n:g}"
+    return f"{text}: it looks 1000 × too {size(too_large)}; was it given in {given_in}?"
+
+
+def series_dynamic_force(dynamic_force_n: float, too_large: bool, given_in: str) -> str:
+    """A dynamic force that contradicts the recorded force."""
+    text = f"{dynamic_force_n:g} N looks 1000 × too {size(too_large)} beside the recorded force"
+    return f"{text}: was it given in {given_in}?"
+
+
+def series_preload(preload_n: float, mean_n: float, too_large: bool, given_in: str) -> str:
+    """A preload that contradicts the recorded force."""
+    beside = f"beside the recorded force's mean of {mean_n:.3g} N"
+    return f"{preload_n:g} N looks 1000 × too {size(too_large)} {beside}: was it given in {given_in}?"
+
+
+def one_place(sensors: Sequence[str], x_mm: float, y_mm: float, more: int) -> str:
+    """Sensors at one place."""
+    place = f"x {x_mm:g} mm, y {y_mm:g} mm"
+    return f"{listed_sensors(sensors)} lie at one place, {place}: is it a slip?{more_alike(more, 'place')}"
+
+
+def too_near(sensors: Sequence[str], radius_mm: float, pitch_mm: float, in_metres: bool) -> str:
+    """Sensors nearer to each other than their radius allows."""
+    guess = "were their places given in m" if in_metres else "is it the diameter"
+    return f"{listed_sensors(sensors)} of {radius_mm:g} mm radius cannot lie {pitch_mm:g} mm apart: {guess}, or a slip?"
+
+
+def lines_left_out(faint: int, measured: int, recordings: int, beside: int) -> str:
+    """Lines where the force has little power."""
+    text = f"{faint} of {measured} lines of {recordings} recordings are left out: the force has little power there"
+    shared = f", and {beside} that share their noise with the next one" if beside else ""
+    return f"{text} and charge does not follow it{shared}"
+
+
+def mains_in_charge(affected: int, recordings: int, mains_hz: float, charge_pc: float) -> str:
+    """Mains on the charge."""
+    return (
+        f"in {affected} of {recordings} recordings the charge stands out at {mains_hz:g} Hz or a multiple of it by "
+        f"about {significant(charge_pc, 2)} pC, and the force does not: mains pickup? The lines there are left out"
+    )
+
+
+def parameter_at_bound(mechanism: str, parameter: str, low: float, high: float, unit: str) -> str:
+    """A parameter at the end of its range."""
+    limits = f"{low:g} to {high:g} {unit.strip('-')}".rstrip()
+    return f"{mechanism}: {parameter} lies at an end of what is held possible ({limits})"
+
+
+def line_noise(level: float) -> str:
+    """Lines that scatter more about the answer than about their neighbours."""
+    return (
+        f"the lines scatter {in_digits(level, 2)} times more about the stated answer than about their own neighbours: "
+        "part of the misfit along frequency may have been taken for noise"
+    )
+
+
+def held_out(groups: Sequence[str], mechanisms: Sequence[str], before_percent: float, after_percent: float) -> str:
+    """Mechanisms that predict held-out groups no better."""
+    return (
+        f"what was left out ({', '.join(groups)}) is predicted no better with {' and '.join(mechanisms)}: "
+        f"{before_percent:.3g} % before, {after_percent:.3g} % after; do not extrapolate with it"
+    )
+
+
+def load_not_linear(load_parameter: float, more: int) -> str:
+    """A load beyond the linear layer."""
+    return (
+        f"L = F/(R²E) is {load_parameter:.2g}: the layer is linear here, and finite strain is left out; it adds up to "
+        f"1.3 % at L = 0.01 and 3 % at L = 0.1 to the stress on a sensor beneath a sphere{more_rows(more, 'contacts')}"
+    )
+
+
+def contact_slips(ratio: float, more: int) -> str:
+    """A tangential force above the normal one."""
+    text = f"the tangential force is {ratio:.3g} times the normal one: it slips unless friction is stronger"
+    return f"{text}{more_rows(more, 'contacts')}"

@@ -1,0 +1,114 @@
+"""H1, H2 and Hv with their coherence from spectra averaged over blocks of two signals (equations in `estimation`)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.errors import ErrorCode, InvalidInput
+from underskin.findings import sentences
+from underskin.recordings.frf.signal_checks import Defect, damaged, defects_of_pair
+from underskin.units import Complexes, Floats
+
+Estimator = Literal["H1", "H2", "Hv"]
+_TINY = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Blocks as long as their `taper` that start every `step` samples, less what `steadied` takes off them, and the
+    `lines` of their spectra that are kept."""
+
+    taper: Floats
+    step: int
+    lines: slice
+    steadied: Callable[[Floats], Floats]
+
+    def of(self, signal: NDArray[np.generic]) -> NDArray[Any]:
+        """(blocks, samples)."""
+        return np.lib.stride_tricks.sliding_window_view(signal, len(self.taper))[:: self.step]
+
+    def spectra(self, signal: Floats) -> Complexes:
+        """(blocks, lines)."""
+        return np.fft.rfft(self.steadied(self.of(signal)) * self.taper)[:, self.lines]
+
+
+@dataclass(frozen=True)
+class Average:
+    """Spectra averaged over the undamaged blocks, (lines,) each: as the fields of the same names of `Frf`."""
+
+    frequency: Floats  # in cycles per sample
+    values: Complexes
+    coherence: Floats
+    averages: Floats
+    defects: tuple[Defect, ...]
+    force_power: Floats
+    charge_power: Floats
+    passes: Floats
+
+
+def averaged(force: Floats, charge: Floats, blocks: Blocks, estimator: Estimator) -> Average:
+    """The average over the undamaged blocks, its frequencies in cycles per sample."""
+    defects = defects_of_pair(force, charge)
+    whole = ~blocks.of(damaged(defects, len(force))).any(axis=1)
+    count = int(whole.sum())
+    if not count:
+        first = defects[0]
+        words = sentences.defect(first.kind, first.channel, first.samples, first.first_sample)
+        raise InvalidInput(
+            first.channel, f"{len(defects)} defects", f"no undamaged block: {words}", code=ErrorCode.UNUSABLE_SIGNAL
+        )
+    force_spectra, charge_spectra = (blocks.spectra(signal)[whole] for signal in (force, charge))
+    frequency: Floats = np.fft.rfftfreq(len(blocks.taper))[blocks.lines].astype(np.float64)
+    averages = _independent_blocks(count, blocks.taper, blocks.step)
+    values, coherence = ratio(force_spectra, charge_spectra, estimator)
+    scale = 2 / blocks.taper.sum()
+    force_power, charge_power = (np.abs(scale * spectra) ** 2 for spectra in (force_spectra, charge_spectra))
+    return Average(
+        frequency,
+        values,
+        coherence if count > 1 else np.full_like(coherence, np.nan),
+        np.full(len(frequency), averages),
+        tuple(defects),
+        force_power.mean(axis=0),
+        charge_power.mean(axis=0),
+        force_power.sum(axis=0) ** 2 / np.maximum((force_power**2).sum(axis=0), _TINY),
+    )
+
+
+def ratio(force: Complexes, charge: Complexes, estimator: Estimator) -> tuple[Complexes, Floats]:
+    """H and γ² of spectra (blocks, lines)."""
+    if estimator not in ("H1", "H2", "Hv"):
+        raise InvalidInput("estimator", estimator, "must be H1, H2 or Hv", code=ErrorCode.NOT_ONE_OF)
+    ff, qq = (np.mean(np.abs(blocks) ** 2, axis=0) for blocks in (force, charge))
+    fq = np.mean(np.conj(force) * charge, axis=0)
+    coherence = np.minimum(np.abs(fq) ** 2 / np.maximum(ff * qq, _TINY), 1.0)
+    if estimator == "H1":
+        return fq / np.maximum(ff, _TINY), coherence
+    if estimator == "H2":
+        return qq * fq / np.maximum(np.abs(fq) ** 2, _TINY), coherence
+    kappa = qq.sum() / max(ff.sum(), _TINY)
+    difference = qq - kappa * ff
+    root = np.sqrt(difference**2 + 4 * kappa * np.abs(fq) ** 2)
+    share = np.where(difference > 0, (difference + root) / (2 * np.maximum(np.abs(fq) ** 2, _TINY)), 0)
+    return fq * np.where(difference > 0, share, 2 * kappa / np.maximum(root - difference, _TINY)), coherence
+
+
+def without_line(blocks: Floats) -> Floats:
+    """The blocks (blocks, samples) less the straight line that fits each best."""
+    time = np.arange(blocks.shape[1]) - (blocks.shape[1] - 1) / 2
+    level = blocks.mean(axis=1, keepdims=True)
+    slope = (blocks @ time / (time @ time))[:, None]
+    return blocks - level - slope * time
+
+
+def _independent_blocks(count: int, taper: Floats, step: int) -> float:
+    """How many independent blocks carry as much as `count` overlapping ones (Welch 1967)."""
+    power = taper @ taper
+    excess = 0.0
+    for lag in range(1, min(count, -(-len(taper) // step))):
+        shared = float(taper[lag * step :] @ taper[: len(taper) - lag * step] / power)
+        excess += 2 * (1 - lag / count) * shared**2
+    return count / (1 + excess)
