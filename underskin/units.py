@@ -20,7 +20,6 @@ from underskin.requirement import UNITS_CHECKED, Requirement
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-CONFIRM_UNITS = " (or set units_checked to true)"  # how a request confirms an unlikely magnitude
 
 
 @dataclass(frozen=True)

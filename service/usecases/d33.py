@@ -1,7 +1,6 @@
 """d33 of each sensor from its measured FRF, by the paper's model or by the adopted one."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
 
 import numpy as np
 
@@ -37,7 +36,7 @@ def d33(table: SigmaTable, store: Database, request: D33Columns) -> Columns:
         model=request.model,
         table_sha256=table.sha256,
         inside=answer.inside,
-        shared={"findings": [asdict(finding) for finding in answer.findings]},
+        shared={"findings": [finding.in_columns() for finding in answer.findings]},
         columns={**leading, **plateau, **measured, **results},
     )
 
@@ -63,7 +62,7 @@ def _by_adopted_model(table: SigmaTable, store: Database, request: D33Columns) -
         pressed.require_lines("frequency_hz")
     value = measured["frf_pc_per_n"] / pressed.level
     unsure = np.hypot(measured["frf_uncertainty_pc_per_n"] / pressed.level, value * pressed.columns["rel_error"])
-    findings = [asdict(finding) for finding in plausibility.of_rows(measured["frf_pc_per_n"], value)]
+    findings = [finding.in_columns() for finding in plausibility.of_rows(measured["frf_pc_per_n"], value)]
     return Columns(
         rows=len(pressed.level),
         model=request.model,

@@ -1,7 +1,5 @@
 """Charge on every sensor of an array under several contacts or a pressure map."""
 
-from dataclasses import asdict
-
 from service.schemas.columns_answer import Columns
 from underskin.array_stress.answer import answer
 from underskin.array_stress.request import LoadCase
@@ -19,7 +17,7 @@ def stress(table: InfluenceTable, request: LoadCase) -> Columns:
         shared={
             "reach_mm": result.reach_mm,
             "contact_radius_mm": result.contact_radius_mm,
-            "findings": [asdict(finding) for finding in result.findings],
+            "findings": [finding.in_columns() for finding in result.findings],
         },
         names={"sensor": result.sensors},
         columns=result.columns,

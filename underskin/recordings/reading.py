@@ -31,9 +31,9 @@ class Reading:
 def read_file(source: Path | str | bytes, name: str, rig: RigDescription | None = None) -> Reading:
     """The campaign in a file, of which `source` is the place on this machine or the bytes, and `name` what to call it.
 
-    The content decides the format, the name that of another package. Files that hold channels, not campaigns, need a rig
-    description. Raises FileError that names the file and the place, InvalidInput where the campaign itself or its skin
-    cannot be used.
+    The content decides the format, of another package's formats the name. Files that hold channels, not campaigns,
+    need a rig description. Raises FileError that names the file and the place, InvalidInput where the campaign itself
+    or its skin cannot be used.
     """
     return understood(read_contents(source, name), name, rig)
 

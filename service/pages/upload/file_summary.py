@@ -61,7 +61,6 @@ class FileSummary:
     sample_rate_hz: float | None = None
     channels: Sequence[ChannelSummary] = ()
     properties: Mapping[str, str | float] = field(default_factory=dict)
-    is_exported_skin: bool = False  # which is read alone, not among other files
 
 
 def seen(upload: Upload, look: InspectedFile, known: Sequence[str]) -> FileSummary:
@@ -83,16 +82,8 @@ def seen(upload: Upload, look: InspectedFile, known: Sequence[str]) -> FileSumma
         campaigns=[campaign.name for campaign in campaigns],
         skin=next(iter(skins)) if len(skins) == 1 else None,
         known=known,
-        is_exported_skin=_is_exported_skin(upload, arrived),
         **about,
     )
-
-
-def _is_exported_skin(upload: Upload, arrived: Sequence[CheckedCampaign]) -> bool:
-    if any(one.campaign is not None for one in arrived):
-        return False
-    with upload.path.open("rb") as stream:
-        return is_export(stream, upload.label or "the file")
 
 
 def _own_errors(one: CheckedCampaign) -> list[dict[str, Any]]:

@@ -15,7 +15,7 @@ from service.problems import Refusal
 from service.store.engine import Database
 from service.store.errors import Conflict, Missing
 from underskin import InvalidInput
-from underskin.errors import FileError
+from underskin.errors import ErrorCode, FileError
 
 SKIN_FIELD, CORRECTS = "skin", "corrects"
 
@@ -55,7 +55,7 @@ def _rig_upload(pending: PendingUpload) -> list[Upload]:
 
 
 def _field_error(error: InvalidInput) -> dict[str, Any]:
-    return {"field": error.field, "value": error.value, "allowed": error.allowed}
+    return {"code": str(error.code), "field": error.field, "value": error.value, "allowed": error.allowed}
 
 
 def field_errors(error: Exception) -> list[dict[str, Any]]:
@@ -65,5 +65,7 @@ def field_errors(error: Exception) -> list[dict[str, Any]]:
     if isinstance(error, Refusal) and error.errors:
         return [dict(entry) for entry in error.errors]
     if isinstance(error, FileError):
-        return [{"field": error.file, "value": None, "allowed": f"{error.place} {error.reason}".strip()}]
-    return [{"field": "upload", "value": None, "allowed": error.detail if isinstance(error, Refusal) else str(error)}]
+        allowed = f"{error.place} {error.reason}".strip()
+        return [{"code": str(error.code), "field": error.file, "value": None, "allowed": allowed}]
+    detail = error.detail if isinstance(error, Refusal) else str(error)
+    return [{"code": str(ErrorCode.INVALID_VALUE), "field": "upload", "value": None, "allowed": detail}]

@@ -20,6 +20,7 @@ from underskin.diagnosis.noise.correlated_error import UNNAMED
 from underskin.diagnosis.noise.noise_priors import UNUSUAL_GAIN, UNUSUAL_POSITION
 from underskin.diagnosis.selection.frequency_gp import over_lines
 from underskin.diagnosis.selection.recording_gp import over_recordings
+from underskin.recordings.usual_scatter import GAIN_RANGE, POSITION_RANGE
 
 _KINDS = {"recordings": 0.45, "lines": 0.4, "both": 0.05, "scatter": 0.1}
 

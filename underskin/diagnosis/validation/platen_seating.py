@@ -44,7 +44,7 @@ def without_seating(
     assert plain is not None
     if stiffer.log_evidence - plain.log_evidence > SHOWS:
         return None
-    arguments = {"percent": 100 * _BEGINNING, "mechanisms": imitated}
+    arguments = {"percent": 100 * _BEGINNING, "mechanisms": " and ".join(imitated)}
     return problem, Finding(Reason.SEATING, "", "displacement_mm", arguments)
 
 
