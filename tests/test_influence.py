@@ -69,7 +69,7 @@ def test_the_hertz_pressure_beside_the_sensor_equals_the_oracle() -> None:
         influence = TABLE.at(rho, poisson_ratio, slip)
         assert influence is not None
         load = hertz_load(float(row["a_over_h"]), np.zeros(2))
-        answer = influence.stress(1.0, np.array([[0.6 * offset, -0.8 * offset]]), load.places, load.forces)
+        answer = influence.stress(1.0, np.array([[0.6 * offset, -0.8 * offset]]), load.positions, load.forces)
         found.append(-float(answer.stress[0]) * 2 * np.pi / 3)
         exact.append(value)
     assert len(found) > 600
@@ -146,7 +146,7 @@ def test_a_map_of_the_hertz_pressure_gives_the_contact(cells: int) -> None:
     assert influence is not None
     a, sensors = 1.0, np.array([[0.0, 0.0], [0.7, 0.4], [3.0, -1.0]])
     load = hertz_load(a, np.array([0.1, 0.2]))
-    contact = influence.stress(1.0, sensors, load.places, load.forces).stress
+    contact = influence.stress(1.0, sensors, load.positions, load.forces).stress
     x = np.linspace(-1.2, 1.4, cells)
     square = ((x - 0.1) ** 2 + (x[:, None] - 0.2 - 0.1) ** 2) / a**2
     pressure = 1.5 / np.pi / a**2 * np.sqrt(np.clip(1 - square, 0, None))
