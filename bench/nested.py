@@ -16,7 +16,7 @@ from bench.diagnosed import Effects, recorded
 from bench.figures import Figure
 from tests.nested_sampling import Posterior, Sampled, nested
 from underskin.diagnosis.data.dataset import lines
-from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.selection.search import log_prior
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
@@ -82,14 +82,14 @@ def measure() -> list[Figure]:
 
 
 def _compared(effects: Effects) -> Compared:
-    bench = Workbench(lines(recorded(effects, columns=2, preloads_n=PRELOADS_N, lines=20)), load_table())
+    problem = FittingProblem(lines(recorded(effects, columns=2, preloads_n=PRELOADS_N, lines=20)), load_table())
     times = []
     for _ in range(ROUNDS):
         start = time.process_time()
-        explained = _explained(bench)
+        explained = _explained(problem)
         times.append(time.process_time() - start)
     start = time.process_time()
-    sampled = [_sampled(bench, entry) for entry in explained]
+    sampled = [_sampled(problem, entry) for entry in explained]
     return Compared(
         [entry.log_evidence for entry in explained],
         [entry.log_evidence for entry in sampled],
@@ -99,14 +99,14 @@ def _compared(effects: Effects) -> Compared:
     )
 
 
-def _explained(bench: Workbench) -> list[Explanation]:
-    found = [bench.explain(names) for names in HYPOTHESES]
+def _explained(problem: FittingProblem) -> list[Explanation]:
+    found = [problem.explain(names) for names in HYPOTHESES]
     return [entry.integrated() for entry in found if entry is not None]  # without a parent none is left out
 
 
-def _sampled(bench: Workbench, explained: Explanation) -> Sampled:
+def _sampled(problem: FittingProblem, explained: Explanation) -> Sampled:
     """Without positioning scatter and, where the diagnosis looked for it, with it."""
-    plain, placed = (Fitter(bench.hypothesis(explained.names, placed)) for placed in (False, True))
+    plain, placed = (Fitter(problem.hypothesis(explained.names, placed)) for placed in (False, True))
     without = nested(Posterior(plain, explained.point))
     if explained.placed == 0:
         return without

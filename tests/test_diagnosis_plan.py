@@ -12,7 +12,7 @@ from tests.diagnosis_campaigns import Made, campaign
 from tests.mechanism_campaigns import indentation_campaign
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.data.names import EXPLAINED
-from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import Limits
@@ -36,11 +36,11 @@ class Left:
     """A campaign, what it leaves open, and the search that says so."""
 
     def __init__(self, made: Made, table: SigmaTable) -> None:
-        self.bench = Workbench(lines(campaign(made, table)), table)
-        self.search = search(self.bench)
+        self.problem = FittingProblem(lines(campaign(made, table)), table)
+        self.search = search(self.problem)
 
     def plan(self, **limits: Any) -> dict[str, Any]:
-        return plan(self.bench, self.search, Limits(**limits))
+        return plan(self.problem, self.search, Limits(**limits))
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +98,7 @@ def test_rivals_without_a_law_and_curves_have_a_document_too(narrow: Left, table
             return [Answer(leader, 0.6), Answer(None, 0.4)]
 
     torn = Torn(narrow.search.explanations, (process,), narrow.search.unsupported)
-    planned = plan(narrow.bench, torn, Limits())
+    planned = plan(narrow.problem, torn, Limits())
     assert planned["recordings"] == []
     assert "something without a name" in planned["statement"]
     assert diagnose(indentation_campaign(), table).next_experiment is not None
@@ -152,7 +152,7 @@ def test_a_plan_decides_as_often_as_it_promises(narrow: Left, table: SigmaTable)
     prior = np.array([answer.probability for answer in rivals])
     prior /= prior.sum()
     random = np.random.default_rng(4)
-    whole = narrow.bench.lines.campaign
+    whole = narrow.problem.lines.campaign
     together = with_planned(whole, planned)
     decided = 0
     for truth in random.choice(len(rivals), size=DRAWS, p=prior):
@@ -160,12 +160,12 @@ def test_a_plan_decides_as_often_as_it_promises(narrow: Left, table: SigmaTable)
         true = explanations[truth]
         assert true is not None
         made = recorded(together, len(whole.recordings), true, table, random)
-        bench = Workbench(lines(made), table)
+        problem = FittingProblem(lines(made), table)
         log_posterior = np.log(prior)
         for number, explanation in enumerate(explanations):
             assert explanation is not None
-            again = bench.refit(explanation)
-            before = narrow.bench.refit(explanation)
+            again = problem.refit(explanation)
+            before = narrow.problem.refit(explanation)
             assert again is not None
             assert before is not None
             log_posterior[number] += again.log_evidence - before.log_evidence

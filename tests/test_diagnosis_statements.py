@@ -10,7 +10,7 @@ from tests.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.dataset import Lines, lines
 from underskin.diagnosis.inference.evidence import laplace
-from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.localisation.effect_size import Effect, effect
 from underskin.diagnosis.localisation.permutation_test import AxisResult
@@ -150,10 +150,10 @@ def test_every_axis_has_words() -> None:
 
 def answers_of(table: SigmaTable, weights: dict[tuple[str, ...], float]) -> list[Answer]:
     """Answers of given probabilities, fitted to a small campaign."""
-    bench = Workbench(lines(campaign(Made(("ageing",), (0.3, 300.0, 0.0)), table)), table)
+    problem = FittingProblem(lines(campaign(Made(("ageing",), (0.3, 300.0, 0.0)), table)), table)
     found = []
     for names, probability in weights.items():
-        explanation = bench.explain(names)
+        explanation = problem.explain(names)
         assert explanation is not None
         found.append(Answer(explanation, probability))
     return found
@@ -221,24 +221,26 @@ def moved(explanation: Explanation, **values: float) -> Explanation:
 
 
 def test_contacts_beyond_the_tables_at_the_fitted_values_are_named(table: SigmaTable) -> None:
-    bench = Workbench(lines(campaign(Made(modulus_mpa=0.5, thickness_mm=1.0, sensor_radius_mm=0.5), table)), table)
-    explanation = bench.explain(("modulus_error",))
+    problem = FittingProblem(
+        lines(campaign(Made(modulus_mpa=0.5, thickness_mm=1.0, sensor_radius_mm=0.5), table)), table
+    )
+    explanation = problem.explain(("modulus_error",))
     assert explanation is not None
     entry = next(one for one in explanation.model.parameters if not one.name.startswith(("d33", "youngs", "thick")))
     soft = moved(explanation, **{entry.name: entry.low})
     inside = soft.best.at.prediction.inside
     assert not inside.all()
-    found = {one.recording for one in doubts(bench, soft) if one.code == "out_of_domain"}
+    found = {one.recording for one in doubts(problem, soft) if one.code == "out_of_domain"}
     assert found == {f"r{number}" for number in np.flatnonzero(~inside)}
 
 
 def test_noise_larger_than_the_lines_own_is_named(table: SigmaTable) -> None:
-    bench = Workbench(lines(campaign(Made(), table)), table)
-    explanation = bench.explain(())
+    problem = FittingProblem(lines(campaign(Made(), table)), table)
+    explanation = problem.explain(())
     assert explanation is not None
-    assert "line_noise_level" not in {one.code for one in doubts(bench, explanation)}
+    assert "line_noise_level" not in {one.code for one in doubts(problem, explanation)}
     fitter, point = explanation.best.fitter, explanation.point
     loud = fitter.evaluate(replace(point, covariance=point.covariance + np.array([0.0, np.log(3.0)])))
     noisy = replace(explanation, best=laplace(fitter, loud))
     noisy = replace(noisy, best=replace(noisy.best, at=loud))
-    assert "line_noise_level" in {one.code for one in doubts(bench, noisy)}
+    assert "line_noise_level" in {one.code for one in doubts(problem, noisy)}

@@ -13,7 +13,7 @@ from tests.diagnosis_campaigns import Made, campaign
 from tests.nested_sampling import Posterior, nested
 from underskin.diagnosis.data.dataset import Lines, lines
 from underskin.diagnosis.inference.evidence import Evidence, laplace
-from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.laplace import log_box
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
@@ -31,8 +31,8 @@ def table() -> SigmaTable:
 def fitted(
     made: Made, table: SigmaTable, *, placed: bool = False, whole: bool = True
 ) -> tuple[Fitter, Evaluated, Lines]:
-    bench = Workbench(lines(campaign(made, table)), table)
-    fitter = Fitter(bench.hypothesis(made.mechanisms, placed, whole=whole))
+    problem = FittingProblem(lines(campaign(made, table)), table)
+    fitter = Fitter(problem.hypothesis(made.mechanisms, placed, whole=whole))
     own = [entry.to_fit(value) for entry, value in zip(fitter.parameters, made.parameters, strict=False)]
     start = fitter.start(own)
     return fitter, fitter.evaluate(start), fitter.hypothesis.lines
@@ -150,8 +150,8 @@ CASES: list[tuple[tuple[str, ...], tuple[float, ...]]] = [
 def laplace_of(names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable) -> Evidence:
     """By Laplace's method, of the hypothesis with which the campaign was made."""
     made = Made(names, values, sensors=3, offsets_mm=(0.0, 1.0), preloads_n=(0.3, 1.2, 2.4), highest_hz=1000.0)
-    bench = Workbench(lines(campaign(made, table)), table)
-    fitter = Fitter(bench.hypothesis(names, placed=False))
+    problem = FittingProblem(lines(campaign(made, table)), table)
+    fitter = Fitter(problem.hypothesis(names, placed=False))
     own = [entry.to_fit(value) for entry, value in zip(fitter.parameters, values, strict=False)]
     return laplace(fitter, fitter.improve(fitter.start(own)))
 
@@ -174,7 +174,7 @@ def test_evidence_with_positioning_scatter(
     """The same where little tells how much of it there is (a bell is off by half a nat), and where much does."""
     values = (2.0, 1.0) if names else ()
     made = Made(names, values, sensors=2, offsets_mm=offsets_mm, preloads_n=(0.3, 1.2, 2.4))
-    explained = Workbench(lines(campaign(made, table)), table).explain(names)
+    explained = FittingProblem(lines(campaign(made, table)), table).explain(names)
     assert explained is not None
     _, found = explained.integrated().each[1]
     assert found.fitter.hypothesis.placed
@@ -207,7 +207,7 @@ def test_evidence_agrees_with_nested_sampling(
 
 
 def test_explanations_are_names_in_order_of_composition(table: SigmaTable) -> None:
-    bench = Workbench(lines(campaign(Made(("ageing",), (0.3, 300.0, 0.0)), table)), table)
-    found = bench.explain(("ageing", "modulus_error"))
+    problem = FittingProblem(lines(campaign(Made(("ageing",), (0.3, 300.0, 0.0)), table)), table)
+    found = problem.explain(("ageing", "modulus_error"))
     assert isinstance(found, Explanation)
     assert found.names == ("modulus_error", "ageing")

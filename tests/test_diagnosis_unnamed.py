@@ -11,7 +11,7 @@ from rig.draw import drawn, record
 from rig.recorded import campaign as recorded
 from tests.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.data.dataset import lines
-from underskin.diagnosis.inference.explanation import Workbench
+from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.selection.frequency_gp import frequency_bins
 from underskin.diagnosis.selection.recording_gp import GainResidual, Scatter
@@ -72,12 +72,12 @@ def test_the_scatter_of_an_ordinary_rig_is_nothing_missing(gain: float, position
 
 def test_the_evidence_of_a_process_is_that_of_the_whole_covariance(table: SigmaTable) -> None:
     """Blocks, projections and eigenvalues against dense covariance matrices, one for each scatter and amplitude."""
-    bench = Workbench(lines(campaign(Made(offsets_mm=(0.0, 1.0), position_mm=0.1), table)), table)
-    nothing = bench.explain(())
+    problem = FittingProblem(lines(campaign(Made(offsets_mm=(0.0, 1.0), position_mm=0.1), table)), table)
+    nothing = problem.explain(())
     assert nothing is not None
-    residual = GainResidual(bench, nothing)
+    residual = GainResidual(problem, nothing)
     amplitudes = np.array([0.02, 0.2])
-    sets = np.random.default_rng(1).normal(size=(3, bench.lines.recordings, 4))
+    sets = np.random.default_rng(1).normal(size=(3, problem.lines.recordings, 4))
     known = residual.fixed @ residual.fixed.T
 
     def log_density(scatter: Scatter, shapes: np.ndarray) -> float:

@@ -10,7 +10,7 @@ import scipy
 
 import underskin
 from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.inference.explanation import Workbench
+from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.inference.residuals import residuals, whole_prediction
 from underskin.diagnosis.localisation.effect_size import effect
 from underskin.diagnosis.localisation.permutation_test import SEED, in_region, locate, region
@@ -27,7 +27,7 @@ from underskin.diagnosis.screening.curve_unit_errors import without_slips
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.physical_limits import without_extremes
 from underskin.diagnosis.screening.unusable_curves import without_unusable
-from underskin.diagnosis.selection.noise_refinement import frf_workbench
+from underskin.diagnosis.selection.noise_refinement import frf_problem
 from underskin.diagnosis.selection.search import Search, search
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import confounding, left_open
@@ -74,25 +74,25 @@ def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits
             return Diagnosis(campaign.name, left_out, provenance, lacking=curves.lacking)
         rows = curve_lines(curves.campaign, kind)
         if rows.recordings:
-            bench = Workbench(rows, table)
-            result = search(bench)
+            problem = FittingProblem(rows, table)
+            result = search(problem)
             seated = without_seating(curves.campaign, result.answers[0].names, table) if kind == "compression" else None
             if seated is not None:
-                bench, said = seated
-                left_out, result = [*left_out, said], search(bench)
-            return _work_out(campaign.name, bench, result, left_out, provenance, progress, limits)
+                problem, said = seated
+                left_out, result = [*left_out, said], search(problem)
+            return _work_out(campaign.name, problem, result, left_out, provenance, progress, limits)
     frf = tuple(entry for entry in campaign.recordings if isinstance(entry, FrfRecording))
     inspected = inspect(replace(campaign, recordings=frf), table)
     found = [*left_out, *inspected.found]
     if inspected.lacking:
         return Diagnosis(campaign.name, found, provenance, lacking=inspected.lacking)
-    bench = frf_workbench(inspected.campaign, inspected.uneven, table)
-    return _work_out(campaign.name, bench, search(bench), found, provenance, progress, limits)
+    problem = frf_problem(inspected.campaign, inspected.uneven, table)
+    return _work_out(campaign.name, problem, search(problem), found, provenance, progress, limits)
 
 
 def _work_out(
     name: str,
-    bench: Workbench,
+    problem: FittingProblem,
     result: Search,
     found: Sequence[Finding],
     provenance: dict[str, Any],
@@ -101,43 +101,45 @@ def _work_out(
 ) -> Diagnosis:
     """All steps after the search."""
     progress(0.65)
-    confounded = confounding(bench)
+    confounded = confounding(problem)
     progress(0.7)
     leader = result.answers[0]
     nothing = next(entry for entry in result.explanations if not entry.names)
     shown = result.shown_or_nothing(leader)
     levels = shown.best.at.marginal.levels
     gain = float(np.clip(levels.gain, 0.005, 0.05))
-    against_base = residuals(bench, nothing, gain, levels.position)
-    axes = locate(bench.lines, against_base)
-    ranges = region(bench.lines, against_base, axes)
-    size = effect(bench.lines, whole_prediction(bench, nothing), in_region(bench.lines, ranges), gain, levels.level)
+    against_base = residuals(problem, nothing, gain, levels.position)
+    axes = locate(problem.lines, against_base)
+    ranges = region(problem.lines, against_base, axes)
+    size = effect(
+        problem.lines, whole_prediction(problem, nothing), in_region(problem.lines, ranges), gain, levels.level
+    )
     progress(0.8)
     ranked = [answer.explanation for answer in result.answers if answer.explanation is not None]
-    groups = cross_validation.hold_out(bench, ranked, nothing, result.supported)
+    groups = cross_validation.hold_out(problem, ranked, nothing, result.supported)
     progress(0.95)
-    if contradicts(bench, nothing):
+    if contradicts(problem, nothing):
         result = replace(result, null_contradicted=True)
         leader = result.answers[0]
         shown = result.shown_or_nothing(leader)
-    floor = largest_floor_percent(bench, nothing, groups)
+    floor = largest_floor_percent(problem, nothing, groups)
     if leader.explanation is nothing and floor > _LARGEST_FLOOR:
         lacking = f"a response that stands out of its noise, which is {floor:.0f} % of what is predicted"
         return Diagnosis(name, found, provenance, lacking=lacking)
-    shape = describe(bench, shown) if leader.explanation is None else ""
+    shape = describe(problem, shown) if leader.explanation is None else ""
     return Diagnosis(
         name,
-        (*found, *worth_telling(bench, shown, groups)),
+        (*found, *worth_telling(problem, shown, groups)),
         provenance,
         search=result,
-        bench=bench,
+        problem=problem,
         axes=axes,
         region=ranges,
         effect=size,
         groups=groups,
         confounded=left_open(confounded, result.answers),
         shape=shape,
-        next_experiment=plan(bench, result, limits),
+        next_experiment=plan(problem, result, limits),
     )
 
 

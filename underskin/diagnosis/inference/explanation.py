@@ -86,8 +86,8 @@ def own_places(names: Sequence[str], lines: Lines) -> dict[str, slice]:
     return places
 
 
-class Workbench:
-    """The lines of one campaign, whole and collapsed, and what fitting any set to them needs."""
+class FittingProblem:
+    """Recordings of one kind and their noise, to which hypotheses are fitted: all rows, and a mean a recording."""
 
     def __init__(self, lines: Lines, table: SigmaTable) -> None:
         """Collapse, and work out how σ bends; curves are not collapsed and have no place."""
@@ -191,9 +191,11 @@ def _is_lowest(index: tuple[int, ...], tried: dict[tuple[int, ...], Evaluated]) 
     return all(tried[index].cost <= tried[other].cost for other in around if other in tried)
 
 
-def at_recording(bench: Workbench, at: Evaluated) -> np.ndarray:
+def at_recording(problem: FittingProblem, at: Evaluated) -> np.ndarray:
     """The recording of each row of an evaluated prediction."""
-    return bench.lines.recording if len(at.prediction.value) == len(bench.lines.value) else bench.collapsed.recording
+    return (
+        problem.lines.recording if len(at.prediction.value) == len(problem.lines.value) else problem.collapsed.recording
+    )
 
 
 def needs_lines(name: str) -> bool:

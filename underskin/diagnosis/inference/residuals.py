@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.mechanisms.autodiff import Array
 from underskin.units import Floats
 
@@ -24,18 +24,18 @@ class Residuals:
     line_weight: Floats  # (rows,) 1/variance of real and of imaginary part
 
 
-def whole_prediction(bench: Workbench, explanation: Explanation) -> Array:
+def whole_prediction(problem: FittingProblem, explanation: Explanation) -> Array:
     """The explanation's prediction on all lines."""
     value: Array = explanation.best.at.prediction.value
-    return value if len(value) == len(bench.lines.value) else value[bench.lines.recording]
+    return value if len(value) == len(problem.lines.value) else value[problem.lines.recording]
 
 
-def line_residuals(bench: Workbench, explanation: Explanation) -> tuple[Array, Floats]:
+def line_residuals(problem: FittingProblem, explanation: Explanation) -> tuple[Array, Floats]:
     """Each line over its recording's own best real multiple of the model, less 1, and its weight 1/variance.
 
     The variance is that before the noise's level; mains pick-up adds to it.
     """
-    lines, prediction, at = bench.lines, whole_prediction(bench, explanation), explanation.best.at
+    lines, prediction, at = problem.lines, whole_prediction(problem, explanation), explanation.best.at
     first = lines.first
     further = 0.0 if at.prediction.picked is None else at.pickup_variance / at.marginal.levels.level**2
     precision = 1 / (lines.deviation**2 + further)
@@ -46,10 +46,10 @@ def line_residuals(bench: Workbench, explanation: Explanation) -> tuple[Array, F
     return (lines.value - fitted) / safe, precision * np.abs(fitted) ** 2
 
 
-def residuals(bench: Workbench, explanation: Explanation, gain: float, position: float) -> Residuals:
+def residuals(problem: FittingProblem, explanation: Explanation, gain: float, position: float) -> Residuals:
     """The residuals, with the scatters that are expected of them: `gain` (relative) and `position` [m]."""
-    lines = bench.lines
-    prediction = whole_prediction(bench, explanation)
+    lines = problem.lines
+    prediction = whole_prediction(problem, explanation)
     precision = lines.deviation**-2
     size = np.add.reduceat(precision * np.abs(prediction) ** 2, lines.first)
     along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, lines.first)
@@ -62,5 +62,5 @@ def residuals(bench: Workbench, explanation: Explanation, gain: float, position:
         np.abs(explanation.best.at.prediction.value[first]) ** 2, 1e-60
     )
     placed = position**2 * relative.sum(axis=0) + 0.5 * position**4 * moments.second_order
-    line, weight = line_residuals(bench, explanation)
+    line, weight = line_residuals(problem, explanation)
     return Residuals(along / size - 1, np.sqrt(gain**2 + placed + 1 / size), line, weight)

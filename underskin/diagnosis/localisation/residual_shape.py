@@ -11,7 +11,7 @@ import numpy as np
 
 from underskin.diagnosis.data.axes import WORDS, order, preload_before, recording_axes
 from underskin.diagnosis.data.names import in_words
-from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import Residuals, residuals, whole_prediction
 from underskin.diagnosis.selection.frequency_gp import frequency_bins
 from underskin.diagnosis.selection.recording_gp import relative_place_slopes
@@ -32,19 +32,19 @@ _BEFORE = "the preload of the recording before over its own"
 _LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n", "load_cycles", "dwell_s", "frequency_hz", _BEFORE)
 
 
-def describe(bench: Workbench, explanation: Explanation) -> str:
+def describe(problem: FittingProblem, explanation: Explanation) -> str:
     """One or two sentences; the axis is the one where a form takes away most."""
     beyond = f" beyond {in_words(explanation.names)}" if explanation.names else ""
-    gain, text = (_along_curves if bench.lines.curves else _over_axes)(bench, explanation)
+    gain, text = (_along_curves if problem.lines.curves else _over_axes)(problem, explanation)
     return f"What remains{beyond} {f'looks like {text}' if gain else 'has no simple form over one axis'}."
 
 
-def worth_telling(bench: Workbench, explanation: Explanation, groups: Sequence[HeldOut]) -> list[Finding]:
+def worth_telling(problem: FittingProblem, explanation: Explanation, groups: Sequence[HeldOut]) -> list[Finding]:
     """Of curves: what is left beyond the noise, and whether parts that were left out are predicted no better."""
-    if bench.lines.smooth is None:
+    if problem.lines.smooth is None:
         return []
     found = []
-    smooth, noise = _smooth_part(bench, explanation)
+    smooth, noise = _smooth_part(problem, explanation)
     if _is_above_noise(smooth, noise):
         size = f"{100 * smooth:.2g} % of the largest force, {smooth / noise:.0f} times a sample's noise"
         text = f"a smooth part of about {size}, is left that no mechanism here describes"
@@ -60,23 +60,23 @@ def worth_telling(bench: Workbench, explanation: Explanation, groups: Sequence[H
     return found
 
 
-def contradicts(bench: Workbench, null: Explanation) -> bool:
+def contradicts(problem: FittingProblem, null: Explanation) -> bool:
     """Whether the recordings contradict the null hypothesis, however improbable its rivals are: its residual keeps
     structure above the noise. Of curves that is a smooth part, of FRFs lines that scatter about the model more than
     about their neighbours by as much as those do."""
-    if bench.lines.smooth is not None:
-        return _is_above_noise(*_smooth_part(bench, null))
+    if problem.lines.smooth is not None:
+        return _is_above_noise(*_smooth_part(problem, null))
     return null.best.at.marginal.levels.level > _STRUCTURED
 
 
-def largest_floor_percent(bench: Workbench, null: Explanation, groups: Sequence[HeldOut]) -> float:
+def largest_floor_percent(problem: FittingProblem, null: Explanation, groups: Sequence[HeldOut]) -> float:
     """What noise alone would make of the error, in the recordings and in each group held out, the largest [%]."""
-    return max(entry.floor_percent for entry in (in_sample(bench, null), *(entry.before for entry in groups)))
+    return max(entry.floor_percent for entry in (in_sample(problem, null), *(entry.before for entry in groups)))
 
 
-def _smooth_part(bench: Workbench, explanation: Explanation) -> tuple[float, float]:
+def _smooth_part(problem: FittingProblem, explanation: Explanation) -> tuple[float, float]:
     """Of curves: the size of what is left smoothly, and a sample's noise, both relative to the largest force."""
-    lines, levels = bench.lines, explanation.best.at.marginal.levels
+    lines, levels = problem.lines, explanation.best.at.marginal.levels
     assert lines.smooth is not None
     return levels.smooth, levels.level * float(np.median(lines.deviation / lines.smooth.scale))
 
@@ -85,11 +85,11 @@ def _is_above_noise(smooth: float, noise: float) -> bool:
     return smooth > max(_WORTH_TELLING * noise, _LEAST_TOLD)
 
 
-def _along_curves(bench: Workbench, explanation: Explanation) -> tuple[float, str]:
+def _along_curves(problem: FittingProblem, explanation: Explanation) -> tuple[float, str]:
     """The best form of the residual, relative to each curve's largest force, over displacement and over time."""
-    lines = bench.lines
+    lines = problem.lines
     assert lines.smooth is not None
-    relative = (lines.value - whole_prediction(bench, explanation)).real / lines.smooth.scale
+    relative = (lines.value - whole_prediction(problem, explanation)).real / lines.smooth.scale
     weight = (lines.smooth.scale / lines.deviation) ** 2
     best: tuple[float, str] = (0.0, "")
     for name in ("displacement_mm", "time_s"):
@@ -100,19 +100,19 @@ def _along_curves(bench: Workbench, explanation: Explanation) -> tuple[float, st
     return best
 
 
-def _over_axes(bench: Workbench, explanation: Explanation) -> tuple[float, str]:
+def _over_axes(problem: FittingProblem, explanation: Explanation) -> tuple[float, str]:
     """The best form over the recordings' axes, or over the lines'."""
     levels = explanation.best.at.marginal.levels
-    left = residuals(bench, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
+    left = residuals(problem, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
     best: tuple[float, str] = (0.0, "")
-    for name, column in _axes(bench.lines.campaign).items():
+    for name, column in _axes(problem.lines.campaign).items():
         for index in range(column.shape[1]):
             gain, text = _best_form(column[:, index], left.gain[:, None], left.gain_deviation**-2, name)
             words = WORDS.get(name, (name,))[0]
             axis = words if column.shape[1] == 1 else f"{words} ({'xy'[index]})"
             best = max(best, (gain, f"{text} over {axis}"))
-    best = max(best, _wandering(bench, explanation, left))
-    line, centres = frequency_bins(bench.lines.frequency)
+    best = max(best, _wandering(problem, explanation, left))
+    line, centres = frequency_bins(problem.lines.frequency)
     if len(centres) >= 6:
         total = np.bincount(line, left.line_weight, len(centres)).astype(float)
         parts = [
@@ -133,9 +133,9 @@ def _axes(campaign: Campaign) -> dict[str, Floats]:
     return {**found, "the order of recordings": order(campaign)[:, None]}
 
 
-def _wandering(bench: Workbench, explanation: Explanation, left: Residuals) -> tuple[float, str]:
+def _wandering(problem: FittingProblem, explanation: Explanation, left: Residuals) -> tuple[float, str]:
     """A place that runs round while recordings are made, of the period that fits best."""
-    rank = order(bench.lines.campaign)
+    rank = order(problem.lines.campaign)
     slopes = 1e-3 * relative_place_slopes(explanation.best.at).T  # per mm
     if not np.abs(slopes).max() > 0 or len(rank) < _LEAST_IN_ORDER:
         return 0.0, ""

@@ -18,7 +18,7 @@ import numpy as np
 
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import EXPLAINED, in_words
-from underskin.diagnosis.inference.explanation import Workbench
+from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.planning.rig_limits import Limits, candidates, inferred, wider
 from underskin.diagnosis.selection.search import Answer, Search
 from underskin.formatting import in_percent
@@ -36,7 +36,7 @@ _SURVIVES = 0.02
 _RIVALS = 4
 
 
-def plan(bench: Workbench, search: Search, limits: Limits) -> dict[str, Any]:
+def plan(problem: FittingProblem, search: Search, limits: Limits) -> dict[str, Any]:
     """The recordings to make, in lab units, what they cost, and the chance that they decide; empty if all is decided.
 
     Where several answers remain and no recording can be planned, the document says why, with no recordings in it.
@@ -44,19 +44,19 @@ def plan(bench: Workbench, search: Search, limits: Limits) -> dict[str, Any]:
     surviving = [answer for answer in search.answers if answer.probability > _SURVIVES][:_RIVALS]
     if len(surviving) < 2:
         return {}
-    if not bench.lines.curves:
-        within = inferred(bench.lines.campaign, limits)
-        for beyond, rig in enumerate([within] if limits.given else [within, wider(bench.lines.campaign, within)]):
-            planned = _planned(bench, surviving, rig, bool(beyond))
+    if not problem.lines.curves:
+        within = inferred(problem.lines.campaign, limits)
+        for beyond, rig in enumerate([within] if limits.given else [within, wider(problem.lines.campaign, within)]):
+            planned = _planned(problem, surviving, rig, bool(beyond))
             if planned:
                 return planned
     return {} if surviving[0].probability >= EXPLAINED else _nothing_to_plan(surviving)
 
 
-def _planned(bench: Workbench, surviving: Sequence[Answer], limits: Limits, beyond: bool) -> dict[str, Any]:
+def _planned(problem: FittingProblem, surviving: Sequence[Answer], limits: Limits, beyond: bool) -> dict[str, Any]:
     """The best recordings within these limits; empty where none brings anything."""
-    allowed = candidates(bench.lines.campaign, limits)
-    rivals, outlook, allowed = _outlook(bench, surviving, allowed)
+    allowed = candidates(problem.lines.campaign, limits)
+    rivals, outlook, allowed = _outlook(problem, surviving, allowed)
     if len(rivals) < 2 or not allowed:
         return {}
     chosen, chance = _choose(outlook, allowed, limits)
@@ -100,11 +100,11 @@ def _together(words: Sequence[str]) -> str:
 
 
 def _outlook(
-    bench: Workbench, surviving: Sequence[Answer], allowed: Sequence[FrfConditions]
+    problem: FittingProblem, surviving: Sequence[Answer], allowed: Sequence[FrfConditions]
 ) -> tuple[list[Answer], "_Outlook", list[FrfConditions]]:
     """The rivals whose laws can be predicted there, what they predict, and the candidates that all tables hold."""
     # The campaign's own recordings go along, so that each model has the parameters that it was fitted with.
-    campaign = bench.collapsed.campaign
+    campaign = problem.collapsed.campaign
     together = Conditions(campaign.name, campaign.skin, (*campaign.recordings, *allowed))
     own = len(campaign.recordings)
     inside = np.ones(len(allowed), dtype=bool)
@@ -113,7 +113,7 @@ def _outlook(
         if answer.explanation is None:
             continue
         try:
-            model = compose(answer.explanation.names, together, bench.table, "frf")
+            model = compose(answer.explanation.names, together, problem.table, "frf")
         except Unsupported:
             continue
         if len(model.parameters) != len(answer.explanation.point.fit):
@@ -123,7 +123,7 @@ def _outlook(
         rivals.append(answer)
         predictions.append(prediction)
     kept = own + np.flatnonzero(inside)
-    line = float(np.median(np.add.reduceat(bench.lines.deviation**-2.0, bench.lines.first)) ** -0.5)
+    line = float(np.median(np.add.reduceat(problem.lines.deviation**-2.0, problem.lines.first)) ** -0.5)
     responses, unknown, scatter = [], [], []
     for answer, prediction in zip(rivals, predictions, strict=True):
         explanation = answer.explanation

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.data.axes import recording_axes
-from underskin.diagnosis.inference.explanation import Explanation, Workbench, needs_lines
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, needs_lines
 from underskin.diagnosis.inference.residuals import whole_prediction
 from underskin.diagnosis.localisation.permutation_test import axis_values
 from underskin.diagnosis.reporting.report import Diagnosis
@@ -54,10 +54,10 @@ class Levels:
 class Thinned:
     """Which rows each point is the mean of."""
 
-    def __init__(self, diagnosis: Diagnosis, bench: Workbench, shown: Explanation) -> None:
+    def __init__(self, diagnosis: Diagnosis, problem: FittingProblem, shown: Explanation) -> None:
         """One point a recording unless region or explanation run along the lines."""
-        self.lines = lines = bench.lines
-        self.bench = bench
+        self.lines = lines = problem.lines
+        self.problem = problem
         along = any(axis in diagnosis.region for axis in lines.row_axes)
         by_line = lines.curves or along or any(needs_lines(name) for name in shown.names)
         distinct, line = np.unique(np.round(lines.frequency, 6), return_inverse=True)
@@ -74,7 +74,7 @@ class Thinned:
         lines, best = self.lines, explanation.best.at
         levels = best.marginal.levels
         gains = np.exp(best.marginal.sensor_gains)[lines.sensor][lines.recording]
-        predicted = whole_prediction(self.bench, explanation) * gains
+        predicted = whole_prediction(self.problem, explanation) * gains
         variance = (levels.level**2 / self._total) + self._mean(self._placed(explanation))
         unit = 1.0 if lines.curves else 1e12
         return Points(

@@ -13,7 +13,7 @@ from plotly.subplots import make_subplots
 
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import SIMPLEST
-from underskin.diagnosis.inference.explanation import Explanation, Workbench, own_places
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, own_places
 from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT
 from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned
 from underskin.diagnosis.reporting.report import Diagnosis
@@ -30,11 +30,11 @@ _ROW, _BETWEEN = 110, 0.65  # height of a parameter's row [pixels], and the shar
 
 def figures(diagnosis: Diagnosis, document: Mapping[str, Any]) -> dict[str, go.Figure]:
     """By name: where, before_after, explanations, parameters; those that the diagnosis has. `document`: its report."""
-    if diagnosis.search is None or diagnosis.bench is None:
+    if diagnosis.search is None or diagnosis.problem is None:
         return {}
     nothing = next(entry for entry in diagnosis.search.explanations if not entry.names)
     shown = diagnosis.search.shown_or_nothing(diagnosis.search.answers[0])
-    thinned = Thinned(diagnosis, diagnosis.bench, shown)
+    thinned = Thinned(diagnosis, diagnosis.problem, shown)
     before, after = thinned.points(nothing), thinned.points(shown)
     found = {
         "where": residual_map(diagnosis, thinned, before),
@@ -42,7 +42,7 @@ def figures(diagnosis: Diagnosis, document: Mapping[str, Any]) -> dict[str, go.F
         "explanations": explanations(document),
     }
     if any(entry["parameters"] for entry in document["mechanisms"]):
-        found["parameters"] = parameter_intervals(diagnosis.bench, shown, document)
+        found["parameters"] = parameter_intervals(diagnosis.problem, shown, document)
     return found
 
 
@@ -170,9 +170,9 @@ def before_and_after(
     return _styled(figure)
 
 
-def parameter_intervals(bench: Workbench, shown: Explanation, document: Mapping[str, Any]) -> go.Figure:
+def parameter_intervals(problem: FittingProblem, shown: Explanation, document: Mapping[str, Any]) -> go.Figure:
     """Each parameter's 95 % interval (blue) on that of its prior (grey), in its own unit."""
-    places = own_places(shown.names, bench.lines)
+    places = own_places(shown.names, problem.lines)
     rows = [
         (entry["name"], parameter, prior)
         for entry in document["mechanisms"]

@@ -3,15 +3,15 @@
 import numpy as np
 
 from underskin.diagnosis.data.names import SIMPLEST, in_words
-from underskin.diagnosis.inference.explanation import Explanation, Workbench, at_recording, own_places
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, at_recording, own_places
 from underskin.diagnosis.localisation.residual_shape import NOISY
 from underskin.formatting import in_digits
 from underskin.recordings.finding import Finding
 
 
-def doubts(bench: Workbench, explanation: Explanation) -> list[Finding]:
+def doubts(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
     """Parameters at their bounds, recordings beyond the tables, noise that is larger than the lines' own."""
-    return [*_at_bounds(explanation), *_beyond_tables(bench, explanation), *_noisy(bench, explanation)]
+    return [*_at_bounds(explanation), *_beyond_tables(problem, explanation), *_noisy(problem, explanation)]
 
 
 def _at_bounds(explanation: Explanation) -> list[Finding]:
@@ -26,18 +26,18 @@ def _at_bounds(explanation: Explanation) -> list[Finding]:
     return found
 
 
-def _beyond_tables(bench: Workbench, explanation: Explanation) -> list[Finding]:
+def _beyond_tables(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
     at = explanation.best.at
-    outside = np.unique(at_recording(bench, at)[~at.prediction.inside])
-    named = in_words(explanation.names) or SIMPLEST[bench.kind]
+    outside = np.unique(at_recording(problem, at)[~at.prediction.inside])
+    named = in_words(explanation.names) or SIMPLEST[problem.kind]
     text = f"with the values found for {named} its contact lies beyond the tables: its prediction is the table's edge"
-    entries = bench.lines.campaign.recordings
+    entries = problem.lines.campaign.recordings
     return [Finding("out_of_domain", entries[number].id, "preload_n", text) for number in outside.tolist()]
 
 
-def _noisy(bench: Workbench, explanation: Explanation) -> list[Finding]:
+def _noisy(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
     level = explanation.best.at.marginal.levels.level
-    if bench.lines.curves or level < NOISY:
+    if problem.lines.curves or level < NOISY:
         return []
     text = (
         f"the lines scatter {in_digits(level, 2)} times more about the stated answer than about their own neighbours: "

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.data.names import NOTHING_MISSING
-from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation import cross_validation
@@ -15,7 +15,11 @@ from underskin.mechanisms.registry import CATALOGUE
 
 
 def explains_percent(
-    search: Search, bench: Workbench, explanation: Explanation, name: str, whole: cross_validation.PredictionScore
+    search: Search,
+    problem: FittingProblem,
+    explanation: Explanation,
+    name: str,
+    whole: cross_validation.PredictionScore,
 ) -> float | None:
     """How much of the misfit beyond noise, without the mechanism, it takes away [%].
 
@@ -23,13 +27,13 @@ def explains_percent(
     effect that only many recordings together tell. A mechanism that adds variance takes nothing away (see
     `_share_of_variance`).
     """
-    if any(entry.name in PICKUP_NAMES for entry in CATALOGUE[name].parameters(bench.lines.campaign, bench.kind)):
+    if any(entry.name in PICKUP_NAMES for entry in CATALOGUE[name].parameters(problem.lines.campaign, problem.kind)):
         return round(100 * _share_of_variance(explanation), 1)
     rest = tuple(entry for entry in explanation.names if entry != name)
     without = next((entry for entry in search.explanations if entry.names == rest), None)
     if without is None:
         return None
-    misfit = cross_validation.in_sample(bench, without)
+    misfit = cross_validation.in_sample(problem, without)
     beyond = misfit.square / misfit.size - whole.noise / whole.size
     left = whole.square / whole.size - whole.noise / whole.size
     return round(100 * float(np.clip(1 - max(left, 0.0) / beyond, 0.0, 1.0)), 1) if beyond > 0 else None
@@ -44,18 +48,18 @@ def _share_of_variance(explanation: Explanation) -> float:
 
 
 def fit_summary(
-    search: Search, bench: Workbench, groups: Sequence[cross_validation.HeldOut], explanation: Explanation
+    search: Search, problem: FittingProblem, groups: Sequence[cross_validation.HeldOut], explanation: Explanation
 ) -> dict[str, Any]:
     """Errors before and after, held-out groups, the noise that was found, and of curves the modulus."""
     nothing = next(entry for entry in search.explanations if not entry.names)
-    inside = [cross_validation.in_sample(bench, entry) for entry in (nothing, explanation)]
+    inside = [cross_validation.in_sample(problem, entry) for entry in (nothing, explanation)]
     outside = cross_validation.total(groups)
     parts = {
         name: {
             "rmse_percent": rounded(fitted.rmse_percent),
             "heldout_rmse_percent": rounded(left.rmse_percent),
             "log_score": rounded(left.log_score / left.recordings) if left.recordings else None,
-            **({"youngs_modulus": modulus(bench, entry)} if bench.lines.curves else {}),
+            **({"youngs_modulus": modulus(problem, entry)} if problem.lines.curves else {}),
         }
         for name, entry, fitted, left in zip(("before", "after"), (nothing, explanation), inside, outside, strict=True)
     }
@@ -78,10 +82,10 @@ def fit_summary(
     }
 
 
-def modulus(bench: Workbench, explanation: Explanation) -> dict[str, Any]:
+def modulus(problem: FittingProblem, explanation: Explanation) -> dict[str, Any]:
     """Young's modulus under an explanation, with its 95 % interval; from a factor on what was declared, or free."""
     found = parameter(explanation, place_of(explanation, "youngs_modulus"))
-    declared = bench.lines.campaign.skin.youngs_modulus_mpa
+    declared = problem.lines.campaign.skin.youngs_modulus_mpa
     if declared is None:
         return found
     scaled = {name: rounded(declared * found[name]) for name in ("value", "low", "high")}

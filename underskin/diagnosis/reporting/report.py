@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING
-from underskin.diagnosis.inference.explanation import Explanation, Workbench, own_places
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, own_places
 from underskin.diagnosis.localisation.effect_size import Effect
 from underskin.diagnosis.localisation.permutation_test import AxisResult, reaches_all_along
 from underskin.diagnosis.localisation.residual_shape import REACHES_NOISE
@@ -38,7 +38,7 @@ class Diagnosis:
     provenance: Mapping[str, Any]
     lacking: str = ""  # what a campaign that is too small lacks
     search: Search | None = None
-    bench: Workbench | None = None
+    problem: FittingProblem | None = None
     axes: Sequence[AxisResult] = ()
     region: Mapping[str, list[float | str]] = field(default_factory=dict)
     effect: Effect | None = None
@@ -64,7 +64,7 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
     """The document; plain JSON values."""
     stated = verdict(diagnosis)
     document: dict[str, Any] = {"schema": SCHEMA, "campaign": diagnosis.name, "verdict": stated}
-    if diagnosis.search is None or diagnosis.bench is None:
+    if diagnosis.search is None or diagnosis.problem is None:
         return {
             **document,
             "probability": 1.0,
@@ -79,23 +79,23 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
             "next_experiment": None,
             "provenance": dict(diagnosis.provenance),
         }
-    search, bench = diagnosis.search, diagnosis.bench
+    search, problem = diagnosis.search, diagnosis.problem
     leader = search.answers[0]
     shown = search.shown_or_nothing(leader)
-    fit = fit_summary(search, bench, diagnosis.groups, shown)
+    fit = fit_summary(search, problem, diagnosis.groups, shown)
     named = leader.explanation if stated in ("explained", "ambiguous") else None
-    d33, implausible = _d33(bench, shown, leader, fit)
-    findings = _findings([*diagnosis.findings, *doubts(bench, shown), *implausible])
+    d33, implausible = _d33(problem, shown, leader, fit)
+    findings = _findings([*diagnosis.findings, *doubts(problem, shown), *implausible])
     modulus = fit["after"].get("youngs_modulus")
     statement = answer_statement(
-        search.answers, stated, diagnosis.shape, bench.kind, modulus, caveats=caveats(findings)
+        search.answers, stated, diagnosis.shape, problem.kind, modulus, caveats=caveats(findings)
     )
     return {
         **document,
         "probability": probability(leader.probability),
         "statement": statement,
-        "location": _location(diagnosis, bench, stated == "no_mismatch"),
-        "mechanisms": [] if named is None else _mechanisms(search, bench, named),
+        "location": _location(diagnosis, problem, stated == "no_mismatch"),
+        "mechanisms": [] if named is None else _mechanisms(search, problem, named),
         "alternatives": _alternatives(search.answers),
         "not_identifiable": [
             {"mechanism": entry.mechanism, "confounded_with": entry.confounded_with, "reason": entry.reason}
@@ -110,14 +110,14 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _d33(
-    bench: Workbench, shown: Explanation, leader: Answer, fit: Mapping[str, Any]
+    problem: FittingProblem, shown: Explanation, leader: Answer, fit: Mapping[str, Any]
 ) -> tuple[dict[str, Any] | None, list[Finding]]:
     """The d33 under the one answer that stands, and a finding where no PVDF has it; None where several answers are
     left, or none: each would mean another d33.
 
     `quotable`: it is plausible, and the answer fits the recordings to their noise.
     """
-    if bench.lines.curves or leader.explanation is None or leader.probability < EXPLAINED:
+    if problem.lines.curves or leader.explanation is None or leader.probability < EXPLAINED:
         return None, []
     d33 = parameter(shown, place_of(shown, "d33"))
     slip = plausibility.implausible(d33["value"])
@@ -133,16 +133,16 @@ def _findings(found: Sequence[Finding]) -> list[dict[str, str]]:
     ]
 
 
-def _mechanisms(search: Search, bench: Workbench, explanation: Explanation) -> list[dict[str, Any]]:
+def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:
     places = own_places(explanation.names, explanation.best.fitter.hypothesis.lines)
-    whole = cross_validation.in_sample(bench, explanation)
+    whole = cross_validation.in_sample(problem, explanation)
     sets = [answer for answer in search.answers if answer.explanation is not None]
     return [
         {
             "name": name,
             "probability": probability(sum(answer.probability for answer in sets if name in answer.names)),
             "parameters": [parameter(explanation, place) for place in range(places[name].start, places[name].stop)],
-            "explains_percent": explains_percent(search, bench, explanation, name, whole),
+            "explains_percent": explains_percent(search, problem, explanation, name, whole),
         }
         for name in explanation.names
     ]
@@ -164,10 +164,10 @@ def _alternatives(answers: Sequence[Answer]) -> list[dict[str, Any]]:
     return found
 
 
-def _location(diagnosis: Diagnosis, bench: Workbench, agrees: bool) -> dict[str, Any]:
+def _location(diagnosis: Diagnosis, problem: FittingProblem, agrees: bool) -> dict[str, Any]:
     assert diagnosis.effect is not None
     effect, region = diagnosis.effect, diagnosis.region
-    whole = {name: reaches_all_along(bench.lines, name, ends) for name, ends in region.items()}
+    whole = {name: reaches_all_along(problem.lines, name, ends) for name, ends in region.items()}
     return {
         "axes": [
             {

@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 from scipy.special import logsumexp
 
 from underskin.diagnosis.data.axes import recording_axes
-from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import line_residuals
 from underskin.diagnosis.noise.noise_priors import Bell, level_prior
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, matern, normalised
@@ -26,13 +26,13 @@ _MOST_LINES = 160  # distinct frequencies, beyond which they are binned
 _LEAST_LINES = 8  # in a recording
 
 
-def over_lines(bench: Workbench, explanation: Explanation) -> dict[str, float]:
+def over_lines(problem: FittingProblem, explanation: Explanation) -> dict[str, float]:
     """The log evidence that a process over frequency gains, the level of the lines' noise free in both: one that all
     recordings share ("frequency_hz"), and for each axis one that changes along it."""
-    lines = bench.lines
+    lines = problem.lines
     if np.bincount(lines.recording).max() < _LEAST_LINES:
         return {}
-    relative, weight = line_residuals(bench, explanation)
+    relative, weight = line_residuals(problem, explanation)
     noise = _LineNoise(
         float((weight * np.abs(relative) ** 2).sum()),
         2 * len(relative) + lines.scatter[1] - lines.recordings,

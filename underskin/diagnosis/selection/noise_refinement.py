@@ -13,7 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from underskin.diagnosis.data.dataset import lines
-from underskin.diagnosis.inference.explanation import Explanation, Workbench, needs_lines
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, needs_lines
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.pickup import PICKUP_NAMES
 from underskin.mechanisms.registry import CATALOGUE
@@ -25,27 +25,27 @@ _SPEAKS = 10.0  # nats of evidence over the base model from which a law's course
 _CHANGED = 0.03  # change of the noise of some line, relative, below which it stays as it was
 
 
-def frf_workbench(campaign: Campaign, uneven: Mapping[str, Floats], table: SigmaTable) -> Workbench:
+def frf_problem(campaign: Campaign, uneven: Mapping[str, Floats], table: SigmaTable) -> FittingProblem:
     """The lines of a campaign's FRFs with their noise, ready to be explained."""
-    bench = Workbench(lines(campaign, uneven), table)
-    best = _best_along_frequency(bench)
+    problem = FittingProblem(lines(campaign, uneven), table)
+    best = _best_along_frequency(problem)
     if best is None:
-        return bench
+        return problem
     refined = lines(campaign, uneven, best.best.at.prediction.value)
-    change = np.abs(refined.deviation / bench.lines.deviation - 1).max()
-    return Workbench(refined, table) if change > _CHANGED else bench
+    change = np.abs(refined.deviation / problem.lines.deviation - 1).max()
+    return FittingProblem(refined, table) if change > _CHANGED else problem
 
 
-def _best_along_frequency(bench: Workbench) -> Explanation | None:
+def _best_along_frequency(problem: FittingProblem) -> Explanation | None:
     """The single mechanism acting on lines apart that explains them best, where it does so far better than nothing."""
-    nothing = bench.explain(())
+    nothing = problem.explain(())
     assert nothing is not None
     singles = []
     for name, mechanism in CATALOGUE.items():
         if "frf" not in mechanism.kinds or not needs_lines(name):
             continue
         try:
-            found = bench.explain((name,))
+            found = problem.explain((name,))
         except Unsupported:
             continue
         if found is not None and not any(entry.name in PICKUP_NAMES for entry in found.model.parameters):

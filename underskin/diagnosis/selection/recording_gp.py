@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from underskin.diagnosis.data.axes import order, preload_before, recording_axes
-from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.optimizer import Evaluated
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, normalised
@@ -42,18 +42,18 @@ class Scatter:
     variance: Floats
 
 
-def over_recordings(bench: Workbench, explanation: Explanation) -> dict[str, float]:
+def over_recordings(problem: FittingProblem, explanation: Explanation) -> dict[str, float]:
     """The log evidence that a process of each kind gains over none."""
-    campaign = bench.collapsed.campaign
+    campaign = problem.collapsed.campaign
     axes = {name: normalised(column) for name, column in recording_axes(campaign).items()}
-    if bench.collapsed.recordings < _LEAST_RECORDINGS or not axes:
+    if problem.collapsed.recordings < _LEAST_RECORDINGS or not axes:
         return {}
     if len(axes) > 1:
         axes["all"] = np.concatenate(list(axes.values()), axis=1) / np.sqrt(len(axes))
     before = preload_before(campaign)
     if before is not None:
         axes["preload_before"] = normalised(before)
-    residual = GainResidual(bench, explanation)
+    residual = GainResidual(problem, explanation)
     found = {name: _smooth(residual, column) for name, column in axes.items()}
     rank = order(campaign)
     if len(rank) >= _LEAST_IN_ORDER:
@@ -93,7 +93,7 @@ def _round(residual: "GainResidual", rank: Floats) -> float:
 class GainResidual:
     """Each recording's gain residual, linear in the model's parameters, sensors' gains and a process' features."""
 
-    def __init__(self, bench: Workbench, explanation: Explanation) -> None:
+    def __init__(self, problem: FittingProblem, explanation: Explanation) -> None:
         at, parameters = explanation.best.at, explanation.best.fitter.parameters
         self._moments = moments = at.marginal.moments
         _, uj, _ = moments.slopes
@@ -103,7 +103,7 @@ class GainResidual:
         centre = np.array([entry.start for entry in parameters]) - at.point.fit
         scale = np.array([_prior_sd(entry) for entry in parameters])
         self._known = slopes @ centre
-        sensors = np.eye(int(bench.lines.sensor.max()) + 1)[bench.lines.sensor]
+        sensors = np.eye(int(problem.lines.sensor.max()) + 1)[problem.lines.sensor]
         sensors = sensors[:, sensors.any(axis=0)]
         self.fixed = np.concatenate([slopes * scale, at.marginal.levels.spread * sensors], axis=1)
         self._moving = relative_place_slopes(at)

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
-from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.selection.occam_correction import without_occam
 from underskin.diagnosis.selection.unnamed_rivals import Discrepancy, discrepancy
 from underskin.mechanisms.base import Unsupported
@@ -125,15 +125,15 @@ def log_prior_beneath(size: int, supported: int) -> float:
     return log_prior(size, supported) + math.log(PRIORS[NONE_OF_THESE] * PRIORS["two"] / PRIORS["one"])
 
 
-def search(bench: Workbench) -> Search:
+def search(problem: FittingProblem) -> Search:
     """Fit nothing, every single, then what grows from the best."""
-    nothing = bench.explain(())
+    nothing = problem.explain(())
     assert nothing is not None
     found: dict[frozenset[str], Explanation] = {frozenset(): nothing}
     unsupported: dict[str, str] = {}
     for name in CATALOGUE:
         try:
-            single = bench.explain((name,))
+            single = problem.explain((name,))
         except Unsupported as refusal:
             unsupported[name] = refusal.reason
             continue
@@ -148,13 +148,13 @@ def search(bench: Workbench) -> Search:
                 chosen = frozenset((*parent.names, name))
                 if len(chosen) != size or chosen in found:
                     continue
-                grown = bench.explain(tuple(chosen), parent)
+                grown = problem.explain(tuple(chosen), parent)
                 if grown is not None:
                     found[chosen] = grown
     _integrate(found, done, unsupported, _BEST)
     result = Search(tuple(found.values()), (), unsupported)
     best = sorted((entry for entry in result.explanations if entry.names), key=result.log_weight, reverse=True)[:2]
-    processes = tuple((entry, discrepancy(bench, entry)) for entry in (nothing, *best))
+    processes = tuple((entry, discrepancy(problem, entry)) for entry in (nothing, *best))
     return replace(result, discrepancies=processes)
 
 

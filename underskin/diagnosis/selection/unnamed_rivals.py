@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from underskin.diagnosis.inference.evidence import laplace
-from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import Hypothesis
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.noise.correlated_error import UNNAMED
@@ -32,13 +32,13 @@ class Discrepancy:
     axes: dict[str, float]  # log evidence gained; "frequency_hz" for lines
 
 
-def discrepancy(bench: Workbench, explanation: Explanation) -> Discrepancy:
+def discrepancy(problem: FittingProblem, explanation: Explanation) -> Discrepancy:
     """What a process gains on top of an explanation."""
-    if bench.lines.curves:
-        return _along_curves(bench, explanation)
+    if problem.lines.curves:
+        return _along_curves(problem, explanation)
     over = {
-        "recordings": over_recordings(bench, explanation),
-        "lines": over_lines(bench, explanation),
+        "recordings": over_recordings(problem, explanation),
+        "lines": over_lines(problem, explanation),
         "scatter": _unusual_scatter(explanation),
     }
     gained = {
@@ -73,9 +73,9 @@ def _refitted(hypothesis: Hypothesis, explanation: Explanation, place: int, leas
     return laplace(fitter, fitter.improve(replace(explanation.point, covariance=covariance))).log_evidence
 
 
-def _along_curves(bench: Workbench, explanation: Explanation) -> Discrepancy:
+def _along_curves(problem: FittingProblem, explanation: Explanation) -> Discrepancy:
     """The smooth error that every hypothesis has of curves, large: everything is fitted again beneath it."""
     found = _refitted(
-        replace(bench.hypothesis(explanation.names, placed=False), smooth=UNNAMED), explanation, 2, UNNAMED.low
+        replace(problem.hypothesis(explanation.names, placed=False), smooth=UNNAMED), explanation, 2, UNNAMED.low
     )
     return Discrepancy(found, {"displacement_mm": found - explanation.log_evidence})

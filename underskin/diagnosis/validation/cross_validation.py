@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.explanation import Explanation, Workbench
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.selection.search import log_prior
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Unsupported
@@ -111,13 +111,15 @@ def _parts_of_curves(lines: Lines) -> dict[str, NDArray[np.bool_]]:
     return {f"force_n above {_FURTHEST:.0%}": force > _FURTHEST * highest}
 
 
-def hold_out(bench: Workbench, ranked: Sequence[Explanation], nothing: Explanation, supported: int) -> list[HeldOut]:
+def hold_out(
+    problem: FittingProblem, ranked: Sequence[Explanation], nothing: Explanation, supported: int
+) -> list[HeldOut]:
     """Predict each group from the rest; `ranked` are the sets found on everything, the best first."""
     weights = [entry.log_evidence + log_prior(len(entry.names), supported) for entry in ranked]
     rivals = [entry for entry, w in zip(ranked, weights, strict=True) if w > weights[0] - _BEHIND][:_BEST]
     held_out = []
-    for name, rows in groups(bench.lines).items():
-        smaller = Workbench(bench.lines.part(~rows), bench.table)
+    for name, rows in groups(problem.lines).items():
+        smaller = FittingProblem(problem.lines.part(~rows), problem.table)
         fits: dict[tuple[str, ...], Explanation] = {}
         for entry in (nothing, *rivals):
             if entry.names in fits:
@@ -131,17 +133,17 @@ def hold_out(bench: Workbench, ranked: Sequence[Explanation], nothing: Explanati
         if nothing.names not in fits:
             continue
         chosen = max(fits.values(), key=lambda entry: entry.log_evidence + log_prior(len(entry.names), supported))
-        before, after = (_predict(smaller, fits[names], bench, rows) for names in (nothing.names, chosen.names))
+        before, after = (_predict(smaller, fits[names], problem, rows) for names in (nothing.names, chosen.names))
         held_out.append(HeldOut(name, chosen.names, before, after))
     return held_out
 
 
 def _predict(
-    smaller: Workbench, explanation: Explanation, bench: Workbench, rows: NDArray[np.bool_]
+    smaller: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: NDArray[np.bool_]
 ) -> PredictionScore:
     """Some of the rows from a fit to others; sensors that were seen keep the gain that was found for them."""
-    left = bench.lines.part(rows)
-    model = compose(explanation.names, bench.lines.campaign, bench.table, bench.kind)
+    left = problem.lines.part(rows)
+    model = compose(explanation.names, problem.lines.campaign, problem.table, problem.kind)
     point, levels = explanation.point, explanation.best.at.marginal.levels
     whole = model.predict(point.fit)
     prediction, pickup_variance = _some(whole, rows), whole.pickup_variance
@@ -150,7 +152,7 @@ def _predict(
     fitted_gains = explanation.best.at.marginal.sensor_gains
     gains[: len(fitted_gains)] = fitted_gains
     # A contact on an extremum of σ feels positioning scatter in second order, as in the likelihood
-    p2, curvature, recording = levels.position**2, bench.curvature, bench.lines.recording[rows]
+    p2, curvature, recording = levels.position**2, problem.curvature, problem.lines.recording[rows]
     value = prediction.value * np.exp(gains[left.sensor])[left.recording]
     value = value * np.exp(0.5 * p2 * curvature.laplacian)[recording]
     scatter = levels.gain**2 + np.where(seen, 0.0, levels.spread**2)
@@ -181,9 +183,9 @@ def total(held_out: Sequence[HeldOut]) -> tuple[PredictionScore, PredictionScore
     return before, after
 
 
-def in_sample(bench: Workbench, explanation: Explanation) -> PredictionScore:
+def in_sample(problem: FittingProblem, explanation: Explanation) -> PredictionScore:
     """The recordings that the explanation was fitted to."""
-    return _predict(bench, explanation, bench, np.ones(len(bench.lines.value), dtype=bool))
+    return _predict(problem, explanation, problem, np.ones(len(problem.lines.value), dtype=bool))
 
 
 def _some(whole: Prediction, rows: NDArray[np.bool_]) -> Prediction:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.diagnosis.inference.explanation import Workbench
+from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.inference.hypothesis import COVARIANCE_NAMES
 from underskin.diagnosis.inference.likelihood import Marginal, Moments
 from underskin.diagnosis.inference.optimizer import Fitter
@@ -42,19 +42,19 @@ class Confounding:
     reason: str
 
 
-def confounding(bench: Workbench) -> list[Confounding]:
+def confounding(problem: FittingProblem) -> list[Confounding]:
     """What cannot be told apart here; mechanisms that the campaign does not support at all are not listed."""
-    fitter = Fitter(bench.hypothesis((), placed=False, whole=True))
+    fitter = Fitter(problem.hypothesis((), placed=False, whole=True))
     base = fitter.evaluate(fitter.start(np.zeros(0)))
     owners, signatures = [], []
     for name, mechanism in CATALOGUE.items():
-        if bench.kind not in mechanism.kinds:
+        if problem.kind not in mechanism.kinds:
             continue
-        parameters = mechanism.parameters(bench.lines.campaign, bench.kind)
+        parameters = mechanism.parameters(problem.lines.campaign, problem.kind)
         if any(entry.name in COVARIANCE_NAMES for entry in parameters):
             continue
         try:
-            hypothesis = bench.hypothesis((name,), placed=False, whole=True)
+            hypothesis = problem.hypothesis((name,), placed=False, whole=True)
         except Unsupported:
             continue
         for own in _shapes(parameters):
@@ -64,9 +64,9 @@ def confounding(bench: Workbench) -> list[Confounding]:
         return []
     slopes = np.concatenate([base.prediction.slopes, np.array(signatures) - base.prediction.value])
     prediction = replace(base.prediction, slopes=slopes)
-    lines = bench.lines
+    lines = problem.lines
     ratio = TYPICAL if lines.curves else 0.0
-    moments = Moments(lines, prediction, np.zeros(lines.recordings), bench.curvature, 0.0, ratio)
+    moments = Moments(lines, prediction, np.zeros(lines.recordings), problem.curvature, 0.0, ratio)
     information, _ = Marginal(lines, moments, NoiseLevels(USUAL_GAIN, 1.0, 0.0, SENSOR_SPREAD)).normal_equations()
     return _told(owners, information, fitter.parameters)
 

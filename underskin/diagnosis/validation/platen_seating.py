@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.inference.explanation import Workbench
+from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.selection.search import SHOWS
 from underskin.recordings.campaign import Campaign, CompressionRecording, Recording
 from underskin.recordings.finding import Finding
@@ -21,7 +21,9 @@ _BEGINNING = 0.1  # of each curve's displacement
 _STIFFENING = "strain_stiffening"
 
 
-def without_seating(campaign: Campaign, names: Sequence[str], table: SigmaTable) -> tuple[Workbench, Finding] | None:
+def without_seating(
+    campaign: Campaign, names: Sequence[str], table: SigmaTable
+) -> tuple[FittingProblem, Finding] | None:
     """The rest of the curves and the finding, where the rest speaks no more for the stiffening among `names`.
 
     Relaxation needs a curve's whole history: with contact_creep nothing is tried.
@@ -33,8 +35,11 @@ def without_seating(campaign: Campaign, names: Sequence[str], table: SigmaTable)
     rows = curve_lines(_without_beginning(campaign), "compression")
     if rows.recordings < len(campaign.recordings):
         return None
-    bench = Workbench(rows, table)
-    stiffer, plain = bench.explain(tuple(names)), bench.explain(tuple(name for name in names if name != _STIFFENING))
+    problem = FittingProblem(rows, table)
+    stiffer, plain = (
+        problem.explain(tuple(names)),
+        problem.explain(tuple(name for name in names if name != _STIFFENING)),
+    )
     assert stiffer is not None
     assert plain is not None
     if stiffer.log_evidence - plain.log_evidence > SHOWS:
@@ -43,7 +48,7 @@ def without_seating(campaign: Campaign, names: Sequence[str], table: SigmaTable)
         f"only the first {100 * _BEGINNING:.0f} % of the displacement speaks for strain_stiffening: a platen that is "
         "tilted, or an uneven end, seats like that. It was left out; a small preload before zeroing avoids it"
     )
-    return bench, Finding("seating", "", "displacement_mm", text)
+    return problem, Finding("seating", "", "displacement_mm", text)
 
 
 def _is_pressed(entry: Recording) -> bool:
