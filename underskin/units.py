@@ -21,7 +21,6 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 
-
 @dataclass(frozen=True)
 class LabField:
     """A field as a lab writes it: SI value = number × `to_si`; `likely` bounds the number's magnitude."""

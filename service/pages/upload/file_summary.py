@@ -11,7 +11,6 @@ from service.ingest.uploads import Upload
 from underskin import InvalidInput
 from underskin.recordings.campaign import CompressionRecording, FrfRecording, Recording
 from underskin.recordings.channels import Contents
-from underskin.recordings.skin_export import is_export
 from underskin.units import to_lab
 
 MOST_LISTED = 60

@@ -1,12 +1,12 @@
-"""The evidence of one hypothesis: Laplace's method, and integrals over what has no bell for a posterior.
+"""The evidence of one hypothesis: Laplace's method, and integrals over parameters whose posterior is not Gaussian.
 
-A parameter on a logarithmic scale that the lines leave loose (the time of a small step, the onset of a small loss) has
-none: the others follow it along a bend, and where the effect is small it is free. There Z is the integral over that
+A parameter on a logarithmic scale that the lines hardly determine (the time of a small step, the onset of a small loss)
+is one: the others follow it along a curve, and where the effect is small it is free. There Z is the integral over that
 parameter of the evidence that Laplace's method gives with it held.
 
-Nor has the positioning scatter: its prior is flat between two values, and often nothing tells how much there is; with
-it the gain's has none. There Z is the integral over the logarithms of both, at the most probable prediction, from
-which the quadratic of the mean parameters leads on.
+The positioning scatter is another: its prior is flat between two values, and often the recordings do not determine it;
+the gain scatter's posterior is then not Gaussian either. There Z is the integral over the logarithms of both, at the
+most probable prediction, from which the quadratic of the mean parameters leads on.
 
 Integrals are sums at equal strides, as good as exact for what falls to nothing both ways.
 """
@@ -90,7 +90,7 @@ def _held_at(held: Fitter, near: Evaluated, place: int, value: float) -> Evidenc
 
 
 def _over_position(evidence: Evidence) -> Evidence:
-    """With the integral over log p in place of the bell's, p the positioning scatter."""
+    """With the integral over log p in place of its normal approximation, p the positioning scatter."""
     fitter, at = evidence.fitter, evidence.at
     bounds = fitter.covariance[POSITION].low, fitter.covariance[POSITION].high
     stride = _stride(fitter.covariance_equations(at)[1][POSITION, POSITION])

@@ -107,7 +107,7 @@ class FittingProblem:
         """The set's explanation; from a parent's, which has one mechanism less, where one is given.
 
         None where the log posterior density gains less than `_LEAST_GAIN` over the parent: the added mechanism does
-        not show. Its evidence is a bell's, until it is `integrated`. Raises Unsupported.
+        not show. Its evidence is a Laplace approximation, until it is `integrated`. Raises Unsupported.
         """
         plain = self.hypothesis(names, False)
         fitters = [Fitter(plain), Fitter(replace(plain, placed=True))]
@@ -131,7 +131,7 @@ class FittingProblem:
         return Explanation.of(names, fits)
 
     def refit(self, explanation: Explanation) -> Explanation | None:
-        """A set that was fitted to more recordings, fitted to these, from where it stood; its evidence is a bell's.
+        """A set that was fitted to more recordings, fitted to these, from where it stood; by the Laplace approximation.
 
         None where the set has other parameters here. Raises Unsupported.
         """

@@ -72,14 +72,16 @@ def around_levels(fitter: Fitter, at: Evaluated) -> float:
 
 
 def log_volume(hessian: Floats) -> float:
-    """Of the bell of logarithms of noise levels."""
+    """The log volume of the normal approximation in the logarithms of the noise levels."""
     eigenvalues = np.maximum(np.linalg.eigvalsh(hessian), _LEAST_COVARIANCE_CURVATURE)
     return float(0.5 * len(hessian) * np.log(2 * np.pi) - 0.5 * np.log(eigenvalues).sum())
 
 
 def levels_covariance(hessian: Floats) -> Floats:
-    """Of logarithms of noise levels; never narrower than that bell: at a bound the Hessian may be negative, and an
-    interval that was read from it would have no width."""
+    """The covariance of the logarithms of the noise levels, with the same least curvature.
+
+    At a bound the Hessian may be negative, and an interval read from it would have no width.
+    """
     eigenvalues, vectors = np.linalg.eigh(hessian)
     return np.asarray(vectors / np.maximum(eigenvalues, _LEAST_COVARIANCE_CURVATURE) @ vectors.T)
 
