@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from underskin.errors import InvalidInput
 from underskin.recordings import validation as field
-from underskin.recordings.validation import shown
+from underskin.recordings.shown_values import shown
 from underskin.units import Floats, to_si
 
 
