@@ -10,9 +10,9 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.conftest import UNDERSKIN, Server, running
-from tests.pages.test_pages_security import BROWSING, token_of
-from tests.store.server import campaign
+from tests.service.pages.test_pages_security import BROWSING, token_of
+from tests.support.server import UNDERSKIN, Server, running
+from tests.support.store_server import campaign
 from underskin.recordings.campaign import parse
 from underskin.recordings.plausibility import implausible
 

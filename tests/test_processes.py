@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.diagnosis_campaigns import Made, campaign
+from tests.support.diagnosis_campaigns import Made, campaign
 from underskin.recordings.campaign import to_dict
 from underskin.surrogate.sigma_table import load_table
 

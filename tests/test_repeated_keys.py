@@ -12,12 +12,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.store.server import UNDERSKIN
+from tests.support.repository import ROOT
+from tests.support.store_server import UNDERSKIN
 from underskin.errors import FileError
 from underskin.recordings import read_file, rig_description
 from underskin.recordings.readers.repeated_keys import RepeatedKey, repeated_key
 
-EXAMPLES = Path(__file__).parents[1] / "examples" / "formats"
+EXAMPLES = ROOT / "examples" / "formats"
 CAMPAIGN = (EXAMPLES / "template.json").read_text()
 TWICE = CAMPAIGN.replace('"thickness_mm"', '"thickness_mm": 5,\n "thickness_mm"', 1)
 
