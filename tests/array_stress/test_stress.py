@@ -211,6 +211,7 @@ def test_a_huge_map_takes_little_more_memory_than_itself() -> None:
     assert peak < 150e6
 
 
+@pytest.mark.slow
 def test_the_command_takes_a_map_from_csv(tmp_path: Path) -> None:
     skin, pressed = tmp_path / "skin.json", tmp_path / "map.csv"
     skin.write_text(json.dumps(SKIN))

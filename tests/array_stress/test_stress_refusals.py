@@ -120,6 +120,7 @@ def test_nan_is_refused_and_a_batch_too_large_says_so(http: httpx.Client) -> Non
     assert "sensors times points of the load must be at most" in reply.json()["errors"][0]["allowed"]
 
 
+@pytest.mark.slow
 def test_the_command_names_what_is_wrong(tmp_path: Path) -> None:
     file = tmp_path / "load.json"
     missing = subprocess.run([COMMAND, "stress", tmp_path / "none.json"], capture_output=True, text=True)

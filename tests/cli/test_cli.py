@@ -63,6 +63,7 @@ def test_frf_agrees_with_the_service(server_url: str) -> None:
     assert written["status"] == answer.status.tolist() == ["ok", "ok", "ok", "out_of_domain"]
 
 
+@pytest.mark.slow
 def test_a_d33_that_no_sensor_has_is_answered_and_named() -> None:
     for frf, said in (("7400", "more than sensors have"), ("0.0074", "less than sensors have"), ("-7.4", "negative")):
         found = run("d33", *SKIN, "--preload-n", "1", "--frf-pc-per-n", frf)
@@ -70,6 +71,7 @@ def test_a_d33_that_no_sensor_has_is_answered_and_named() -> None:
         assert f"look at d33_pc_per_n: d33 is {float(frf) * 1.8932:.3g} pC/N, {said}" in found.stderr
 
 
+@pytest.mark.slow
 def test_d33_takes_back_what_frf_gave_through_csv() -> None:
     frf = columns(*FRF, "--preload-n", "1,3")["frf_pc_per_n"]
     table = f"preload_n,frf_pc_per_n\n1,{frf[0]}\n\n3,{frf[1]}\n"
@@ -79,6 +81,7 @@ def test_d33_takes_back_what_frf_gave_through_csv() -> None:
     assert numbers(back["d33_uncertainty_pc_per_n"]) == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_sigma_of_both_models() -> None:
     layer = columns("sigma", "--a-over-h", "0.3,4", "--rt-over-h", "0.6", "--load-parameter", "0.01")
     expected = underskin.load_table().sigma(0.3, 0.6, 0.01)
@@ -89,6 +92,7 @@ def test_sigma_of_both_models() -> None:
     assert half_space["status"] == ["ok", "out_of_domain"]
 
 
+@pytest.mark.slow
 def test_table_shows_units_and_what_a_status_means() -> None:
     shown = run(*FRF, "--preload-n", "1,300").stdout
     for text in ("thickness h", "2.5", "mm", "16", "MPa", "7.3958", "pC/N", "out_of_domain"):
@@ -97,12 +101,14 @@ def test_table_shows_units_and_what_a_status_means() -> None:
     assert run(*FRF, "--preload-n", "1").stdout.split()[-2:] == ["status", "ok"]
 
 
+@pytest.mark.slow
 def test_csv_file_written_by_a_spreadsheet(tmp_path: Path) -> None:
     sheet = tmp_path / "measured.csv"
     sheet.write_bytes("\ufeffpreload_n , frf_pc_per_n\r\n1,7.4\r\n3,11.5\r\n".encode())
     assert len(columns("d33", *SKIN, "--input", str(sheet))["d33_pc_per_n"]) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
@@ -133,6 +139,7 @@ def test_bad_input_is_one_line_and_status_2(arguments: list[str], says: str) -> 
     assert says in line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -150,6 +157,7 @@ def test_bad_csv_is_one_line_and_status_2(text: str, says: str) -> None:
     assert says in refused("d33", *SKIN, "--input", "-", given=text)
 
 
+@pytest.mark.slow
 def test_missing_table_says_what_to_do(tmp_path: Path) -> None:
     line = refused(*FRF, "--preload-n", "1", UNDERSKIN_TABLES=str(tmp_path))
     assert "sigma.h5 cannot be read: No such file or directory. Restore it" in line
@@ -171,6 +179,7 @@ def test_units_stand_in_the_help() -> None:
         assert unit in shown
 
 
+@pytest.mark.slow
 def test_commands_of_other_packages_get_their_arguments(tmp_path: Path) -> None:
     made = run("key", "create", "bench-1", UNDERSKIN_DATA=str(tmp_path))
     assert (made.returncode, made.stderr) == (0, "")

@@ -39,6 +39,7 @@ def file(palm: Campaign, tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_csv_has_the_inversions_numbers(palm: Campaign, file: Path) -> None:
     found = invert(palm, load_table())
     answer = run("d33", str(file), "--csv")
@@ -64,6 +65,7 @@ def test_csv_has_the_inversions_numbers(palm: Campaign, file: Path) -> None:
     assert "left out: sensor s5: weak" in answer.stderr
 
 
+@pytest.mark.slow
 def test_the_table_shows_array_sensors_band_and_what_is_left_out(palm: Campaign, file: Path) -> None:
     shown = run("d33", str(file)).stdout
     found = invert(palm, load_table())
@@ -79,6 +81,7 @@ def test_the_table_shows_array_sensors_band_and_what_is_left_out(palm: Campaign,
     assert "look at" not in shown
 
 
+@pytest.mark.slow
 def test_a_band_of_ones_own(file: Path) -> None:
     assert "20 to 80 Hz, as asked" in run("d33", str(file), "--band", "20,80").stdout
     answer = run("d33", str(file), "--band", "500,600")
@@ -86,6 +89,7 @@ def test_a_band_of_ones_own(file: Path) -> None:
     assert "no d33: band_hz" in answer.stdout
 
 
+@pytest.mark.slow
 def test_unreadable_files_and_recordings_are_named_and_the_others_inverted(palm: Campaign, tmp_path: Path) -> None:
     document = json.loads(json_file.write(palm))
     document["recordings"][3]["preload_n"] = -1
@@ -107,6 +111,7 @@ def test_unreadable_files_and_recordings_are_named_and_the_others_inverted(palm:
     assert run("d33", names[2]).returncode == 0
 
 
+@pytest.mark.slow
 def test_a_campaign_that_tells_nothing_says_why(palm: Campaign, tmp_path: Path) -> None:
     document = json.loads(json_file.write(palm))
     for recording in document["recordings"]:
@@ -123,6 +128,7 @@ def test_a_campaign_that_tells_nothing_says_why(palm: Campaign, tmp_path: Path) 
     assert refused[2].startswith("left out: recording r0: preload_n = -1")
 
 
+@pytest.mark.slow
 def test_instrument_files_need_a_rig_and_tell_the_modulus(tmp_path: Path) -> None:
     (tmp_path / "block.csv").write_text(CURVE)
     rig = tmp_path / "rig.yaml"
@@ -145,6 +151,7 @@ def test_instrument_files_need_a_rig_and_tell_the_modulus(tmp_path: Path) -> Non
     assert (wrong.returncode, wrong.stderr) == (2, f"underskin: {rig}: schema = 'rig/9': must be rig/1\n")
 
 
+@pytest.mark.slow
 def test_d33_and_modulus_of_one_campaign(palm: Campaign, tmp_path: Path) -> None:
     strain = np.linspace(0, 0.1, 50)
     area_mm2 = np.pi / 4 * 12.0**2
@@ -161,6 +168,7 @@ def test_d33_and_modulus_of_one_campaign(palm: Campaign, tmp_path: Path) -> None
     assert "left out: recording idle: force_n" in shown.stdout
 
 
+@pytest.mark.slow
 def test_values_in_the_wrong_unit_are_a_finding(palm: Campaign, tmp_path: Path) -> None:
     def in_coulombs(recording: FrfRecording) -> FrfRecording:
         assert recording.frf_re_pc_per_n is not None
@@ -171,6 +179,7 @@ def test_values_in_the_wrong_unit_are_a_finding(palm: Campaign, tmp_path: Path) 
     assert "look at: FRF, median of the recordings: " in run("d33", str(tmp_path / "small.json")).stdout
 
 
+@pytest.mark.slow
 def test_figures_are_pages_that_need_nothing_else(file: Path, tmp_path: Path) -> None:
     assert run("d33", str(file), "--figures", str(tmp_path / "new" / "figures")).returncode == 0
     (page,) = (tmp_path / "new" / "figures").iterdir()

@@ -40,6 +40,7 @@ def figures(text: str) -> list[dict[str, str]]:
     return [{name: value for name, value in row.items() if name != "file"} for row in csv.DictReader(io.StringIO(text))]
 
 
+@pytest.mark.slow
 def test_files_together_tell_what_one_file_of_all_would(palm: Campaign, presses: list[str], tmp_path: Path) -> None:
     (tmp_path / "all.json").write_bytes(json_file.write(palm))
     whole = run("d33", str(tmp_path / "all.json"), "--csv")
@@ -52,6 +53,7 @@ def test_files_together_tell_what_one_file_of_all_would(palm: Campaign, presses:
     assert [page.name for page in (tmp_path / "pages").iterdir()] == ["palm-3.html"]
 
 
+@pytest.mark.slow
 def test_a_copy_of_a_file_counts_once(presses: list[str], tmp_path: Path) -> None:
     copy = tmp_path / "copy.json"
     copy.write_bytes(Path(presses[0]).read_bytes())
@@ -61,6 +63,7 @@ def test_a_copy_of_a_file_counts_once(presses: list[str], tmp_path: Path) -> Non
     assert "recordings with the very numbers of others count once: 'copy r' is 'press-0 r'" in twice.stderr
 
 
+@pytest.mark.slow
 def test_an_unreadable_file_costs_only_itself(presses: list[str], tmp_path: Path) -> None:
     Path(presses[2]).write_text("{")
     answer = run("d33", *presses, str(tmp_path / "nowhere.json"), "--together", "palm")
@@ -70,6 +73,7 @@ def test_an_unreadable_file_costs_only_itself(presses: list[str], tmp_path: Path
     assert (none.returncode, none.stdout) == (2, "")
 
 
+@pytest.mark.slow
 def test_files_of_different_skins_are_refused(presses: list[str]) -> None:
     document = json.loads(Path(presses[1]).read_text())
     document["skin"]["thickness_mm"] = 3.0

@@ -99,6 +99,7 @@ def test_of_two_curves_the_declared_modulus_tells_which_is_off(change: Change, p
     assert without_inconsistent(two, "compression").findings == []
 
 
+@pytest.mark.slow
 def test_reversed_forces_are_put_right_and_invent_nothing(pads: Campaign) -> None:
     for names in (ALL, ("c2",)):
         report = diagnosis_report(changed(pads, times(-1.0, "force_n"), *names), load_table())

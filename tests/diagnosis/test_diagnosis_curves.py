@@ -25,6 +25,7 @@ def creeping_pad(seed: int) -> dict[str, Any]:
     return campaign
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 def test_creep_alone_is_named_where_only_the_way_in_is_kept(seed: int) -> None:
     """A fit with adhesion hangs at the kink where the sphere first touches; it must not win by that."""
@@ -46,6 +47,7 @@ def pressed_pad(seed: int, bump: float) -> dict[str, Any]:
     return campaign
 
 
+@pytest.mark.slow
 def test_a_percent_that_no_law_describes_is_told_and_is_no_mechanism() -> None:
     report = diagnosis_report(parse(pressed_pad(4, 0.01)), load_table())
     assert report["verdict"] == "unexplained"  # no all-clear over a remainder above the noise
@@ -55,6 +57,7 @@ def test_a_percent_that_no_law_describes_is_told_and_is_no_mechanism() -> None:
     assert report["fit"]["before"]["youngs_modulus"]["value"] == pytest.approx(0.5, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_large_bump_is_unexplained_and_described_along_the_curve() -> None:
     report = diagnosis_report(parse(pressed_pad(4, 0.15)), load_table())
     assert report["verdict"] == "unexplained"
@@ -62,6 +65,7 @@ def test_a_large_bump_is_unexplained_and_described_along_the_curve() -> None:
     assert "Hz" not in report["statement"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif("UNDERSKIN_RECORDINGS" not in os.environ, reason="UNDERSKIN_RECORDINGS names no folder")
 @pytest.mark.parametrize("name", ["compression-EF10", "compression-EF50", "tension-RTV615"])
 def test_silicone_stiffens_and_does_not_creep_where_nothing_tells_time(name: str) -> None:

@@ -98,6 +98,7 @@ def table() -> SigmaTable:
     return load_table()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of arithmetic: a warning says nothing to a user, a report does
 @EDGE
 @given(document=campaigns())

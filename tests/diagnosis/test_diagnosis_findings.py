@@ -164,6 +164,7 @@ SKIN = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "factor"), SKIN)
 def test_a_skin_in_other_units_is_named_and_tells_nothing(
     name: str, factor: float, good: Campaign, table: SigmaTable
@@ -180,6 +181,7 @@ def test_a_skin_in_other_units_is_named_and_tells_nothing(
     assert meant.lacking is None or "units_checked" not in english.lacking(meant.lacking)
 
 
+@pytest.mark.slow
 def test_a_modulus_that_was_checked_is_diagnosed_with_the_suspicion_beside(good: Campaign, table: SigmaTable) -> None:
     stiff = replace(good, skin=replace(good.skin, youngs_modulus_mpa=3000.0), units_checked=True)
     report = diagnosis_report(stiff, table)

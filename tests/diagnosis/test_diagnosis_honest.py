@@ -36,6 +36,7 @@ def test_places_that_rounding_leaves_where_zero_is_meant_are_no_impossible_numbe
     assert len(found.campaign.recordings) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tip_mass_g", [300.0, 1500.0])
 def test_a_recording_above_its_resonance_is_not_reversed(tip_mass_g: float, table: SigmaTable) -> None:
     """In antiphase with force over most of its lines, with the heavier tip in all recordings."""

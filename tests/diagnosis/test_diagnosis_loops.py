@@ -23,6 +23,7 @@ def standard_errors(report: dict[str, Any], name: str, truth: float) -> float:
     return float(abs(truth - found["value"]) / (found["high"] - found["low"]) * 2 * 1.96)
 
 
+@pytest.mark.slow
 def test_a_loop_with_a_hold_gives_creep_and_no_more() -> None:
     report = diagnosis_report(parse(loops({"contact_creep": {"fraction": 0.3, "time_s": 8}}, hold_s=10)), load_table())
     assert report["verdict"] == "explained"
@@ -31,12 +32,14 @@ def test_a_loop_with_a_hold_gives_creep_and_no_more() -> None:
     assert standard_errors(report, "relaxation_time", 8) < 3
 
 
+@pytest.mark.slow
 def test_a_loop_that_snaps_and_tears_off_gives_the_work_of_adhesion() -> None:
     report = diagnosis_report(parse(loops({"adhesion": {"work_j_per_m2": 0.3}})), load_table())
     assert "adhesion" in [entry["name"] for entry in report["mechanisms"]]
     assert standard_errors(report, "work_of_adhesion", 0.3) < 3
 
 
+@pytest.mark.slow
 def test_a_curve_that_cannot_be_used_is_named_and_the_others_are_diagnosed() -> None:
     campaign = loops({"contact_creep": {"fraction": 0.3, "time_s": 8}})
     short = campaign["recordings"][1]

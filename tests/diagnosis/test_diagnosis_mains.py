@@ -27,6 +27,7 @@ def picked_up(quiet: Campaign, line: Floats, share: float) -> Campaign:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.1, 0.7])
 @pytest.mark.parametrize(("shape", "width_hz"), [("bell", 1.0), ("bell", 3.0), ("resonance", 2.0)])
 def test_mains_are_named(shape: str, width_hz: float, share: float, table: SigmaTable) -> None:

@@ -97,6 +97,7 @@ def text(found: Diagnosis, document: dict[str, Any]) -> str:
     return page(document, figures(found, document))
 
 
+@pytest.mark.slow
 def test_it_says_all_that_the_report_says(text: str, document: dict[str, Any]) -> None:
     tags = Tags(text)
     assert document["verdict"] == "explained"
@@ -225,6 +226,7 @@ KINDS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("make", "verdict", "names"), KINDS, ids=["nothing", "off centre", "too little", "curves"])
 def test_every_kind_of_report_has_its_page(make: Callable[[], Campaign], verdict: str, names: set[str]) -> None:
     whole = make()
@@ -240,6 +242,7 @@ def test_every_kind_of_report_has_its_page(make: Callable[[], Campaign], verdict
         json.loads(figure.to_json())
 
 
+@pytest.mark.slow
 def test_reports_and_pages_are_the_same_on_a_dask_cluster_and_in_processes(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="the cluster extra is not installed")
     files = [tmp_path / f"palm-{number}.json" for number in range(2)]
@@ -266,6 +269,7 @@ def test_reports_and_pages_are_the_same_on_a_dask_cluster_and_in_processes(tmp_p
     assert written("processes", "--workers", "2") == here
 
 
+@pytest.mark.slow
 def test_a_single_file_is_diagnosed_with_one_blas_thread(tmp_path: Path) -> None:
     """As it is in a process of many: so that its report is the same on any machine."""
     file = tmp_path / "palm.json"

@@ -53,6 +53,7 @@ def twins(table: SigmaTable) -> Left:
     return Left(TWINS, table)
 
 
+@pytest.mark.slow
 def test_a_plan_keeps_within_the_limits(narrow: Left) -> None:
     planned = narrow.plan(preload_n=(0.3, 2.5), indenter_radius_mm=[4.0, 8.0], recordings=5)
     assert sum(entry["repeats"] for entry in planned["recordings"]) <= 5
@@ -71,6 +72,7 @@ def test_the_sentence_names_all_that_it_separates(narrow: Left) -> None:
     assert f"probability of {in_percent(planned['probability_of_deciding'])}." in planned["statement"]
 
 
+@pytest.mark.slow
 def test_where_the_campaign_s_own_settings_tell_nothing_others_are_tried(twins: Left) -> None:
     """At one dynamic force a moving edge and a finite amplitude are the same; another one tells them apart."""
     assert twins.search.answers[0].probability < EXPLAINED
@@ -87,6 +89,7 @@ def test_where_nothing_can_be_planned_it_is_said_why(twins: Left) -> None:
     assert "dynamic force" in planned["statement"]
 
 
+@pytest.mark.slow
 def test_rivals_without_a_law_and_curves_have_a_document_too(narrow: Left, table: SigmaTable) -> None:
     leader = narrow.search.answers[0].explanation
     assert leader is not None
@@ -144,6 +147,7 @@ def recorded(
     return replace(together, recordings=tuple(entries))
 
 
+@pytest.mark.slow
 def test_a_plan_decides_as_often_as_it_promises(narrow: Left, table: SigmaTable) -> None:
     """The experiment simulated with whole recordings, every rival fitted again to all of them."""
     planned = narrow.plan()

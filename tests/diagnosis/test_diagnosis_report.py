@@ -48,6 +48,7 @@ def scaled(entry: FrfRecording, factor: float) -> FrfRecording:
     )
 
 
+@pytest.mark.slow
 def test_nothing_is_found_where_nothing_is_missing(table: SigmaTable) -> None:
     report = diagnosis_report(campaign(SENSORS, table), table)
     assert report["verdict"] == "no_mismatch"
@@ -63,6 +64,7 @@ def test_nothing_is_found_where_nothing_is_missing(table: SigmaTable) -> None:
     assert report["fit"]["after"]["heldout_rmse_percent"] < 1.3 * report["fit"]["noise_floor_percent"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("made", "value"),
     [
@@ -87,6 +89,7 @@ def test_what_is_missing_is_named_with_its_parameters(made: Made, value: float |
     assert report["d33"]["low"] < 15.0 < report["d33"]["high"]
 
 
+@pytest.mark.slow
 def test_what_has_no_name_is_declared_unexplained_and_described(table: SigmaTable) -> None:
     def notch(entry: FrfRecording) -> FrfRecording:
         assert entry.frequency_hz is not None
@@ -106,12 +109,14 @@ def test_what_has_no_name_is_declared_unexplained_and_described(table: SigmaTabl
     assert axes["preload_n"] > 0.05
 
 
+@pytest.mark.slow
 def test_the_same_input_gives_the_same_report(table: SigmaTable) -> None:
     whole = campaign(replace(SENSORS, mechanisms=("layered_contact",)), table)
     first, second = (json.dumps(diagnosis_report(whole, table)) for _ in range(2))
     assert first == second
 
 
+@pytest.mark.slow
 def test_twins_are_reported_as_such(table: SigmaTable) -> None:
     """At one amplitude a moving edge and a finite amplitude cannot be told apart; neither is guessed."""
     made = replace(SENSORS, mechanisms=("moving_contact_edge",), parameters=(0.9,), thickness_mm=1.2)
@@ -134,6 +139,7 @@ BAD: list[tuple[str, Callable[[FrfRecording], FrfRecording]]] = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("code", "change"), BAD)
 def test_one_bad_recording_is_named_and_no_mechanism_absorbs_it(
     code: str, change: Callable[[FrfRecording], FrfRecording], table: SigmaTable
@@ -143,6 +149,7 @@ def test_one_bad_recording_is_named_and_no_mechanism_absorbs_it(
     assert report["verdict"] == "no_mismatch"
 
 
+@pytest.mark.slow
 def test_a_copy_is_named(table: SigmaTable) -> None:
     whole = campaign(SENSORS, table)
     copies = tuple(replace(entry, id=f"{entry.id} copy") for entry in whole.recordings[:4])
@@ -151,6 +158,7 @@ def test_a_copy_is_named(table: SigmaTable) -> None:
     assert report["verdict"] == "no_mismatch"
 
 
+@pytest.mark.slow
 def test_units_of_the_whole_campaign(table: SigmaTable) -> None:
     whole = campaign(SENSORS, table)
     for number in range(len(whole.recordings)):
@@ -168,6 +176,7 @@ def test_too_little_is_said_to_be_too_little(count: int, table: SigmaTable) -> N
     assert "at least 2" in report["statement"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [2, 5])
 def test_few_recordings_or_one_line_never_crash(count: int, table: SigmaTable) -> None:
     for count_of_lines in (1, 9):
@@ -176,6 +185,7 @@ def test_few_recordings_or_one_line_never_crash(count: int, table: SigmaTable) -
         assert report["verdict"] in ("no_mismatch", "insufficient_data")
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_report_for_each_readable_file(tmp_path: Path, table: SigmaTable) -> None:
     good, bad = tmp_path / "palm.json", tmp_path / "torn.json"
     good.write_text(json.dumps(to_dict(campaign(SENSORS, table))), encoding="utf-8")
@@ -200,6 +210,7 @@ def test_campaigns_of_one_name_are_told_what_to_do(tmp_path: Path) -> None:
     assert not (tmp_path / "reports").exists()
 
 
+@pytest.mark.slow
 def test_a_plan_separates_what_is_confusable(tmp_path: Path, table: SigmaTable) -> None:
     made = replace(SENSORS, mechanisms=("strain_stiffening",), parameters=(8.0,), modulus_mpa=2.7)
     file = tmp_path / "palm.json"
@@ -215,6 +226,7 @@ def test_a_plan_separates_what_is_confusable(tmp_path: Path, table: SigmaTable) 
     assert all(entry["position_mm"] == places[entry["sensor"]] for entry in planned["recordings"])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(SHARED is None, reason="UNDERSKIN_CAMPAIGNS is not set")
 @pytest.mark.parametrize(
     ("name", "verdict"), [("c4chxhg3d", "explained"), ("c2pdsjnae", "no_mismatch"), ("cxcz7s613", "unexplained")]
@@ -228,6 +240,7 @@ def test_campaigns_of_another_rig(name: str, verdict: str, table: SigmaTable) ->
     assert names(report) <= set(CATALOGUE)
 
 
+@pytest.mark.slow
 def test_curves_are_diagnosed_too(table: SigmaTable) -> None:
     """A thin layer under a sphere, diagnosed from force against depth."""
     empty = indentation_campaign()

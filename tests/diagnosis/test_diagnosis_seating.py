@@ -25,6 +25,7 @@ def pressed(seed: int, **effects: Any) -> Any:
     return diagnosis_report(campaign, load_table())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_seating_platen_is_named_and_no_stiffening(seed: int) -> None:
     report = pressed(seed, tilted_platen={"wedge_mm": 0.06})
@@ -32,6 +33,7 @@ def test_a_seating_platen_is_named_and_no_stiffening(seed: int) -> None:
     assert ("seating", "displacement_mm") in {(entry["code"], entry["field"]) for entry in report["findings"]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_stiffening_stays(seed: int) -> None:
     report = pressed(seed, strain_stiffening={"coefficient": 2.0})

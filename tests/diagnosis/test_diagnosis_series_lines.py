@@ -27,6 +27,7 @@ def quiet() -> Campaign:
     return recorded()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sample_rate_hz", [512.0, 2048.0])
 def test_lines_without_force_are_no_misfit(sample_rate_hz: float, table: SigmaTable) -> None:
     """Beside the excited band a line's noise is unlike the others'; mains were found there."""
@@ -38,6 +39,7 @@ def test_lines_without_force_are_no_misfit(sample_rate_hz: float, table: SigmaTa
     assert "the force has little power" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drive", [
     {"kind": "sweep", "duration_s": 8.0},  # in step: the charge follows the force there all the same
     {"duration_s": 8.0},
@@ -102,6 +104,7 @@ def test_a_resonance_on_a_multiple_of_the_mains_is_none(quiet: Campaign, table: 
     assert all(300.0 in lines_of(entry).frequency for entry in frf_recordings(found.campaign))
 
 
+@pytest.mark.slow
 def test_lines_of_uneven_power_are_no_mains(quiet: Campaign, table: SigmaTable) -> None:
     """A periodic force has more power at one line than at the next, the same in all recordings; at 60 Hz little."""
     line = 2.0 * np.arange(1, 257)
@@ -115,6 +118,7 @@ def test_lines_of_uneven_power_are_no_mains(quiet: Campaign, table: SigmaTable) 
     assert "mains_in_charge" not in {entry["code"] for entry in report["findings"]}
 
 
+@pytest.mark.slow
 def test_blows_too_weak_for_their_highest_lines_hide_nothing(quiet: Campaign, table: SigmaTable) -> None:
     """Of lines chosen by how certain each came out the larger would be kept."""
     time = np.arange(8 * 4096) / 4096.0
@@ -128,6 +132,7 @@ def test_blows_too_weak_for_their_highest_lines_hide_nothing(quiet: Campaign, ta
     assert diagnosis_report(shaken(quiet, table, 4096.0, made), table)["verdict"] == "no_mismatch"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "sample_rate_hz"), [("random", 512.0), ("random", 2048.0), ("sweep", 512.0), ("sweep", 2048.0)]
 )
@@ -144,6 +149,7 @@ def test_what_a_time_series_hides_is_still_found(kind: str, sample_rate_hz: floa
     assert corner["low"] < 1.0 < corner["high"]
 
 
+@pytest.mark.slow
 def test_recordings_of_different_drives_rates_and_lengths_go_together(table: SigmaTable) -> None:
     """And FRFs with time series."""
     effects = {"amplifier_high_pass": {"corner_hz": 1.0}}
@@ -163,6 +169,7 @@ def test_recordings_of_different_drives_rates_and_lengths_go_together(table: Sig
     assert report["mechanisms"][0]["parameters"][0]["value"] == pytest.approx(1.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_of_a_single_sweep_a_high_pass_is_still_found(quiet: Campaign, table: SigmaTable) -> None:
     """It has each line in one block alone, whose ends cut it: the lowest lines would say more than a high-pass."""
     time = np.arange(16 * 1024) / 1024.0

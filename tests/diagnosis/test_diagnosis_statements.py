@@ -98,6 +98,7 @@ def test_large_effects_are_factors(size: Effect, said: str) -> None:
     assert said in location_statement(AXES, {}, {}, size)
 
 
+@pytest.mark.slow
 def test_a_probability_is_never_certain_and_the_same_everywhere(table: SigmaTable) -> None:
     document = report(diagnose(campaign(Made(("ageing",), (0.3, 300.0, 0.0), sensors=3, repeats=2), table), table))
     assert document["probability"] == 0.985
@@ -171,6 +172,7 @@ def test_what_was_found_is_not_called_unidentifiable(table: SigmaTable) -> None:
     assert left == {("adhesion", "noise"), ("modulus_error", "thickness_error"), ("ageing", "misalignment")}
 
 
+@pytest.mark.slow
 def test_sentences_hold_no_statistics(table: SigmaTable) -> None:
     made = Made(("ageing",), (0.3, 300.0, 0.0), sensors=3, repeats=2)
     document = report(diagnose(campaign(made, table), table))

@@ -156,6 +156,7 @@ def laplace_of(names: tuple[str, ...], values: tuple[float, ...], table: SigmaTa
     return laplace(fitter, fitter.improve(fitter.start(own)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("names", "values"), [CASES[index] for index in (0, 1, 4, 10, 17)])
 def test_evidence_agrees_with_importance_sampling(
     names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable
@@ -165,6 +166,7 @@ def test_evidence_agrees_with_importance_sampling(
     assert found.log_evidence == pytest.approx(importance(found), abs=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("names", "offsets_mm"), [((), (0.0,)), (("preload_dependent_d33",), (0.0, 0.3)), ((), (0.0, 1.0))]
 )

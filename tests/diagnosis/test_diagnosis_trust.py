@@ -57,6 +57,7 @@ def pdms_curve(
     return Campaign("pdms", SkinDescription(poisson_ratio=0.5), (recording,), units_checked=True)
 
 
+@pytest.mark.slow
 def test_a_raw_curve_with_snap_in_and_pull_off_is_no_all_clear(table: SigmaTable) -> None:
     """Hertz's law under an error of hundreds of per cent was said to agree within the noise."""
     report = diagnosis_report(pdms_curve(), table)
@@ -65,6 +66,7 @@ def test_a_raw_curve_with_snap_in_and_pull_off_is_no_all_clear(table: SigmaTable
     assert "agree within the noise" not in report["statement"]
 
 
+@pytest.mark.slow
 def test_a_resonance_in_many_recordings_brings_no_mains(table: SigmaTable) -> None:
     """The flank of a resonance counted as line noise, and mains were credited with the difference."""
     made = Made(
@@ -87,6 +89,7 @@ def test_a_resonance_in_many_recordings_brings_no_mains(table: SigmaTable) -> No
     assert noise["line_level"] == pytest.approx(1.0, abs=0.05)  # as large as the lines' roughness says
 
 
+@pytest.mark.slow
 def test_the_example_is_explained_by_its_heavy_tip(table: SigmaTable) -> None:
     """As docs/tour.md has it, and so it can be adopted."""
     report = diagnosis_report(read_file(EXAMPLE, EXAMPLE.name).campaign, table)
@@ -100,6 +103,7 @@ def test_the_example_is_explained_by_its_heavy_tip(table: SigmaTable) -> None:
     assert report["d33"]["quotable"]
 
 
+@pytest.mark.slow
 def test_a_resonance_and_mains_are_both_named(table: SigmaTable) -> None:
     """Where mains are there, the noise beside the resonance hides none of them."""
     made = Made(
@@ -126,6 +130,7 @@ def test_the_interval_of_a_noise_level_has_a_width_where_its_hessian_is_negative
     assert levels_covariance(sound) == pytest.approx(np.linalg.inv(sound))
 
 
+@pytest.mark.slow
 def test_recordings_of_noise_tell_nothing(table: SigmaTable) -> None:
     """A noise floor of several hundred per cent is no agreement, and no sign of physics either."""
     report = diagnosis_report(campaign(Made(line=1.5, lines=40), table), table)
@@ -133,6 +138,7 @@ def test_recordings_of_noise_tell_nothing(table: SigmaTable) -> None:
     assert "stands out of its noise" in report["statement"]
 
 
+@pytest.mark.slow
 def test_the_noise_floor_counts_positioning_scatter_of_centred_presses(table: SigmaTable) -> None:
     """A press on its sensor's centre feels it in second order: errors looked far above a floor that left that out."""
     centred, _ = from_dict(rig_campaign(record(drawn(20261122, 1, "none"))))
@@ -145,6 +151,7 @@ def test_the_noise_floor_counts_positioning_scatter_of_centred_presses(table: Si
     assert report["d33"]["quotable"]
 
 
+@pytest.mark.slow
 def test_no_d33_is_given_where_several_answers_are_left(table: SigmaTable) -> None:
     """E declared three times too small, one sphere and few preloads: E and what acts like it are not told apart."""
     made = campaign(Made(preloads_n=(0.5, 1.0, 2.0), spheres_mm=(10.0,), modulus_mpa=8.0), table)
@@ -156,6 +163,7 @@ def test_no_d33_is_given_where_several_answers_are_left(table: SigmaTable) -> No
     assert "No d33 is given" in page(report)
 
 
+@pytest.mark.slow
 def test_a_d33_that_pvdf_cannot_have_is_called_so(table: SigmaTable) -> None:
     report = diagnosis_report(campaign(Made(d33_pc_per_n=400.0), table), table)
     assert report["verdict"] == "no_mismatch"
@@ -178,6 +186,7 @@ def without_response(made: Campaign, sensors: set[str], seed: int = 3) -> Campai
     return replace(made, recordings=tuple(entries))
 
 
+@pytest.mark.slow
 def test_a_dead_sensor_stands_beside_the_verdict(table: SigmaTable) -> None:
     report = diagnosis_report(without_response(campaign(Made(sensors=3, lines=40), table), {"s2"}), table)
     said = "sensor 's2' shows no response above its noise in any of its 8 recordings: left out."
@@ -188,12 +197,14 @@ def test_a_dead_sensor_stands_beside_the_verdict(table: SigmaTable) -> None:
     assert unescape(shown).index("sensor 's2' shows no response") < shown.index("<h2>")
 
 
+@pytest.mark.slow
 def test_each_dead_sensor_is_named(table: SigmaTable) -> None:
     dead = {"s1", "s2", "s4", "s5"}
     report = diagnosis_report(without_response(campaign(Made(sensors=7, lines=40), table), dead), table)
     assert all(f"sensor {name!r} shows no response" in report["statement"] for name in dead)
 
 
+@pytest.mark.slow
 def test_a_dead_sensor_is_one_though_chance_gives_a_recording_a_mean(table: SigmaTable) -> None:
     """One in some hundred recordings of noise has a mean that stands out of it: its sensor is dead all the same."""
     made = campaign(Made(sensors=3, lines=40), table)
@@ -209,6 +220,7 @@ def test_a_dead_sensor_is_one_though_chance_gives_a_recording_a_mean(table: Sigm
     assert not {"sign_flipped", "units_off_by_1000"} & {entry["code"] for entry in report["findings"]}
 
 
+@pytest.mark.slow
 def test_what_is_left_out_of_an_explained_campaign_stands_at_the_head_of_its_page(table: SigmaTable) -> None:
     made = campaign(Made(mechanisms=("contact_resonance",), parameters=(40.0, 0.05), highest_hz=400.0, lines=40), table)
     first = made.recordings[0]

@@ -48,6 +48,7 @@ def rig_report(table: SigmaTable, gain: float, position_mm: float, effects: dict
     return diagnosis_report(found, table)
 
 
+@pytest.mark.slow
 def test_a_place_that_runs_round_is_no_scatter(table: SigmaTable) -> None:
     report = rig_report(table, 0.02, 0.0, {"stage_wobble": {"amplitude_mm": 0.5, "period_recordings": 6.3}})
     assert report["verdict"] == "unexplained"
@@ -55,16 +56,19 @@ def test_a_place_that_runs_round_is_no_scatter(table: SigmaTable) -> None:
     assert "once in 6." in report["statement"]
 
 
+@pytest.mark.slow
 def test_a_memory_of_the_preload_before_is_found(table: SigmaTable) -> None:
     report = rig_report(table, 0.02, 0.0, {"hysteretic_d33": {"amplitude": 0.1}})
     assert report["verdict"] == "unexplained"
     assert "the preload of the recording before" in report["statement"]
 
 
+@pytest.mark.slow
 def test_what_scatters_as_no_rig_does_is_unexplained(table: SigmaTable) -> None:
     assert rig_report(table, 0.25, 0.0, {})["verdict"] == "unexplained"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gain", "position_mm"), [(0.05, 0.0), (0.02, 0.28)])
 def test_the_scatter_of_an_ordinary_rig_is_nothing_missing(gain: float, position_mm: float, table: SigmaTable) -> None:
     assert rig_report(table, gain, position_mm, {})["verdict"] == "no_mismatch"

@@ -31,6 +31,7 @@ def test_the_half_spaces_error_falls_with_the_depth_of_the_base() -> None:
     np.testing.assert_allclose(percent, [-34.7, -7.8, -0.7, -0.01], atol=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("depth", "bonded"), [(1.0, True), (4.0, True), (1.0, False)])
 def test_a_very_wide_block_is_the_endless_layer(depth: float, bonded: bool) -> None:
     wide = 16 * max(1.0, depth)
@@ -38,6 +39,7 @@ def test_a_very_wide_block_is_the_endless_layer(depth: float, bonded: bool) -> N
     np.testing.assert_allclose(block.sigma, deep_layer.sigma(depth, A, RHO, bonded=bonded), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_the_error_falls_with_the_order_of_the_elements() -> None:
     exact = linear_layer.sigma(A, RHO)
     errors = [
@@ -46,6 +48,7 @@ def test_the_error_falls_with_the_order_of_the_elements() -> None:
     assert errors[1] < errors[0] / 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", [1.0, 12.0])
 def test_the_papers_block_converges_and_carries_the_whole_force(depth: float) -> None:
     block = FiniteBlock(PAPER_LENGTH, PAPER_WIDTH, depth)
@@ -55,6 +58,7 @@ def test_the_papers_block_converges_and_carries_the_whole_force(depth: float) ->
     np.testing.assert_allclose(coarse.sigma, fine.sigma, rtol=2e-4)
 
 
+@pytest.mark.slow
 def test_length_and_width_can_be_exchanged() -> None:
     along = solve(FiniteBlock(PAPER_LENGTH, PAPER_WIDTH, 4.0), A, RHO, order=4)
     across = solve(FiniteBlock(PAPER_WIDTH, PAPER_LENGTH, 4.0), A, RHO, order=4)

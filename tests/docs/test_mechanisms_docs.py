@@ -22,6 +22,7 @@ def test_the_page_is_the_catalogue_s() -> None:
     assert (DOCS / "mechanisms.md").read_text(encoding="utf-8") == document()
 
 
+@pytest.mark.slow
 def test_each_mechanism_has_a_figure_of_an_effect() -> None:
     for name in (mechanism.name for mechanism in built_in()):
         assert (DOCS / "figures" / f"mechanism-{name}.svg").exists()
@@ -32,6 +33,7 @@ def test_each_mechanism_has_a_figure_of_an_effect() -> None:
             assert changed, (name, panel.axis)
 
 
+@pytest.mark.slow
 def test_figures_come_out_the_same_every_time(tmp_path: Path) -> None:
     first, second = (
         [path.read_bytes() for path in draw(load_table(), tmp_path, ["ageing", "contact_resonance"])] for _ in range(2)

@@ -45,17 +45,21 @@ def committed_section(start: str) -> str:
     return heading + page.split(heading)[1].split("\n## ")[0].rstrip("\n")
 
 
+@pytest.mark.slow
+@pytest.mark.server
 def test_the_array_comes_back_from_the_service(run: ArrayRun) -> None:
     assert run.status == ["ok"]
     np.testing.assert_allclose(run.d33_from_service, D33_PC_PER_N, rtol=1e-12)
     assert run.largest_spread == 0.0
 
 
+@pytest.mark.server
 def test_the_service_agrees_with_fresh_solves(run: ArrayRun) -> None:
     np.testing.assert_allclose(run.d33_from_fresh_solve, D33_PC_PER_N, rtol=2e-5)
     np.testing.assert_allclose(run.frf_from_service, run.frf_from_fresh_solve, rtol=2e-5)
 
 
+@pytest.mark.server
 def test_the_page_says_what_is_computed(table: SigmaTable, run: ArrayRun) -> None:
     presses = [press(table, radius, PRELOADS_N) for radius in INDENTERS_MM]
     for section in (numbers_section(table), load_section(presses), array_section(run)):
@@ -63,6 +67,7 @@ def test_the_page_says_what_is_computed(table: SigmaTable, run: ArrayRun) -> Non
     assert table.sha256 in (DOCS / "paper.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_figures_are_those_that_are_drawn(table: SigmaTable, tmp_path: Path) -> None:
     drawn = figures.draw(table, tmp_path)
     assert [path.name for path in drawn] == [f"paper-fig{number}.svg" for number in FIGURES]
@@ -73,6 +78,7 @@ def test_the_figures_are_those_that_are_drawn(table: SigmaTable, tmp_path: Path)
         assert_same_but_for_rounding(made, committed)
 
 
+@pytest.mark.slow
 def test_drawing_twice_gives_the_same_bytes(table: SigmaTable, tmp_path: Path) -> None:
     for name in ("first", "second"):
         (tmp_path / name).mkdir()

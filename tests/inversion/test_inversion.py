@@ -29,6 +29,7 @@ def table() -> SigmaTable:
     return load_table()
 
 
+@pytest.mark.slow
 def test_intervals_cover_as_often_as_they_say(table: SigmaTable) -> None:
     random = np.random.default_rng(1)
     arrays, sensors, cells = [], [], []

@@ -62,6 +62,7 @@ def test_a_sensor_that_stands_out_is_named_with_the_reason(table: SigmaTable, ch
     assert named == (change in ("weak", "strong", "dead", "inverted"))
 
 
+@pytest.mark.slow
 def test_whole_arrays_are_seldom_accused(table: SigmaTable) -> None:
     random = np.random.default_rng(6)
     accused = 0
@@ -116,6 +117,7 @@ def test_a_recording_grossly_off_is_set_aside_and_named(table: SigmaTable, facto
     assert found.flags == ()
 
 
+@pytest.mark.slow
 def test_scatter_that_rigs_have_is_never_set_aside(table: SigmaTable) -> None:
     random = np.random.default_rng(14)
     for _ in range(60):

@@ -252,6 +252,7 @@ def test_derivatives_match_differences_on_the_way_in_and_back(names: list[str], 
         assert error.max() < 5e-5 * np.abs(slopes[smooth]).max() + 1e-7 * np.abs(exact.value).max(), names_of[number]
 
 
+@pytest.mark.slow
 def test_every_share_and_time_of_relaxation_gives_finite_forces_and_slopes() -> None:
     for path in (LOOP, LOOP + 0.003, LOOP[8:], LOOP[8:74]):
         model = compose(["contact_creep", "layered_contact", "adhesion"], recorded(path), table())

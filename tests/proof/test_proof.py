@@ -125,6 +125,7 @@ def test_work_is_kept_and_found_again(tmp_path: Path) -> None:
     assert not list(tmp_path.glob(".*"))
 
 
+@pytest.mark.slow
 def test_the_digest_follows_the_sources() -> None:
     assert sources("underskin") != sources("rig")
     assert sources("proof/ideal*.py") != sources("proof")
@@ -159,6 +160,7 @@ def test_a_supposition_gives_back_the_effects_of_its_place() -> None:
             assert again == pytest.approx(place)
 
 
+@pytest.mark.slow
 def test_the_ideal_diagnoser_names_what_plainly_shows() -> None:
     quiet = next(n for n in range(50) if _light(drawn(9, n, "none")))
     assert diagnosed(DrawnCase(9, quiet, "none"))["answer"] == []
@@ -168,6 +170,7 @@ def _light(description: dict[str, Any]) -> bool:
     return not description["noise"]["position_mm"] and description["design"]["most_recordings"] < 40
 
 
+@pytest.mark.slow
 def test_a_small_run_writes_the_page_and_goes_on_from_what_it_kept(tmp_path: Path) -> None:
     command = typer.Typer()
     command.command()(prove)
@@ -209,12 +212,14 @@ def test_identifiable_is_what_stands_out_from_every_rival() -> None:
     assert row[5].strip().startswith("1 of 1")
 
 
+@pytest.mark.slow
 def test_the_ideal_diagnoser_finds_a_twin_no_better_than_the_truth() -> None:
     found = diagnosed(DrawnCase(7001, 12, "single"))
     assert set(drawn(7001, 12, "single")["effects"]) == {"amplitude_nonlinearity"}
     assert abs(found["chi2_over_rivals"]) < 3.0
 
 
+@pytest.mark.slow
 def test_a_diagnosis_that_fails_is_a_wrong_answer(tmp_path: Path) -> None:
     [made] = reports(Work(tmp_path), [MadeCase("broken", {"schema": "campaign/1"})], lambda _: None)
     found = judge("broken", made, {"effects": [], "identifiable": True, "chi2_gain_of_truth": 0.0})
@@ -248,6 +253,7 @@ def test_the_paper_s_campaigns_say_what_the_paper_says() -> None:
     assert (preloads.count(3.0), preloads.count(1.0)) == (paper_array.AT_HIGHER, paper_array.AT_LOWER)
 
 
+@pytest.mark.slow
 def test_the_paper_s_question_is_left_open_and_what_would_settle_it_is_planned() -> None:
     """Preload and age go together on the array: both are named, neither is guessed, and the plan takes them apart."""
     made = paper_array.worlds()
@@ -264,6 +270,7 @@ def test_the_paper_s_question_is_left_open_and_what_would_settle_it_is_planned()
     assert all(entry["position_mm"] == [0.0, 0.0] for entry in planned["recordings"])
 
 
+@pytest.mark.slow
 def test_what_would_settle_the_paper_s_question_does() -> None:
     """Both preloads on late sensors: what did it is named."""
     made = paper_array.worlds()
@@ -271,6 +278,7 @@ def test_what_would_settle_the_paper_s_question_does() -> None:
     assert {entry["name"] for entry in aged["mechanisms"]} == {"ageing"}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(RECORDINGS is None, reason="UNDERSKIN_RECORDINGS names no folder of recordings")
 def test_real_recordings() -> None:
     """The main outcomes: stiffening PDMS, creeping gel, relaxing cell, a layer in one of the wells."""

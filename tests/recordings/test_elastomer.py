@@ -62,6 +62,7 @@ def hertz(depth: Floats, modulus: float = 16e6, contact: float = 0.1e-3, offset:
     return offset + 4 / 3 * modulus / 0.75 * np.sqrt(RADIUS) * np.maximum(depth - contact, 0) ** 1.5
 
 
+@pytest.mark.slow
 def test_indentation_finds_contact_offset_and_modulus_and_its_interval_covers() -> None:
     random = np.random.default_rng(2)
     depth = np.linspace(0, 0.4e-3, 200)

@@ -103,6 +103,7 @@ def test_the_kind_of_excitation_is_recognised() -> None:
     assert len(estimate(*shaken(3, 8000), RATE).frequency) > 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("overlap", [0.0, 0.5])
 @pytest.mark.parametrize("block", ["broadband", "stepped"])
 def test_the_stated_uncertainty_and_the_variance_of_coherence_are_those_seen(overlap: float, block: str) -> None:
@@ -129,6 +130,7 @@ def test_the_stated_uncertainty_and_the_variance_of_coherence_are_those_seen(ove
         assert np.mean(variances) == pytest.approx(np.mean(np.var(coherences, axis=0)), rel=0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("noise_in_force", "noise_in_charge", "best"), [(0.0, 0.3, "H1"), (0.3, 0.0, "H2"), (0.3, 0.3, "Hv")]
 )

@@ -206,6 +206,7 @@ def test_an_interrupted_lvm_acquisition_is_said() -> None:
         read_contents(lvm().replace("\t1100.0000", "\tx", 1).encode(), "run.lvm")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("write", [matlab_5, matlab_73])
 def test_matlab(write: Any) -> None:
     recording = {**COMMON, "sample_rate_hz": {"property": "fs"}}

@@ -47,6 +47,7 @@ def test_what_the_child_reads_arrives_unchanged(stream: BinaryIO) -> None:
         assert np.array_equal(mine.values, other.values)
 
 
+@pytest.mark.slow
 def test_a_small_file_that_unfolds_beyond_the_memory_limit_is_refused() -> None:
     data = matlab_73(lambda target: target.create_dataset("force", data=np.zeros(20_000_000), compression="gzip"))
     assert len(data) < 1_000_000
@@ -57,6 +58,7 @@ def test_a_small_file_that_unfolds_beyond_the_memory_limit_is_refused() -> None:
             parse_apart("MATLAB", stream, "bomb.mat", Limits(memory_bytes=107_374_182))
 
 
+@pytest.mark.slow
 def test_a_small_file_cannot_become_a_large_campaign() -> None:
     data = matlab_73(lambda target: target.create_dataset("force", data=np.zeros(20_000_000), compression="gzip"))
     with pytest.raises(FileError, match=r"bomb\.mat: it unfolds to more than \d+ MB, too much for a file of its size"):
@@ -183,6 +185,7 @@ def test_references_in_a_campaign_are_refused_as_values() -> None:
     assert [(problem.recording, problem.field) for problem in problems] == [("r1", "sensor")]
 
 
+@pytest.mark.slow
 def test_a_name_given_by_a_client_never_becomes_a_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("../../escape.h5", str(tmp_path / "absolute.h5"), "\0", "x" * 5000, "-rf"):

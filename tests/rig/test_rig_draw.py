@@ -28,6 +28,7 @@ def test_what_is_hidden_is_as_asked(what: str, count: int) -> None:
         assert names <= set(UNKNOWN if what == "unknown" else CATALOGUED)
 
 
+@pytest.mark.slow
 def test_all_effects_of_the_kind_are_drawn() -> None:
     seen = Counter(name for number in range(250) for name in drawn(5, number, "single")["effects"])
     assert set(seen) == set(CATALOGUED)
@@ -36,6 +37,7 @@ def test_all_effects_of_the_kind_are_drawn() -> None:
     assert not set(UNKNOWN) & set(EFFECTS)
 
 
+@pytest.mark.slow
 def test_draws_are_campaigns_within_the_tables_and_their_truth_says_what_shows() -> None:
     shows = []
     for number in range(24):

@@ -140,6 +140,7 @@ def test_line_noise_and_coherence_are_as_described() -> None:
     assert np.sqrt(stated) * size == pytest.approx(expected, rel=0.15)
 
 
+@pytest.mark.slow
 def test_d33_comes_back_within_the_stated_uncertainty() -> None:
     runs = 200 if SOAK else 40
     table = underskin.load_table()
@@ -210,6 +211,7 @@ def test_examples_run(example: Path, tmp_path: Path) -> None:
     assert (tmp_path / "recordings.tdms").exists() == bool(raw)
 
 
+@pytest.mark.slow
 def test_draws_are_campaigns_with_their_truth_beside_them(tmp_path: Path) -> None:
     arguments = ["draw", "--output-dir", str(tmp_path), "--count", "6", "--seed", "4", "--what", "pair"]
     assert CliRunner().invoke(command, arguments).exit_code == 0

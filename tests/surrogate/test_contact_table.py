@@ -26,6 +26,7 @@ TABLE = ContactInterpolation(tables_folder() / "contact.h5")
 RHO = [0.2, 0.6, 1.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("radius", "load"), [(0.5, 0.1), (1.6, 0.01), (1.6, 0.1), (4.0, 0.05)])
 def test_an_independent_code_finds_the_same_contact(radius: float, load: float) -> None:
     """FElupe at the table's indentation: the force (3 G = E), the contact radius to its mesh, and the stress."""
@@ -36,6 +37,7 @@ def test_an_independent_code_finds_the_same_contact(radius: float, load: float) 
     assert TABLE.stress(radius, load, RHO).sigma == pytest.approx(sigma, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("a", "radius"), [(0.06, 0.7), (0.47, 1.3), (0.9, 5.3)])
 def test_fresh_solves_agree_within_the_reported_error(a: float, radius: float) -> None:
     (sphere,) = press_spheres(a, np.array([radius]), np.array(RHO), 5)

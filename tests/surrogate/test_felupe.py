@@ -17,6 +17,7 @@ POINTS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("a", "rho", "load"), POINTS)
 def test_tables_agree_with_an_independent_code(a: float, rho: float, load: float) -> None:
     (independent,) = felupe_layer.sigma(a, [rho], load)

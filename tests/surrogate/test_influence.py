@@ -61,6 +61,7 @@ def test_point_forces_equal_the_oracle(quantity: str) -> None:
     assert_accurate(np.array(found), np.array(exact))
 
 
+@pytest.mark.slow
 @NEEDS_ORACLE
 def test_the_hertz_pressure_beside_the_sensor_equals_the_oracle() -> None:
     found, exact = [], []
@@ -99,6 +100,7 @@ def test_reported_errors_are_small() -> None:
     assert np.median(errors) < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("poisson_ratio", "slip"), [(0.5, 0.0), (0.5, 1.0), (0.35, 0.2)])
 def test_the_elements_converge_to_the_exact_layer(poisson_ratio: float, slip: float) -> None:
     rho, r = np.array([0.1, 0.6, 2.0]), np.linspace(0, 6, 13)
@@ -198,6 +200,7 @@ def test_another_table_is_refused() -> None:
         InfluenceTable(tables_folder() / "sigma.h5")
 
 
+@pytest.mark.slow
 def test_a_small_sweep_writes_a_table(tmp_path: Path) -> None:
     path, r = tmp_path / "influence.h5", 6 * np.linspace(0, 1, 33) ** 1.5
     axes = (np.linspace(0.44, 0.5, 7), (0.5 - 0.5 * np.cos(np.pi * np.linspace(0, 1, 7))), np.linspace(0, 1, 9), r)

@@ -46,6 +46,7 @@ def test_point_load_knows_no_finite_strain() -> None:
     assert TABLE.sigma(0.0, 0.6, 0.1).sigma == pytest.approx(linear_layer.sigma(0.0, 0.6), rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", range(50 if SOAK else 5))
 def test_fresh_solves_on_a_finer_mesh_agree_within_the_reported_error(number: int) -> None:
     generator = np.random.default_rng([50, number])

@@ -25,6 +25,7 @@ def hertz_ratios(sphere: SphereSolution, a: float) -> list[float]:
     return [sphere.force / hertz, sphere.indentation * sphere.radius / a**2, sphere.stiffness / (8 * a)]
 
 
+@pytest.mark.slow
 @NEEDS_ORACLE
 @pytest.mark.parametrize("a", [0.05, 0.3, 1.0, 2.0])
 def test_the_small_load_limit_is_the_exact_linear_contact(a: float) -> None:
@@ -36,6 +37,7 @@ def test_the_small_load_limit_is_the_exact_linear_contact(a: float) -> None:
     assert 2 * first - second == pytest.approx(exact, rel=2e-4)
 
 
+@pytest.mark.slow
 def test_stress_under_a_small_contact_is_the_exact_layers() -> None:
     """For a/h → 0 the pressure is Hertz's, and its increment that of a flat punch: a point force for the sensors."""
     (sphere,) = press_spheres(0.02, np.array([20.0]), RHO, 5)
@@ -43,6 +45,7 @@ def test_stress_under_a_small_contact_is_the_exact_layers() -> None:
     assert sphere.sigma_increment == pytest.approx(linear_layer.gamma_n(0.0, RHO), rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("a", "radius"), [(0.1, 0.25), (1.0, 3.0)])
 def test_contact_conditions_hold(a: float, radius: float) -> None:
     """On the sphere inside the edge, off it outside, pressure throughout, volume kept, and the base bears it all."""
@@ -68,6 +71,7 @@ def test_contact_conditions_hold(a: float, radius: float) -> None:
     assert layer.volume_change(now.state) < 1e-6
 
 
+@pytest.mark.slow
 def test_increments_are_the_slopes_over_neighbours_whose_edges_differ() -> None:
     """One sphere at contact edges of 0.85 to 1.15, each on its own mesh: dF/dδ and d(Fσ)/dF at fixed R."""
     edges = np.linspace(0.85, 1.15, 7)
@@ -83,11 +87,13 @@ def test_increments_are_the_slopes_over_neighbours_whose_edges_differ() -> None:
     assert middle.sigma_increment == pytest.approx(gained, rel=3e-4)
 
 
+@pytest.mark.slow
 def test_orders_agree() -> None:
     fine, coarse = (press_spheres(0.5, np.array([2.0]), RHO, order)[0].over_hertz() for order in (5, 4))
     assert coarse == pytest.approx(fine, rel=3e-4)
 
 
+@pytest.mark.slow
 def test_a_sphere_out_of_reach_names_the_point() -> None:
     with pytest.raises(SolverError, match=r"contact edge 1 h, R = "):
         press_spheres(1.0, np.array([4.0, 0.3]), RHO, 3)

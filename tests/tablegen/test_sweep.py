@@ -48,6 +48,7 @@ def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_killed_at_any_moment_it_resumes_to_the_same_table(uninterrupted: Path, tmp_path: Path) -> None:
     script = tmp_path / "make.py"
     script.write_text(SCRIPT)
@@ -72,6 +73,7 @@ def test_killed_at_any_moment_it_resumes_to_the_same_table(uninterrupted: Path, 
     assert datasets(path) == datasets(uninterrupted)
 
 
+@pytest.mark.slow
 def test_a_dask_cluster_gives_the_same_table(uninterrupted: Path, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="the cluster extra is not installed")
     with distributed.LocalCluster(
@@ -89,6 +91,7 @@ def succeed() -> dict[str, np.ndarray]:
     return {"value": np.ones(1)}
 
 
+@pytest.mark.slow
 def test_a_failed_piece_stops_the_sweep_and_keeps_the_others(tmp_path: Path) -> None:
     with pytest.raises(SolverError, match=r"a/h = 1, L = 0\.1"):
         run_pieces({"good": succeed, "bad": fail}, tmp_path)
@@ -96,6 +99,7 @@ def test_a_failed_piece_stops_the_sweep_and_keeps_the_others(tmp_path: Path) -> 
     assert run_pieces({"good": succeed}, tmp_path)["good"]["value"] == [1.0]
 
 
+@pytest.mark.slow
 def test_no_table_is_written_when_a_point_fails(tmp_path: Path) -> None:
     hopeless = Nodes(a=np.array([0.0, 3.0]), rho=SMALL.rho, cbrt_load=np.array([0.0, 8.0]), r=SMALL.r)
     with pytest.raises(SolverError, match="a/h"):

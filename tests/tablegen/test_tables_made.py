@@ -26,6 +26,7 @@ def test_the_sources_on_record_are_these(name: str, maker: ModuleType) -> None:
     assert sources_hash(maker.SOURCES) in on_record, "run `make tables`"
 
 
+@pytest.mark.slow
 def test_sigma_solved_anew() -> None:
     nodes = sigma_table.DEFAULT_NODES
     with h5py.File(tables_folder() / "sigma.h5") as file:
@@ -38,6 +39,7 @@ def test_sigma_solved_anew() -> None:
         assert np.abs(column["linear_error"] / kept[number][:, 0] - linear_error[number]).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_influence_solved_anew() -> None:
     axes = influence_table.DEFAULT_AXES
     with h5py.File(tables_folder() / "influence.h5") as file:
@@ -50,6 +52,7 @@ def test_influence_solved_anew() -> None:
         assert np.abs(solved["tangential"] - tangential[i, j]).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_contact_solved_anew() -> None:
     """The table holds a spline through the solved edges, at other spheres: within its own error."""
     table = ContactInterpolation(tables_folder() / "contact.h5")

@@ -64,6 +64,7 @@ def test_what_is_wrong_is_said_on_the_page(server: Server, query: dict[str, str]
     assert told in answer.text
 
 
+@pytest.mark.slow
 def test_d33_by_the_adopted_model_stands_beside_the_paper_s(tmp_path: Path) -> None:
     with running(Place(tmp_path), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
         _, diagnosis_id = diagnosed(server, resonant("monday"), mistuned(), "palm-m")

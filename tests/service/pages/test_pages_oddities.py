@@ -236,6 +236,7 @@ def test_a_band_without_lines_is_refused_by_name(server: Server) -> None:
         assert "band" in answer.text
 
 
+@pytest.mark.slow
 def test_the_example_comes_back_once_all_of_it_was_withdrawn(tmp_path: Path) -> None:
     with (  # a server of its own: withdrawn campaigns stay
         running(Place(tmp_path)) as server,

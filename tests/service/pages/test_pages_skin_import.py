@@ -126,6 +126,7 @@ def _other(_content: bytes) -> bytes:
     return held.getvalue()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoil", "told"),
     [
@@ -156,6 +157,7 @@ def test_an_exported_skin_comes_alone(sender: httpx.Client, export: bytes) -> No
     assert "Put it right in the file" not in shown
 
 
+@pytest.mark.slow
 def test_bringing_a_skin_in_needs_the_session_s_own_form_and_is_done_once(tmp_path: Path, export: bytes) -> None:
     with (
         running(Place(tmp_path / "third")) as server,
@@ -194,6 +196,7 @@ def test_who_may_read_only_brings_no_skin_in(locked: tuple[Server, dict[str, str
         assert SKIN not in [entry["id"] for entry in server.http.get("/v1/skins").json()["skins"]]
 
 
+@pytest.mark.slow
 def test_an_export_beyond_the_limit_is_refused(tmp_path: Path, export: bytes) -> None:
     with (
         running(Place(tmp_path / "small"), UNDERSKIN_MAX_UPLOAD_MB="0.02") as server,

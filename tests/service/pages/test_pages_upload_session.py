@@ -84,6 +84,7 @@ def test_who_may_read_only_uploads_nothing(locked: tuple[Server, dict[str, str]]
         assert "scope read" in answer.text
 
 
+@pytest.mark.slow
 def test_an_upload_beyond_the_limit_is_refused_on_a_page(tmp_path: Path) -> None:
     with (
         running(Place(tmp_path / "small"), UNDERSKIN_MAX_UPLOAD_MB="0.1") as server,
