@@ -24,7 +24,7 @@ serve: $(VENV)/.runtime ## serve on http://127.0.0.1:8000 (PORT=...)
 unit: $(VENV)/.dev ## run the quick tests, without server, browser or database (TESTS=...)
 	$(PYTEST) -m unit --durations 5 $(TESTS)
 
-test: $(VENV)/.dev ## run the tests at reduced counts (TESTS=tests/test_x.py for some of them)
+test: $(VENV)/.dev ## run the tests at reduced counts (TESTS=tests/physics for some of them)
 	@scripts/system-packages.sh $(TEST_PACKAGES)
 	$(PYTEST) $(TESTS)
 

@@ -7,7 +7,7 @@ import numpy as np
 from bench.figures import Figure
 from tablegen import linear_layer
 from tablegen.sigma import Nodes, solve_column
-from tests.oracle import linear_layer_values
+from tests.support.oracle import linear_layer_values
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 FRESH_POINTS = 50

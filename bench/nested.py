@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from bench.diagnosed import Effects, recorded
 from bench.figures import Figure
-from tests.nested_sampling import Posterior, Sampled, nested
+from tests.support.nested_sampling import Posterior, Sampled, nested
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.optimizer import Fitter

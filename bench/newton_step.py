@@ -20,7 +20,7 @@ from tablegen.discretisation import discretise
 from tablegen.faces import hertz_load
 from tablegen.mesh import layer_mesh
 from tablegen.newton import NonlinearLayer
-from tests.felupe_layer import BULK_MODULUS, FelupeLayer, Floats, quadratic_mesh
+from tests.support.felupe_layer import BULK_MODULUS, FelupeLayer, Floats, quadratic_mesh
 
 CONTACT_RADIUS = 0.3
 PEAK_PRESSURE = 0.1

@@ -35,7 +35,7 @@ _SECTIONS = {
 
 _EXPLANATIONS = {
     "accuracy": """Errors are relative. The fresh solves share nothing with the table but the code of the elements; an
-independent finite-element code is compared in `tests/test_felupe.py`.""",
+independent finite-element code is compared in `tests/surrogate/test_felupe.py`.""",
     "batch": "One request of 100,000 rows, the server on one core.",
     "requests": """8 connections, the server on one core and the load on the other, against the `umbridge` package's own
 server and Tesseract Core's runtime, each serving the same spline.""",

@@ -4,7 +4,7 @@ Every pair of Poisson's ratio and slip is solved twice, with elements of order 6
 table holds the former, and their difference is its discretisation error. The interpolation error is measured axis by
 axis: each inner node is left out in turn, and the spline through the others is compared with the value left out. Near
 a node left out the distances of the degree-5 spline are twice as long: the table's own error is a tenth of that or
-less (measured against the exact layer in `tests/test_influence.py`); a quarter is claimed.
+less (measured against the exact layer in `tests/surrogate/test_influence.py`); a quarter is claimed.
 """
 
 import shutil

@@ -1,21 +1,14 @@
-"""A real server process for the tests that talk HTTP, and the markers that say what a test needs."""
+"""The server that most tests over HTTP share, and the markers that say what a test needs."""
 
-import os
 import signal
-import socket
-import subprocess
 import sys
-import time
-from collections.abc import Generator, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Generator, Iterator, Sequence
 from pathlib import Path
 
 import httpx
 import pytest
 
-UNDERSKIN = Path(sys.executable).with_name("underskin")
-_START_LIMIT = 30.0  # s
+from tests.support.server import Server, running
 
 # A shell that runs the tests in the background has them ignore it, and the servers would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -23,7 +16,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Fixtures that start something; a test that uses one, directly or through another, gets the marker.
 _STARTED_BY = {
-    "server": {"server", "servers", "idle", "locked"},
+    "server": {"shared_server", "server", "servers", "idle", "locked"},
     "browser": {"browser"},
     "database": {"cluster"},
 }
@@ -31,69 +24,23 @@ _NO_UNIT = {"server", "browser", "database", "slow", "soak"}
 _unit_test_under_way = ""
 
 
-@dataclass(frozen=True)
-class Server:
-    """A running `underskin serve`."""
-
-    url: str
-    process: subprocess.Popen[bytes]
-    log: Path
-
-
-def free_port() -> int:
-    """A port of the loopback that nobody listens on."""
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return int(listener.getsockname()[1])
-
-
-@contextmanager
-def running(folder: Path, settings: Mapping[str, str] | None = None, *options: str) -> Iterator[Server]:
-    """`underskin serve` with its data and log in `folder`; RuntimeError with its log when it does not start."""
-    port = free_port()
-    log = folder / "server.log"
-    environment = {**os.environ, "UNDERSKIN_DATA": str(folder / "data"), **dict(settings or {})}
-    with log.open("wb") as errors:
-        process = subprocess.Popen(
-            [UNDERSKIN, "serve", "--port", str(port), *options], env=environment, stdout=errors, stderr=errors
-        )
-    try:
-        url = f"http://127.0.0.1:{port}"
-        _await_ready(url, process, log)
-        yield Server(url, process, log)
-    finally:
-        process.terminate()
-        process.wait(20)
-
-
-def _await_ready(url: str, process: subprocess.Popen[bytes], log: Path) -> None:
-    end = time.monotonic() + _START_LIMIT
-    while time.monotonic() < end and process.poll() is None:
-        try:
-            if httpx.get(f"{url}/ready").status_code == 200:
-                return
-        except httpx.TransportError:
-            time.sleep(0.05)
-    raise RuntimeError(f"the server did not start: {log.read_text()[-2000:]}")
-
-
 @pytest.fixture(scope="session")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+def shared_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """One server for all tests that change nothing on it."""
     with running(tmp_path_factory.mktemp("server")) as started:
         yield started
 
 
 @pytest.fixture(scope="session")
-def server_url(server: Server) -> str:
+def server_url(shared_server: Server) -> str:
     """Its address."""
-    return server.url
+    return shared_server.url
 
 
 @pytest.fixture(scope="session")
-def http(server: Server) -> Iterator[httpx.Client]:
+def http(shared_server: Server) -> Iterator[httpx.Client]:
     """A client of it."""
-    with httpx.Client(base_url=server.url, timeout=60) as client:
+    with httpx.Client(base_url=shared_server.url, timeout=60) as client:
         yield client
 
 

@@ -10,9 +10,9 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.conftest import UNDERSKIN, Server, running
-from tests.pages.test_pages_security import BROWSING, token_of
-from tests.store.server import campaign
+from tests.service.pages.test_pages_security import BROWSING, token_of
+from tests.support.server import UNDERSKIN, Server, running
+from tests.support.store_server import campaign
 from underskin.recordings.campaign import parse
 from underskin.recordings.plausibility import implausible
 
@@ -85,6 +85,7 @@ def underskin(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str
     return subprocess.run([UNDERSKIN, *arguments], cwd=folder, capture_output=True, text=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("document", "told"), [(BOTH, [YEAR, PLACE]), (COMPRESSION, [YEAR])])
 def test_d33_of_a_file_tells_them(document: dict[str, Any], told: list[str], tmp_path: Path) -> None:
     (tmp_path / "monday.json").write_text(json.dumps(document))
@@ -92,6 +93,7 @@ def test_d33_of_a_file_tells_them(document: dict[str, Any], told: list[str], tmp
     assert [line for line in found.stdout.splitlines() if "look at" in line] == [f"look at: {said}" for said in told]
 
 
+@pytest.mark.slow
 def test_a_diagnosis_tells_them_once(tmp_path: Path) -> None:
     (tmp_path / "monday.json").write_text(json.dumps(BOTH))
     underskin(tmp_path, "diagnose", "monday.json", "--output-dir", "reports")
@@ -115,6 +117,7 @@ def own_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield started
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("document", "told"), [(BOTH, [YEAR, PLACE]), (COMPRESSION, [YEAR]), (recorded(), [])])
 def test_the_service_tells_them_of_what_comes_in(document: dict[str, Any], told: list[str], own_server: Server) -> None:
     with httpx.Client(base_url=own_server.url, timeout=60) as http:
@@ -132,6 +135,7 @@ def test_import_tells_them(own_server: Server, tmp_path: Path) -> None:
     assert told == [f"import.json: look at: {said}" for said in (YEAR, PLACE)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("document", "told"), [(BOTH, [YEAR, PLACE]), (COMPRESSION, [YEAR])])
 def test_the_upload_page_tells_them_before_anything_is_kept(
     document: dict[str, Any], told: list[str], own_server: Server

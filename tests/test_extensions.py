@@ -13,6 +13,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from tests.support.repository import ROOT
 from underskin import ExtensionError, FileError, InvalidInput, extensions
 from underskin.mechanisms import CATALOGUE, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.autodiff import Differentiated
@@ -26,7 +27,7 @@ from underskin.mechanisms.registry import GROUP, built_in
 from underskin.recordings.conditions import Conditions
 from underskin.recordings.readers import formats
 
-EXAMPLE = Path(__file__).parent.parent / "examples" / "lab-skin"
+EXAMPLE = ROOT / "examples" / "lab-skin"
 
 
 class LowPass(Mechanism):
@@ -154,7 +155,7 @@ def test_charges_of_several_mechanisms_add_their_variances() -> None:
 
 
 def test_the_page_lists_all_that_a_mechanism_may_state() -> None:
-    page = (EXAMPLE.parent.parent / "docs" / "extending.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
     traits = [name for name in vars(Mechanism)["__annotations__"] if not name.startswith("_")]
     for name in (*UNITS, *AXES, *NEEDED_FIELDS, *Stage.__members__, *traits, *get_args(ActsOn), *get_args(Kind)):
         assert f"`{name}`" in page, name
@@ -284,8 +285,8 @@ def test_what_a_reader_of_another_package_answers_is_checked(answer: str, reason
 USE = """
 import numpy as np
 from docs.mechanisms.signatures import panels
-from tests.mechanism_campaigns import frf_campaign, table
-from tests.test_adopted import D33, recorded, report
+from tests.support.mechanism_campaigns import frf_campaign, table
+from tests.prediction.test_adopted import D33, recorded, report
 from underskin.mechanisms import CATALOGUE, compose
 from underskin.parallel import processes
 from underskin.prediction.adopted_model import adopted
@@ -318,7 +319,7 @@ def test_one_of_another_package_is_composed_drawn_adopted_and_found_by_worker_pr
     entry = f"[{GROUP}]\namplifier_low_pass = lab_skin.mechanisms:AmplifierLowPass\n"
     (site / "lab_skin-1.0.dist-info" / "entry_points.txt").write_text(entry)
     (tmp_path / "use.py").write_text(USE, encoding="utf-8")
-    path = [str(site), str(EXAMPLE.parent.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    path = [str(site), str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(path)}
     command = [sys.executable, str(tmp_path / "use.py")]
     answer = subprocess.run(command, env=environment, capture_output=True, text=True)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.diagnosis_campaigns import Made, campaign
+from tests.support.diagnosis_campaigns import Made, campaign
 from underskin.recordings.campaign import to_dict
 from underskin.surrogate.sigma_table import load_table
 
@@ -82,6 +82,7 @@ def awaited(what: Callable[[], bool]) -> bool:
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "number"),
     [
@@ -106,6 +107,7 @@ def test_workers_end_with_what_started_them(
             parent.kill()
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_takes_no_campaign_with_it(files: list[Path], tmp_path: Path) -> None:
     with subprocess.Popen(diagnosing_in_two(files, tmp_path), stderr=subprocess.PIPE, text=True) as parent:
         assert awaited(lambda: len(workers_of(parent.pid)) == 2)
@@ -115,6 +117,7 @@ def test_a_worker_that_is_killed_takes_no_campaign_with_it(files: list[Path], tm
     assert sorted(file.name for file in tmp_path.iterdir()) == [file.name for file in files]
 
 
+@pytest.mark.slow
 def test_reports_are_the_same_bytes_whatever_the_number_of_processes_and_threads(
     files: list[Path], tmp_path: Path
 ) -> None:

@@ -12,12 +12,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.store.server import UNDERSKIN
+from tests.support.repository import ROOT
+from tests.support.store_server import UNDERSKIN
 from underskin.errors import FileError
 from underskin.recordings import read_file, rig_description
 from underskin.recordings.readers.repeated_keys import RepeatedKey, repeated_key
 
-EXAMPLES = Path(__file__).parents[1] / "examples" / "formats"
+EXAMPLES = ROOT / "examples" / "formats"
 CAMPAIGN = (EXAMPLES / "template.json").read_text()
 TWICE = CAMPAIGN.replace('"thickness_mm"', '"thickness_mm": 5,\n "thickness_mm"', 1)
 
@@ -60,6 +61,7 @@ def has_repeated(text: str) -> bool:
     return any(repeated)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(DOCUMENTS, st.sampled_from(["", " ", "\n\t "]), st.booleans(), st.sampled_from(["utf-8", "utf-8-sig", "utf-16"]))
 def test_a_repeated_key_is_seen_wherever_it_is(document: Any, blank: str, ascii_only: bool, encoding: str) -> None:
@@ -136,6 +138,7 @@ def test_a_problem_says_what_comes_twice(http: httpx.Client) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_the_command_line_names_file_line_and_column(tmp_path: Path) -> None:
     (tmp_path / "monday.json").write_text(TWICE)
     found = subprocess.run([UNDERSKIN, "d33", "monday.json"], cwd=tmp_path, capture_output=True, text=True)

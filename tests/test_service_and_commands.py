@@ -10,7 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.conftest import UNDERSKIN, Server, running
+from tests.support.server import UNDERSKIN, Server, running
 
 SKIN = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16.0, "sensor_radius_mm": 1.5, "indenter_radius_mm": 4.0}
 FRF = {**SKIN, "preload_n": 1.0, "d33_pc_per_n": 14.0}

@@ -11,7 +11,8 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from tests.packaging.fresh_environment import ROOT, required
+from tests.packaging.fresh_environment import required
+from tests.support.repository import ROOT
 
 DOCUMENT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 PROJECT: dict[str, Any] = DOCUMENT["project"]

@@ -11,7 +11,10 @@ from typing import Any
 
 import pytest
 
-from tests.packaging.fresh_environment import ROOT, Environment, build_wheel, new_environment, required
+from tests.packaging.fresh_environment import Environment, build_wheel, new_environment, required
+from tests.support.repository import ROOT
+
+pytestmark = pytest.mark.slow  # they build the wheel and its environment
 
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 CAMPAIGN = ROOT / "examples" / "campaigns" / "2017-06.csv"

@@ -13,7 +13,7 @@ from underskin.units import Floats
 
 # The integral is done anew for each row, at a cost that grows with a/h and rT/h.
 DOMAIN_END = 10.0
-# Of the quadrature against one on twice as many panels, over that domain (tests/test_service_sigma.py).
+# Of the quadrature against one on twice as many panels, over that domain (tests/service/routes/test_service_sigma.py).
 REL_ERROR = 1e-10
 
 

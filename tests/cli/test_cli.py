@@ -1,0 +1,215 @@
+"""The command line as a user runs it: what it prints, computes, and says when something is wrong."""
+
+import csv
+import io
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import underskin
+from underskin import Client
+
+COMMAND = Path(sys.executable).with_name("underskin")
+PRESSED: dict[str, Any] = {
+    "thickness_mm": 2.5,
+    "youngs_modulus_mpa": 16.0,
+    "sensor_radius_mm": 1.5,
+    "indenter_radius_mm": 4.0,
+}
+SKIN = [part for name, value in PRESSED.items() for part in ("--" + name.replace("_", "-"), str(value))]
+FRF = ["frf", *SKIN, "--d33-pc-per-n", "14"]
+
+
+def run(*arguments: str, given: str | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
+    """The command's result; `given` is its standard input."""
+    plain = {**os.environ, "COLUMNS": "120", **environment}
+    return subprocess.run([COMMAND, *arguments], input=given, env=plain, capture_output=True, text=True)
+
+
+def columns(*arguments: str, given: str | None = None) -> dict[str, list[str]]:
+    """The columns that a command writes with --csv."""
+    answer = run(*arguments, "--csv", given=given)
+    assert (answer.returncode, answer.stderr) == (0, "")
+    header, *rows = csv.reader(io.StringIO(answer.stdout))
+    return {name: list(cells) for name, cells in zip(header, zip(*rows, strict=True), strict=True)}
+
+
+def numbers(cells: list[str]) -> list[float]:
+    return [float(cell) for cell in cells]
+
+
+def refused(*arguments: str, given: str | None = None, **environment: str) -> str:
+    """The one line on stderr of a command that ends with status 2."""
+    answer = run(*arguments, given=given, **environment)
+    assert (answer.returncode, answer.stdout) == (2, "")
+    (line,) = answer.stderr.splitlines()
+    return line
+
+
+def test_frf_agrees_with_the_service(server_url: str) -> None:
+    preload = [0.5, 1.0, 3.0, 300.0]
+    written = columns(*FRF, "--preload-n", "0.5,1", "--preload-n", "3,300")
+    with Client(server_url) as client:
+        answer = client.frf(**PRESSED, preload_n=preload, d33_pc_per_n=14.0)
+    assert numbers(written["preload_n"]) == preload
+    for name in ("contact_radius_mm", "a_over_h", "load_parameter", "sigma", "rel_error", "mean_stress_mpa"):
+        assert numbers(written[name]) == pytest.approx(getattr(answer, name), rel=1e-12, nan_ok=True)
+    assert numbers(written["frf_pc_per_n"]) == pytest.approx(answer.frf_pc_per_n, rel=1e-12, nan_ok=True)
+    assert written["status"] == answer.status.tolist() == ["ok", "ok", "ok", "out_of_domain"]
+
+
+@pytest.mark.slow
+def test_a_d33_that_no_sensor_has_is_answered_and_named() -> None:
+    for frf, said in (("7400", "more than sensors have"), ("0.0074", "less than sensors have"), ("-7.4", "negative")):
+        found = run("d33", *SKIN, "--preload-n", "1", "--frf-pc-per-n", frf)
+        assert found.returncode == 0
+        assert f"look at d33_pc_per_n: d33 is {float(frf) * 1.8932:.3g} pC/N, {said}" in found.stderr
+
+
+@pytest.mark.slow
+def test_d33_takes_back_what_frf_gave_through_csv() -> None:
+    frf = columns(*FRF, "--preload-n", "1,3")["frf_pc_per_n"]
+    table = f"preload_n,frf_pc_per_n\n1,{frf[0]}\n\n3,{frf[1]}\n"
+    back = columns("d33", *SKIN, "--input", "-", "--frf-uncertainty-pc-per-n", "0.074", given=table)
+    assert numbers(back["d33_pc_per_n"]) == pytest.approx([14, 14], rel=1e-12)
+    expected = 0.074 * 14 / np.array(numbers(frf))
+    assert numbers(back["d33_uncertainty_pc_per_n"]) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_sigma_of_both_models() -> None:
+    layer = columns("sigma", "--a-over-h", "0.3,4", "--rt-over-h", "0.6", "--load-parameter", "0.01")
+    expected = underskin.load_table().sigma(0.3, 0.6, 0.01)
+    assert float(layer["sigma"][0]) == pytest.approx(float(expected.sigma), rel=1e-15)
+    assert (layer["sigma"][1], layer["status"][1]) == ("NaN", "out_of_domain")
+    half_space = columns("sigma", "--a-over-h", "2,20", "--rt-over-h", "0", "--model", "half_space")
+    assert float(half_space["sigma"][0]) == pytest.approx(0.2, rel=1e-9)
+    assert half_space["status"] == ["ok", "out_of_domain"]
+
+
+@pytest.mark.slow
+def test_table_shows_units_and_what_a_status_means() -> None:
+    shown = run(*FRF, "--preload-n", "1,300").stdout
+    for text in ("thickness h", "2.5", "mm", "16", "MPa", "7.3958", "pC/N", "out_of_domain"):
+        assert text in shown
+    assert "The domain is a/h 0 to 3" in shown
+    assert run(*FRF, "--preload-n", "1").stdout.split()[-2:] == ["status", "ok"]
+
+
+@pytest.mark.slow
+def test_csv_file_written_by_a_spreadsheet(tmp_path: Path) -> None:
+    sheet = tmp_path / "measured.csv"
+    sheet.write_bytes("\ufeffpreload_n , frf_pc_per_n\r\n1,7.4\r\n3,11.5\r\n".encode())
+    assert len(columns("d33", *SKIN, "--input", str(sheet))["d33_pc_per_n"]) == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ([*FRF, "--preload-n", "1,-1"], "preload_n[1] = -1.0: must be finite and greater than 0 (N)"),
+        ([*FRF, "--preload-n", "1,x"], "preload_n[1] = 'x': must be a number"),
+        ([*FRF, "--preload-n", ""], "preload_n = '': must be a number"),
+        (FRF, "preload_n is missing: give --preload-n, or a column preload_n in the CSV file of --input"),
+        ([*FRF, "--preload-n", "1", "--poisson-ratio", "0.6"], "poisson_ratio = 0.6: must be 0 to 0.5"),
+        (
+            ["frf", "--thickness-mm", "2500", *SKIN[2:], "--d33-pc-per-n", "14", "--preload-n", "1"],
+            "was it given in µm?",
+        ),
+        (
+            ["sigma", "--a-over-h", "1,2", "--rt-over-h", "1,2,3"],
+            "rt_over_h = '3 rows': must have as many rows as a_over_h",
+        ),
+        (["sigma", "--a-over-h", "-1", "--rt-over-h", "1"], "a_over_h = -1.0: must be finite and at least 0"),
+        (["d33", *SKIN, "--preload-n", "1", "--frf-pc-per-n", "nan"], "frf_pc_per_n = nan: must be finite"),
+        (["sigma", "--input", "nowhere.csv"], "input = 'nowhere.csv': must be a readable CSV file (No such file"),
+        (["sigma", "--model", "jelly", "--a-over-h", "1"], "'jelly' is not one of"),
+        (["sigma", "--a-over-h", "1", "--b-over-h", "1"], "No such option: --b-over-h"),
+        (["guess"], "No such command 'guess'"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(arguments: list[str], says: str) -> None:
+    line = refused(*arguments)
+    assert line.startswith("underskin: ")
+    assert says in line
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "must have a header of field names and at least one row"),
+        ("preload_n,frf_pc_per_n\n", "at least one row"),
+        ("preload_n;frf_pc_per_n\n1;7\n", "must separate cells by commas"),
+        ("preload_n,preload_n\n1,7\n", "has the column 'preload_n'; allowed, once each"),
+        ("preload_n,frf_pc_per_n\n1,7\n1\n", "has 1 cells in row 1, but 2 in the header"),
+        ("preload_n,frf_pc_per_n\n1,7\n3,-\n", "frf_pc_per_n[1] = '-': must be a number"),
+        ("preload_n,thickness_mm,frf_pc_per_n\n1,1,7\n", "thickness_mm = '2.5': is also a column of -; give it once"),
+        ('preload_n,frf_pc_per_n\n"1,7\n', "must be a readable CSV file"),
+    ],
+)
+def test_bad_csv_is_one_line_and_status_2(text: str, says: str) -> None:
+    assert says in refused("d33", *SKIN, "--input", "-", given=text)
+
+
+@pytest.mark.slow
+def test_missing_table_says_what_to_do(tmp_path: Path) -> None:
+    line = refused(*FRF, "--preload-n", "1", UNDERSKIN_TABLES=str(tmp_path))
+    assert "sigma.h5 cannot be read: No such file or directory. Restore it" in line
+
+
+def test_help_lists_all_commands_without_loading_them() -> None:
+    report = run("--help", PYTHONPROFILEIMPORTTIME="1")
+    for command in ("sigma", "frf", "d33", "serve", "key", "tablegen"):
+        assert command in report.stdout
+    assert "Serve σ, FRF and d33 over HTTP." in report.stdout
+    loaded = {line.rpartition("|")[2].strip() for line in report.stderr.splitlines()}
+    assert "underskin.cli" in loaded
+    assert loaded.isdisjoint({"numpy", "scipy", "fastapi", "skfem", "httpx", "service.cli", "tablegen.commands"})
+
+
+def test_units_stand_in_the_help() -> None:
+    shown = run("frf", "--help").stdout
+    for unit in ("[mm]", "[MPa]", "[N]", "[pC/N]"):
+        assert unit in shown
+
+
+@pytest.mark.slow
+def test_commands_of_other_packages_get_their_arguments(tmp_path: Path) -> None:
+    made = run("key", "create", "bench-1", UNDERSKIN_DATA=str(tmp_path))
+    assert (made.returncode, made.stderr) == (0, "")
+    assert "bench-1" in run("key", "list", UNDERSKIN_DATA=str(tmp_path)).stdout
+    assert "--port" in run("serve", "--help").stdout
+    assert "Invalid value for '--port'" in refused("serve", "--port", "seven")
+
+
+def test_terminal_without_greek_letters() -> None:
+    answer = run("sigma", "--a-over-h", "0.3", "--rt-over-h", "0.6", PYTHONIOENCODING="ascii")
+    assert (answer.returncode, answer.stderr) == (0, "")
+    assert "0.93651" in answer.stdout
+
+
+def test_reader_that_goes_away() -> None:
+    """As `underskin … | head` does."""
+    many = ",".join(["1"] * 20_000)
+    command = [str(COMMAND), *FRF, "--preload-n", many, "--csv"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.readline()
+        process.stdout.close()
+        assert process.stderr.read() == b""
+
+
+def test_python_m() -> None:
+    shown = subprocess.run(
+        [sys.executable, "-m", "underskin", "sigma", "--a-over-h", "0.3", "--rt-over-h", "0.6"],
+        capture_output=True,
+        text=True,
+    )
+    assert "0.93651" in shown.stdout

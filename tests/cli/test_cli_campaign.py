@@ -1,0 +1,218 @@
+"""`underskin d33 FILE...` as a user runs it on campaigns, instrument files, and files that cannot be read."""
+
+import csv
+import io
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.cli.test_cli import FRF, SKIN, refused, run
+from tests.support.instrument_files import EXAMPLES
+from tests.support.simulated_campaign import Rig, simulate
+from underskin import load_table
+from underskin.inversion.invert import invert
+from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording
+from underskin.recordings.readers import json_file
+from underskin.units import to_lab
+
+CURVE = "Compression (mm),Load (N)\n" + "".join(f"{0.1 * step:.1f},{0.4 * step:.2f}\n" for step in range(40))
+
+
+@pytest.fixture(scope="module")
+def palm() -> Campaign:
+    """An array in which one sensor is weak."""
+    random = np.random.default_rng(5)
+    d33 = np.append(14 * np.exp(random.normal(0, 0.02, 5)), 4.0)  # pC/N
+    rig = Rig(d33, preloads_n=(0.5, 1.0, 2.0), frequency_hz=np.geomspace(5, 130, 12))
+    campaign = simulate(load_table(), rig, random)
+    return replace(campaign, name="palm")
+
+
+@pytest.fixture
+def file(palm: Campaign, tmp_path: Path) -> Path:
+    path = tmp_path / "palm.json"
+    path.write_bytes(json_file.write(palm))
+    return path
+
+
+@pytest.mark.slow
+def test_csv_has_the_inversions_numbers(palm: Campaign, file: Path) -> None:
+    found = invert(palm, load_table())
+    answer = run("d33", str(file), "--csv")
+    assert answer.returncode == 0
+    array, *others = csv.DictReader(io.StringIO(answer.stdout))
+    sensors, cells = others[:6], others[6:]
+    assert found.campaign_d33 is not None
+    assert (array["level"], array["sensor"]) == ("array", "")
+    for name in ("value", "uncertainty", "low", "high"):
+        column = "d33_pc_per_n" if name == "value" else f"d33_{name}_pc_per_n"
+        assert float(array[column]) == pytest.approx(to_lab("d33_pc_per_n", getattr(found.campaign_d33, name)), 1e-12)
+        assert [float(row[column]) for row in sensors] == pytest.approx(
+            to_lab("d33_pc_per_n", getattr(found.sensors, name)), rel=1e-12
+        )
+        assert [float(row[column]) for row in cells] == pytest.approx(
+            to_lab("d33_pc_per_n", getattr(found.cells.d33, name)), rel=1e-12
+        )
+    assert {row["level"] for row in sensors} == {"sensor"}
+    assert [row["flags"] for row in sensors] == [*5 * [""], "weak"]
+    keys = {(row["sensor"], float(row["indenter_radius_mm"]), float(row["preload_n"])) for row in cells}
+    assert keys == {(f"s{n}", radius, preload) for n in range(6) for radius in (4, 10) for preload in (0.5, 1, 2)}
+    assert {row["recordings"] for row in cells} == {"1"}
+    assert "left out: sensor s5: weak" in answer.stderr
+
+
+@pytest.mark.slow
+def test_the_table_shows_array_sensors_band_and_what_is_left_out(palm: Campaign, file: Path) -> None:
+    shown = run("d33", str(file)).stdout
+    found = invert(palm, load_table())
+    assert found.campaign_d33 is not None
+    value, low, high = (
+        float(to_lab("d33_pc_per_n", getattr(found.campaign_d33, name))) for name in ("value", "low", "high")
+    )
+    assert f"palm ({file})" in shown
+    assert re.search(rf"d33 of the array +{value:.4g} ± \S+ pC/N \(95 %: {low:.4g} to {high:.4g}\)", shown)
+    assert re.search(r"band +5 to 130 Hz: no resonance in any recording; it is the whole recorded range", shown)
+    assert re.search(r"s5 .* weak: 2\d % of the array's d33", shown)
+    assert "left out: sensor s5: weak" in shown
+    assert "look at" not in shown
+
+
+@pytest.mark.slow
+def test_a_band_of_ones_own(file: Path) -> None:
+    assert "20 to 80 Hz, as asked" in run("d33", str(file), "--band", "20,80").stdout
+    answer = run("d33", str(file), "--band", "500,600")
+    assert answer.returncode == 2
+    assert "no d33: band_hz" in answer.stdout
+
+
+@pytest.mark.slow
+def test_unreadable_files_and_recordings_are_named_and_the_others_inverted(palm: Campaign, tmp_path: Path) -> None:
+    document = json.loads(json_file.write(palm))
+    document["recordings"][3]["preload_n"] = -1
+    (tmp_path / "one.json").write_text(json.dumps(document))
+    (tmp_path / "cut.json").write_text(json.dumps(document)[:100])
+    document["skin"]["thickness_mm"] = 0.0025
+    (tmp_path / "slip.json").write_text(json.dumps(document))
+    (tmp_path / "good.json").write_bytes(json_file.write(palm))
+    names = [str(tmp_path / name) for name in ("cut.json", "slip.json", "one.json", "nowhere.json", "good.json")]
+    answer = run("d33", *names)
+    assert answer.returncode == 2
+    errors = answer.stderr.splitlines()
+    assert [line.split(": ")[1] for line in errors] == [names[0], names[1], names[3]]
+    assert "line 1" in errors[0]
+    assert "skin.thickness_mm = 0.0025" in errors[1]
+    assert "No such file" in errors[2]
+    assert answer.stdout.count("d33 of the array") == 2
+    assert "left out: recording r3: preload_n = -1" in answer.stdout
+    assert run("d33", names[2]).returncode == 0
+
+
+@pytest.mark.slow
+def test_a_campaign_that_tells_nothing_says_why(palm: Campaign, tmp_path: Path) -> None:
+    document = json.loads(json_file.write(palm))
+    for recording in document["recordings"]:
+        recording["preload_n"] = 500
+    (tmp_path / "hard.json").write_text(json.dumps(document))
+    answer = run("d33", str(tmp_path / "hard.json"))
+    assert answer.returncode == 2
+    assert "no d33: none of the 36 recordings can be used: recording r0: F = 500 N" in answer.stdout
+    for recording in document["recordings"]:
+        recording["preload_n"] = -1
+    (tmp_path / "refused.json").write_text(json.dumps(document))
+    refused = run("d33", str(tmp_path / "refused.json")).stdout.splitlines()
+    assert refused[1] == f"no d33: none of the {len(document['recordings'])} recordings can be used"
+    assert refused[2].startswith("left out: recording r0: preload_n = -1")
+
+
+@pytest.mark.slow
+def test_instrument_files_need_a_rig_and_tell_the_modulus(tmp_path: Path) -> None:
+    (tmp_path / "block.csv").write_text(CURVE)
+    rig = tmp_path / "rig.yaml"
+    text = (EXAMPLES / "rigs" / "silicone-compression.yaml").read_text()
+    rig.write_text(text.replace("  time_s: {channel: Time (s)}\n", ""))
+    told = run("d33", str(tmp_path / "block.csv"), "--rig", str(rig))
+    assert told.returncode == 0
+    # 4 N/mm on 30 mm of height and 50 mm of diameter
+    modulus = 4 * 30 / (np.pi / 4 * 50**2)
+    assert re.search(rf"block +{modulus:.4g} .* compression: straight from 0 to 13 % strain, and not seen", told.stdout)
+    assert "no d33" not in told.stdout
+    without = run("d33", str(tmp_path / "block.csv"))
+    assert without.returncode == 2
+    assert "a rig description must say what its channels are; it has " in without.stderr
+    assert "Compression (mm)" in without.stderr
+    nowhere = run("d33", str(tmp_path / "block.csv"), "--rig", str(tmp_path / "none.yaml"))
+    assert (nowhere.returncode, "none.yaml: cannot be opened" in nowhere.stderr) == (2, True)
+    rig.write_text(text.replace("rig/1", "rig/9"))
+    wrong = run("d33", str(tmp_path / "block.csv"), "--rig", str(rig))
+    assert (wrong.returncode, wrong.stderr) == (2, f"underskin: {rig}: schema = 'rig/9': must be rig/1\n")
+
+
+@pytest.mark.slow
+def test_d33_and_modulus_of_one_campaign(palm: Campaign, tmp_path: Path) -> None:
+    strain = np.linspace(0, 0.1, 50)
+    area_mm2 = np.pi / 4 * 12.0**2
+    block = CompressionRecording(
+        id="block", sample_height_mm=10.0, sample_diameter_mm=12.0, displacement_mm=10 * strain,
+        force_n=16 * strain * area_mm2,
+    )  # fmt: skip
+    idle = replace(block, id="idle", force_n=0 * strain)
+    (tmp_path / "both.json").write_bytes(json_file.write(replace(palm, recordings=(*palm.recordings, block, idle))))
+    shown = run("d33", str(tmp_path / "both.json"))
+    assert shown.returncode == 0
+    assert "d33 of the array" in shown.stdout
+    assert re.search(r"block +16 ", shown.stdout)
+    assert "left out: recording idle: force_n" in shown.stdout
+
+
+@pytest.mark.slow
+def test_values_in_the_wrong_unit_are_a_finding(palm: Campaign, tmp_path: Path) -> None:
+    def in_coulombs(recording: FrfRecording) -> FrfRecording:
+        assert recording.frf_re_pc_per_n is not None
+        return replace(recording, frf_re_pc_per_n=1e-12 * recording.frf_re_pc_per_n)
+
+    small = tuple(in_coulombs(one) for one in palm.recordings if isinstance(one, FrfRecording))
+    (tmp_path / "small.json").write_bytes(json_file.write(replace(palm, recordings=small)))
+    assert "look at: FRF, median of the recordings: " in run("d33", str(tmp_path / "small.json")).stdout
+
+
+@pytest.mark.slow
+def test_figures_are_pages_that_need_nothing_else(file: Path, tmp_path: Path) -> None:
+    assert run("d33", str(file), "--figures", str(tmp_path / "new" / "figures")).returncode == 0
+    (page,) = (tmp_path / "new" / "figures").iterdir()
+    assert page.name == "palm.json.html"
+    text = page.read_text(encoding="utf-8")
+    assert text.count("plotly.js v") == 1  # the script is inside, once
+    assert re.findall(r"<(?:script|link|img)[^>]+(?:src|href)=", text) == []
+    drawn = [json.loads(figure) for figure in re.findall(r'"figure-\d",\s*(\[\{.*?\}\]),\s*\{', text)]
+    assert [[trace["name"] for trace in traces] for traces in drawn] == [
+        ["sensor", "stands out"],
+        ["4 mm, measured", "4 mm, model", "10 mm, measured", "10 mm, model"],
+        ["sensor", "stands out"],
+    ]
+    assert "left out" in text.lower()
+    assert "sensor s5: weak" in text
+
+
+def test_figures_of_two_files_of_one_name_are_refused(file: Path, tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    other = tmp_path / "other" / "palm.json"
+    other.write_bytes(file.read_bytes())
+    assert "would hold two files' figures" in refused("d33", str(file), str(other), "--figures", str(tmp_path / "f"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["d33", "x.json", *SKIN], "--indenter-radius-mm is for columns; files say it themselves"),
+        (["d33", *SKIN, "--preload-n", "1", "--frf-pc-per-n", "7", "--band", "1,2"], "--band goes with FILE"),
+        (["d33", "x.json", "--band", "100"], "band = '100': must be two frequencies in Hz"),
+        (["d33", "x.json", "--band", "100,10"], "the lower one first"),
+        ([*FRF, "x.json", "--preload-n", "1"], "unexpected extra argument"),
+    ],
+)
+def test_wrong_usage_is_one_line(arguments: list[str], says: str) -> None:
+    assert says in refused(*arguments)

@@ -1,0 +1,296 @@
+"""The report as a page: complete, self-contained, safe whatever a campaign holds, and the same from a cluster."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from tests.support.diagnosis_campaigns import Made, campaign
+from tests.support.mechanism_campaigns import indentation_campaign
+from underskin.cli.app import app
+from underskin.diagnosis.pipeline import diagnose
+from underskin.diagnosis.reporting.figures import figures
+from underskin.diagnosis.reporting.html_report import page
+from underskin.diagnosis.reporting.report import Diagnosis, report
+from underskin.diagnosis.reporting.wording import readable
+from underskin.mechanisms import compose
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, to_dict
+from underskin.surrogate.sigma_table import load_table
+
+HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(2)>&amp;<a href='https://example.org'>x</a>"
+RESONANT = Made(
+    mechanisms=("contact_resonance",), parameters=(6.0, 0.05), highest_hz=1000.0, lines=20, modulus_mpa=16.0, sensors=2
+)
+OFF_CENTRE = Made(("misalignment",), (0.5, 0.4), offsets_mm=(-2.0, 0.0, 2.0))
+CHROMIUM = shutil.which("chromium")
+
+
+class Tags(HTMLParser):
+    """Every tag of a page and its attributes, and the text outside scripts and styles."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_data(self, data: str) -> None:
+        if self.cdata_elem is None:
+            self.text += data
+
+    def count(self, tag: str) -> int:
+        return sum(name == tag for name, _ in self.tags)
+
+
+def hostile() -> Campaign:
+    """A resonant campaign whose every text is markup; one recording's sign is flipped, so that it is named."""
+    whole = campaign(RESONANT, load_table())
+    recordings = []
+    for number, entry in enumerate(whole.recordings):
+        assert isinstance(entry, FrfRecording)
+        assert entry.frf_re_pc_per_n is not None
+        assert entry.frf_im_pc_per_n is not None
+        sign = -1 if number == 3 else 1
+        recordings.append(
+            replace(
+                entry,
+                id=f"{HOSTILE}{number}",
+                sensor=f"{HOSTILE}{entry.sensor}",
+                frf_re_pc_per_n=sign * entry.frf_re_pc_per_n,
+                frf_im_pc_per_n=sign * entry.frf_im_pc_per_n,
+            )
+        )
+    sensors = tuple(replace(sensor, id=f"{HOSTILE}{sensor.id}") for sensor in whole.skin.sensors)
+    return replace(
+        whole, name=f"palm {HOSTILE}", skin=replace(whole.skin, sensors=sensors), recordings=tuple(recordings)
+    )
+
+
+@pytest.fixture(scope="module")
+def found() -> Diagnosis:
+    return diagnose(hostile(), load_table())
+
+
+@pytest.fixture(scope="module")
+def document(found: Diagnosis) -> dict[str, Any]:
+    return report(found)
+
+
+@pytest.fixture(scope="module")
+def text(found: Diagnosis, document: dict[str, Any]) -> str:
+    return page(document, figures(found, document))
+
+
+@pytest.mark.slow
+def test_it_says_all_that_the_report_says(text: str, document: dict[str, Any]) -> None:
+    tags = Tags(text)
+    assert document["verdict"] == "explained"
+    first = "The paper's model lacks contact resonance (probability 98.5 %)"
+    assert tags.text.index(first) < tags.text.index("Where")
+    headings = re.findall(r"<h2>(.*?)</h2>", text)
+    assert headings == [
+        "Where",
+        "What",
+        "How much better",
+        "Look at these recordings",
+        "What to measure next",
+        "Made with",
+    ]
+    wanted = [document["location"]["statement"], *(readable(entry["statement"]) for entry in document["findings"])]
+    wanted += [entry["why_not"] for entry in document["alternatives"]]
+    wanted += [readable(entry["reason"]) for entry in document["not_identifiable"]]
+    wanted += [f"{entry['value']:.4g}" for entry in document["mechanisms"][0]["parameters"]]
+    wanted += [document["provenance"]["tables"]["sigma"], f"{document['fit']['noise_floor_percent']:.3g} %"]
+    wanted += [CATALOGUE["contact_resonance"].plain, "these recordings decide", "stays open"]
+    assert [piece for piece in wanted if piece not in tags.text] == []
+    assert [name for name in CATALOGUE if "_" in name and name in tags.text] == []  # no names of the code
+
+
+def test_markup_in_a_campaign_stays_text(text: str) -> None:
+    tags = Tags(text)
+    assert f"Diagnosis of palm {HOSTILE}" in tags.text
+    assert f"{HOSTILE}3" in tags.text
+    assert tags.count("img") == tags.count("a") == 0
+    assert tags.count("script") == 1 + 4  # plotly's own, and one a figure
+    assert "<script>alert" not in text
+    # In the figures, too, texts reach plotly escaped: it would show <a> and <b> as such.
+    drawn = text[text.index("Plotly.newPlot") :]
+    assert "\\u003ca href" not in drawn
+    assert "\\u0026lt;a href" in drawn or "&lt;a href" in drawn
+
+
+def test_it_needs_nothing_from_outside(text: str) -> None:
+    tags = Tags(text)
+    assert [attributes for tag, attributes in tags.tags if {"src", "href"} & set(attributes)] == []
+    assert tags.count("link") == 0
+    policy = next(a["content"] for tag, a in tags.tags if a.get("http-equiv") == "Content-Security-Policy")
+    assert policy is not None
+    assert policy.startswith("default-src 'none'")
+    assert "http" not in policy
+
+
+@pytest.mark.browser
+@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
+def test_a_browser_draws_every_figure(text: str, tmp_path: Path) -> None:
+    assert CHROMIUM is not None
+    file = tmp_path / "page.html"
+    file.write_text(text, encoding="utf-8")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=10000", "--dump-dom"]
+    drawn = subprocess.run(
+        [CHROMIUM, *options, f"--user-data-dir={tmp_path / 'profile'}", file.as_uri()],
+        capture_output=True, text=True, check=True, timeout=120,
+    ).stdout  # fmt: skip
+    for name in ("where", "before_after", "explanations", "parameters"):
+        part = drawn[drawn.index(f'id="figure-{name}"') :]
+        assert "main-svg" in part[: part.index("</script>")]
+    assert "<img src=x" not in drawn
+
+
+def test_figures_show_the_report_s_numbers(found: Diagnosis, document: dict[str, Any]) -> None:
+    drawn = figures(found, document)
+    bars = drawn["explanations"].data[0]
+    assert next(iter(bars.y)) == "contact resonance"
+    assert list(bars.x) == [document["probability"], *(entry["probability"] for entry in document["alternatives"])]
+    intervals = [trace.x for trace in drawn["parameters"].data if trace.name == "after them, 95 %"]
+    parameters = document["mechanisms"][0]["parameters"]
+    assert [list(ends) for ends in intervals] == [[entry["low"], entry["high"]] for entry in parameters]
+    for prior, ends in zip(
+        (trace.x for trace in drawn["parameters"].data if str(trace.name).startswith("before")), intervals, strict=True
+    ):
+        assert prior[1] - prior[0] > ends[1] - ends[0]
+
+
+def test_after_the_points_lie_within_the_noise_s_band(found: Diagnosis, document: dict[str, Any]) -> None:
+    traces = figures(found, document)["before_after"].data
+    bands = [trace for trace in traces if trace.fill == "toself"]
+    outside = []
+    for band, name in zip(bands, ("before", "after"), strict=True):
+        points = next(trace for trace in traces if trace.name == name)
+        count = len(band.x) // 2
+        high, low = band.y[:count], band.y[count:][::-1]
+        above = points.y > np.interp(points.x, band.x[:count], high)
+        below = points.y < np.interp(points.x, band.x[:count], low)
+        outside.append(float(np.mean(above | below)))
+    before, after = outside
+    assert after < 0.1 < 0.2 < before
+
+
+def test_the_map_shows_where_the_misfit_is(found: Diagnosis, document: dict[str, Any]) -> None:
+    drawn = figures(found, document)["where"]
+    cells, (outline,) = np.abs(np.asarray(drawn.data[0].z, dtype=float)), drawn.layout.shapes
+    inside = cells[:, int(outline.x0 + 0.5) : int(outline.x1 + 0.5)]
+    assert set(document["location"]["region"]) == {"frequency_hz"}
+    assert inside.size < cells.size / 2
+    assert np.nanmean(inside) > 5 * np.nanmean(cells[:, : int(outline.x0 + 0.5)])
+    lowest = float(drawn.layout.xaxis.ticktext[int(outline.x0 + 0.5)])
+    assert lowest == pytest.approx(document["location"]["region"]["frequency_hz"][0], rel=5e-3)
+
+
+def curves() -> Campaign:
+    """A thin layer's indentation."""
+    table, empty = load_table(), indentation_campaign()
+    model = compose(("layered_contact",), empty, table, "indentation")
+    force = model.predict(np.array([entry.start for entry in model.parameters])).value.real
+    random = np.random.default_rng(1)
+    recordings = []
+    for number, entry in enumerate(empty.recordings):
+        assert isinstance(entry, IndentationRecording)
+        own = force[model.recording == number]
+        recordings.append(replace(entry, force_n=own + 1e-3 * np.abs(own).max() * random.normal(size=len(own))))
+    return replace(empty, recordings=tuple(recordings))
+
+
+EVERY = {"where", "before_after", "explanations", "parameters"}
+ALONE = Made(sensors=1, preloads_n=(1.0,), spheres_mm=(4.0,))
+KINDS = [
+    (lambda: campaign(Made(), load_table()), "no_mismatch", EVERY - {"parameters"}),
+    (lambda: campaign(OFF_CENTRE, load_table()), "explained", EVERY),
+    (lambda: campaign(ALONE, load_table()), "insufficient_data", set()),
+    (curves, "explained", EVERY - {"parameters"}),  # a thin layer has no parameter
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("make", "verdict", "names"), KINDS, ids=["nothing", "off centre", "too little", "curves"])
+def test_every_kind_of_report_has_its_page(make: Callable[[], Campaign], verdict: str, names: set[str]) -> None:
+    whole = make()
+    found = diagnose(whole, load_table())
+    document = report(found)
+    drawn = figures(found, document)
+    assert (document["verdict"], set(drawn)) == (verdict, names)
+    tags = Tags(page(document, drawn))
+    assert readable(document["statement"]).partition(". ")[0].rstrip(".") in tags.text
+    if not names:
+        assert tags.count("script") == 0
+    for figure in drawn.values():
+        json.loads(figure.to_json())
+
+
+@pytest.mark.slow
+def test_reports_and_pages_are_the_same_on_a_dask_cluster_and_in_processes(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed", reason="the cluster extra is not installed")
+    files = [tmp_path / f"palm-{number}.json" for number in range(2)]
+    for number, file in enumerate(files):
+        made = replace(RESONANT, sensors=1, lines=10, seed=number)
+        file.write_text(json.dumps(to_dict(campaign(made, load_table()))), encoding="utf-8")
+    torn = tmp_path / "torn.json"
+    torn.write_text("{", encoding="utf-8")
+    given = ["diagnose", *map(str, files), str(torn), "--html"]
+
+    def written(folder: str, *options: str) -> dict[str, bytes]:
+        result = CliRunner().invoke(app, [*given, "--output-dir", str(tmp_path / folder), *options])
+        assert result.exit_code == 2
+        assert "torn.json" in result.stderr
+        return {file.name: file.read_bytes() for file in (tmp_path / folder).iterdir()}
+
+    here = written("here", "--workers", "1")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+    ) as cluster:
+        there = written("there", "--scheduler", cluster.scheduler_address)
+    assert sorted(here) == ["palm-0.html", "palm-0.json", "palm-1.html", "palm-1.json"]
+    assert there == here
+    assert written("processes", "--workers", "2") == here
+
+
+@pytest.mark.slow
+def test_a_single_file_is_diagnosed_with_one_blas_thread(tmp_path: Path) -> None:
+    """As it is in a process of many: so that its report is the same on any machine."""
+    file = tmp_path / "palm.json"
+    file.write_text(json.dumps(to_dict(campaign(ALONE, load_table()))), encoding="utf-8")
+    code = (
+        "import threadpoolctl\nfrom underskin.cli.app import app\n"
+        f"app(['diagnose', {str(file)!r}, '--output-dir', {str(tmp_path)!r} + '/reports'], standalone_mode=False)\n"
+        "print({pool['num_threads'] for pool in threadpoolctl.threadpool_info()})"
+    )
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("NUM_THREADS")}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "{1}"
+
+
+def test_a_cluster_that_does_not_answer_is_named(tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="the cluster extra is not installed")
+    address = "tcp://127.0.0.1:1"
+    file = tmp_path / "palm.json"
+    file.write_text("{}", encoding="utf-8")
+    result = CliRunner().invoke(
+        app, ["diagnose", str(file), "--output-dir", str(tmp_path / "reports"), "--scheduler", address]
+    )
+    assert isinstance(result.exception, Exception)
+    assert address in str(result.exception)

@@ -1,0 +1,215 @@
+"""The diagnosis' statistics against exact answers: likelihood, gradient, line noise, evidence."""
+
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag
+from scipy.special import logsumexp
+from scipy.stats import multivariate_normal, multivariate_t
+
+from tests.support.diagnosis_campaigns import Made, campaign
+from tests.support.nested_sampling import Posterior, nested
+from underskin.diagnosis.data.dataset import Lines, lines
+from underskin.diagnosis.inference.evidence import Evidence, laplace
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.laplace import log_box
+from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
+from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
+from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.units import Floats
+
+SOAK = os.environ.get("UNDERSKIN_SOAK") == "1"
+
+
+@pytest.fixture(scope="module")
+def table() -> SigmaTable:
+    return load_table()
+
+
+def fitted(
+    made: Made, table: SigmaTable, *, placed: bool = False, whole: bool = True
+) -> tuple[Fitter, Evaluated, Lines]:
+    problem = FittingProblem(lines(campaign(made, table)), table)
+    fitter = Fitter(problem.hypothesis(made.mechanisms, placed, whole=whole))
+    own = [entry.to_fit(value) for entry, value in zip(fitter.parameters, made.parameters, strict=False)]
+    start = fitter.start(own)
+    return fitter, fitter.evaluate(start), fitter.hypothesis.lines
+
+
+def real(rows: np.ndarray) -> Floats:
+    return np.concatenate([rows.real, rows.imag])
+
+
+@pytest.mark.parametrize(
+    ("made", "placed"),
+    [
+        (Made(sensors=2, lines=4, preloads_n=(0.5, 2.0)), False),
+        (Made(sensors=2, lines=4, preloads_n=(0.5, 2.0), offsets_mm=(0.0, 1.3)), True),
+        (Made(("mains_pickup",), (0.05, 2.0, 1.0), sensors=1, lines=5, preloads_n=(0.5, 2.0), highest_hz=50.0), False),
+    ],
+)
+def test_the_likelihood_is_that_of_the_whole_covariance_matrix(made: Made, placed: bool, table: SigmaTable) -> None:
+    """Woodbury's identity against one dense covariance matrix over all rows."""
+    fitter, at, used = fitted(made, table, placed=placed)
+    levels = at.marginal.levels
+    curvature = fitter.hypothesis.curvature
+    factor = np.exp(0.5 * levels.position**2 * curvature.laplacian)[used.recording]
+    prediction = at.prediction
+    model = real(prediction.value * factor)
+    which = np.tile(used.recording, 2)
+    sensor = used.sensor[which]
+    deviation = levels.level * np.tile(used.deviation, 2)
+    covariance = np.diag(deviation**2)
+    same = which[:, None] == which[None, :]
+    gain = levels.gain**2 + 0.5 * levels.position**4 * curvature.square[which]
+    covariance += np.outer(model, model) * same * gain[:, None]
+    covariance += np.outer(model, model) * (sensor[:, None] == sensor[None, :]) * levels.spread**2
+    if placed:
+        assert prediction.position_slopes is not None
+        for slope in prediction.position_slopes:
+            column = real(slope * factor)
+            covariance += levels.position**2 * np.outer(column, column) * same
+    covariance += np.diag(np.tile(prediction.pickup_variance, 2))
+    exact = float(multivariate_normal.logpdf(real(used.value), model, covariance, allow_singular=True))
+    # What all hypotheses share is left out: 2π and the lines' own deviations
+    shared = -float(len(model) * np.log(2 * np.pi) / 2 + 2 * np.log(used.deviation).sum())
+    assert at.marginal.log_likelihood == pytest.approx(exact - shared, abs=1e-6 * abs(exact))
+
+
+def test_the_gradient_is_that_of_the_posterior(table: SigmaTable) -> None:
+    """What the model's covariance adds included, against differences."""
+    fitter, _, _ = fitted(Made(("moving_contact_edge",), (0.6,), sensors=3), table)
+    start = fitter.start([0.5])
+    at = fitter.settle(fitter.evaluate(replace(start, fit=start.fit + np.array([0, 0.03, 0.01, 0.005]))), 2)
+    _, gradient = fitter.posterior_equations(at)
+    for index, place in enumerate(fitter.places):
+        step = np.zeros(len(at.point.fit))
+        step[place] = 1e-5
+        ends = [fitter.evaluate(replace(at.point, fit=at.point.fit + sign * step)).cost for sign in (1, -1)]
+        assert gradient[index] == pytest.approx(-(ends[0] - ends[1]) / 2e-5, rel=1e-5, abs=1e-3)
+
+
+def test_collapsed_lines_give_the_same_posterior(table: SigmaTable) -> None:
+    made = Made(("moving_contact_edge",), (0.4,), offsets_mm=(0.0, 1.0))
+    _, whole, _ = fitted(made, table, placed=True)
+    _, collapsed, _ = fitted(made, table, placed=True, whole=False)
+    assert collapsed.cost == pytest.approx(whole.cost, abs=1e-2)
+
+
+def test_priors_of_scatter_integrate_to_one() -> None:
+    for prior in (GAIN_PRIOR, POSITION_PRIOR):
+        x = np.linspace(prior.low - 8 * prior.fall_low, prior.high + 8 * prior.fall_high, 20001)
+        assert np.trapezoid([np.exp(prior.log_density(value)) for value in x], x) == pytest.approx(1, abs=1e-4)
+
+
+@pytest.mark.parametrize("relative", [0.002, 0.02])
+def test_line_noise_is_found_beneath_a_smooth_misfit(relative: float, table: SigmaTable) -> None:
+    """A high pass bends the lines much more than their noise does; the roughness does not mind."""
+    made = Made(("amplifier_high_pass",), (0.8,), lines=60, line=relative, sensors=3)
+    found = lines(campaign(made, table))
+    ratio = found.deviation / (relative * np.abs(found.value))
+    assert np.median(ratio) == pytest.approx(1, abs=0.12)
+
+
+def test_the_box_of_one_bound_is_exact_and_of_two_close() -> None:
+    mean, covariance = np.array([0.3, -0.2]), np.array([[1.0, 0.5], [0.5, 2.0]])
+    low, high = np.array([0.0, -50.0]), np.array([50.0, 50.0])
+    exact = multivariate_normal(mean[:1], covariance[:1, :1]).cdf([1e9]) - multivariate_normal(0.3, 1.0).cdf(0.0)
+    assert log_box(mean, covariance, low, high) == pytest.approx(np.log(exact), abs=1e-9)
+    both = np.array([0.0, 0.0])
+    random = np.random.default_rng(3).multivariate_normal(mean, covariance, 400_000)
+    assert log_box(mean, covariance, both, high) == pytest.approx(np.log((random > 0).all(axis=1).mean()), abs=0.03)
+
+
+CASES: list[tuple[tuple[str, ...], tuple[float, ...]]] = [
+    ((), ()),
+    (("moving_contact_edge",), (0.7,)),
+    (("amplifier_high_pass",), (0.5,)),
+    (("moving_contact_edge",), (0.05,)),
+    (("layered_contact",), ()),
+    (("adhesion",), (0.5,)),
+    (("interface_slip",), (0.3,)),
+    (("compressible_layer",), (0.45,)),
+    (("strain_stiffening",), (5.0,)),
+    (("sensor_spread",), (0.15,)),
+    (("ageing",), (0.2, 500.0, 0.0)),
+    (("contact_creep",), (0.5, 20.0)),
+    (("misalignment",), (0.4, 0.3)),
+    (("preload_dependent_d33",), (2.0, 1.0)),
+    (("modulus_error",), (1.4,)),
+    (("thickness_error",), (1.1,)),
+    (("timing_delay",), (20.0,)),
+    (("sensor_relaxation",), (0.03, 0.0, 20.0)),
+    (("contact_resonance",), (3.0, 0.05)),
+    (("moving_contact_edge", "ageing"), (0.7, 0.2, 500.0, 0.0)),
+]
+
+
+def laplace_of(names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable) -> Evidence:
+    """By Laplace's method, of the hypothesis with which the campaign was made."""
+    made = Made(names, values, sensors=3, offsets_mm=(0.0, 1.0), preloads_n=(0.3, 1.2, 2.4), highest_hz=1000.0)
+    problem = FittingProblem(lines(campaign(made, table)), table)
+    fitter = Fitter(problem.hypothesis(names, placed=False))
+    own = [entry.to_fit(value) for entry, value in zip(fitter.parameters, values, strict=False)]
+    return laplace(fitter, fitter.improve(fitter.start(own)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("names", "values"), [CASES[index] for index in (0, 1, 4, 10, 17)])
+def test_evidence_agrees_with_importance_sampling(
+    names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable
+) -> None:
+    """Laplace's method against the mean of density over Student's t around the mode."""
+    found = laplace_of(names, values, table)
+    assert found.log_evidence == pytest.approx(importance(found), abs=0.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("names", "offsets_mm"), [((), (0.0,)), (("preload_dependent_d33",), (0.0, 0.3)), ((), (0.0, 1.0))]
+)
+def test_evidence_with_positioning_scatter(
+    names: tuple[str, ...], offsets_mm: tuple[float, ...], table: SigmaTable
+) -> None:
+    """The same where little tells how much of it there is (a bell is off by half a nat), and where much does."""
+    values = (2.0, 1.0) if names else ()
+    made = Made(names, values, sensors=2, offsets_mm=offsets_mm, preloads_n=(0.3, 1.2, 2.4))
+    explained = FittingProblem(lines(campaign(made, table)), table).explain(names)
+    assert explained is not None
+    _, found = explained.integrated().each[1]
+    assert found.fitter.hypothesis.placed
+    assert found.log_evidence == pytest.approx(importance(found), abs=0.3)
+
+
+def importance(found: Evidence) -> float:
+    """The log evidence by importance sampling."""
+    fitter, point = found.fitter, found.at.point
+    posterior = Posterior(fitter, point)
+    values, vectors = np.linalg.eigh(fitter.covariance_equations(found.at)[1])
+    levels = (vectors / np.maximum(values, 0.6)) @ vectors.T
+    centre = np.concatenate([point.fit[fitter.places], point.covariance])
+    proposal = multivariate_t(centre, 2 * block_diag(found.covariance, levels), df=4, seed=1)
+    draws = proposal.rvs(4000)
+    weights = np.array([posterior.log_density(x) for x in draws]) - proposal.logpdf(draws)
+    return float(logsumexp(weights) - np.log(len(draws)))
+
+
+@pytest.mark.soak
+@pytest.mark.skipif(not SOAK, reason="minutes a case: UNDERSKIN_SOAK=1")
+@pytest.mark.parametrize(("names", "values"), CASES)
+def test_evidence_agrees_with_nested_sampling(
+    names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable
+) -> None:
+    """Laplace's method against nested sampling of the same posterior: 0.5 in log evidence, beside its own error."""
+    found = laplace_of(names, values, table)
+    sampled = nested(Posterior(found.fitter, found.at.point))
+    assert found.log_evidence == pytest.approx(sampled.log_evidence, abs=0.5 + 2 * sampled.error)
+
+
+def test_explanations_are_names_in_order_of_composition(table: SigmaTable) -> None:
+    problem = FittingProblem(lines(campaign(Made(("ageing",), (0.3, 300.0, 0.0)), table)), table)
+    found = problem.explain(("ageing", "modulus_error"))
+    assert isinstance(found, Explanation)
+    assert found.names == ("modulus_error", "ageing")

@@ -1,0 +1,107 @@
+"""What no mechanism describes, from recording to recording: found, described, and not seen where it is not."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+from scipy.stats import multivariate_normal
+
+from rig.draw import drawn, record
+from rig.recorded import campaign as recorded
+from tests.support.diagnosis_campaigns import Made, campaign
+from underskin.diagnosis.data.dataset import lines
+from underskin.diagnosis.inference.explanation import FittingProblem
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.selection.frequency_gp import frequency_bins
+from underskin.diagnosis.selection.recording_gp import GainResidual, Scatter
+from underskin.recordings.campaign import from_dict
+from underskin.surrogate.sigma_table import SigmaTable, load_table
+
+
+@pytest.fixture(scope="module")
+def table() -> SigmaTable:
+    return load_table()
+
+
+def rig_report(table: SigmaTable, gain: float, position_mm: float, effects: dict[str, Any]) -> dict[str, Any]:
+    """The report on three sensors of the virtual rig, pressed at four places each, in any order."""
+    description = drawn(5, 0, "none")
+    description["skin"] = {
+        "thickness_mm": 2.0,
+        "youngs_modulus_mpa": 3.0,
+        "sensor_radius_mm": 1.0,
+        "d33_pc_per_n": 15.0,
+        "array": {"columns": 3, "rows": 1, "pitch_mm": 8.0},
+    }
+    description["design"] = {
+        "indenters_mm": [4.0],
+        "preloads_n": [0.4, 0.8, 1.6, 3.0],
+        "dynamic_forces_n": [0.05],
+        "offsets_mm": [[0.0, 0.0], [0.8, 0.0], [0.0, -1.2], [-1.5, 0.6]],
+        "shuffled": True,
+    }
+    description["noise"] |= {"gain": gain, "position_mm": position_mm}
+    description["effects"] = effects
+    found, refused = from_dict(recorded(record(description)))
+    assert not refused
+    return diagnosis_report(found, table)
+
+
+@pytest.mark.slow
+def test_a_place_that_runs_round_is_no_scatter(table: SigmaTable) -> None:
+    report = rig_report(table, 0.02, 0.0, {"stage_wobble": {"amplitude_mm": 0.5, "period_recordings": 6.3}})
+    assert report["verdict"] == "unexplained"
+    assert "a place that runs round, up to 0." in report["statement"]
+    assert "once in 6." in report["statement"]
+
+
+@pytest.mark.slow
+def test_a_memory_of_the_preload_before_is_found(table: SigmaTable) -> None:
+    report = rig_report(table, 0.02, 0.0, {"hysteretic_d33": {"amplitude": 0.1}})
+    assert report["verdict"] == "unexplained"
+    assert "the preload of the recording before" in report["statement"]
+
+
+@pytest.mark.slow
+def test_what_scatters_as_no_rig_does_is_unexplained(table: SigmaTable) -> None:
+    assert rig_report(table, 0.25, 0.0, {})["verdict"] == "unexplained"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("gain", "position_mm"), [(0.05, 0.0), (0.02, 0.28)])
+def test_the_scatter_of_an_ordinary_rig_is_nothing_missing(gain: float, position_mm: float, table: SigmaTable) -> None:
+    assert rig_report(table, gain, position_mm, {})["verdict"] == "no_mismatch"
+
+
+def test_the_evidence_of_a_process_is_that_of_the_whole_covariance(table: SigmaTable) -> None:
+    """Blocks, projections and eigenvalues against dense covariance matrices, one for each scatter and amplitude."""
+    problem = FittingProblem(lines(campaign(Made(offsets_mm=(0.0, 1.0), position_mm=0.1), table)), table)
+    nothing = problem.explain(())
+    assert nothing is not None
+    residual = GainResidual(problem, nothing)
+    amplitudes = np.array([0.02, 0.2])
+    sets = np.random.default_rng(1).normal(size=(3, problem.lines.recordings, 4))
+    known = residual.fixed @ residual.fixed.T
+
+    def log_density(scatter: Scatter, shapes: np.ndarray) -> float:
+        whole = np.diag(scatter.variance) + known + shapes @ shapes.T
+        density = multivariate_normal(np.zeros(len(whole)), whole).logpdf(scatter.residual)
+        return scatter.log_weight + float(density)
+
+    found = residual.gains(sets, amplitudes)
+    expected = [
+        logsumexp([log_density(entry, size * own) for entry in residual.usual for size in amplitudes]) for own in sets
+    ]
+    assert found - found[0] == pytest.approx(np.array(expected) - expected[0], abs=1e-6)
+    # With hardly any amplitude nothing is gained, but for the grids of scatter: usual ones, and any.
+    assert residual.gains(sets, np.array([1e-9])) == pytest.approx(0.0, abs=0.3)
+
+
+@pytest.mark.parametrize("spacing", [1 / 1.7, 1 / 1.3, 0.62515263])
+def test_more_frequencies_than_bins_each_fall_into_one(spacing: float) -> None:
+    """Those at the ends, too, that six decimals round up or down."""
+    frequency = np.tile(spacing * np.arange(1, 401), 2)
+    line, centres = frequency_bins(frequency)
+    assert len(centres) <= 160
+    assert np.abs(np.log(centres[line] / frequency)).max() <= np.log(400) / 160

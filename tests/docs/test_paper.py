@@ -1,0 +1,96 @@
+"""docs/paper.md and its figures are what `make paper` writes, and the prototype's array comes back from the service."""
+
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from docs.paper import figures
+from docs.paper.__main__ import main
+from docs.paper.prototype import INDENTERS_MM, PRELOADS_N, press
+from docs.paper.service_run import D33_PC_PER_N, ArrayRun, run_array
+from docs.paper.text import array_section, load_section, numbers_section
+from tests.support.repository import ROOT
+from underskin.surrogate.sigma_table import SigmaTable, load_table
+
+DOCS = ROOT / "docs"
+FIGURES = ("4", "6", "8", "10", "11")
+_NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+_SVG_IDENTIFIER = re.compile(r"\b[mpch][0-9a-f]{8,}\b")  # hashes of coordinates
+
+
+@pytest.fixture(scope="module")
+def table() -> SigmaTable:
+    return load_table()
+
+
+@pytest.fixture(scope="module")
+def run() -> ArrayRun:
+    return run_array()
+
+
+def assert_same_but_for_rounding(made: str, committed: str) -> None:
+    """The same words, and numbers that differ in their last digits at most."""
+    assert _NUMBER.sub("#", made) == _NUMBER.sub("#", committed)
+    made_numbers, committed_numbers = (np.array(_NUMBER.findall(text), dtype=float) for text in (made, committed))
+    np.testing.assert_allclose(made_numbers, committed_numbers, rtol=1e-4, atol=2e-4)
+
+
+def committed_section(start: str) -> str:
+    """The section of the committed page that begins like `start`, up to the next heading."""
+    heading = start.splitlines()[0]
+    page = (DOCS / "paper.md").read_text(encoding="utf-8")
+    return heading + page.split(heading)[1].split("\n## ")[0].rstrip("\n")
+
+
+@pytest.mark.slow
+@pytest.mark.server
+def test_the_array_comes_back_from_the_service(run: ArrayRun) -> None:
+    assert run.status == ["ok"]
+    np.testing.assert_allclose(run.d33_from_service, D33_PC_PER_N, rtol=1e-12)
+    assert run.largest_spread == 0.0
+
+
+@pytest.mark.server
+def test_the_service_agrees_with_fresh_solves(run: ArrayRun) -> None:
+    np.testing.assert_allclose(run.d33_from_fresh_solve, D33_PC_PER_N, rtol=2e-5)
+    np.testing.assert_allclose(run.frf_from_service, run.frf_from_fresh_solve, rtol=2e-5)
+
+
+@pytest.mark.server
+def test_the_page_says_what_is_computed(table: SigmaTable, run: ArrayRun) -> None:
+    presses = [press(table, radius, PRELOADS_N) for radius in INDENTERS_MM]
+    for section in (numbers_section(table), load_section(presses), array_section(run)):
+        assert_same_but_for_rounding(section.rstrip("\n"), committed_section(section))
+    assert table.sha256 in (DOCS / "paper.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_the_figures_are_those_that_are_drawn(table: SigmaTable, tmp_path: Path) -> None:
+    drawn = figures.draw(table, tmp_path)
+    assert [path.name for path in drawn] == [f"paper-fig{number}.svg" for number in FIGURES]
+    for path in drawn:
+        made, committed = (
+            _SVG_IDENTIFIER.sub("id", file.read_text(encoding="utf-8")) for file in (path, DOCS / "figures" / path.name)
+        )
+        assert_same_but_for_rounding(made, committed)
+
+
+@pytest.mark.slow
+def test_drawing_twice_gives_the_same_bytes(table: SigmaTable, tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        (tmp_path / name).mkdir()
+        figures.draw(table, tmp_path / name)
+    for number in FIGURES:
+        file = f"paper-fig{number}.svg"
+        assert (tmp_path / "first" / file).read_bytes() == (tmp_path / "second" / file).read_bytes()
+
+
+@pytest.mark.soak
+@pytest.mark.skipif("UNDERSKIN_SOAK" not in os.environ, reason="solves every block again: only in make soak")
+def test_the_whole_page_is_what_make_paper_writes(tmp_path: Path) -> None:
+    main(tmp_path)
+    made, committed = ((folder / "paper.md").read_text(encoding="utf-8") for folder in (tmp_path, DOCS))
+    assert_same_but_for_rounding(made, committed)

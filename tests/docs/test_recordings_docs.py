@@ -1,0 +1,53 @@
+"""docs/formats.md is true: its examples are read, and it names every format, module and field of a rig description."""
+
+import re
+from dataclasses import fields
+
+import pytest
+
+from tests.support.repository import ROOT
+from underskin.recordings import read_file, rig_description
+from underskin.recordings.campaign import CompressionRecording, FrfRecording
+from underskin.recordings.readers.formats import MODULES
+from underskin.recordings.rig_description import ChannelMapping, Property
+
+TEXT = (ROOT / "docs" / "formats.md").read_text()
+
+
+def examples(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", TEXT, re.DOTALL)
+
+
+def test_the_template_as_documented() -> None:
+    plain, foreign = (read_file(text.encode(), "doc.csv") for text in examples("csv"))
+    assert not plain.problems + foreign.problems
+    first, second = plain.campaign.recordings
+    assert isinstance(first, FrfRecording)
+    assert isinstance(second, FrfRecording)
+    assert first.frf_re_pc_per_n == pytest.approx([7.1, 7.2])
+    assert second.frf_im_pc_per_n == pytest.approx([-0.4, -0.6])
+    (block,) = foreign.campaign.recordings
+    assert isinstance(block, CompressionRecording)
+    assert (block.sample_height_mm, block.sample_diameter_mm) == (10.0, 20.0)
+    assert block.displacement_mm == pytest.approx([0.0, 0.1])
+    assert block.force_n == pytest.approx([0.0, 50.0])
+
+
+def test_the_rig_description_as_documented() -> None:
+    (text,) = examples("yaml")
+    rig = rig_description.parse(text.encode(), "rig.yaml")
+    table = "Preload [mN];1500\n\nt [ms];Load cell;Amplifier\n0;2.25;0\n1;4.5;-0.07\n"
+    channels = {**rig.document["channels"], "time_s": {"channel": "t [ms]"}}
+    reading = read_file(table.encode(), "a.csv", rig_description.from_dict({**rig.document, "channels": channels}))
+    assert not reading.problems
+    (recording,) = reading.campaign.recordings
+    assert isinstance(recording, FrfRecording)
+    assert recording.preload_n == pytest.approx(1.5)
+    assert recording.sample_rate_hz == pytest.approx(1000)
+    assert recording.force_n == pytest.approx([1, 2])
+    assert recording.charge_pc == pytest.approx([0, 7])
+
+
+def test_every_format_and_field_is_documented() -> None:
+    for name in (*MODULES.values(), *(entry.name for model in (ChannelMapping, Property) for entry in fields(model))):
+        assert name in TEXT, name

@@ -1,0 +1,158 @@
+"""Sensors and recordings that stand out are named with the reason, and others are not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.inversion.inverted_campaigns import covered, drawn, moved, scaled
+from tests.support.simulated_campaign import Rig, simulate
+from underskin.findings.codes import FindingCode
+from underskin.inversion.invert import Inversion, invert
+from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.surrogate.sigma_table import SigmaTable, load_table
+
+
+@pytest.fixture(scope="module")
+def table() -> SigmaTable:
+    return load_table()
+
+
+def codes(found: Inversion) -> dict[str, list[str]]:
+    return {flag.sensor: [other.code for other in found.flags if other.sensor == flag.sensor] for flag in found.flags}
+
+
+def altered(campaign: Campaign, sensor: str, change: str) -> Campaign:
+    random = np.random.default_rng(9)
+
+    def alter(recording: FrfRecording) -> FrfRecording:
+        assert recording.frf_re_pc_per_n is not None
+        assert recording.frf_im_pc_per_n is not None
+        real, imaginary = recording.frf_re_pc_per_n, recording.frf_im_pc_per_n
+        factor = {
+            "weak": 0.3,
+            "strong": 2.5,
+            "dead": 0.0,
+            "inverted": -1.0,
+            "noisy": 1.0,
+            "bent": 1 + 0.3 * ((recording.preload_n - 1.75) / 1.25) ** 2,
+        }[change]
+        extra = 0.3 * np.abs(real).mean() * random.normal(size=len(real)) if change in ("noisy", "dead") else 0.0
+        return replace(recording, frf_re_pc_per_n=factor * real + extra, frf_im_pc_per_n=factor * imaginary)
+
+    changed = [
+        alter(recording) if isinstance(recording, FrfRecording) and recording.sensor == sensor else recording
+        for recording in campaign.recordings
+    ]
+    return replace(campaign, recordings=tuple(changed))
+
+
+@pytest.mark.parametrize("change", ["weak", "strong", "dead", "inverted", "noisy", "bent"])
+def test_a_sensor_that_stands_out_is_named_with_the_reason(table: SigmaTable, change: str) -> None:
+    rig = Rig(d33=np.full(9, 14.0), preloads_n=tuple(np.linspace(0.5, 3, 8).tolist()))
+    campaign = simulate(table, rig, np.random.default_rng(5))
+    plain = invert(campaign, table)
+    found = invert(altered(campaign, "s4", change), table)
+    assert plain.flags == ()
+    assert codes(found) == {"s4": [change]}
+    assert found.flags[0].reason.startswith(change)
+    assert found.campaign_d33 is not None
+    assert covered(found.campaign_d33, np.array(14.0))
+    named = any("s4" in left.sentence for left in found.left_out)
+    assert named == (change in ("weak", "strong", "dead", "inverted"))
+
+
+@pytest.mark.slow
+def test_whole_arrays_are_seldom_accused(table: SigmaTable) -> None:
+    random = np.random.default_rng(6)
+    accused = 0
+    for _ in range(60):
+        d33 = 14 * (1 + 0.05 * random.normal(size=16))
+        rig = Rig(d33=d33, preloads_n=(0.5, 1.0, 2.0, 3.0), gain=0.03, position_mm=0.1, largest_offset_mm=0.5)
+        accused += bool(invert(simulate(table, rig, random), table).flags)
+    assert accused <= 2
+
+
+@pytest.mark.parametrize(
+    ("factor", "asks"),
+    [
+        (1000.0, "was mV/pC meant, not mV/nC"),
+        (1e-3, "was mV/nC meant, not mV/pC"),
+        (-1.0, "is the sign of charge or force"),
+    ],
+)
+def test_a_slip_that_the_whole_array_shows_is_a_finding(table: SigmaTable, factor: float, asks: str) -> None:
+    campaign = simulate(table, Rig(d33=np.full(3, 14.0)), np.random.default_rng(7))
+    assert invert(campaign, table).findings == ()
+    slipped = campaign
+    for row in range(len(campaign.recordings)):
+        slipped = scaled(slipped, row, factor)
+    (finding,) = invert(slipped, table).findings
+    assert asks in finding.statement
+    assert f"{14 * factor:.2g}"[:3] in finding.statement
+
+
+@pytest.mark.parametrize("x_mm", [19.0, 250.0, 1e9, 1e308])
+def test_a_recording_far_off_its_sensor_costs_only_itself(table: SigmaTable, x_mm: float) -> None:
+    campaign = simulate(table, Rig(d33=np.array([14.0])), np.random.default_rng(11))
+    found = invert(moved(campaign, 0, position_mm=(x_mm, 0.0)), table)
+    rest = invert(replace(campaign, recordings=campaign.recordings[1:]), table)
+    assert found.campaign_d33 is not None
+    assert rest.campaign_d33 is not None
+    assert float(found.campaign_d33.value) == pytest.approx(float(rest.campaign_d33.value), rel=1e-6)
+    assert found.recordings.inside.tolist() == [False] + 9 * [True]
+    assert [left.sentence.split(":")[0] for left in found.left_out] == ["recording r0"]
+
+
+@pytest.mark.parametrize("factor", [1000.0, 10.0, -1.0, 1e-3])
+@pytest.mark.parametrize("sensors", [1, 5])
+def test_a_recording_grossly_off_is_set_aside_and_named(table: SigmaTable, factor: float, sensors: int) -> None:
+    rig = Rig(d33=np.full(sensors, 14.0), preloads_n=(0.5, 2.0))
+    campaign = simulate(table, rig, np.random.default_rng(13))
+    found = invert(scaled(campaign, 0, factor), table)
+    assert found.campaign_d33 is not None
+    assert covered(found.campaign_d33, np.array(14.0))
+    assert covered(found.sensors, rig.d33).all()
+    assert [left.sentence.split(":")[0] for left in found.left_out] == ["recording r0"]
+    assert found.flags == ()
+
+
+@pytest.mark.slow
+def test_scatter_that_rigs_have_is_never_set_aside(table: SigmaTable) -> None:
+    random = np.random.default_rng(14)
+    for _ in range(60):
+        rig, _ = drawn(random)
+        assert invert(simulate(table, rig, random), table).left_out == ()
+
+
+def test_a_sensor_of_few_recordings_is_flagged_as_a_whole(table: SigmaTable) -> None:
+    rig = Rig(d33=np.array([14.0] * 8 + [3.0, 60.0]), preloads_n=(1.0,))
+    found = invert(simulate(table, rig, np.random.default_rng(15)), table)
+    assert codes(found) == {"s8": ["weak"], "s9": ["strong"]}
+
+
+def test_a_sensor_of_exact_zeros_is_dead(table: SigmaTable) -> None:
+    campaign = simulate(table, Rig(d33=np.full(3, 14.0), preloads_n=(1.0,)), np.random.default_rng(17))
+    found = invert(scaled(scaled(campaign, 0, 0.0), 1, 0.0), table)
+    assert codes(found) == {"s0": ["dead"]}
+    assert np.isfinite([found.sensors.value, found.sensors.low, found.sensors.high]).all()
+
+
+def test_a_force_whose_mean_contradicts_the_preload_is_a_finding(table: SigmaTable) -> None:
+    random = np.random.default_rng(18)
+    campaign = simulate(table, Rig(d33=np.array([14.0]), preloads_n=(1.0,)), random)
+
+    def as_series(recording: FrfRecording, mean: float) -> FrfRecording:
+        assert recording.frf_re_pc_per_n is not None
+        shaken = 0.03 * random.normal(size=4000)
+        charge = recording.frf_re_pc_per_n[0] * shaken + 1e-3 * random.normal(size=4000)
+        return replace(
+            recording, frequency_hz=None, frf_re_pc_per_n=None, frf_im_pc_per_n=None, coherence=None,
+            sample_rate_hz=500.0, force_n=mean + shaken, charge_pc=charge,
+        )  # fmt: skip
+
+    recorded = [item for item in campaign.recordings if isinstance(item, FrfRecording)]
+    for means, accused in (((1.0, 0.0), []), ((0.05, 2.5), []), ((4.0, 0.2), ["r0", "r1"]), ((1.0, -1000.0), ["r1"])):
+        series = tuple(as_series(item, mean) for item, mean in zip(recorded, means, strict=True))
+        found = invert(replace(campaign, recordings=series), table).findings
+        assert [one.recording for one in found if one.code == FindingCode.FORCE_CONTRADICTS_PRELOAD] == accused

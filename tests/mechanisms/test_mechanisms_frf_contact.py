@@ -1,0 +1,149 @@
+"""Mechanisms of the contact: its edge, layer, adhesion, time and strain, against exact limits, published relations."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from tablegen.linear_layer import transmission
+from tests.mechanisms.mechanism_contacts import (
+    LINEAR_MM,
+    RHO,
+    E,
+    H,
+    level,
+    linear_contact,
+    oracle_rows,
+    sphere_on_layer,
+)
+from tests.support.mechanism_campaigns import SKIN, campaign, frf_recording, predicted, table
+from tests.support.oracle import NEEDS_ORACLE
+from tests.support.sphere_contact import SphereOnLayer
+from underskin.physics import hertz
+from underskin.physics.elastic_layer import Layer
+from underskin.physics.hankel_transform import hertz_transform, normal_stress, punch_transform
+
+
+@NEEDS_ORACLE
+def test_a_moving_edge_feels_the_flat_punch() -> None:
+    rows = oracle_rows("sigma_edge", poisson_ratio="0.5", glue_stiffness_h_over_2g="inf", rt_over_h="0.6")
+    assert rows
+    for row in rows:
+        a, offset = float(row["a_over_h"]), float(row["offset_over_h"])
+        if a <= 2:
+            found = level(["moving_contact_edge"], linear_contact(a, offset_over_h=offset), mobile_fraction=1.0)
+            assert found.real == pytest.approx(float(row["value"]), abs=2e-5)
+
+
+def test_a_moving_edge_has_the_published_ratios() -> None:
+    for a, ratio in ((0.1, 0.996), (0.3, 0.964), (0.6, 0.862), (1.0, 0.674), (1.5, 0.485), (2.0, 0.402)):
+        recording = linear_contact(a)
+        moving = level(["moving_contact_edge"], recording, mobile_fraction=1.0)
+        assert (moving / level([], recording)).real == pytest.approx(ratio, abs=6e-4)
+
+
+def test_half_a_moving_edge_is_half_way() -> None:
+    still, half, moving = (
+        level(["moving_contact_edge"], frf_recording(), mobile_fraction=m).real for m in (0.0, 0.5, 1.0)
+    )
+    assert half == pytest.approx((still + moving) / 2, rel=1e-12)
+
+
+@NEEDS_ORACLE
+def test_a_layered_contact_has_the_layer_s_radius_and_pressure() -> None:
+    for row in sphere_on_layer():
+        a = row["a_over_h"]
+        on_half_space = linear_contact(a)
+        pressed = replace(on_half_space, preload_n=on_half_space.preload_n * row["force_over_hertz"])
+        contact = SphereOnLayer(LINEAR_MM * 1e-3, E, H, Layer()).at_radius(a * H)
+        assert contact.force == pytest.approx(pressed.preload_n, rel=2e-6)
+        exact = normal_stress(transmission, contact.pressure_transform, a, RHO) / contact.force
+        assert level(["layered_contact"], pressed).real == pytest.approx(float(exact), rel=1e-5)
+
+
+def test_on_a_thick_layer_the_contact_is_hertz() -> None:
+    skin = replace(SKIN, thickness_mm=60.0, sensor_radius_mm=30.0)
+    recording = frf_recording(indenter_radius_mm=10.0)
+    assert level(["layered_contact"], recording, skin).real == pytest.approx(level([], recording, skin).real, rel=1e-5)
+
+
+def test_adhesion_is_jkr_on_the_half_space() -> None:
+    w, radius = 0.5, 1e3
+    force = 1e-2 * np.pi * w * radius
+    a = np.cbrt(
+        0.75
+        * radius
+        * 0.75
+        / E
+        * (force + 3 * np.pi * w * radius + np.sqrt(6 * np.pi * w * radius * force + (3 * np.pi * w * radius) ** 2))
+    )
+    sphere = 4 / 3 * E / 0.75 * a**3 / radius
+    share = sphere / force
+    h = 2 * a
+    skin = replace(SKIN, thickness_mm=h * 1e3, sensor_radius_mm=RHO * h * 1e3)
+    expected = share * normal_stress(transmission, hertz_transform, 0.5, RHO) + (1 - share) * normal_stress(
+        transmission, punch_transform, 0.5, RHO
+    )
+    recording = frf_recording(indenter_radius_mm=radius * 1e3, preload_n=force, dynamic_force_n=force / 10)
+    strain = table().sigma(0.5, RHO, force / (radius**2 * E)).sigma - table().sigma(0.5, RHO, 0.0).sigma
+    found = level(["adhesion"], recording, skin, work_of_adhesion=w)
+    assert found.real == pytest.approx(float(expected + strain), rel=1e-5)
+
+
+def test_adhesion_and_layer_together_are_jkr_on_the_layer() -> None:
+    w, recording = 0.3, frf_recording(preload_n=0.2)
+    contact = SphereOnLayer(4e-3, E, H, Layer(), work_of_adhesion=w).at_force(0.2)
+    a = contact.contact_radius / H
+    load = hertz.load_parameter(0.2, 4e-3, E)
+    exact = normal_stress(transmission, lambda s: contact.pressure_transform(s) / contact.force, a, RHO)
+    strain = table().sigma(a, RHO, load).sigma - table().sigma(a, RHO, 0.0).sigma
+    found = level(["layered_contact", "adhesion"], recording, work_of_adhesion=w)
+    assert found.real == pytest.approx(float(exact + strain), rel=1e-5)
+
+
+def test_creep_is_the_relaxed_modulus() -> None:
+    for dwell in (0.0, 30.0, 1e5):
+        recordings = [frf_recording(dwell_s=dwell), frf_recording(id="other", dwell_s=7.0)]
+        factor = 1 - 0.4 * (1 - np.exp(-dwell / 30.0))
+        crept = predicted(["contact_creep"], campaign(recordings), relaxed_fraction=0.4, relaxation_time=30.0)
+        softer = predicted(["modulus_error"], campaign(recordings), modulus_factor=factor)
+        assert crept[0] == pytest.approx(softer[0], rel=1e-12)
+
+
+def test_a_fast_oscillation_meets_the_unrelaxed_modulus_on_the_contact_that_crept() -> None:
+    recordings = [frf_recording(dwell_s=1e6), frf_recording(id="other", dwell_s=0.0)]
+    names = ["contact_creep", "contact_resonance"]
+    crept = predicted(names, campaign(recordings), relaxed_fraction=0.4, relaxation_time=30.0, tip_mass=20.0)
+    softer = replace(SKIN, youngs_modulus_mpa=0.6 * 2.0)
+    grown = predicted(["contact_resonance"], campaign(recordings[:1], softer), tip_mass=0.6 * 20.0)
+    assert crept[: len(grown)] == pytest.approx(grown, rel=1e-9)
+
+
+def test_a_stiffening_contact_solves_its_own_strain() -> None:
+    def misfit(factor: float) -> float:
+        a = float(hertz.contact_radius(2.0, 4e-3, E * factor))
+        return 1 + 5.0 * 0.2 * a / 4e-3 - factor
+
+    recording = frf_recording(preload_n=2.0)
+    stiffened = level(["strain_stiffening"], recording, stiffening=5.0)
+    expected = level(["modulus_error"], recording, modulus_factor=float(brentq(misfit, 1.0, 3.0)))
+    assert stiffened == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_small_amplitude_is_a_moving_edge() -> None:
+    recording = frf_recording(dynamic_force_n=0.01)
+    small = level(["amplitude_nonlinearity"], recording, edge_mobility=0.8)
+    assert small == pytest.approx(level(["moving_contact_edge"], recording, mobile_fraction=0.8), rel=1e-5)
+
+
+def test_a_large_amplitude_is_the_first_harmonic_of_the_charge() -> None:
+    preload, dynamic, phase = 1.0, 0.8, (np.arange(512) + 0.5) * 2 * np.pi / 512
+    force = preload + dynamic * np.sin(phase)
+    a, load = hertz.contact_radius(force, 4e-3, E), hertz.load_parameter(force, 4e-3, E)
+    charge = force * table().sigma(a / H, RHO, load).sigma
+    first_harmonic = 2 * np.mean(charge * np.sin(phase)) / dynamic
+    recording = frf_recording(preload_n=preload, dynamic_force_n=dynamic)
+    assert level(["amplitude_nonlinearity"], recording, edge_mobility=1.0).real == pytest.approx(
+        first_harmonic, rel=1e-5
+    )

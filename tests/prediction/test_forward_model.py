@@ -1,0 +1,176 @@
+"""Predictions for conditions alone: values, derivatives, and the same for a campaign as for its conditions."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike
+
+from tests.support.mechanism_campaigns import (
+    SKIN,
+    compression_campaign,
+    frf_campaign,
+    hertz_force,
+    indentation_campaign,
+    table,
+)
+from underskin import Conditions, InvalidInput, SkinDescription, frf_conditions, predict
+from underskin.mechanisms import compose
+from underskin.recordings.campaign import Campaign, FrfRecording, Recording
+from underskin.recordings.conditions import CompressionConditions, FrfConditions, IndentationConditions
+from underskin.units import Floats
+
+DEPTH_MM = np.linspace(0.0, 0.3, 7)
+COMBINED = {
+    "relaxed_fraction": 0.3,
+    "relaxation_time": 40.0,
+    "mobile_fraction": 0.6,
+    "fraction": 0.1,
+    "loss": 0.2,
+    "onset": 1000.0,
+    "saturation": 0.5,
+    "delay": 200.0,
+    "d33": 14.0,
+}
+MECHANISMS = ("contact_creep", "moving_contact_edge", "crosstalk", "ageing", "timing_delay")
+
+
+def rows(*, sensor: str | None = None, **further: ArrayLike) -> Conditions:
+    lines = [30.0, 100.0]
+    return frf_conditions(
+        SKIN, sensor=sensor, indenter_radius_mm=4.0, preload_n=[0.5, 1.0, 2.0], frequency_hz=lines, **further
+    )
+
+
+def curve(skin: SkinDescription = SKIN) -> Conditions:
+    return Conditions("curve", skin, (IndentationConditions("i", 4.0, DEPTH_MM),))
+
+
+def test_a_campaign_and_its_conditions_alone_are_predicted_alike() -> None:
+    campaign = frf_campaign()
+    alone = Conditions("alone", campaign.skin, tuple(entry.without_measurements() for entry in frf_entries(campaign)))
+    assert not any(isinstance(entry, FrfRecording) for entry in alone.recordings)
+    of_campaign, of_conditions = (
+        predict(entry, table(), COMBINED, mechanisms=MECHANISMS) for entry in (campaign, alone)
+    )
+    np.testing.assert_array_equal(of_campaign.value, of_conditions.value)
+    assert of_campaign.derivatives.keys() == of_conditions.derivatives.keys()
+
+
+def frf_entries(campaign: Conditions) -> list[FrfConditions]:
+    return [entry for entry in campaign.recordings if isinstance(entry, FrfConditions)]
+
+
+def test_it_is_what_a_fit_composes() -> None:
+    campaign = frf_campaign()
+    model = compose(MECHANISMS, campaign, table())
+    fit = np.array([entry.to_fit(COMBINED.get(entry.name, 1.0)) for entry in model.parameters])
+    expected = 1e12 * model.predict(fit).value
+    np.testing.assert_allclose(predict(campaign, table(), COMBINED, mechanisms=MECHANISMS).value, expected, rtol=1e-14)
+
+
+def test_derivatives_are_by_the_parameters_in_their_units() -> None:
+    conditions = rows(dwell_s=[2.0, 60.0, 600.0], load_cycles=[0.0, 300.0, 900.0], dynamic_force_n=0.1)
+    derivatives = predict(conditions, table(), COMBINED, mechanisms=MECHANISMS).derivatives
+    for name, value in COMBINED.items():
+        step = 1e-5 * value
+        high, low = (
+            predict(conditions, table(), {**COMBINED, name: value + way}, mechanisms=MECHANISMS).value
+            for way in (step, -step)
+        )
+        np.testing.assert_allclose(derivatives[name], (high - low) / (2 * step), rtol=1e-5, atol=1e-9)
+
+
+def test_single_numbers_hold_for_all_rows() -> None:
+    conditions = rows(offset_x_mm=0.5, sensor="s2")
+    first = conditions.recordings[0]
+    assert isinstance(first, FrfConditions)
+    assert (first.sensor, first.position_mm, len(conditions.recordings)) == ("s2", (4.5, 0.0), 3)
+    predicted = predict(conditions, table(), {"d33": 14.0})
+    assert predicted.recording.tolist() == [0, 0, 1, 1, 2, 2]
+    assert predicted.inside.all()
+
+
+def test_the_declared_d33_is_the_default() -> None:
+    declared = replace(SKIN, d33_pc_per_n=14.0)
+    own = frf_conditions(declared, indenter_radius_mm=4.0, preload_n=1.0, frequency_hz=30.0)
+    given = frf_conditions(SKIN, indenter_radius_mm=4.0, preload_n=1.0, frequency_hz=30.0)
+    assert predict(own, table()).value == predict(given, table(), {"d33": 14.0}).value
+
+
+def test_a_skin_without_sensors_has_one_at_the_origin() -> None:
+    bare = replace(SKIN, sensors=())
+    conditions = frf_conditions(bare, indenter_radius_mm=4.0, preload_n=1.0, frequency_hz=30.0)
+    assert [(sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors] == [(0.0, 0.0)]
+
+
+def test_an_indentation_follows_hertz_from_displacement_zero() -> None:
+    np.testing.assert_allclose(predict(curve(), table()).value, hertz_force(DEPTH_MM, 4.0, 2.0), rtol=1e-6, atol=1e-9)
+
+
+def test_a_compression_follows_hooke_from_displacement_zero() -> None:
+    conditions = Conditions("block", SKIN, (CompressionConditions("c", 10.0, 20.0, DEPTH_MM),))
+    expected: Floats = 2.0 * np.pi / 4 * 20.0**2 * DEPTH_MM / 10.0
+    np.testing.assert_allclose(predict(conditions, table()).value, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("campaign", [indentation_campaign(), compression_campaign()])
+def test_curves_that_were_measured_are_predicted_from_their_own_contact_points(campaign: Campaign) -> None:
+    late = replace(campaign, recordings=tuple(map(begun_late, campaign.recordings)))
+    measured = np.concatenate([entry.force_n for entry in late.recordings if not isinstance(entry, FrfRecording)])
+    np.testing.assert_allclose(predict(late, table()).value, measured, rtol=1e-3, atol=1e-4 * measured.max())
+
+
+def begun_late(entry: Recording) -> Recording:
+    assert not isinstance(entry, FrfRecording)
+    return replace(entry, displacement_mm=entry.displacement_mm + 0.1)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "mechanisms", "field"),
+    [
+        ({}, (), "parameters.d33"),
+        ({"d33": 14.0, "loss": 0.1}, (), "parameters"),
+        ({"d33": 14.0}, ("moving_contact_edge",), "parameters.mobile_fraction"),
+        ({"d33": 14.0, "mobile_fraction": 2.0}, ("moving_contact_edge",), "parameters.mobile_fraction"),
+        ({"d33": float("nan")}, (), "parameters.d33"),
+        ({"d33": 14.0}, ("contact_creep",), r"recordings[row 0].dwell_s"),
+        ({"d33": 14.0}, ("platen_friction",), "mechanisms"),
+        ({"d33": 14.0}, ("phlogiston",), "mechanism"),
+    ],
+)
+def test_what_cannot_be_predicted_is_refused(
+    parameters: Mapping[str, float], mechanisms: Sequence[str], field: str
+) -> None:
+    with pytest.raises(InvalidInput) as refused:
+        predict(rows(), table(), parameters, mechanisms=mechanisms)
+    assert refused.value.field == field
+
+
+def test_a_curve_needs_a_declared_modulus() -> None:
+    undeclared = replace(SKIN, youngs_modulus_mpa=None)
+    for conditions in (
+        curve(undeclared),
+        Conditions("block", undeclared, (CompressionConditions("c", 10.0, 20.0, DEPTH_MM),)),
+    ):
+        with pytest.raises(InvalidInput, match="youngs_modulus_mpa"):
+            predict(conditions, table())
+
+
+def test_lines_of_a_time_series_must_be_estimated_before_they_are_predicted() -> None:
+    entry = FrfConditions("r", "s1", 4.0, 1.0, 0.1)
+    with pytest.raises(InvalidInput, match=r"recordings\[r\].frequency_hz"):
+        predict(Conditions("series", SKIN, (entry,)), table(), {"d33": 14.0})
+
+
+def test_columns_that_make_no_rows_are_refused() -> None:
+    with pytest.raises(InvalidInput, match="colour"):
+        rows(colour=1.0)
+    with pytest.raises(InvalidInput, match="must have one length"):
+        rows(dwell_s=[1.0, 2.0])
+
+
+def test_a_sensor_that_the_skin_does_not_have_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="sensor"):
+        rows(sensor="s9")

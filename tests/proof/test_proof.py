@@ -1,0 +1,301 @@
+"""The proof's own tools: judging, statistics, stored results, the ideal diagnoser, and the page from a small run."""
+
+import json
+import os
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from proof import figures, own_rig, paper_array
+from proof.cases import DrawnCase, FileCase, MadeCase
+from proof.commands import prove
+from proof.ideal import diagnosed
+from proof.ideal_laws import suppositions
+from proof.judge import QUIET, Judged, judge
+from proof.real import recorded
+from proof.results import PARTS
+from proof.statistics import calibration, share
+from proof.stored import Work, of_each, reports, sources, stored
+from proof.text import document
+from rig.description import parse as parse_experiment
+from rig.draw import CATALOGUED, UNKNOWN, drawn
+from rig.strengths import of_frf
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.recordings.campaign import FrfRecording, parse
+from underskin.surrogate.sigma_table import load_table
+
+RECORDINGS = os.environ.get("UNDERSKIN_RECORDINGS")
+
+
+def report(verdict: str, *names: str, probability: float = 0.9) -> dict[str, Any]:
+    return {
+        "verdict": verdict,
+        "probability": probability,
+        "mechanisms": [{"name": name} for name in names],
+        "alternatives": [{"mechanisms": ["twin"]}],
+        "fit": {"after": {"heldout_rmse_percent": 2.0}, "noise_floor_percent": 1.0},
+    }
+
+
+@pytest.mark.parametrize(
+    ("given", "effects", "right"),
+    [
+        (report("explained", "b", "a"), ["a", "b"], True),
+        (report("ambiguous", "a"), ["a"], True),
+        (report("explained", "a"), ["a", "b"], False),
+        (report("unexplained"), ["unknown"], True),
+        (report("no_mismatch"), [], True),
+        (report("no_mismatch"), ["unknown"], False),
+        (report("explained", "a"), [], False),
+    ],
+)
+def test_an_answer_is_right_if_it_is_exactly_the_truth(given: dict[str, Any], effects: list[str], right: bool) -> None:
+    truth = {"effects": effects, "identifiable": True, "chi2_gain_of_truth": 49.0}
+    found = judge("c", given, truth)
+    assert found.right is right
+    assert found.size == 7.0
+    assert found.held_out == (2.0, 1.0)
+
+
+def test_a_pair_is_visible_only_if_each_of_its_members_is() -> None:
+    truth = {
+        "effects": ["a", "b"],
+        "identifiable": True,
+        "every_effect_identifiable": False,
+        "chi2_gain_of_truth": 90.0,
+    }
+    found = judge("c", report("explained", "a"), truth)
+    assert (found.kind, found.visible, found.one_visible) == ("pair", False, True)
+
+
+def test_a_twin_is_left_open_only_under_ambiguous() -> None:
+    truth = {"effects": ["twin"], "identifiable": True, "chi2_gain_of_truth": 90.0}
+    for verdict in ("ambiguous", "explained"):
+        found = judge("c", report(verdict, "a"), truth)
+        assert not found.right
+        assert found.left_open is (verdict == "ambiguous")
+
+
+def test_wilson_interval_against_its_known_values() -> None:
+    """Brown, Cai, DasGupta (2001): 0 of 10 gives 0 to 0.2775."""
+    assert share([False] * 10).interval == pytest.approx((0.0, 0.2775), abs=1e-4)
+    low, high = share([True] * 5 + [False] * 5).interval
+    assert low + high == pytest.approx(1.0)
+
+
+def test_a_tool_that_is_always_right_can_be_drawn(tmp_path: Path) -> None:
+    alike = Judged("c", ("a",), ("a",), False, "explained", 0.7, True, True, 9.0, None)
+    judged = [replace(alike, probability=0.7 + 0.01 * number) for number in range(30)]
+    assert figures.calibration_and_size(judged, tmp_path / "all.svg").stat().st_size > 1000
+
+
+def test_a_calibrated_tool_lies_inside_the_range_of_chance_and_a_boaster_outside() -> None:
+    random = np.random.default_rng(3)
+    stated = random.uniform(0.3, 1.0, 400)
+    honest = calibration(stated.tolist(), (random.random(400) < stated).tolist())
+    boasting = calibration(stated.tolist(), (random.random(400) < stated - 0.25).tolist())
+    assert honest.error <= honest.chance_range[1] < boasting.error
+    assert boasting.error == pytest.approx(0.25, abs=0.06)
+    assert sum(honest.count) == 400
+
+
+def test_a_tool_that_states_one_probability_has_the_plain_difference_as_its_error() -> None:
+    found = calibration([0.75] * 8, [True] * 4 + [False] * 4)
+    assert found.error == pytest.approx(0.25)
+
+
+def test_work_is_kept_and_found_again(tmp_path: Path) -> None:
+    made: list[int] = []
+
+    def make(item: int) -> dict[str, Any]:
+        def count() -> dict[str, Any]:
+            made.append(item)
+            return {"twice": 2 * item}
+
+        return stored(tmp_path, str(item), count)
+
+    for _ in range(2):
+        assert of_each(Work(tmp_path), [1, 2], make, lambda _: None) == [{"twice": 2}, {"twice": 4}]
+    assert made == [1, 2]
+    assert not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.slow
+def test_the_digest_follows_the_sources() -> None:
+    assert sources("underskin") != sources("rig")
+    assert sources("proof/ideal*.py") != sources("proof")
+    assert sources("rig") == sources("rig")
+
+
+def test_drawn_cases_tell_nothing_of_the_truth() -> None:
+    case = DrawnCase(own_rig.SEED, 4)
+    document = case.document()
+    assert document == case.document()
+    assert set(document) == {"schema", "name", "skin", "recordings"}
+    assert document["skin"]["d33_pc_per_n"] is None
+
+
+def test_every_effect_that_is_drawn_can_be_supposed_where_it_is() -> None:
+    """The ideal diagnoser's laws reach the parameters that the rig draws, and no others of the same name."""
+    for number in range(60):
+        description = drawn(3, number)
+        effects = parse_experiment(description).effects
+        found = [entry.place_of(effects) for entry in suppositions(tuple(sorted(effects)), of_frf(description))]
+        places = [place for place in found if place is not None]
+        assert len(places) == 1
+    assert not set(CATALOGUED) & set(UNKNOWN)
+
+
+def test_a_supposition_gives_back_the_effects_of_its_place() -> None:
+    description = drawn(3, 1, "single")
+    for name in ("misalignment", "thickness_error", "preload_dependent_d33"):
+        for supposed in suppositions((name,), of_frf(description)):
+            place = np.linspace(0.3, 0.6, len(supposed.coordinates))
+            again = supposed.place_of(supposed.effects(place))
+            assert again == pytest.approx(place)
+
+
+@pytest.mark.slow
+def test_the_ideal_diagnoser_names_what_plainly_shows() -> None:
+    quiet = next(n for n in range(50) if _light(drawn(9, n, "none")))
+    assert diagnosed(DrawnCase(9, quiet, "none"))["answer"] == []
+
+
+def _light(description: dict[str, Any]) -> bool:
+    return not description["noise"]["position_mm"] and description["design"]["most_recordings"] < 40
+
+
+@pytest.mark.slow
+def test_a_small_run_writes_the_page_and_goes_on_from_what_it_kept(tmp_path: Path) -> None:
+    command = typer.Typer()
+    command.command()(prove)
+    options = [
+        "--count",
+        "2",
+        "--workers",
+        "1",
+        "--work-dir",
+        str(tmp_path / "work"),
+        "--docs-dir",
+        str(tmp_path / "docs"),
+    ]
+    first = CliRunner().invoke(command, ["mixture", *options])
+    assert first.exit_code == 0, first.output
+    page = (tmp_path / "docs/proof.md").read_text(encoding="utf-8")
+    assert "2 of 300 campaigns" in page
+    drawings = sorted(file.name for file in (tmp_path / "docs/figures").iterdir())
+    assert drawings == ["proof-calibration.svg", "proof-confusion.svg"]
+    reports = {file: file.stat().st_mtime_ns for file in (tmp_path / "work/reports").iterdir()}
+    assert len(reports) == 2
+    assert CliRunner().invoke(command, ["mixture", *options]).exit_code == 0
+    assert {file: file.stat().st_mtime_ns for file in (tmp_path / "work/reports").iterdir()} == reports
+    assert (tmp_path / "docs/proof.md").read_text(encoding="utf-8") == page
+
+
+def test_identifiable_is_what_stands_out_from_every_rival() -> None:
+    """Of two that are visible the twin is nobody's to name; what is wrong beside it counts."""
+    plain = Judged("plain", ("a",), ("a",), False, "explained", 0.9, True, True, 9.0, None)
+    judged = [plain, replace(plain, name="twin", answer=("b",)), replace(plain, name="quiet", truth=(), answer=())]
+    gains = {"plain": 31.0, "twin": -0.4, "quiet": None}
+    answers = {name: {"answer": ["a"], "chi2_over_rivals": gain} for name, gain in gains.items()}
+    page = document({
+        "mixture": {"judged": [asdict(entry) for entry in judged], "sources": "x"},
+        "ceiling": {"answers": answers, "sources": "x"},
+    })  # fmt: skip
+    row = next(line for line in page.splitlines() if line.startswith("| single |")).split("|")
+    assert row[3].strip().startswith("1 of 2")
+    assert row[5].strip().startswith("1 of 1")
+
+
+@pytest.mark.slow
+def test_the_ideal_diagnoser_finds_a_twin_no_better_than_the_truth() -> None:
+    found = diagnosed(DrawnCase(7001, 12, "single"))
+    assert set(drawn(7001, 12, "single")["effects"]) == {"amplitude_nonlinearity"}
+    assert abs(found["chi2_over_rivals"]) < 3.0
+
+
+@pytest.mark.slow
+def test_a_diagnosis_that_fails_is_a_wrong_answer(tmp_path: Path) -> None:
+    [made] = reports(Work(tmp_path), [MadeCase("broken", {"schema": "campaign/1"})], lambda _: None)
+    found = judge("broken", made, {"effects": [], "identifiable": True, "chi2_gain_of_truth": 0.0})
+    assert not found.right
+    assert found.verdict not in QUIET
+
+
+def test_an_unknown_part_is_named() -> None:
+    command = typer.Typer()
+    command.command()(prove)
+    result = CliRunner().invoke(command, ["sealing"])
+    assert result.exit_code == 2
+    for name in PARTS:
+        assert name in result.output
+
+
+def test_what_was_judged_survives_being_kept(tmp_path: Path) -> None:
+    from proof.concealed import judged_of
+
+    entry = Judged("c", ("a",), (), False, "no_mismatch", 0.5, True, True, 3.0, (1.0, 2.0))
+    text = json.dumps({"judged": [asdict(entry)]})
+    assert judged_of(json.loads(text)) == [entry]
+    path = tmp_path / "x.json"
+    path.write_text(text, encoding="utf-8")
+    assert FileCase(path).name == "x"
+
+
+def test_the_paper_s_campaigns_say_what_the_paper_says() -> None:
+    array = parse(paper_array.worlds()["array"])
+    preloads = [entry.preload_n for entry in array.recordings if isinstance(entry, FrfRecording)]
+    assert (preloads.count(3.0), preloads.count(1.0)) == (paper_array.AT_HIGHER, paper_array.AT_LOWER)
+
+
+@pytest.mark.slow
+def test_the_paper_s_question_is_left_open_and_what_would_settle_it_is_planned() -> None:
+    """Preload and age go together on the array: both are named, neither is guessed, and the plan takes them apart."""
+    made = paper_array.worlds()
+    array = diagnosis_report(parse(made["array"]), load_table())
+    rivals = {"preload_dependent_d33", "ageing"}
+    assert array["verdict"] == "ambiguous"
+    assert array["probability"] < 0.6
+    assert {entry["name"] for entry in array["mechanisms"]} | set(array["alternatives"][0]["mechanisms"]) == rivals
+    tied = [entry for entry in array["not_identifiable"] if entry["confounded_with"] in rivals]
+    assert [{entry["mechanism"], entry["confounded_with"]} for entry in tied] == [rivals]
+    planned = array["next_experiment"]
+    assert planned["probability_of_deciding"] > 0.9
+    assert {entry["preload_n"] for entry in planned["recordings"]} - {1.0}
+    assert all(entry["position_mm"] == [0.0, 0.0] for entry in planned["recordings"])
+
+
+@pytest.mark.slow
+def test_what_would_settle_the_paper_s_question_does() -> None:
+    """Both preloads on late sensors: what did it is named."""
+    made = paper_array.worlds()
+    aged = diagnosis_report(parse(made["array, then both preloads: age did it"]), load_table())
+    assert {entry["name"] for entry in aged["mechanisms"]} == {"ageing"}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(RECORDINGS is None, reason="UNDERSKIN_RECORDINGS names no folder of recordings")
+def test_real_recordings() -> None:
+    """The main outcomes: stiffening PDMS, creeping gel, relaxing cell, a layer in one of the wells."""
+    assert RECORDINGS is not None
+    found = {}
+    for entry in recorded():
+        if entry.name in ("well-E5", "tension-RTV615", "polymergel_creep", "cell_stress_relaxation"):
+            document = entry.make(Path(RECORDINGS))
+            made = diagnosis_report(parse(document), load_table())
+            found[entry.name] = made, {mechanism["name"] for mechanism in made["mechanisms"]}
+    assert "layered_contact" in found["well-E5"][1]
+    tied = {(entry["mechanism"], entry["confounded_with"]) for entry in found["well-E5"][0]["not_identifiable"]}
+    assert any("instrument_compliance" in pair for pair in tied)
+    assert "strain_stiffening" in found["tension-RTV615"][1]
+    assert "contact_creep" in found["polymergel_creep"][1]
+    assert "contact_creep" in found["cell_stress_relaxation"][0]["fit"]["mechanisms"]  # one time is not all of it
+    fits = {name: report["fit"] for name, (report, _) in found.items()}
+    for name in ("tension-RTV615", "polymergel_creep"):
+        assert fits[name]["after"]["heldout_rmse_percent"] < 0.5 * fits[name]["before"]["heldout_rmse_percent"]
+    assert fits["well-E5"]["after"]["heldout_rmse_percent"] < 1.15 * fits["well-E5"]["noise_floor_percent"]

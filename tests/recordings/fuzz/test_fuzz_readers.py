@@ -1,0 +1,152 @@
+"""Every reader on damaged files: cut, shuffled, overwritten, random. An error that names the file, never another one.
+
+500 files a format, 100,000 with UNDERSKIN_SOAK=1.
+"""
+
+import io
+import os
+import signal
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import h5py
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.recordings.test_recordings_campaign import EVERYTHING
+from tests.support import instrument_files as examples
+from tests.support.repository import ROOT
+from underskin.recordings.campaign import parse
+from underskin.recordings.readers import json_file
+from underskin.recordings.readers.formats import MODULES
+
+COUNT = 100_000 if os.environ.get("UNDERSKIN_SOAK") == "1" else 500
+# Read by libraries in C, which damage can make crash, loop or ask for all memory: what the process apart is for.
+FOREIGN = ("HDF5", "MATLAB")
+CONTAINED = ("no memory", f"died: {-signal.SIGSEGV}", f"died: {-signal.SIGABRT}", f"died: {-signal.SIGALRM}")
+
+
+def sound_files() -> dict[str, list[bytes]]:
+    """Small files without a fault, by format."""
+    csv = b"Sample,palm\n\nforce,amplifier\n1000,0\n1100,-0.007\n900,0.007\n1000,-0.001\n"
+    structure = {**examples.matlab_variables(), "run": {"force": examples.FORCE, "fs": 2.0}, "cell": [{"a": 1}, "x"]}
+    datasets = examples.time_datasets()
+    return {
+        "JSON": [json_file.write(parse(EVERYTHING))],
+        "CSV template": [(examples.EXAMPLES / "template.csv").read_bytes()],
+        "CSV": [csv, csv.replace(b",", b"\t"), csv.replace(b",", b";").replace(b".", b",")],
+        "LVM": [examples.lvm().encode(), examples.lvm(separator=",").encode()],
+        "TDMS": [examples.tdms(1), examples.tdms(3)],
+        "UFF": [examples.uff(0, datasets), examples.uff(1, datasets)],
+        "MATLAB": [
+            examples.matlab_5(structure),
+            examples.matlab_5(structure, compressed=False),
+            examples.matlab_73(examples.matlab_variables()),
+        ],
+        "HDF5": [examples.hdf5(EVERYTHING), without_checksums(examples.hdf5(EVERYTHING))],
+    }
+
+
+def without_checksums(data: bytes) -> bytes:
+    """The same objects as older HDF5 libraries write them, where damage is not found out at once."""
+    buffer = io.BytesIO()
+    with h5py.File(io.BytesIO(data), "r") as source, h5py.File(buffer, "w", libver="earliest") as target:
+        for name, value in source.attrs.items():
+            target.attrs[name] = value
+        for name in source:
+            source.copy(name, target)
+    return buffer.getvalue()
+
+
+class Reader:
+    """A worker that reads one file after another, and is started again when one ends it."""
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+        self.process = self._start()
+
+    def _start(self) -> "subprocess.Popen[bytes]":
+        command = [sys.executable, "-m", "tests.recordings.fuzz.worker", self.kind]
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
+        return subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment
+        )
+
+    def said(self, data: bytes) -> str:
+        """What the worker says of a file, or how it died."""
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.write(struct.pack("<Q", len(data)) + data)
+        self.process.stdin.flush()
+        line = self.process.stdout.readline()
+        if line:
+            return line.decode().strip()
+        self.close()
+        status = self.process.returncode
+        self.process = self._start()
+        return f"died: {status}"
+
+    def close(self) -> None:
+        for pipe in (self.process.stdin, self.process.stdout):
+            assert pipe is not None
+            pipe.close()
+        self.process.wait()
+
+
+@pytest.fixture(params=sorted(MODULES))
+def reader(request: pytest.FixtureRequest) -> Iterator[Reader]:
+    worker = Reader(request.param)
+    yield worker
+    worker.close()
+
+
+@st.composite
+def damaged(draw: st.DrawFn, files: list[bytes]) -> bytes:
+    data = draw(st.sampled_from(files))
+    for _ in range(draw(st.integers(1, 4))):
+        start = draw(st.integers(0, len(data)))
+        end = min(len(data), start + draw(st.integers(0, 16) | st.integers(0, len(data))))
+        noise = draw(
+            st.binary(max_size=24) | st.sampled_from([b"\xff" * 8, b"\0" * 8, b"\n", b"9" * 12, b"nan", b"-1"])
+        )
+        data = draw(
+            st.sampled_from(
+                [
+                    data[:end],
+                    data[:start] + noise + data[start + len(noise) :],
+                    data[:start] + noise + data[start:],
+                    data[:start] + data[end:],
+                    data[end:] + data[start:end] + data[:start],
+                    data[:end] + data[start:],
+                    data[:16] + noise,
+                    noise,
+                ]
+            )
+        )
+    return data
+
+
+@pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
+def test_damaged_files_are_refused_with_their_name(reader: Reader) -> None:
+    files = sound_files()[reader.kind]
+    for sound in files:
+        assert reader.said(sound) == "read"
+
+    allowed = ["read", "refused", *(CONTAINED if reader.kind in FOREIGN else ())]
+
+    @settings(
+        max_examples=COUNT,
+        deadline=None,
+        database=None,
+        derandomize=COUNT < 100_000,
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(data=damaged(files))
+    def try_it(data: bytes) -> None:
+        said = reader.said(data)
+        assert said in allowed, said
+
+    try_it()

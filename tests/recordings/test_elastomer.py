@@ -1,0 +1,143 @@
+"""The elastomer's modulus: the paper's reading from its curve, Hertz with a free contact point, and real recordings."""
+
+import csv
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from underskin.errors import InvalidInput
+from underskin.recordings.campaign import CompressionRecording, IndentationRecording
+from underskin.recordings.elastomer import compression_modulus, indentation_modulus, of_compression, of_indentation
+from underskin.units import Floats
+
+HEIGHT, DIAMETER = 10e-3, 10e-3
+RADIUS = 4e-3
+NEEDS_RECORDINGS = pytest.mark.skipif(
+    "UNDERSKIN_RECORDINGS" not in os.environ, reason="UNDERSKIN_RECORDINGS does not name the folder of real recordings"
+)
+
+
+def paper_curve(strain: Floats, toe: float = 0.0) -> Floats:
+    """16 MPa up to 2 MPa and stiffer from there, behind a toe in which the platens come to bear."""
+    seated = np.where(strain < 2 * toe, strain**2 / (4 * toe) if toe else 0.0, strain - toe)
+    beyond = np.maximum(seated - 2 / 16, 0)
+    return 16e6 * seated + 14e6 * beyond + 80e6 * beyond**2
+
+
+@pytest.mark.parametrize("toe", [0.0, 0.01])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_papers_reading(toe: float, sign: int) -> None:
+    strain = np.linspace(0, 0.3, 600)
+    stress = paper_curve(strain, toe) + np.random.default_rng(0).normal(0, 5e3, 600)
+    area = np.pi / 4 * DIAMETER**2
+    found = compression_modulus(sign * strain * HEIGHT, sign * stress * area, HEIGHT, DIAMETER)
+    assert found.modulus == pytest.approx(16e6, rel=0.01)
+    assert found.leaves_at_stress == pytest.approx(2e6, rel=0.1)
+    assert found.leaves_at_strain == pytest.approx(2 / 16, rel=0.1)
+
+
+def test_a_straight_curve_stays_straight_and_its_uncertainty_is_the_scatter_seen() -> None:
+    random = np.random.default_rng(1)
+    displacement = np.linspace(0, 1e-3, 300)
+    force = 16e6 * displacement / HEIGHT * np.pi / 4 * DIAMETER**2
+    found = [compression_modulus(displacement, force + random.normal(0, 0.5, 300), HEIGHT, DIAMETER) for _ in range(60)]
+    assert all(one.leaves_at_strain is None for one in found)
+    errors = np.array([one.modulus for one in found]) - 16e6
+    stated = np.sqrt(np.mean([one.uncertainty**2 for one in found]))
+    assert abs(errors.mean()) < 3 * stated / np.sqrt(60)
+    assert 0.4 < errors.std() / stated < 1.1  # noise alone, and noise seen once more as a change of slope
+
+
+def test_unloading_is_not_read() -> None:
+    strain = np.concatenate([np.linspace(0, 0.3, 300), np.linspace(0.3, 0, 300)])
+    stress = paper_curve(strain) * np.where(np.arange(600) < 300, 1, 0.6)
+    found = compression_modulus(strain * HEIGHT, stress, HEIGHT, DIAMETER)
+    once = compression_modulus(strain[:300] * HEIGHT, stress[:300], HEIGHT, DIAMETER)
+    assert found.modulus == pytest.approx(once.modulus, rel=1e-3)
+
+
+def hertz(depth: Floats, modulus: float = 16e6, contact: float = 0.1e-3, offset: float = -0.05) -> Floats:
+    return offset + 4 / 3 * modulus / 0.75 * np.sqrt(RADIUS) * np.maximum(depth - contact, 0) ** 1.5
+
+
+@pytest.mark.slow
+def test_indentation_finds_contact_offset_and_modulus_and_its_interval_covers() -> None:
+    random = np.random.default_rng(2)
+    depth = np.linspace(0, 0.4e-3, 200)
+    hits = 0
+    for _ in range(200):
+        found = indentation_modulus(depth, hertz(depth) + random.normal(0, 0.05, 200), RADIUS, 0.5)
+        hits += abs(found.modulus - 16e6) < 1.96 * found.uncertainty
+    assert 0.9 <= hits / 200 <= 0.985
+    exact = indentation_modulus(depth, hertz(depth), RADIUS, 0.5)
+    assert exact.modulus == pytest.approx(16e6, rel=1e-4)
+    assert exact.contact_point == pytest.approx(0.1e-3, abs=1e-7)
+    assert exact.force_offset == pytest.approx(-0.05, abs=1e-3)
+
+
+def test_a_recording_that_starts_in_contact_has_its_contact_point_before_it() -> None:
+    depth = np.linspace(0.15e-3, 0.5e-3, 200)
+    found = indentation_modulus(depth, hertz(depth, offset=0.0), RADIUS, 0.5)
+    assert found.contact_point == pytest.approx(0.1e-3, abs=1e-6)
+    assert found.modulus == pytest.approx(16e6, rel=1e-3)
+
+
+@pytest.mark.parametrize(("height_mm", "diameter_mm"), [(10.0, 10.0), (12.5, 29.0), (30.0, 50.0)])
+def test_the_papers_reading_on_the_stated_geometry(height_mm: float, diameter_mm: float) -> None:
+    strain = np.linspace(0, 0.3, 600)
+    pressed = CompressionRecording(
+        id="c", sample_height_mm=height_mm, sample_diameter_mm=diameter_mm, displacement_mm=strain * height_mm,
+        force_n=paper_curve(strain) * np.pi / 4 * (diameter_mm * 1e-3) ** 2,
+    )  # fmt: skip
+    found = of_compression(pressed)
+    assert found.modulus == pytest.approx(16e6, rel=0.01)
+    assert found.leaves_at_stress == pytest.approx(2e6, rel=0.1)
+    assert "leaves the line at 2.11 MPa" in found.statement
+
+
+def test_an_indentation_in_lab_units_gives_the_same() -> None:
+    depth = np.linspace(0, 0.4e-3, 200)
+    indented = IndentationRecording(id="i", indenter_radius_mm=4.0, displacement_mm=depth * 1e3, force_n=hertz(depth))
+    found = of_indentation(indented, 0.5)
+    assert found.modulus == pytest.approx(16e6, rel=1e-4)
+    assert "contact from 0.1 mm" in found.statement
+
+
+def test_a_recording_that_does_not_load_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="force_n"):
+        indentation_modulus(np.linspace(0, 1, 50), -hertz(np.linspace(0.4e-3, 0, 50)) * 0, RADIUS, 0.5)
+
+
+def test_a_modulus_that_one_sample_in_contact_leaves_open_is_refused() -> None:
+    depth = np.linspace(0, 0.4e-3, 20)
+    force = np.where(np.arange(20) == 19, 1.0, 0.0)
+    with pytest.raises(InvalidInput, match="displacement_mm"):
+        indentation_modulus(depth, force, RADIUS, 0.5)
+
+
+@NEEDS_RECORDINGS
+@pytest.mark.parametrize(("product", "modulus_kpa"), [("EF10_0T", 62.5), ("EF30_0T", 114.0), ("EF50_0T", 181.0)])
+def test_silicones_under_compression(product: str, modulus_kpa: float) -> None:
+    """Their slope between 2 and 10 % strain, as the folder's description gives it."""
+    files = sorted((Path(os.environ["UNDERSKIN_RECORDINGS"]) / "silicone-compression" / product).glob("*.csv"))
+    found = []
+    for file in files:
+        table = np.loadtxt(file, delimiter=",", skiprows=8)
+        found.append(compression_modulus(table[:, 1] * 1e-3, table[:, 2], 30e-3, 50e-3))
+    assert len(files) == 10
+    assert np.median([one.modulus for one in found]) == pytest.approx(1e3 * modulus_kpa, rel=0.1)
+    assert all(one.leaves_at_strain is not None and one.leaves_at_strain < 0.3 for one in found)
+
+
+@NEEDS_RECORDINGS
+@pytest.mark.parametrize(("well", "modulus_mpa"), [("E5", 9.16), ("E6", 8.32), ("E7", 8.28)])
+def test_a_steel_sphere_in_a_well(well: str, modulus_mpa: float) -> None:
+    """Hertz' modulus as the folder's description gives it; force is negative in compression there."""
+    folder = Path(os.environ["UNDERSKIN_RECORDINGS"]) / "sphere-in-well" / "run_732_20251030"
+    with next(folder.glob(f"well_{well}_*.csv")).open(newline="") as file:
+        rows = [row for row in csv.reader(file) if len(row) == 4]
+    values = np.array([[float(cell) for cell in row] for row in rows[1:]])
+    found = indentation_modulus(-values[:, 1] * 1e-3, -values[:, 3], 2.5e-3, 0.5)
+    assert found.modulus == pytest.approx(1e6 * modulus_mpa, rel=0.01)

@@ -1,0 +1,127 @@
+"""Text files and rig descriptions at the edge: what is read all the same, and what is refused and why."""
+
+import pytest
+
+from tests.support.instrument_files import COMMON, lvm, matlab_5, matlab_variables, rig
+from underskin.errors import FileError
+from underskin.recordings import Reading, read_contents, read_file
+from underskin.recordings.campaign import IndentationRecording
+from underskin.recordings.channels import Contents
+
+CURVES = "schema,campaign/1\nname,x\nskin.poisson_ratio,0.5\n\n"
+
+
+def wide_then_narrow(width: int, header: str = "") -> bytes:
+    """An LVM file of one wide row, then as many rows of one cell."""
+    head = [
+        "LabVIEW Measurement",
+        "Separator\tTab",
+        "X_Columns\tNo",
+        "***End_of_Header***",
+        f"Channels\t{width}",
+        header,
+    ]
+    rows = ["\t" + "\t".join(["1"] * width), *["\t1"] * width]
+    return "\n".join([*head, "***End_of_Header***", "X_Value", *rows]).encode()
+
+
+def test_channels_that_few_rows_hold_cost_no_more_than_their_numbers() -> None:
+    contents = read_contents(wide_then_narrow(30_000), "wide.lvm")
+    assert isinstance(contents, Contents)
+    lengths = [len(channel.values) for channel in contents.blocks[0].channels]
+    assert lengths == [30_001] + 29_999 * [1]
+
+
+def test_an_lvm_file_cut_into_parts_that_are_all_but_empty_is_refused() -> None:
+    samples = "\t".join(["Samples"] + ["1"] * 3000)
+    with pytest.raises(FileError, match=r"wide\.lvm: line 9: Samples = 1 cuts 6000 numbers of 3000 channels into 3001"):
+        read_contents(wide_then_narrow(3000, samples), "wide.lvm")
+
+
+def test_a_decimal_comma_in_the_step_alone_is_understood() -> None:
+    text = lvm(repeats=1).replace("Decimal_Separator\t.\n", "").replace("0.001\t0.001", "0,001\t0,001")
+    contents = read_contents(text.encode(), "run.lvm")
+    assert isinstance(contents, Contents)
+    assert contents.blocks[0].sample_rate_hz == pytest.approx(1000)
+
+
+def csv(table: str) -> Reading:
+    return read_file((CURVES + table).encode(), "a.csv")
+
+
+@pytest.mark.parametrize("again", ["force_n", "Force [kN]"])
+def test_a_heading_that_comes_twice_is_refused(again: str) -> None:
+    with pytest.raises(FileError, match=r"a\.csv: line 5: .* is a second column of force_n"):
+        csv(f"id,kind,indenter_radius_mm,displacement_mm,force_n,{again}\nb,indentation,4,0,0,0\n,,,1,5,1\n")
+
+
+def test_numbers_of_different_rows_are_never_taken_for_a_pair() -> None:
+    table = "id,kind,indenter_radius_mm,displacement_mm,force_n\n"
+    good = "a,indentation,4,0,0\n,,,1,5\n"
+    reading = csv(f"{table}{good}b,indentation,4,0,\n,,,,0.5\n,,,1,\n,,,,1.5\n")
+    assert [recording.id for recording in reading.campaign.recordings] == ["a"]
+    assert [(problem.recording, problem.field, problem.value) for problem in reading.problems] == [
+        ("b", "displacement_mm[1]", None),
+        ("b", "force_n[0]", None),
+    ]
+
+
+def test_columns_that_a_recording_does_not_use_may_be_empty() -> None:
+    headings = "id,kind,indenter_radius_mm,displacement_mm,time_s,force_n\n"
+    reading = csv(headings + "a,indentation,4,0,,0\n,,,1,,5\nb,indentation,4,0,0,0\n,,,1,2,5\n")
+    assert not reading.problems
+    first, second = reading.campaign.recordings
+    assert isinstance(first, IndentationRecording)
+    assert isinstance(second, IndentationRecording)
+    assert first.time_s is None
+    assert second.time_s is not None
+    assert second.time_s.tolist() == [0, 2]
+
+
+def test_load_cycles_that_a_text_header_states_are_a_number() -> None:
+    text = "cycles;1200\n\nforce;amplifier\nmN;V\n" + "\n".join(f"{n};{n}" for n in range(1, 6))
+    described = rig(recording={**COMMON, "sample_rate_hz": 10, "load_cycles": {"property": "cycles"}})
+    reading = read_file(text.encode(), "run.csv", described)
+    assert not reading.problems
+    assert [recording.load_cycles for recording in reading.campaign.recordings] == [1200]
+
+
+def test_parts_of_a_file_with_a_long_name_have_ids_of_their_own() -> None:
+    structures = {name: matlab_variables() for name in ("first", "second")}
+    described = rig(recording={**COMMON, "sample_rate_hz": 10})
+    reading = read_file(matlab_5(structures), "x" * 300 + ".mat", described)
+    assert not reading.problems
+    assert [recording.id for recording in reading.campaign.recordings] == [
+        "x" * 194 + " first",
+        "x" * 193 + " second",
+    ]
+
+
+def test_an_empty_file_is_said_to_be_empty() -> None:
+    for name in ("monday.csv", "skin.h5"):
+        with pytest.raises(FileError) as refusal:
+            read_file(b"", name)
+        assert str(refusal.value) == f"{name}: the file is empty (0 bytes)"
+
+
+UNITS = """schema,campaign/1
+name,x
+skin.thickness [m],{}
+skin.poisson_ratio,0.5
+{}
+id,kind,sample_height_mm,sample_diameter_mm,time_s,force_n,displacement_mm
+c1,compression,5,20,0,0,0
+,,,,1,1,0.1
+,,,,2,2,0.2
+"""
+
+
+def test_a_unit_that_a_heading_says_and_its_value_contradicts_is_named_by_both() -> None:
+    asked = r"^x\.csv: line 3: skin\.thickness \[m\] = 2\.5: 2\.5 m is 2500 mm: was 2\.5 mm meant\?"
+    with pytest.raises(FileError, match=asked):
+        read_file(UNITS.format("2.5", "").encode(), "x.csv")
+    said = read_file(UNITS.format("2.5", "units_checked,true").encode(), "x.csv")
+    right = read_file(UNITS.format("0.0025", "").encode(), "x.csv")
+    assert isinstance(said, Reading)
+    assert isinstance(right, Reading)
+    assert [found.campaign.skin.thickness_mm for found in (said, right)] == [2500.0, 2.5]

@@ -1,0 +1,171 @@
+"""Rig descriptions: what they refuse, what they convert."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.instrument_files import CHARGE, COMMON, EXAMPLES, FORCE, matlab_5, rig, tdms
+from underskin.errors import FileError, InvalidInput
+from underskin.recordings import read_file, rig_description
+from underskin.recordings.campaign import FrfRecording, IndentationRecording
+from underskin.recordings.rig_description import RigDescription
+
+RIGS = sorted((EXAMPLES / "rigs").glob("*.yaml"))
+
+
+def parsed(text: str) -> RigDescription:
+    return rig_description.parse(text.encode(), "rig.yaml")
+
+
+SMALL = """
+schema: rig/1
+kind: indentation
+skin: {poisson_ratio: 0.5}
+recording: {indenter_radius_mm: 2.5, recorded_at: 2017-05-03T09:00:00Z}
+channels:
+  displacement_mm: {channel: depth, unit: um}
+  force_n: {channel: load, unit: V, sensitivity: 1e-2, sensitivity_unit: V/mN}
+"""
+
+
+def indented(force: str, rig_text: str = SMALL) -> IndentationRecording:
+    reading = read_file(f"depth;load\n0;0\n100;{force}\n200;{force}".encode(), "a.csv", parsed(rig_text))
+    assert not reading.problems
+    recording = reading.campaign.recordings[0]
+    assert isinstance(recording, IndentationRecording)
+    return recording
+
+
+def test_units_and_sensitivities_are_applied() -> None:
+    recording = indented("2.5")
+    assert recording.displacement_mm == pytest.approx([0, 0.1, 0.2])
+    assert recording.force_n == pytest.approx([0, 0.25, 0.25])  # 2.5 V over 0.01 V/mN is 250 mN
+    assert recording.recorded_at == "2017-05-03T09:00:00Z"
+    assert recording.id == "a"
+
+
+def test_the_instruments_own_give_is_subtracted() -> None:
+    stiff = SMALL.replace("unit: um}", "unit: um, stiffness_n_per_mm: 5}")
+    assert indented("2.5", stiff).displacement_mm == pytest.approx([0, 0.05, 0.15])
+
+
+def test_a_force_that_falls_with_depth_needs_its_sign_said() -> None:
+    with pytest.raises(FileError, match=r"a\.csv: channels: force falls .* say sign: 1 or sign: -1"):
+        indented("-2.5")
+    turned = SMALL.replace("channel: load,", "channel: load, sign: -1,").replace(
+        "channel: depth,", "channel: depth, sign: 1,"
+    )
+    assert indented("-2.5", turned).force_n == pytest.approx([0, 0.25, 0.25])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("rig/1", "rig/2", "schema = 'rig/2': must be rig/1"),
+        ("kind: indentation", "kind: tension", "kind = 'tension': must be one of frf, indentation, compression"),
+        ("skin: {poisson_ratio", "skin: {colour", r"skin\.colour = 0\.5: must be one of"),
+        ("recording: {indenter_radius_mm", "recording: {preload_n", r"recording\.preload_n = 2\.5: must be one of"),
+        ("force_n:", "charge_pc:", r"channels\.charge_pc .*must be one of"),
+        ("channel: load,", "", r"channels\.force_n\.channel = None: required"),
+        ("channel: load,", "channel: load, sign: 2,", r"channels\.force_n\.sign = 2: must be 1 or -1"),
+        ("channel: load,", "channel: load, offset: 2,", r"channels\.force_n\.offset = 2: unknown field"),
+        ("sensitivity: 1e-2,", "", r"channels\.force_n\.sensitivity = None: needs a sensitivity_unit"),
+        ("unit: um", "labelled: um", r"channels\.displacement_mm\.unit = None: required where labelled"),
+        ("channel: load,", "channel: load, stiffness_n_per_mm: 1,", "is for displacement_mm"),
+        ("kind: indentation", "rig: 3", "rig = 3: unknown field"),
+    ],
+)
+def test_a_wrong_rig_description_is_refused_by_field(old: str, new: str, message: str) -> None:
+    assert old in SMALL
+    with pytest.raises(InvalidInput, match=message):
+        parsed(SMALL.replace(old, new, 1))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: [1, 2", r"rig\.yaml: line 1: not YAML"),
+        ("a: &x [1]\nb: *x", r"rig\.yaml: line 2: not YAML: references"),
+        ("!!python/object/apply:os.system [ls]", r"rig\.yaml: line 1: not YAML: could not determine a constructor"),
+        ("{" * 3000, "rig.yaml: line 1.*not JSON"),
+        ("[" * 3000, "rig.yaml: not YAML"),
+        ('{"schema": }', r"rig\.yaml: line 1, column 12: not JSON"),
+        ("x" * 1_000_001, "may have up to 1000000 bytes"),
+    ],
+)
+def test_what_is_no_rig_description_is_refused(text: str, message: str) -> None:
+    with pytest.raises(FileError, match=message):
+        parsed(text)
+
+
+@pytest.mark.parametrize(
+    ("channel", "message"),
+    [
+        (
+            {"channel": "amplifier", "unit": "V"},
+            "its unit 'V' is one of voltage; charge_pc needs one of charge, such as pC; a signal",
+        ),
+        ({"channel": "amplifier"}, "has no unit in the file"),
+        ({"channel": "force"}, "its unit 'mN' is one of force; charge_pc needs one of charge"),
+        ({"channel": "force", "unit": "pC"}, r"is labelled 'mN', .* says 'pC': .*add labelled: mN"),
+        ({"channel": "force", "unit": "pC", "labelled": "g"}, "is labelled 'mN', not 'g'"),
+        (
+            {"channel": "amplifier", "unit": "V", "sensitivity": 1, "sensitivity_unit": "A/pC"},
+            "is not of the sensitivity's",
+        ),
+        (
+            {"channel": "charge", "unit": "pC"},
+            r"no part holds all .*: charge is missing; it has force \[mN\], amplifier \[\?\]",
+        ),
+    ],
+)
+def test_a_channel_that_does_not_fit_is_refused(channel: dict[str, Any], message: str) -> None:
+    channels = {"force_n": {"channel": "force"}, "charge_pc": channel}
+    with pytest.raises(FileError, match=rf"run\.tdms: .*{message}"):
+        read_file(tdms(1), "run.tdms", rig(channels=channels))
+
+
+def test_a_property_that_the_file_does_not_state_is_refused() -> None:
+    with pytest.raises(
+        FileError, match=r"property 'rate': is not in the file, which states block, operator, run\.preload, preload"
+    ):
+        read_file(tdms(1), "run.tdms", rig(recording={**COMMON, "preload_n": {"property": "rate"}}))
+    reading = read_file(tdms(1), "run.tdms", rig(recording={**COMMON, "preload_n": {"property": "run.preload"}}))
+    recording = reading.campaign.recordings[0]
+    assert isinstance(recording, FrfRecording)
+    assert recording.preload_n == 1.0
+
+
+def test_each_block_can_say_its_own_sensor_and_preload() -> None:
+    data = matlab_5(
+        {name: {"force": FORCE, "amplifier": CHARGE, "preload": n} for name, n in (("s01", 1.0), ("s02", 2.0))}
+    )
+    recording = {**COMMON, "sensor": {"property": "block"}, "preload_n": {"property": "preload"}, "sample_rate_hz": 10}
+    reading = read_file(data, "both.mat", rig(recording=recording))
+    found = [kept for kept in reading.campaign.recordings if isinstance(kept, FrfRecording)]
+    assert [(kept.id, kept.sensor, kept.preload_n) for kept in found] == [
+        ("both s01", "s01", 1.0),
+        ("both s02", "s02", 2.0),
+    ]
+
+
+def test_times_that_are_not_evenly_spaced_give_no_sample_rate() -> None:
+    channels = {
+        name: {"channel": name[0], "unit": unit}
+        for name, unit in (("force_n", "N"), ("charge_pc", "pC"), ("time_s", "s"))
+    }
+    for times, rate in (([0, 1, 2, 3], 1.0), ([0, 1, 2, 4], None)):
+        table = "t;f;c\n" + "\n".join(f"{time};1;{time}" for time in times)
+        if rate is None:
+            with pytest.raises(FileError, match="time_s: samples are not evenly spaced"):
+                read_file(table.encode(), "a.csv", rig(channels=channels))
+        else:
+            recording = read_file(table.encode(), "a.csv", rig(channels=channels)).campaign.recordings[0]
+            assert isinstance(recording, FrfRecording)
+            assert recording.sample_rate_hz == pytest.approx(rate)
+
+
+@pytest.mark.parametrize("file", RIGS, ids=lambda file: file.stem)
+def test_the_example_rig_descriptions_are_valid(file: Path) -> None:
+    assert rig_description.parse(file.read_bytes(), file.name).channels

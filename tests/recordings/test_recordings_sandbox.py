@@ -1,0 +1,193 @@
+"""Binary files are parsed in a process of their own; what it must not do, and how its end is told."""
+
+import io
+import os
+import signal
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.recordings.test_recordings_campaign import EVERYTHING, INDENTATION, document
+from tests.support.instrument_files import hdf5, tdms
+from underskin.errors import FileError
+from underskin.recordings import read_contents, read_file
+from underskin.recordings.channels import Contents
+from underskin.recordings.readers.sandbox import Limits, call_apart, parse_apart
+
+
+@pytest.fixture
+def stream() -> Iterator[BinaryIO]:
+    with tempfile.TemporaryFile() as opened:
+        opened.write(tdms(1))
+        opened.flush()
+        yield opened
+
+
+def matlab_73(fill: Callable[[Any], None]) -> bytes:
+    """A file that begins as MATLAB 7.3 does, with what `fill` puts into it."""
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w", userblock_size=512) as target:
+        fill(target)
+    return b"MATLAB 7.3 MAT-file".ljust(512, b"\0") + buffer.getvalue()[512:]
+
+
+def test_what_the_child_reads_arrives_unchanged(stream: BinaryIO) -> None:
+    from underskin.recordings.readers import tdms_file
+
+    here, apart = tdms_file.read(stream, "a"), parse_apart("TDMS", stream, "a")
+    assert isinstance(apart, Contents)
+    assert (apart.properties, apart.warnings) == (here.properties, here.warnings)
+    for mine, other in zip(here.blocks[0].channels, apart.blocks[0].channels, strict=True):
+        assert (mine.name, mine.unit) == (other.name, other.unit)
+        assert np.array_equal(mine.values, other.values)
+
+
+@pytest.mark.slow
+def test_a_small_file_that_unfolds_beyond_the_memory_limit_is_refused() -> None:
+    data = matlab_73(lambda target: target.create_dataset("force", data=np.zeros(20_000_000), compression="gzip"))
+    assert len(data) < 1_000_000
+    with tempfile.TemporaryFile() as stream:
+        stream.write(data)
+        stream.flush()
+        with pytest.raises(FileError, match=r"bomb\.mat: .*more than 0\.1 GB of memory"):
+            parse_apart("MATLAB", stream, "bomb.mat", Limits(memory_bytes=107_374_182))
+
+
+@pytest.mark.slow
+def test_a_small_file_cannot_become_a_large_campaign() -> None:
+    data = matlab_73(lambda target: target.create_dataset("force", data=np.zeros(20_000_000), compression="gzip"))
+    with pytest.raises(FileError, match=r"bomb\.mat: it unfolds to more than \d+ MB, too much for a file of its size"):
+        read_contents(data, "bomb.mat")
+
+
+def test_a_dataset_that_was_never_written_is_refused() -> None:
+    def declare(target: Any) -> None:
+        del target["recordings/000000/force_n"]
+        target.create_dataset("recordings/000000/force_n", (1_000_000,), "f8", fillvalue=1.0)
+
+    with pytest.raises(FileError, match=r"force_n: declares 8000000 bytes of data, of which the file stores 0"):
+        read_contents(altered_hdf5(declare), "bomb.h5")
+
+
+def altered_hdf5(change: Callable[[Any], None]) -> bytes:
+    buffer = io.BytesIO(hdf5(document(INDENTATION)))
+    with h5py.File(buffer, "r+") as target:
+        change(target)
+    return buffer.getvalue()
+
+
+def test_attributes_named_as_no_field_is_are_refused_one_by_one() -> None:
+    def rename(target: Any) -> None:
+        del target["recordings/000000"]
+        target.create_group("recordings/000000").attrs.update({"array": "<f8", "start": 0, "count": 10**9})
+
+    problems = read_file(altered_hdf5(rename), "a.h5").problems
+    assert {"array", "start", "count"} <= {problem.field for problem in problems}
+
+
+def test_a_file_that_takes_too_long_is_refused(stream: BinaryIO) -> None:
+    with pytest.raises(FileError, match=r"slow\.tdms: reading it as TDMS took more than 0\.02 s"):
+        parse_apart("TDMS", stream, "slow.tdms", Limits(seconds=0.02))
+
+
+def die(_stream: BinaryIO) -> None:
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def fail(_stream: BinaryIO) -> None:
+    raise RuntimeError("something unforeseen")
+
+
+def write_much(_stream: BinaryIO) -> dict[str, Any]:
+    part = np.zeros(10_000_000)
+    return {str(number): part for number in range(5)}
+
+
+def see_environment(_stream: BinaryIO) -> dict[str, str]:
+    return dict(os.environ)
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [("die", "was killed by signal 11"), ("fail", "ended with status 1: RuntimeError: something unforeseen")],
+)
+def test_the_childs_death_is_an_error_that_names_the_file(stream: BinaryIO, function: str, message: str) -> None:
+    with pytest.raises(FileError, match=message) as refusal:
+        call_apart(f"{__name__}:{function}", stream, "palm.tdms", what="TDMS")
+    assert refusal.value.file == "palm.tdms"
+
+
+def test_the_child_cannot_answer_more_than_it_may_hold(stream: BinaryIO) -> None:
+    with pytest.raises(FileError, match=r"a: it unfolds to more than 16 MB"):
+        call_apart(f"{__name__}:write_much", stream, "a", what="TDMS")
+
+
+def test_the_child_knows_no_secrets(stream: BinaryIO, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("UNDERSKIN_DATABASE_URL", "postgresql://lab:secret@host/db")
+    seen = call_apart(f"{__name__}:see_environment", stream, "a", what="TDMS")
+    assert "PYTHONPATH" in seen
+    assert not any("secret" in value for value in seen.values())
+
+
+def link_outside(target: Any, secret: Path) -> None:
+    target["force"] = h5py.ExternalLink(str(secret), "/data")
+
+
+def link_inside(target: Any, _secret: Path) -> None:
+    target["force"] = h5py.SoftLink("/elsewhere")
+
+
+def store_outside(target: Any, secret: Path) -> None:
+    target.create_dataset("force", (4,), "f8", external=[(str(secret), 0, 32)])
+
+
+def map_outside(target: Any, secret: Path) -> None:
+    layout = h5py.VirtualLayout((4,), "f8")
+    layout[:] = h5py.VirtualSource(str(secret), "data", (4,))
+    target.create_virtual_dataset("force", layout)
+
+
+def lead_back(target: Any, _secret: Path) -> None:
+    target.create_group("run")["again"] = target
+
+
+def same_twice(target: Any, _secret: Path) -> None:
+    target["a"] = np.zeros(3)
+    target["b"] = target["a"]
+
+
+@pytest.mark.parametrize("fill", [link_outside, link_inside, store_outside, map_outside, lead_back, same_twice])
+@pytest.mark.parametrize("kind", ["MATLAB", "HDF5"])
+def test_hdf5_that_leads_out_of_the_file_is_refused(fill: Any, kind: str, tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "secret.h5", "w") as secret:
+        secret["data"] = np.arange(4.0)
+    if kind == "MATLAB":
+        data = matlab_73(lambda target: fill(target, tmp_path / "secret.h5"))
+    else:
+        buffer = io.BytesIO(hdf5(EVERYTHING))
+        with h5py.File(buffer, "r+") as target:
+            fill(target["recordings/000000"], tmp_path / "secret.h5")
+        data = buffer.getvalue()
+    with pytest.raises(FileError, match=r"somewhere else|another file|same object"):
+        read_file(data, "a.h5")
+
+
+def test_references_in_a_campaign_are_refused_as_values() -> None:
+    buffer = io.BytesIO(hdf5(EVERYTHING))
+    with h5py.File(buffer, "r+") as target:
+        target["recordings/000000"].attrs["sensor"] = target["skin"].ref
+    problems = read_file(buffer.getvalue(), "a.h5").problems
+    assert [(problem.recording, problem.field) for problem in problems] == [("r1", "sensor")]
+
+
+@pytest.mark.slow
+def test_a_name_given_by_a_client_never_becomes_a_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("../../escape.h5", str(tmp_path / "absolute.h5"), "\0", "x" * 5000, "-rf"):
+        assert read_file(hdf5(EVERYTHING), name).campaign.recordings
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,102 @@
+"""Damage in a recorded signal is seen where it is, and nowhere else."""
+
+import numpy as np
+import pytest
+
+from tests.recordings.known_signals import RATE, answer_to, dwelling, known_frf, rms_error, shaken, swept
+from underskin.recordings.frf.estimation import Frf, broadband, stepped_sine
+from underskin.recordings.frf.signal_checks import defects, defects_of_pair
+
+
+def test_overload_is_seen_where_it_is_and_nowhere_else() -> None:
+    _, charge = shaken(7)
+    ceiling = np.quantile(charge, 0.98)
+    found = defects("charge_pc", np.minimum(charge, ceiling))
+    assert {defect.kind for defect in found} == {"overload"}
+    assert all(charge[defect.first_sample : defect.first_sample + defect.samples].min() >= ceiling for defect in found)
+    assert defects("charge_pc", charge) == []
+
+
+def test_broadband_leaves_damaged_blocks_out() -> None:
+    force, charge = shaken(10)
+    damaged = charge.copy()
+    damaged[30_000:30_100] = damaged[30_000]
+    frf = broadband(force, damaged, RATE, block_samples=2000)
+    whole = broadband(force, charge, RATE, block_samples=2000)
+    assert [defect.kind for defect in frf.defects] == ["held_samples"]
+    assert rms_error(frf) < 1.2 * rms_error(whole)
+    assert frf.averages is not None
+    assert whole.averages is not None
+    assert frf.averages[0] < whole.averages[0]
+
+
+def test_a_coarse_but_whole_sine_is_not_called_overloaded_or_held() -> None:
+    for amplitude in (7.3, 20.0, 50.5):
+        sine = np.round(amplitude * np.sin(2 * np.pi * np.arange(20_000) * 3.1 / RATE))
+        assert defects("force_n", sine) == []
+
+
+def test_where_a_periodic_sweep_begins_anew_nothing_is_damaged() -> None:
+    """It jumps there in force and charge, at one distance; so do samples lost at the end of each buffer, which are."""
+    time = np.arange(1000) / RATE
+    period = 1.0 + np.cos(2 * np.pi * (1.0 + 40.0 * time) * time + 0.7)
+    force = np.tile(period, 8) + 1e-4 * np.random.default_rng(3).normal(size=8000)
+    assert {defect.kind for defect in defects("force_n", force)} == {"jump"}
+    assert defects_of_pair(force, 1e12 * answer_to(force)) == []
+    spiked = 1e12 * answer_to(force)
+    spiked[4321] += 3.0
+    assert [(found.kind, found.channel) for found in defects_of_pair(force, spiked)] == [("jump", "charge_pc")]
+    sine = np.sin(2 * np.pi * 3.73 * np.arange(9000) / RATE)
+    lossy = np.delete(sine, [sample for start in range(1000, 9000, 1000) for sample in range(start, start + 30)])
+    assert len([defect for defect in defects_of_pair(lossy, 7.0 * lossy) if defect.channel == "force_n"]) == 8
+
+
+@pytest.mark.parametrize("period", [300.4, 251.25])
+def test_a_period_need_not_be_a_whole_number_of_samples(period: float) -> None:
+    time = np.arange(8000) % period / RATE
+    force = 1.0 + np.cos(2 * np.pi * (4.0 + 120.0 * time) * time + 0.7)
+    force = force + 1e-4 * np.random.default_rng(3).normal(size=8000)
+    assert {defect.kind for defect in defects("force_n", force)} == {"jump"}
+    assert defects_of_pair(force, 1e12 * answer_to(force)) == []
+
+
+@pytest.mark.parametrize("kind", ["overload", "held_samples", "jump"])
+def test_damage_is_named_and_left_out(kind: str) -> None:
+    random = np.random.default_rng(8)
+    force = dwelling([10.0], cycles=100)
+    charge = answer_to(force) + 1e-16 * random.standard_normal(len(force))
+    if kind == "overload":
+        charge[6000:6400] *= 1.5
+        charge = np.minimum(charge, 1.04 * np.quantile(charge, 0.9))
+    elif kind == "held_samples":
+        charge[7005:7045] = charge[7005]
+    else:
+        charge = np.concatenate([charge[:7010], charge[7030:], charge[-20:]])
+    frf = stepped_sine(force, charge, RATE)
+    assert kind in {defect.kind for defect in frf.defects}
+    if kind != "jump":  # after lost samples of one channel, the phase is off for good
+        np.testing.assert_allclose(frf.values, known_frf(frf.frequency), rtol=5e-3)
+
+
+def test_coarse_levels_are_no_held_samples() -> None:
+    """Noise of few levels repeats one by chance, and a slow signal turns on one; a hold within either is still seen."""
+    random = np.random.default_rng(9)
+    noise = np.round(4.0 * random.normal(size=100_000))
+    sweeps = np.tile(np.round(400.0 * swept(1000)), 8)
+    assert defects("force_n", noise) == []
+    assert {found.kind for found in defects("force_n", sweeps)} <= {"jump"}
+    noise[5000:5020] = noise[5000]
+    assert [(found.kind, found.first_sample) for found in defects("force_n", noise)] == [("held_samples", 5000)]
+
+
+def test_a_spike_is_a_defect_and_a_blow_is_not() -> None:
+    random = np.random.default_rng(11)
+    force = 0.001 * random.standard_normal(8192)
+    spiked = force.copy()
+    spiked[3000] = 5.0
+    assert [defect.kind for defect in broadband(spiked, 1e-12 * force, RATE).defects] == ["jump"]
+    force[3000:3005] += np.hanning(7)[1:-1]
+    frf = broadband(force, answer_to(force), RATE, block_samples=8192, window="boxcar")
+    assert frf.defects == ()
+    struck = frf.frequency < 300  # the blow's own spectrum ends at 670 Hz
+    assert rms_error(Frf(frf.frequency[struck], frf.values[struck])) < 0.03

@@ -1,0 +1,68 @@
+"""Random experiments: like a lab's, the same for the same seed, and what they hide is as asked."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from rig.draw import CATALOGUED, UNKNOWN, drawn, record
+from rig.draw_curves import drawn_curves
+from rig.effects import EFFECTS, UNCATALOGUED
+from rig.elastomer import campaign_of_curves
+from rig.recorded import campaign
+from rig.truth import truth_of_curves, truth_of_lines
+from underskin.recordings import campaign as campaigns
+
+
+def test_the_same_seed_and_number_give_the_same_campaign() -> None:
+    assert drawn(1, 2) == drawn(1, 2)
+    assert drawn(1, 2) != drawn(1, 3)
+    assert campaign(record(drawn(1, 2))) == campaign(record(drawn(1, 2)))
+
+
+@pytest.mark.parametrize(("what", "count"), [("none", 0), ("single", 1), ("pair", 2), ("unknown", 1)])
+def test_what_is_hidden_is_as_asked(what: str, count: int) -> None:
+    for number in range(6):
+        names = set(drawn(3, number, what)["effects"])
+        assert len(names) == count
+        assert names <= set(UNKNOWN if what == "unknown" else CATALOGUED)
+
+
+@pytest.mark.slow
+def test_all_effects_of_the_kind_are_drawn() -> None:
+    seen = Counter(name for number in range(250) for name in drawn(5, number, "single")["effects"])
+    assert set(seen) == set(CATALOGUED)
+    assert set(CATALOGUED) == {name for name, effect in EFFECTS.items() if "frf" in effect.kinds}
+    assert len(UNKNOWN) >= 5
+    assert not set(UNKNOWN) & set(EFFECTS)
+
+
+@pytest.mark.slow
+def test_draws_are_campaigns_within_the_tables_and_their_truth_says_what_shows() -> None:
+    shows = []
+    for number in range(24):
+        recorded = record(drawn(7, number))
+        kept = campaigns.parse(campaign(recorded))
+        truth = truth_of_lines(recorded)
+        assert 1 <= len(kept.recordings) <= 110
+        skin, plan = recorded.response.experiment.skin, recorded.response.plan
+        radius = np.cbrt(0.5625 * plan.preload_n * plan.indenter_mm / skin.youngs_modulus_mpa)
+        assert radius.max() / skin.thickness_mm < 2
+        if not truth["effects"]:
+            assert truth["identifiable"]
+            assert abs(truth["chi2_gain_of_truth"]) < 1e-6 + 20 * bool(recorded.response.missed_mm.any())
+        shows.append(truth["identifiable"])
+        if "unknown" in truth["effects"]:
+            assert set(truth["parameters"]) <= set(UNCATALOGUED)
+    assert sum(shows) > 12
+
+
+@pytest.mark.parametrize("kind", ["indentation", "compression"])
+def test_curves_are_drawn_too(kind: str) -> None:
+    for number in range(15):
+        experiment, curves = drawn_curves(2, number, kind)
+        again, _ = drawn_curves(2, number, kind)
+        assert experiment == again
+        kept = campaigns.parse(campaign_of_curves(experiment, curves))
+        assert len(kept.recordings) == len(curves)
+        assert set(truth_of_curves(experiment, curves)) >= {"effects", "parameters", "identifiable"}

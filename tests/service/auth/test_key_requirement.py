@@ -1,0 +1,258 @@
+"""Once a key was made the service stays closed, whatever becomes of keys.json, until `underskin key open --yes`."""
+
+import shutil
+import time
+from pathlib import Path
+
+import httpx
+import pytest
+
+from service.store import database, key_requirement, open_store
+from service.store.restore import keys_needed
+from tests.support.store_server import Place, Server, campaign, running
+
+on_sqlite = pytest.mark.parametrize("place", ["sqlite"], indirect=True)  # what no database does otherwise
+QUIET = {"UNDERSKIN_DIAGNOSIS_WORKERS": "0"}
+
+
+def anonymous(server: Server, path: str = "/v1/skins", accept: str = "*/*") -> httpx.Response:
+    return httpx.get(server.http.base_url.join(path), headers={"Accept": accept})
+
+
+def status_in_time(server: Server, expected: int) -> int:
+    """Of an anonymous request: the expected status, or the last one within two seconds."""
+    deadline = time.monotonic() + 2
+    while (status := anonymous(server).status_code) != expected and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return status
+
+
+def make_key(place: Place, name: str = "lab") -> str:
+    done = place.command("key", "create", name, "--scope", "write")
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout.strip()
+
+
+def assert_closed(server: Server) -> None:
+    """Without keys.json."""
+    for path in ("/v1/skins", "/v1/sigma?a_over_h=0.3&rt_over_h=0.6", "/metrics", "/umbridge/Info"):
+        assert anonymous(server, path).status_code == 401, path
+    refused = anonymous(server)
+    assert "keys.json is missing from its data folder" in refused.json()["detail"]
+    assert "underskin key create NAME" in refused.json()["detail"]
+    post = httpx.post(server.http.base_url.join("/v1/campaigns"), json=campaign("anonymous"))
+    assert post.status_code == 401
+    assert anonymous(server, "/", "text/html").headers["location"] == "/login?next=/"
+    assert "is missing" in anonymous(server, "/login", "text/html").text
+    assert anonymous(server, "/health").status_code == anonymous(server, "/ready").status_code == 200
+
+
+@on_sqlite
+def test_a_running_server_stays_closed_without_its_file(place: Place, tmp_path: Path) -> None:
+    with running(place, **QUIET) as server:
+        assert anonymous(server).status_code == 200
+        token = make_key(place)
+        assert status_in_time(server, 401) == 401
+        (place.folder / "keys.json").rename(tmp_path / "aside")
+        deadline = time.monotonic() + 2
+        while time.monotonic() < deadline:
+            assert anonymous(server).status_code == 401
+            time.sleep(0.05)
+        assert_closed(server)
+        (tmp_path / "aside").rename(place.folder / "keys.json")
+        time.sleep(0.6)
+        assert server.http.get("/v1/skins", headers={"Authorization": f"Bearer {token}"}).status_code == 200
+    assert (place.folder.parent / f"{place.folder.name}.log").read_text().count(
+        "keys.json is missing: put it back"
+    ) == 1
+
+
+def test_a_restart_opens_nothing(place: Place) -> None:
+    with running(place, **QUIET):
+        make_key(place)
+    (place.folder / "keys.json").unlink()
+    with running(place, **QUIET) as server:
+        assert_closed(server)
+        token = make_key(place, "new")
+        time.sleep(0.6)
+        assert server.http.get("/v1/skins", headers={"Authorization": f"Bearer {token}"}).status_code == 200
+        assert anonymous(server).status_code == 401
+
+
+@on_sqlite
+def test_a_key_that_was_made_before_the_store_is_noted_at_the_start(place: Place) -> None:
+    make_key(place)
+    with running(place, **QUIET):
+        pass
+    (place.folder / "keys.json").unlink()
+    with running(place, **QUIET) as server:
+        assert_closed(server)
+
+
+@on_sqlite
+def test_a_file_of_keys_that_was_put_there_is_noted_while_the_server_runs(place: Place, tmp_path: Path) -> None:
+    other = Place(tmp_path / "other")
+    make_key(other)
+    with running(place, **QUIET) as server:
+        shutil.copy(other.folder / "keys.json", place.folder)
+        assert status_in_time(server, 401) == 401
+        time.sleep(0.6)
+    (place.folder / "keys.json").unlink()
+    with running(place, **QUIET) as server:
+        assert_closed(server)
+
+
+def test_a_command_opens_it_again(place: Place) -> None:
+    with running(place, **QUIET) as server:
+        make_key(place)
+        assert status_in_time(server, 401) == 401
+        asked = place.command("key", "open")
+        assert (asked.returncode, asked.stdout) == (2, "")
+        assert "revokes all keys" in asked.stderr
+        assert "--yes" in asked.stderr
+        assert anonymous(server).status_code == 401
+        done = place.command("key", "open", "--yes")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "all keys are revoked" in done.stdout
+        assert status_in_time(server, 200) == 200
+        time.sleep(1.2)
+        assert anonymous(server).status_code == 200
+        assert not (place.folder / "keys.json").exists()
+        make_key(place)
+        assert status_in_time(server, 401) == 401
+
+
+@on_sqlite
+def test_a_command_opens_it_where_the_file_is_lost_or_damaged(place: Place) -> None:
+    with running(place, **QUIET) as server:
+        make_key(place)
+        (place.folder / "keys.json").write_text("{")
+        assert status_in_time(server, 503) == 503
+        assert place.command("key", "open", "--yes").returncode == 0
+        assert status_in_time(server, 200) == 200
+
+
+@on_sqlite
+def test_the_help_says_what_open_cannot_know(place: Place) -> None:
+    said = " ".join(place.command("key", "open", "--help").stdout.split())
+    assert "other machines reach" in said
+    assert "cannot know" in said
+
+
+@on_sqlite
+def test_other_machines_need_a_key_all_the_same(place: Place) -> None:
+    token = make_key(place)
+    with running(place, key=token, UNDERSKIN_HOSTS="skin.example.org", **QUIET) as server:
+        assert place.command("key", "open", "--yes").returncode == 0
+        time.sleep(1.2)
+        assert anonymous(server).status_code == 401
+
+
+@on_sqlite
+def test_a_restore_into_another_folder_says_that_keys_are_needed(place: Place, tmp_path: Path) -> None:
+    with running(place, **QUIET):
+        make_key(place)
+    assert place.command("backup", str(tmp_path / "kept")).returncode == 0
+    other = Place(tmp_path / "other", place.database_url)
+    done = other.command("restore", str(tmp_path / "kept"))
+    assert done.returncode == 0, done.stderr
+    assert f"keys are needed, and {other.folder / 'keys.json'}" in done.stdout
+    assert "underskin key create NAME" in done.stdout
+    with running(other, **QUIET) as server:
+        assert_closed(server)
+    make_key(other)
+    assert f"keys are needed: those in {other.folder / 'keys.json'}" in other.command(
+        "restore", str(tmp_path / "kept")
+    ).stdout  # fmt: skip
+
+
+def test_a_backup_from_before_the_first_key_opens_nothing(place: Place, tmp_path: Path) -> None:
+    with running(place, **QUIET) as server:
+        assert place.command("backup", str(tmp_path / "kept")).returncode == 0
+        make_key(place)
+        assert status_in_time(server, 401) == 401
+        (place.folder / "keys.json").unlink()
+        assert "keys are needed" in place.command("restore", str(tmp_path / "kept")).stdout
+        time.sleep(1.2)
+        assert_closed(server)
+    with running(place, **QUIET) as server:
+        assert_closed(server)
+
+
+@on_sqlite
+def test_a_store_that_never_had_a_key_is_restored_without_a_word_of_keys(place: Place, tmp_path: Path) -> None:
+    with running(place, **QUIET):
+        assert place.command("backup", str(tmp_path / "kept")).returncode == 0
+    assert "keys" not in place.command("restore", str(tmp_path / "kept")).stdout.replace(str(tmp_path), "")
+
+
+def test_a_key_is_made_though_the_store_cannot_note_it(tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "underskin.sqlite3").write_text("no database")
+    done = Place(tmp_path / "data").command("key", "create", "lab")
+    assert (done.returncode, done.stdout.startswith("us_")) == (0, True)
+    assert "the key is made; the store will note it" in done.stderr
+
+
+def test_servers_of_one_database_are_closed_together(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    url = request.getfixturevalue("cluster").new_database()
+    first, second = Place(tmp_path / "first", url), Place(tmp_path / "second", url)
+    with running(first, **QUIET) as one, running(second, **QUIET) as two:
+        make_key(first)
+        assert status_in_time(one, 401) == status_in_time(two, 401) == 401
+        assert_closed(two)
+        assert first.command("key", "open", "--yes").returncode == 0
+        assert status_in_time(one, 200) == status_in_time(two, 200) == 200
+
+
+def test_what_is_noted_stays_noted_from_when_it_was(place: Place) -> None:
+    store = open_store(place.database_url, place.folder)
+    noted = []
+    for change in (key_requirement.require, key_requirement.require, key_requirement.lift, key_requirement.lift):
+        with store.writing() as connection:
+            change(connection)
+        with store.reading() as connection:
+            noted.append(key_requirement.find(connection))
+        assert keys_needed(store) == (change is key_requirement.require)
+    store.close()
+    assert noted[0] == noted[1]
+    assert database(place.database_url, place.folder).is_made()
+
+
+@on_sqlite
+def test_a_file_of_keys_that_cannot_be_looked_at_ends_no_watch(place: Place, tmp_path: Path) -> None:
+    """As where its disk has an error: here its name leads to one that is too long."""
+    there = place.folder / "keys.json"
+    with running(place, **QUIET) as server:
+        make_key(place)
+        assert status_in_time(server, 401) == 401
+        there.rename(tmp_path / "aside")
+        there.symlink_to("x" * 300)
+        time.sleep(1.5)
+        there.unlink()
+        (tmp_path / "aside").rename(there)
+        assert place.command("key", "open", "--yes").returncode == 0
+        assert status_in_time(server, 200) == 200
+    log = (place.folder.parent / f"{place.folder.name}.log").read_text()
+    assert log.count("whether keys are needed cannot be looked up: ") == 1
+
+
+def test_commands_say_that_the_file_of_keys_is_missing(place: Place) -> None:
+    never = place.command("key", "list")
+    assert (never.returncode, never.stdout, never.stderr) == (0, "", "")
+    with running(place, **QUIET):
+        make_key(place)
+        listed = place.command("key", "list")
+        assert (listed.stdout.split("\t")[:2], listed.stderr) == (["lab", "write"], "")
+        (place.folder / "keys.json").unlink()
+        missing = place.command("key", "list")
+        assert (missing.returncode, missing.stdout) == (0, "")
+        assert f"keys are needed, and {place.folder / 'keys.json'}" in missing.stderr
+        assert "is missing" in missing.stderr
+        assert "underskin key create NAME" in missing.stderr
+        for said in (place.command("key", "open").stderr, place.command("key", "open", "--yes").stdout):
+            assert f"there is no {place.folder / 'keys.json'}" in said
+            assert "all keys" not in said
+            assert "revokes" not in said
+        lifted = place.command("key", "list")
+        assert (lifted.returncode, lifted.stdout, lifted.stderr) == (0, "", "")

@@ -1,0 +1,73 @@
+"""Every store test runs on SQLite and on a real PostgreSQL."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from service.store import database
+from service.store.tables import metadata
+from tests.support import postgres
+from tests.support.store_server import Place, Server, running
+
+BACKENDS = ("sqlite", "postgresql")
+
+
+@pytest.fixture(scope="session")
+def cluster() -> Iterator[postgres.Cluster]:
+    """PostgreSQL, started once."""
+    if not postgres.available():
+        pytest.skip("PostgreSQL (Debian's package postgresql) is not installed")
+    with postgres.running() as started:
+        yield started
+
+
+@pytest.fixture(params=BACKENDS)
+def place(request: pytest.FixtureRequest, tmp_path: Path) -> Place:
+    """An empty store, for tests that start and end servers."""
+    folder = tmp_path / "data"
+    folder.mkdir()
+    return Place(folder, "" if request.param == "sqlite" else request.getfixturevalue("cluster").new_database())
+
+
+@pytest.fixture(scope="session")
+def servers(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Callable[[str], Server]]:
+    """Servers by name, started when first asked for, since that takes longer than most tests; they run no diagnoses."""
+    started: dict[str, Server] = {}
+    with ExitStack() as stack:
+
+        def server(name: str) -> Server:
+            if name not in started:
+                folder = tmp_path_factory.mktemp(name)
+                url = request.getfixturevalue("cluster").new_database() if name == "postgresql" else ""
+                started[name] = stack.enter_context(running(Place(folder, url), UNDERSKIN_DIAGNOSIS_WORKERS="0"))
+            return started[name]
+
+        yield server
+
+
+@pytest.fixture(params=BACKENDS)
+def server(request: pytest.FixtureRequest, servers: Callable[[str], Server]) -> Server:
+    """A running server, its store emptied."""
+    return emptied(servers(request.param))
+
+
+@pytest.fixture
+def elsewhere(servers: Callable[[str], Server]) -> Server:
+    """Another one."""
+    return emptied(servers("elsewhere"))
+
+
+def emptied(server: Server) -> Server:
+    """The server without anything kept."""
+    store = database(server.place.database_url, server.place.folder)
+    with store.writing() as connection:
+        for table in reversed(metadata.sorted_tables):
+            connection.execute(table.delete())
+    store.close()
+    shutil.rmtree(server.place.folder / "backups", ignore_errors=True)
+    return server

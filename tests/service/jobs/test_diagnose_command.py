@@ -1,0 +1,52 @@
+"""`underskin diagnose --campaign`: reports of campaigns that a service keeps."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from tests.support.diagnosed import report, resonant, sent
+from tests.support.store_server import Place, running
+from underskin.cli.app import app
+
+
+def test_reports_of_kept_campaigns_are_those_of_the_service(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    reports = tmp_path / "reports"
+    with running(Place(folder), UNDERSKIN_DIAGNOSIS_WORKERS="1") as server:
+        kept = sent(server, resonant("array"))
+        given = ["--campaign", kept, "--campaign", "nowhere", "--url", str(server.http.base_url)]
+        result = CliRunner().invoke(app, ["diagnose", *given, "--output-dir", str(reports), "--html"])
+    assert result.exit_code == 2
+    assert f"{kept}: explained" in result.stderr
+    assert "nowhere: 404" in result.stderr
+    assert json.loads((reports / f"{kept}.json").read_text(encoding="utf-8")) == report()
+    assert "contact resonance" in (reports / f"{kept}.html").read_text(encoding="utf-8")
+    assert len(list(reports.iterdir())) == 2
+
+
+@pytest.mark.parametrize("given", [[], ["a/palm.json", "b/palm.json"]])
+def test_what_to_diagnose_must_be_given_once(given: list[str], tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["diagnose", *given, "--output-dir", str(tmp_path / "reports")])
+    assert result.exit_code == 2
+    assert not (tmp_path / "reports").exists()
+
+
+def test_without_a_folder_reports_go_into_one_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(app, ["diagnose", "nowhere.json"])
+    assert result.exit_code == 2
+    assert "nowhere.json" in result.stderr
+    assert "Missing option" not in result.stderr
+    assert not any(Path("diagnosis").iterdir())
+
+
+def test_a_report_never_overwrites_its_campaign(tmp_path: Path) -> None:
+    file = tmp_path / "palm.json"
+    file.write_text("{}", encoding="utf-8")
+    result = CliRunner().invoke(app, ["diagnose", str(file), "--output-dir", str(tmp_path)])
+    assert result.exit_code == 2
+    assert "overwrite" in result.stderr
+    assert file.read_text(encoding="utf-8") == "{}"

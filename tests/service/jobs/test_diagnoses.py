@@ -1,0 +1,262 @@
+"""Diagnoses of kept campaigns: by worker processes that are killed, cancelled and taken up again."""
+
+import os
+import signal
+import threading
+import time
+from contextlib import closing, suppress
+from pathlib import Path
+
+import pytest
+
+from service.store import database, diagnoses
+from service.store.tables import diagnoses as table_of_diagnoses
+from tests.support.diagnosed import asked, awaited, found, report, resonant, sent, table
+from tests.support.store_server import Place, Server, campaign, running
+from underskin import Client, ServiceError, __version__
+
+NONE = {"UNDERSKIN_DIAGNOSIS_WORKERS": "0"}
+ONE = {"UNDERSKIN_DIAGNOSIS_WORKERS": "1"}
+
+
+@pytest.fixture
+def file_place(tmp_path: Path) -> Place:
+    """An empty SQLite store, for what workers do whatever the store is."""
+    folder = tmp_path / "data"
+    folder.mkdir()
+    return Place(folder)
+
+
+def workers_of(server: Server) -> list[int]:
+    """Process ids of the worker processes of a server."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        with suppress(OSError):
+            if entry.name.isdigit() and b"service.jobs.worker" in (entry / "cmdline").read_bytes():
+                fields = (entry / "stat").read_text().rpartition(")")[2].split()
+                if fields[0] != "Z" and int(fields[1]) == server.process.pid:
+                    found.append(int(entry.name))
+    return found
+
+
+def await_workers(server: Server, count: int) -> list[int]:
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        pids = workers_of(server)
+        if len(pids) == count:
+            return pids
+        time.sleep(0.02)
+    raise AssertionError(f"{len(workers_of(server))} workers")
+
+
+def is_gone(pid: int) -> bool:
+    """Whether a process ends within a while, whoever its parent is by now."""
+    deadline = time.monotonic() + 30
+    while time.monotonic() < deadline:
+        with suppress(FileNotFoundError, ProcessLookupError):
+            if (Path("/proc") / str(pid) / "stat").read_text().rpartition(")")[2].split()[0] != "Z":
+                time.sleep(0.02)
+                continue
+        return True
+    return False
+
+
+def test_a_campaign_is_diagnosed_once(file_place: Place) -> None:
+    with running(file_place, **ONE) as server, Client(str(server.http.base_url)) as client:
+        campaign_id = sent(server, resonant("array"))
+        started = client.diagnoses.start(campaign_id)
+        shares: list[float] = []
+        done = client.diagnoses.wait(started["id"], progress=shares.append)
+        assert (done["state"], done["verdict"], done["progress"]) == ("done", "explained", 1.0)
+        assert shares == sorted(shares)
+        assert done["report"] == report()
+        assert client.diagnoses.start(campaign_id) == {"id": started["id"], "state": "done"}
+        with pytest.raises(ServiceError, match="cannot be cancelled"):
+            client.diagnoses.cancel(started["id"])
+        client.campaigns.exclude(campaign_id, "r3", "cable loose")
+        assert client.diagnoses.get(started["id"])["outdated"].startswith("changed")
+        second = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
+        assert (second["excluded"], second["outdated"]) == (1, None)
+        assert second["report"]["findings"][0] == {
+            "code": "excluded",
+            "recording": "r3",
+            "field": "",
+            "statement": "Left out: cable loose",
+        }
+        assert second["report"] != done["report"]
+        client.campaigns.withdraw(campaign_id, "fell down")
+        with pytest.raises(ServiceError, match="withdrawn: fell down"):
+            client.diagnoses.start(campaign_id)
+
+
+def test_a_killed_server_takes_up_what_it_was_at(place: Place) -> None:
+    with running(place, **ONE) as server:
+        first, second = (asked(server, sent(server, resonant("array"), name)) for name in ("a", "b"))
+        awaited(server, first, "running")
+        (worker,) = await_workers(server, 1)
+        server.kill()
+        assert is_gone(worker)
+    with running(place, **ONE) as server:
+        for diagnosis_id in (first, second):
+            diagnosis = awaited(server, diagnosis_id)
+            assert (diagnosis["state"], diagnosis["report"]) == ("done", report())
+
+
+def test_a_server_that_ends_puts_back_what_it_was_at(place: Place) -> None:
+    with running(place, **ONE) as server:
+        diagnosis_id = asked(server, sent(server, resonant("array")))
+        (worker,) = await_workers(server, 1)
+        server.process.send_signal(signal.SIGTERM)
+        server.process.wait(30)
+        assert is_gone(worker)
+    with running(place, **NONE) as server:
+        assert found(server, diagnosis_id)["state"] == "queued"
+
+
+def test_cancelled_while_it_runs_and_while_it_waits(file_place: Place) -> None:
+    with running(file_place, **ONE) as server, Client(str(server.http.base_url)) as client:
+        first, second = (asked(server, sent(server, resonant("array"), name)) for name in ("a", "b"))
+        (worker,) = await_workers(server, 1)
+        assert client.diagnoses.cancel(second)["state"] == "cancelled"
+        assert client.diagnoses.cancel(first)["state"] == "cancelled"
+        assert client.diagnoses.cancel(first)["state"] == "cancelled"
+        assert is_gone(worker)
+        assert workers_of(server) == []
+        again = client.diagnoses.start(found(server, first)["campaign_id"])
+        assert again["id"] != first
+        assert client.diagnoses.wait(again["id"])["report"] == report()
+        assert found(server, first)["state"] == found(server, second)["state"] == "cancelled"
+
+
+def test_a_worker_that_dies_is_told(file_place: Place) -> None:
+    with running(file_place, **ONE) as server:
+        campaign_id = sent(server, resonant("array"))
+        diagnosis_id = asked(server, campaign_id)
+        (worker,) = await_workers(server, 1)
+        os.kill(worker, signal.SIGKILL)
+        died = awaited(server, diagnosis_id)
+        assert (died["state"], died["report"]) == ("failed", None)
+        assert "killed by signal 9" in died["reason"]
+        assert server.http.get("/ready").status_code == 200
+        again = asked(server, campaign_id)
+        assert again != diagnosis_id
+        assert awaited(server, again)["state"] == "done"
+
+
+def test_a_diagnosis_that_needs_more_memory_than_it_may_have_fails(file_place: Place) -> None:
+    document = resonant("large", preloads=[0.5 + 0.01 * step for step in range(100)], lines=200)
+    with running(file_place, **ONE, UNDERSKIN_DIAGNOSIS_MEMORY_MB="100") as server:
+        failed = awaited(server, asked(server, sent(server, document)))
+        assert failed["state"] == "failed"
+        assert "UNDERSKIN_DIAGNOSIS_MEMORY_MB" in failed["reason"]
+
+
+def test_a_campaign_that_cannot_be_diagnosed_says_why(file_place: Place) -> None:
+    document = campaign("cylinder")
+    document["skin"] = {"poisson_ratio": 0.5}
+    curve = {"displacement_mm": [0.0, 0.0, 0.0], "force_n": [0.0, 0.0, 0.0]}
+    document["recordings"] = [
+        {"id": "c1", "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 20.0, **curve}
+    ]
+    with running(file_place, **ONE) as server:
+        diagnosis = awaited(server, asked(server, sent(server, document)))
+        assert (diagnosis["verdict"] == "insufficient_data") or diagnosis["reason"], diagnosis
+
+
+def test_servers_that_claim_at_once_get_different_ones(place: Place) -> None:
+    with running(place, **NONE) as server:
+        ids = [asked(server, sent(server, campaign(str(number), sensors=1))) for number in range(20)]
+    claimed: list[str] = []
+    together = threading.Barrier(4)
+
+    def claim(name: str) -> None:
+        with closing(database(place.database_url, place.folder)) as own:
+            together.wait()
+            mine: list[str] = []
+            while len(mine) < len(ids) // 4:
+                with own.writing() as connection:
+                    row = diagnoses.claim(connection, name, table().sha256, __version__)
+                mine += [] if row is None else [row.id]
+            claimed.extend(mine)
+
+    threads = [threading.Thread(target=claim, args=(f"server {number}",)) for number in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(claimed) == sorted(ids)
+
+
+def test_a_silent_server_loses_what_it_was_at_and_cannot_end_it(place: Place) -> None:
+    with running(place, **NONE) as server:
+        asked(server, sent(server, campaign("array")))
+    store = database(place.database_url, place.folder)
+    with closing(store), store.writing() as connection:
+        row = diagnoses.claim(connection, "first", "table", "1")
+        assert row is not None
+        assert diagnoses.claim(connection, "second", "table", "1") is None
+        late = table_of_diagnoses.c.alive_at - diagnoses.SILENT_S - 1
+        connection.execute(table_of_diagnoses.update().values(alive_at=late))
+        assert diagnoses.claim(connection, "first", "table", "1") is None
+        taken = diagnoses.claim(connection, "second", "other", "2")
+        assert taken is not None
+        assert (taken.id, taken.table_sha256, taken.version) == (row.id, "other", "2")
+        assert not diagnoses.keep_alive(connection, row.number, "first", 0.5)
+        assert not diagnoses.finish(connection, row.number, "first", report())
+        assert not diagnoses.fail(connection, row.number, "first", "no")
+        assert diagnoses.keep_alive(connection, row.number, "second", 0.5)
+        assert diagnoses.finish(connection, row.number, "second", report())
+        assert not diagnoses.fail(connection, row.number, "second", "no")
+        assert diagnoses.find(connection, row.id).state == "done"
+
+
+def test_diagnoses_are_listed(server: Server) -> None:
+    campaigns = [sent(server, campaign(str(number), sensors=1), f"skin-{number % 2}") for number in range(5)]
+    ids = [asked(server, campaign_id) for campaign_id in campaigns]
+    with Client(str(server.http.base_url)) as client:
+        assert [entry["id"] for entry in client.diagnoses.all()] == ids[::-1]
+        assert [entry["id"] for entry in client.diagnoses.all(campaign=campaigns[2])] == [ids[2]]
+        assert [entry["id"] for entry in client.diagnoses.all(skin="skin-1")] == [ids[3], ids[1]]
+        client.diagnoses.cancel(ids[0])
+        assert [entry["id"] for entry in client.diagnoses.all(state="cancelled")] == [ids[0]]
+        with pytest.raises(TimeoutError):
+            client.diagnoses.wait(ids[1], timeout=0.1)
+    first = server.http.get("/v1/diagnoses?limit=3").json()
+    second = server.http.get("/v1/diagnoses", params={"limit": 3, "cursor": first["next"]}).json()
+    assert [entry["id"] for entry in first["diagnoses"] + second["diagnoses"]] == ids[::-1]
+    assert second["next"] is None
+    assert server.http.get("/v1/diagnoses/d-1").status_code == 404
+    assert server.http.delete("/v1/diagnoses/d-1").status_code == 404
+    assert server.http.post("/v1/campaigns/c-1/diagnosis").status_code == 404
+
+
+def test_asked_twice_under_one_key_is_asked_once(server: Server) -> None:
+    campaign_id, other = (sent(server, campaign(name, sensors=1)) for name in ("a", "b"))
+    key = {"Idempotency-Key": "mine"}
+    first = asked(server, campaign_id, **key)
+    assert server.http.delete(f"/v1/diagnoses/{first}").status_code == 200
+    assert asked(server, campaign_id, **key) == first
+    assert asked(server, campaign_id) != first
+    assert server.http.post(f"/v1/campaigns/{other}/diagnosis", headers=key).status_code == 422
+
+
+def test_asked_at_once_is_asked_once(server: Server) -> None:
+    campaign_id = sent(server, campaign("array", sensors=1))
+    told: list[str] = []
+    threads = [threading.Thread(target=lambda: told.append(asked(server, campaign_id))) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(told) == 8
+    assert len(set(told)) == 1
+
+
+def test_changes_need_a_key_of_scope_write(file_place: Place) -> None:
+    done = file_place.command("key", "create", "reader", "--scope", "read")
+    assert done.returncode == 0, done.stderr
+    with running(file_place, key=done.stdout.split()[-1], **NONE) as server:
+        assert server.http.get("/v1/diagnoses").status_code == 200
+        assert server.http.post("/v1/campaigns/c-1/diagnosis").status_code == 403
+        assert server.http.delete("/v1/diagnoses/d-1").status_code == 403
+        assert server.http.post("/v1/skins/palm/model", json={"diagnosis_id": "d-1"}).status_code == 403

@@ -1,0 +1,176 @@
+"""Bodies over the limit, and senders that lie about them or give up: refused or dropped, and the server goes on."""
+
+import json
+import re
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.service.middleware.test_service_errors import D33, FRF, SIGMA, problem_of
+from tests.support.server import Server, running
+
+LIMIT = 50_000  # bytes
+HEAD = "Host: localhost\r\nContent-Type: application/json\r\n"
+BODIES: dict[str, dict[str, Any]] = {
+    "/v1/sigma": SIGMA,
+    "/v1/frf": FRF,
+    "/v1/d33": D33,
+    "/umbridge/Evaluate": {"name": "sigma", "input": [[0.3, 0.6, 0.01]]},
+    "/umbridge/Gradient": {"name": "sigma", "input": [[0.3, 0.6, 0.01]], "sens": [1.0]},
+}
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A server that takes bodies of up to LIMIT bytes."""
+    with running(tmp_path_factory.mktemp("limits"), {"UNDERSKIN_MAX_BODY_MB": str(LIMIT / 1e6)}) as started:
+        yield started
+
+
+@pytest.fixture
+def client(small: Server) -> Iterator[httpx.Client]:
+    """A client of it; whatever a test did, the server must be well afterwards."""
+    with httpx.Client(base_url=small.url, timeout=30) as opened:
+        yield opened
+        assert opened.post("/v1/sigma", json=SIGMA).status_code == 200
+
+
+def connect(server: Server) -> socket.socket:
+    """A connection on which a test may say what no honest client would."""
+    return socket.create_connection(("127.0.0.1", httpx.URL(server.url).port or 0), timeout=30)
+
+
+def read_answer(connection: socket.socket) -> tuple[int, dict[str, str], bytes]:
+    """Status, headers and body of the next answer."""
+    received = b""
+    while b"\r\n\r\n" not in received:
+        received += connection.recv(1) or pytest.fail(f"closed after {received!r}")
+    status, *lines = received.decode().split("\r\n")
+    headers = {name.lower(): value for name, value in (line.split(": ", 1) for line in lines if line)}
+    body = b""
+    while len(body) < int(headers.get("content-length", 0)):
+        body += connection.recv(1) or pytest.fail(f"closed after {body!r}")
+    return int(status.split()[1]), headers, body
+
+
+def assert_too_large(answer: tuple[int, dict[str, str], bytes]) -> None:
+    """The 413 of every other test, read from a raw connection."""
+    status, headers, body = answer
+    problem = json.loads(body)
+    assert (status, headers["content-type"]) == (413, "application/problem+json")
+    assert (problem["type"], problem["request_id"]) == ("urn:underskin:problem:body-too-large", headers["x-request-id"])
+
+
+def padded(path: str, size: int) -> bytes:
+    """A body that `path` accepts, filled up with blanks."""
+    return json.dumps(BODIES[path]).encode().ljust(size)
+
+
+@pytest.mark.parametrize("chunked", [False, True])
+@pytest.mark.parametrize("path", BODIES)
+def test_the_limit_is_where_the_setting_says(client: httpx.Client, path: str, chunked: bool) -> None:
+    def post(size: int) -> httpx.Response:
+        body = padded(path, size)
+        pieces = (body[start : start + 7000] for start in range(0, size, 7000))
+        return client.post(path, content=pieces if chunked else body, headers={"Content-Type": "application/json"})
+
+    assert post(LIMIT).status_code == 200
+    problem = problem_of(post(LIMIT + 1), 413)
+    assert "0.05 MB (UNDERSKIN_MAX_BODY_MB)" in problem.get("detail", problem.get("message", ""))
+
+
+def test_csv_counts_as_well(client: httpx.Client) -> None:
+    rows = b"a_over_h,rt_over_h\n" + b"0.3,0.6\n" * 10_000
+    problem_of(client.post("/v1/sigma", content=rows, headers={"Content-Type": "text/csv"}), 413)
+
+
+@pytest.mark.usefixtures("client")
+def test_a_declared_length_is_refused_before_anything_is_sent(small: Server) -> None:
+    for length in (LIMIT + 1, 2**64 - 1):
+        with connect(small) as connection:
+            head = f"POST /v1/sigma HTTP/1.1\r\n{HEAD}Content-Length: {length}\r\nExpect: 100-continue\r\n\r\n"
+            connection.sendall(head.encode())
+            assert_too_large(read_answer(connection))
+
+
+@pytest.mark.usefixtures("client")
+def test_a_body_without_end_is_answered_once_it_exceeds_the_limit(small: Server) -> None:
+    with connect(small) as connection:
+        connection.sendall(f"POST /v1/sigma HTTP/1.1\r\n{HEAD}Transfer-Encoding: chunked\r\n\r\n".encode())
+        connection.sendall(b"c350\r\n" + b" " * LIMIT + b"\r\n")  # the limit itself still waits for more
+        connection.sendall(b"1\r\n \r\n")
+        assert_too_large(read_answer(connection))
+
+
+@pytest.mark.usefixtures("client")
+def test_the_connection_serves_on_after_a_refused_body(small: Server) -> None:
+    length = LIMIT + 1
+    with connect(small) as connection:
+        head = f"POST /v1/sigma HTTP/1.1\r\n{HEAD}Content-Length: {length}\r\n\r\n"
+        connection.sendall(head.encode() + b" " * length)
+        assert_too_large(read_answer(connection))
+        connection.sendall(f"GET /health HTTP/1.1\r\n{HEAD}\r\n".encode())
+        assert read_answer(connection)[0] == 200
+
+
+@pytest.mark.usefixtures("client")
+def test_what_exceeds_a_length_that_is_too_small_is_not_taken_for_body(small: Server) -> None:
+    body = padded("/v1/sigma", LIMIT + 1)
+    with connect(small) as connection:
+        head = f"POST /v1/sigma HTTP/1.1\r\n{HEAD}Content-Length: 20\r\n\r\n"
+        connection.sendall(head.encode() + body[:20])
+        status, headers, answer = read_answer(connection)
+        assert (status, headers["content-type"]) == (400, "application/problem+json")
+        assert "not JSON" in json.loads(answer)["detail"]
+        connection.sendall(body[20:])  # where a request should begin
+        status, headers, _ = read_answer(connection)
+        assert (status, headers["connection"]) == (400, "close")
+        assert connection.recv(1) == b""
+
+
+@pytest.mark.parametrize(
+    "lengths",
+    ["Content-Length: 20\r\nTransfer-Encoding: chunked\r\n", "Content-Length: 20\r\nContent-Length: 90000\r\n"],
+)
+@pytest.mark.usefixtures("client")
+def test_contradictory_lengths_end_the_connection(small: Server, lengths: str) -> None:
+    with connect(small) as connection:
+        connection.sendall(f"POST /v1/sigma HTTP/1.1\r\n{HEAD}{lengths}\r\n".encode())
+        status, headers, _ = read_answer(connection)
+        assert (status, headers["connection"]) == (400, "close")
+        assert connection.recv(1) == b""
+
+
+@pytest.mark.parametrize("path", BODIES)
+@pytest.mark.usefixtures("client")
+def test_a_sender_who_gives_up_is_logged_without_a_traceback(small: Server, path: str) -> None:
+    request_id = f"gone{path.replace('/', '-')}"
+    with connect(small) as connection:
+        head = f"POST {path} HTTP/1.1\r\n{HEAD}X-Request-ID: {request_id}\r\nContent-Length: 1000\r\n\r\n"
+        connection.sendall(head.encode() + b"{")
+    deadline = time.monotonic() + 10
+    lines: list[str] = []
+    while not lines and time.monotonic() < deadline:
+        time.sleep(0.05)
+        lines = [line for line in small.log.read_text().splitlines() if request_id in line]
+    (line,) = lines
+    assert (json.loads(line)["status"], json.loads(line)["level"]) == (499, "info")
+    assert "Traceback" not in small.log.read_text()
+
+
+def test_a_huge_body_is_dropped_as_it_arrives(small: Server, client: httpx.Client) -> None:
+    def largest_memory_kb() -> int:
+        status = Path(f"/proc/{small.process.pid}/status").read_text()
+        found = re.search(r"VmHWM:\s+(\d+) kB", status)
+        assert found
+        return int(found[1])
+
+    before = largest_memory_kb()
+    pieces = (b" " * 1_000_000 for _ in range(100))
+    problem_of(client.post("/v1/sigma", content=pieces, headers={"Content-Type": "application/json"}), 413)
+    assert largest_memory_kb() - before < 20_000

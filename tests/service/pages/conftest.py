@@ -1,0 +1,116 @@
+"""A real server with the example skin, and a real browser that looks at its pages."""
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from tests.support.store_server import Place, Server, running
+
+CHROMIUM = shutil.which("chromium")
+SERIOUS = ("serious", "critical")
+
+
+@pytest.fixture(scope="package")
+def browser() -> Iterator[Browser]:
+    """The system's Chromium, closed after these tests: its driver's event loop keeps others from having theirs."""
+    if CHROMIUM is None:
+        pytest.skip("Chromium (Debian's package chromium) is not installed")
+    with sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+@pytest.fixture(scope="session")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """One for all tests here; they add to it."""
+    folder = tmp_path_factory.mktemp("pages")
+    with running(Place(folder)) as started:
+        yield started
+
+
+@dataclass
+class Visit:
+    """A page of a browser, and what should never happen in it."""
+
+    page: Page
+    address: str
+    wrong: list[str] = field(default_factory=list)
+
+    def go(self, path: str) -> None:
+        """Open a path of the server."""
+        self.page.goto(self.address + path)
+
+    def drawn(self, count: int) -> None:
+        """Wait until so many figures are drawn, scrolling as a reader would."""
+        for plot in self.page.locator(".plot").all():
+            plot.scroll_into_view_if_needed()
+        self.page.wait_for_function(
+            "n => document.querySelectorAll('.plot .main-svg:first-child').length >= n", arg=count
+        )
+
+    def require_accessible(self) -> None:
+        """axe-core finds no serious problem."""
+        found = Axe().run(self.page).response["violations"]
+        assert [(entry["id"], entry["nodes"][0]["html"]) for entry in found if entry["impact"] in SERIOUS] == []
+
+
+def visit(browser: Browser, server: Server) -> Iterator[Visit]:
+    """A fresh session; at its end nothing may have gone wrong."""
+    context = browser.new_context(timezone_id="Europe/Rome", locale="en-GB", accept_downloads=True)
+    seen = Visit(context.new_page(), str(server.http.base_url).rstrip("/"))
+
+    def outside(address: str) -> None:
+        if not address.startswith((seen.address, "data:", "blob:")):
+            seen.wrong.append(f"request to {address}")
+
+    context.on(
+        "console", lambda message: seen.wrong.append(message.text) if message.type in ("error", "warning") else None
+    )
+    context.on("weberror", lambda error: seen.wrong.append(str(error.error)))
+    context.on("request", lambda request: outside(request.url))
+    yield seen
+    context.close()
+    assert seen.wrong == []
+
+
+@pytest.fixture
+def visitor(browser: Browser, server: Server) -> Iterator[Visit]:
+    """Somebody at the server."""
+    yield from visit(browser, server)
+
+
+@pytest.fixture(scope="module")
+def idle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A server of a module's own, since what is withdrawn or adopted stays; it runs no diagnosis."""
+    with running(Place(tmp_path_factory.mktemp("idle")), UNDERSKIN_DIAGNOSIS_WORKERS="0") as started:
+        yield started
+
+
+@pytest.fixture
+def reader(browser: Browser, idle: Server) -> Iterator[Visit]:
+    yield from visit(browser, idle)
+
+
+@pytest.fixture(scope="session")
+def locked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, dict[str, str]]]:
+    """A server that asks for a key, and the keys by scope."""
+    folder = tmp_path_factory.mktemp("locked")
+    place = Place(folder)
+    keys = {
+        scope: place.command("key", "create", f"the {scope}er", "--scope", scope).stdout.strip()
+        for scope in ("read", "write")
+    }
+    with running(place, key=keys["write"]) as started:
+        yield started, keys
+
+
+@pytest.fixture
+def downloads(tmp_path: Path) -> Path:
+    """Where files are saved."""
+    return tmp_path

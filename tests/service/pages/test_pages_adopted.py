@@ -1,0 +1,197 @@
+"""What lists and skins say of a diagnosis and of an adopted model: which, how sure, since when, and by how much."""
+
+import re
+from datetime import UTC, datetime
+from typing import Any
+
+import pytest
+
+from tests.service.pages.conftest import Visit
+from tests.support.diagnosed import diagnosed, report, resonant, sent
+from tests.support.store_server import Server
+
+
+def mistuned() -> dict[str, Any]:
+    """The report, as of a skin whose modulus was declared a fifth too high: d33 by it differs from the paper's."""
+    ratio = {"name": "modulus_factor", "unit": "-", "value": 0.8, "low": 0.79, "high": 0.81}
+    found = {"name": "modulus_error", "probability": 0.97, "parameters": [ratio], "explains_percent": 90.0}
+    return {**report(), "mechanisms": [found]}
+
+
+def d33(server: Server, campaign_id: str, model: str) -> dict[str, Any]:
+    answer = server.http.get(f"/v1/campaigns/{campaign_id}/d33", params={"model": model})
+    assert answer.status_code == 200, answer.text
+    return dict(answer.json())
+
+
+def numbers(text: str) -> list[float]:
+    found = re.findall(r"[+−-]?\d+\.?\d*", text.replace("d33", ""))
+    return [float(one.replace("−", "-")) for one in found]
+
+
+def test_an_adopted_model_heads_its_skin_and_the_start(reader: Visit, idle: Server) -> None:
+    page = reader.page
+    campaign_id, diagnosis_id = diagnosed(idle, resonant("monday"), mistuned(), "palm-a")
+    reader.go("/skins/palm-a")
+    assert "the paper's" in page.locator(".facts").inner_text()
+    reader.go(f"/diagnoses/{diagnosis_id}")
+    stays = page.locator("#adopt ~ p").all_inner_texts()[1]
+    assert "until another diagnosis of the skin is adopted, or until it is withdrawn" in stays
+    page.get_by_role("button", name="Adopt this model").click()
+    page.wait_for_url("**/skins/palm-a?model=adopted")
+    by_paper, by_model = (d33(idle, campaign_id, model) for model in ("paper", "adopted"))
+    change = 100 * (by_model["array"]["d33_pc_per_n"] / by_paper["array"]["d33_pc_per_n"] - 1)
+    assert abs(change) > 1
+    today = datetime.now(UTC).strftime("%Y-%m-%d")
+    for address, shown in (("/skins/palm-a", "adopted"), ("/skins/palm-a?model=paper", "paper's")):
+        reader.go(address)
+        reader.drawn(2)
+        head = page.get_by_role("region", name="Adopted model").inner_text()
+        assert "modulus error, version 1, since" in head
+        assert today in str(page.locator("section.adopted time").get_attribute("datetime"))
+        told = numbers(head)
+        arrays = [answer["array"] for answer in (by_model, by_paper)]
+        intervals = [array[f"d33{part}_pc_per_n"] for array in arrays for part in ("", "_low", "_high")]
+        assert told[:6] == pytest.approx(intervals, rel=1e-3)
+        assert told[6] == pytest.approx(change, rel=0.06)
+        assert "quote its report's" in head
+        assert f"below go by {'it' if shown == 'adopted' else 'the paper'}" in head
+        assert f"by the {shown}" in page.locator("#figure-map figcaption").inner_text()
+        reader.require_accessible()
+    reader.go("/skins/palm-a?sensor=s2")
+    page.get_by_label("Colour by").select_option("uncertainty")
+    page.wait_for_url("**show=uncertainty*")
+    assert page.get_by_label("d33 by").input_value() == "adopted"
+    assert page.get_by_label("Sensor", exact=True).input_value() == "s2"
+    reader.go("/")
+    cell = page.get_by_role("row", name="palm-a").locator(".trend").inner_text()
+    assert "by the adopted model, version 1: modulus error, since" in cell
+    for array in arrays:
+        assert f"array {array['d33_pc_per_n']:#.4g} pC/N" in cell.replace("\xa0", " ")
+    assert numbers(cell.partition("is ")[2])[0] == pytest.approx(change, rel=0.06)
+    reader.require_accessible()
+    page.set_viewport_size({"width": 375, "height": 800})  # a phone's
+    for address in ("/", "/upload"):
+        reader.go(address)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 375
+    reader.go("/")
+    assert page.get_by_role("region", name="Skins").evaluate("box => box.scrollWidth <= box.clientWidth")
+
+
+def test_what_comes_later_is_told_by_the_adopted_model_too(reader: Visit, idle: Server) -> None:
+    _, diagnosis_id = diagnosed(idle, resonant("before"), mistuned(), "palm-b")
+    idle.http.post("/v1/skins/palm-b/model", json={"diagnosis_id": diagnosis_id}).raise_for_status()
+    later = sent(idle, resonant("later"), "palm-b")
+    reader.go("/")
+    row = reader.page.get_by_role("row", name="palm-b")
+    assert "later" in row.inner_text()
+    by_model = d33(idle, later, "adopted")["array"]["d33_pc_per_n"]
+    assert numbers(row.locator(".trend b").inner_text())[0] == pytest.approx(by_model, rel=0.01)
+
+
+def test_an_outdated_model_is_said_to_serve_nothing(reader: Visit, idle: Server) -> None:
+    campaign_id, diagnosis_id = diagnosed(idle, resonant("gone"), mistuned(), "palm-c")
+    idle.http.post("/v1/skins/palm-c/model", json={"diagnosis_id": diagnosis_id}).raise_for_status()
+    sent(idle, resonant("stays"), "palm-c")
+    idle.http.post(f"/v1/campaigns/{campaign_id}/withdraw", json={"reason": "loose cable"}).raise_for_status()
+    reader.go("/skins/palm-c")
+    said = reader.page.get_by_role("status").inner_text()
+    assert "modulus error" in said
+    assert "outdated and serves no figures: its campaign was withdrawn: loose cable" in said
+    reader.go("/")
+    assert "is outdated" in reader.page.get_by_role("row", name="palm-c").inner_text()
+
+
+def test_a_model_is_withdrawn_on_its_skin_s_page(reader: Visit, idle: Server) -> None:
+    page = reader.page
+    _, diagnosis_id = diagnosed(idle, resonant("friday"), mistuned(), "palm-d")
+    idle.http.post("/v1/skins/palm-d/model", json={"diagnosis_id": diagnosis_id}).raise_for_status()
+    reader.go("/skins/palm-d")
+    button = page.get_by_role("button", name="Withdraw the model")
+    assert not button.is_visible()
+    page.get_by_text("Withdraw the adopted model").click()
+    reader.require_accessible()
+    button.click()  # without a reason: the browser asks for it
+    assert page.get_by_label("Reason").first.evaluate("field => field.validity.valueMissing")
+    assert idle.http.get("/v1/skins/palm-d/model").status_code == 200
+    page.get_by_label("Reason").first.fill("the <b>wrong</b> diagnosis")
+    button.click()
+    page.wait_for_url("**/skins/palm-d")
+    for address in ("/skins/palm-d", "/skins/palm-d?model=adopted"):
+        reader.go(address)
+        reader.drawn(2)
+        assert "the paper's" in page.locator(".facts").inner_text()
+        assert page.get_by_role("region", name="Adopted model").count() == 0
+        assert page.get_by_text("Withdraw the adopted model").count() == 0
+        said = page.get_by_role("status")
+        assert "modulus error (version 1, since" in said.inner_text()
+        assert "was withdrawn" in said.inner_text()
+        assert "the <b>wrong</b> diagnosis" in said.inner_text()
+        today = datetime.now(UTC).strftime("%Y-%m-%d")
+        assert today in str(said.locator("time").last.get_attribute("datetime"))
+        assert "by the paper's model" in page.locator("#figure-map figcaption").inner_text()
+        assert page.get_by_role("row", name="friday").locator("a.tag").inner_text() == "mismatch, explained"
+        reader.require_accessible()
+    reader.go("/")
+    assert "adopted" not in page.get_by_role("row", name="palm-d").inner_text()
+    reader.go("/d33?skin=palm-d")
+    assert "by the adopted model" not in page.locator("main").inner_text()
+    reader.go(f"/diagnoses/{diagnosis_id}")
+    reminder = page.get_by_role("status").inner_text()
+    assert "as version 1, and was withdrawn" in reminder
+    assert "“the <b>wrong</b> diagnosis”" in reminder
+    page.get_by_role("button", name="Adopt this model").click()
+    page.wait_for_url("**/skins/palm-d?model=adopted")
+    assert "version 2" in page.get_by_role("region", name="Adopted model").inner_text()
+    assert "was withdrawn" not in page.locator("main").inner_text()
+    assert "adopted" in page.get_by_role("row", name="friday").locator("a.tag").inner_text()
+
+
+@pytest.mark.parametrize(
+    ("verdict", "probability", "mechanisms", "alternatives", "tag", "beside", "mood"),
+    [
+        ("no_mismatch", 0.99, [], [("strain_stiffening", 0.006)], "no mismatch found, 99 %", "", "good"),
+        ("no_mismatch", 0.6, [], [("strain_stiffening", 0.38)], "no mismatch found, 60 %",
+         "not ruled out: strain stiffening 38 %", "look"),
+        ("explained", 0.97, ["contact_resonance"], [("timing_delay", 0.03)], "mismatch, explained",
+         "contact resonance 97 %", "look"),
+        ("ambiguous", 0.55, ["contact_resonance"], [("timing_delay", 0.4), ("none_of_these", 0.015)],
+         "mismatch, several explanations", "contact resonance 55 % or timing delay 40 %", "look"),
+        ("unexplained", 0.999, [], [("crosstalk", 0.001)], "mismatch, no explanation, 99.9 %", "", "look"),
+        ("insufficient_data", 0.5, [], [], "too little data", "", "quiet"),
+    ],
+)  # fmt: skip
+def test_a_tag_says_how_sure_it_is(
+    reader: Visit,
+    idle: Server,
+    verdict: str,
+    probability: float,
+    mechanisms: list[str],
+    alternatives: list[tuple[str, float]],
+    tag: str,
+    beside: str,
+    mood: str,
+) -> None:
+    found = {
+        **report(),
+        "verdict": verdict,
+        "probability": probability,
+        "mechanisms": [entry for entry in report()["mechanisms"] if entry["name"] in mechanisms],
+        "alternatives": [{"mechanisms": [name], "probability": share, "why_not": "."} for name, share in alternatives],
+    }
+    skin = f"tag {verdict} {probability}"
+    campaign_id, _ = diagnosed(idle, resonant(skin), found, skin)
+    for path in ("/", f"/skins/{skin}", f"/campaigns/{campaign_id}"):
+        reader.go(path)
+        tags = reader.page.locator("tr", has_text=skin) if "campaigns" not in path else reader.page.locator("p")
+        shown = tags.locator("a.tag").first
+        assert shown.inner_text() == tag
+        assert mood in str(shown.get_attribute("class")).split()
+        assert beside in shown.locator("xpath=..").inner_text()
+        assert ("not ruled out" in shown.locator("xpath=..").inner_text()) == ("not ruled out" in beside)
+    shown.click()
+    reader.page.locator(".report .verdict").wait_for()
+    cannot = reader.page.get_by_text("It cannot be adopted as the skin's model:")
+    assert cannot.count() == (0 if verdict == "explained" else 1)
+    assert reader.page.get_by_role("button", name="Adopt this model").count() == 1 - cannot.count()
+    reader.require_accessible()

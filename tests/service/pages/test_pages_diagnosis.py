@@ -1,0 +1,198 @@
+"""A diagnosis in the browser: asked for, watched, read, saved, adopted; and what nobody else may do with it."""
+
+import csv
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+import orjson
+import pytest
+
+from service.store import database, diagnoses
+from tests.service.pages.conftest import Visit
+from tests.service.pages.test_pages_security import BROWSING, HOSTILE, token_of
+from tests.support.diagnosed import asked, resonant, sent, table
+from tests.support.store_server import Server
+from underskin import __version__
+from underskin.diagnosis.pipeline import diagnose
+from underskin.diagnosis.reporting.figures import figures
+from underskin.diagnosis.reporting.report import report
+from underskin.recordings.campaign import parse
+
+LINES = 30
+
+
+@dataclass(frozen=True)
+class Made:
+    """What a worker would have made of `resonant`."""
+
+    report: dict[str, Any]
+    figures: dict[str, str]
+
+
+@pytest.fixture(scope="module")
+def made() -> Made:
+    found = diagnose(parse(resonant("array", lines=LINES)), table())
+    document = report(found)
+    plain = orjson.loads(orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY))
+    return Made(plain, {name: figure.to_json() for name, figure in figures(found, document).items()})
+
+
+def keep(server: Server, document: dict[str, Any], made: Made, skin: str) -> str:
+    """The id of a diagnosis that is done."""
+    campaign_id = sent(server, document, skin)
+    store = database(server.place.database_url, server.place.folder)
+    with store.writing() as connection:
+        row = diagnoses.ask(connection, campaign_id, table().sha256, __version__, None)
+        while (claimed := diagnoses.claim(connection, "test", table().sha256, __version__)) is not None:
+            assert diagnoses.finish(connection, claimed.number, "test", made.report, made.figures)
+    store.close()
+    return str(row.id)
+
+
+def test_a_diagnosis_is_watched_read_and_adopted(visitor: Visit, server: Server) -> None:
+    campaign_id = sent(server, resonant("array", lines=LINES), "resonating")
+    page = visitor.page
+    visitor.go(f"/campaigns/{campaign_id}")
+    page.get_by_role("button", name="Diagnose").click()
+    page.wait_for_url("**/diagnoses/*")
+    page.get_by_role("heading", name="Where", exact=True).wait_for(timeout=240_000)  # without reloading by hand
+    visitor.drawn(4)
+    visitor.require_accessible()
+    headings = page.get_by_role("heading", level=2).all_inner_texts()
+    sections = [name for name in headings if name in ("Where", "What", "How much better", "Adopt")]
+    assert sections == ["Where", "What", "How much better", "Adopt"]
+    assert "contact_resonance" in page.locator(".first").inner_text().replace(" ", "_")
+    page.get_by_role("button", name="Adopt this model").click()
+    page.wait_for_url("**/skins/resonating?model=adopted")
+    visitor.drawn(2)
+    assert "by the adopted model" in page.locator("#figure-history figcaption").inner_text()
+    assert page.get_by_label("d33 by").input_value() == "adopted"
+    page.get_by_role("link", name="version 1").click()
+    page.get_by_text("in force for skin resonating", exact=True).wait_for()
+    assert page.get_by_role("button", name="Adopt this model").count() == 0
+
+
+def test_the_saved_file_needs_nothing_else(reader: Visit, idle: Server, made: Made, downloads: Path) -> None:
+    page = reader.page
+    reader.go(f"/diagnoses/{keep(idle, resonant('saved', lines=LINES), made, 'saved')}")
+    with page.expect_download() as saving:
+        page.get_by_role("link", name="Save as one HTML file").click()
+    file = downloads / "report.html"
+    saving.value.save_as(file)
+    asked_for: list[str] = []
+    page.on("request", lambda request: asked_for.append(request.url))
+    page.goto(file.as_uri())
+    page.wait_for_function("document.querySelectorAll('.main-svg').length >= 4")
+    assert asked_for == [file.as_uri()]
+    reader.wrong.clear()  # the file itself is not of the server
+
+
+def test_on_paper_there_is_the_report_and_nothing_to_press(reader: Visit, idle: Server, made: Made) -> None:
+    page = reader.page
+    reader.go(f"/diagnoses/{keep(idle, resonant('printed', lines=LINES), made, 'printed')}")
+    reader.drawn(4)
+    assert page.get_by_role("button", name="Print or save as PDF").is_visible()
+    page.emulate_media(media="print")
+    assert [button for button in page.locator("button, .button").all() if button.is_visible()] == []
+    sections = [heading for heading in page.get_by_role("heading", level=2).all() if heading.is_visible()]
+    assert {"Where", "What", "How much better", "What to measure next"} <= {one.inner_text() for one in sections}
+    for plot in page.locator(".plot").all():
+        assert plot.is_visible()
+
+
+def test_a_figure_s_numbers_are_those_of_the_report(idle: Server, made: Made) -> None:
+    place = f"/diagnoses/{keep(idle, resonant('numbers', lines=LINES), made, 'numbers')}"
+    tables = {
+        name: list(csv.DictReader(idle.http.get(f"{place}/{name}.csv").text.splitlines()))
+        for name in ("where", "before_after", "explanations", "parameters")
+    }
+    mass = made.report["mechanisms"][0]["parameters"][0]
+    told = tables["parameters"][0]
+    assert (told["parameter"], float(told["value"])) == (mass["name"], mass["value"])
+    assert float(tables["explanations"][0]["probability"]) == made.report["probability"]
+    shown = {(row["model"], row["recording"]) for row in tables["before_after"]}
+    assert shown == {(model, f"r{number}") for model in ("before", "after") for number in range(12)}
+    lines = sum(int(row["points"]) for row in tables["where"])
+    assert lines == len(tables["before_after"]) / 2  # each point is in one cell
+    assert idle.http.get(f"{place}/nothing.csv").status_code == 404
+
+
+def test_one_that_waits_is_cancelled_and_asked_for_again(reader: Visit, idle: Server) -> None:
+    page = reader.page
+    reader.go(f"/diagnoses/{asked(idle, sent(idle, resonant('waits'), 'waits'))}")
+    assert "waits for its turn" in page.get_by_role("status").inner_text()
+    reader.require_accessible()
+    page.get_by_role("button", name="Cancel").click()
+    page.get_by_text("It was cancelled").wait_for()
+    page.get_by_role("button", name="Diagnose it again").click()
+    page.get_by_text("It waits for its turn").wait_for()
+    page.get_by_role("button", name="Cancel").click()
+
+
+def test_hostile_names_in_a_report_stay_text(reader: Visit, idle: Server, made: Made) -> None:
+    hostile = Made(deepcopy(made.report), made.figures)
+    hostile.report["statement"] = f"{HOSTILE}. {HOSTILE}"
+    hostile.report["location"]["statement"] = HOSTILE
+    hostile.report["findings"] = [{"code": HOSTILE, "recording": HOSTILE, "field": HOSTILE, "statement": HOSTILE}]
+    hostile.report["alternatives"][0]["why_not"] = HOSTILE
+    document = resonant("hostile", lines=LINES)
+    document["name"] = HOSTILE
+    reader.page.on("dialog", lambda dialog: reader.wrong.append(dialog.message))
+    reader.go(f"/diagnoses/{keep(idle, document, hostile, 'hostile')}")
+    reader.drawn(4)
+    assert reader.page.locator("img[src=x]").count() == 0
+    assert HOSTILE.split(".")[0] in reader.page.locator(".first").inner_text()
+
+
+def test_a_report_without_its_figures_says_so(idle: Server, made: Made) -> None:
+    place = f"/diagnoses/{keep(idle, resonant('bare', lines=LINES), Made(made.report, {}), 'bare')}"
+    shown = idle.http.get(place, headers=BROWSING).text
+    assert "were not kept" in shown
+    assert shown.count('class="plot"') == 1  # how probable each explanation is: of the report itself
+    assert idle.http.get(f"{place}/where.csv", headers=BROWSING).status_code == 422
+    assert idle.http.get(f"{place}/parameters.csv").status_code == 200
+
+
+def test_an_imported_report_of_odd_shape_is_said_to_be_one(idle: Server, made: Made) -> None:
+    odd = Made({**made.report, "location": None}, {})
+    place = f"/diagnoses/{keep(idle, resonant('odd', lines=LINES), odd, 'odd')}"
+    for path in (place, f"{place}/report.html"):
+        answer = idle.http.get(path, headers=BROWSING)
+        assert answer.status_code == 422
+        assert "lacks what a page shows" in answer.text
+
+
+def test_what_changes_something_needs_the_session_s_own_form(idle: Server, made: Made) -> None:
+    diagnosis_id = keep(idle, resonant("forms", lines=LINES), made, "forms")
+    campaign_id = idle.http.get(f"/v1/diagnoses/{diagnosis_id}").json()["campaign_id"]
+    for path in (
+        f"/campaigns/{campaign_id}/diagnosis",
+        f"/diagnoses/{diagnosis_id}/cancel",
+        f"/diagnoses/{diagnosis_id}/adopt",
+        "/skins/forms/model/withdraw",
+    ):
+        assert idle.http.post(path, data={"form_token": "x"}, headers=BROWSING).status_code == 403
+    assert idle.http.get("/v1/skins/forms/model").status_code == 404
+
+
+def test_who_may_read_only_sees_no_button_and_changes_nothing(locked: tuple[Server, dict[str, str]]) -> None:
+    server, keys = locked
+    diagnosis_id = asked(server, campaign_id := sent(server, resonant("locked"), "locked"))
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING) as somebody:
+        somebody.post("/login", data={"form_token": token_of(somebody.get("/login").text), "key": keys["read"]})
+        shown = somebody.get(f"/campaigns/{campaign_id}").text
+        assert "Diagnose</button>" not in shown
+        form = {"form_token": token_of(shown)}
+        own = {"Origin": str(server.http.base_url).rstrip("/")}
+        for path in (
+            f"/campaigns/{campaign_id}/diagnosis",
+            f"/diagnoses/{diagnosis_id}/cancel",
+            f"/diagnoses/{diagnosis_id}/adopt",
+            "/skins/locked/model/withdraw",
+        ):
+            answer = somebody.post(path, data=form, headers=own)
+            assert answer.status_code == 403
+            assert "scope read" in answer.text

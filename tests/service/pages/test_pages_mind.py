@@ -1,0 +1,99 @@
+"""Changing one's mind with a mouse: a recording excluded, a campaign withdrawn; and what then is said of models."""
+
+from tests.service.pages.conftest import Visit
+from tests.support.diagnosed import diagnosed, report, resonant
+from tests.support.store_server import Server, campaign
+
+
+def test_a_recording_is_excluded_and_the_campaign_withdrawn_by_clicks(reader: Visit, idle: Server) -> None:
+    page = reader.page
+    kept = idle.http.post("/v1/campaigns?skin=mind", json=campaign("a loose cable")).json()
+    before = idle.http.get(f"/v1/campaigns/{kept['id']}/d33").json()["array"]["d33_pc_per_n"]
+    reader.go(f"/campaigns/{kept['id']}")
+    page.get_by_text("Exclude a recording, or correct or withdraw the campaign").click()
+    exclude = page.locator("form", has=page.get_by_role("button", name="Exclude", exact=True))
+    exclude.get_by_label("Recording").fill("s1-2N")
+    exclude.get_by_label("Reason").fill("cable <b>loose</b>")
+    exclude.get_by_role("button", name="Exclude").click()
+    page.get_by_text("1 excluded").wait_for()
+    row = page.get_by_role("row", name="s1-2N")
+    assert "excluded: cable <b>loose</b>" in row.inner_text()
+    after = idle.http.get(f"/v1/campaigns/{kept['id']}/d33").json()["array"]["d33_pc_per_n"]
+    assert after != before
+    assert f"{after:.3g}" in page.locator(".result").inner_text()
+    reader.require_accessible()
+    page.get_by_text("Exclude a recording, or correct or withdraw the campaign").click()
+    withdraw = page.locator("form", has=page.get_by_role("button", name="Withdraw the campaign"))
+    withdraw.get_by_label("Reason").fill("wrong sphere")
+    withdraw.get_by_role("button", name="Withdraw the campaign").click()
+    page.get_by_text("Withdrawn").first.wait_for()
+    assert "wrong sphere. Figures do not use it" in page.get_by_role("status").inner_text()
+    assert page.get_by_role("button", name="Diagnose").count() == 0
+    reader.require_accessible()
+    reader.go("/skins/mind")
+    assert "withdrawn: wrong sphere" in page.get_by_role("row", name="a loose cable").inner_text()
+    reader.require_accessible()
+    reader.go("/")
+    assert "none in use" in page.get_by_role("row", name="mind").inner_text()
+
+
+def test_a_recording_that_is_not_there_is_said_so(reader: Visit, idle: Server) -> None:
+    page = reader.page
+    kept = idle.http.post("/v1/campaigns?skin=slip", json=campaign("a slip")).json()
+    reader.go(f"/campaigns/{kept['id']}")
+    page.get_by_text("Exclude a recording, or correct or withdraw the campaign").click()
+    exclude = page.locator("form", has=page.get_by_role("button", name="Exclude", exact=True))
+    exclude.get_by_label("Recording").fill("s9")
+    exclude.get_by_label("Reason").fill("a guess")
+    exclude.get_by_role("button", name="Exclude").click()
+    assert "s9" in page.get_by_role("alert").inner_text()
+    reader.require_accessible()
+    reader.wrong.clear()  # the browser says so of every 404
+    page.go_back()
+    assert "in use" in page.get_by_role("row", name="s0-1N").inner_text()
+
+
+def test_an_excluded_recording_takes_the_model_out_of_force(reader: Visit, idle: Server) -> None:
+    page = reader.page
+    campaign_id, diagnosis_id = diagnosed(idle, resonant("explained"), report(), "adopts")
+    reader.go(f"/diagnoses/{diagnosis_id}")
+    page.get_by_role("link", name="Adopt", exact=True).click()
+    page.get_by_role("button", name="Adopt this model").click()
+    page.wait_for_url("**/skins/adopts?model=adopted")
+    assert "In force: contact resonance" in page.get_by_role("region", name="Adopted model").inner_text()
+    reader.go(f"/campaigns/{campaign_id}")
+    page.get_by_text("Exclude a recording, or correct or withdraw the campaign").click()
+    exclude = page.locator("form", has=page.get_by_role("button", name="Exclude", exact=True))
+    exclude.get_by_label("Recording").fill("r0")
+    exclude.get_by_label("Reason").fill("cable loose")
+    exclude.get_by_role("button", name="Exclude").click()
+    page.get_by_text("1 excluded").wait_for()
+    reader.go("/skins/adopts?model=adopted")
+    assert "is outdated and serves no figures" in page.get_by_role("status").inner_text()
+    assert "by the paper's model" in page.locator("#figure-history figcaption").inner_text()
+    reader.go(f"/diagnoses/{diagnosis_id}")
+    assert "recordings were excluded since" in page.get_by_role("status").first.inner_text()
+    assert page.get_by_role("button", name="Adopt this model").count() == 0
+
+
+def test_an_ambiguous_diagnosis_names_its_rivals_and_what_would_settle_it(reader: Visit, idle: Server) -> None:
+    page = reader.page
+    rivals = [
+        {"mechanisms": ["timing_delay"], "probability": 0.41, "why_not": "the recordings hardly tell it apart"},
+        {"mechanisms": ["none_of_these"], "probability": 0.03, "why_not": "a smooth discrepancy explains less"},
+    ]
+    said = "Best explained by contact_resonance (56 %), but these rivals remain: timing delay (41 %)."
+    found = {**report(), "verdict": "ambiguous", "probability": 0.56, "alternatives": rivals, "statement": said}
+    _, diagnosis_id = diagnosed(idle, resonant("two ways"), found, "ambiguous")
+    reader.go(f"/diagnoses/{diagnosis_id}")
+    assert "Best explained by contact resonance (56 %)" in page.locator(".first").inner_text()
+    assert "several explanations remain · probability 56 %" in page.locator(".verdict").inner_text()
+    table = page.get_by_role("table").filter(has_text="why not")
+    assert "timing delay" in table.inner_text()
+    assert "41 %" in table.inner_text()
+    assert (
+        "It cannot be adopted as the skin's model: several explanations remain" in page.get_by_role("main").inner_text()
+    )
+    reader.require_accessible()
+    answer = idle.http.post("/v1/skins/ambiguous/model", json={"diagnosis_id": diagnosis_id})
+    assert (answer.status_code, "several explanations remain" in answer.json()["detail"]) == (422, True)

@@ -1,0 +1,72 @@
+"""What to measure next within the reader's own rig, on the pages."""
+
+import re
+
+import httpx
+import pytest
+
+from tests.diagnosis.test_diagnosis_plan import NARROW
+from tests.service.pages.conftest import Visit
+from tests.service.pages.test_pages_security import BROWSING
+from tests.support.diagnosed import asked, awaited, sent, table
+from tests.support.diagnosis_campaigns import campaign
+from tests.support.store_server import Server
+from underskin.diagnosis.pipeline import diagnose
+from underskin.diagnosis.planning.rig_limits import Limits
+from underskin.diagnosis.reporting.wording import readable
+from underskin.recordings.campaign import to_dict
+
+LIMITS = Limits(preload_n=(0.3, 2.5), indenter_radius_mm=[4.0, 8.0], recordings=5)
+
+
+@pytest.fixture(scope="module")
+def diagnosis_id(server: Server) -> str:
+    """Of a campaign that leaves several explanations."""
+    found = str(asked(server, sent(server, to_dict(campaign(NARROW, table())), "narrow")))
+    assert awaited(server, found)["report"]["next_experiment"] is not None
+    return found
+
+
+def test_the_next_experiment_is_planned_within_the_reader_s_rig(visitor: Visit, diagnosis_id: str) -> None:
+    expected = diagnose(campaign(NARROW, table()), table(), limits=LIMITS).next_experiment
+    page = visitor.page
+    visitor.go(f"/diagnoses/{diagnosis_id}")
+    page.get_by_label("lowest preload").fill("0.3")
+    page.get_by_label("radii of the spheres at hand").fill("4, 8")
+    page.get_by_label("recordings at most").fill("5")
+    page.get_by_role("button", name="Plan the next recordings").click()
+    assert "lowest and highest preload [N] – give both" in page.get_by_role("alert").inner_text()
+    visitor.require_accessible()
+    page.get_by_label("highest preload").fill("2.5")
+    page.get_by_role("button", name="Plan the next recordings").click()
+    page.get_by_role("progressbar", name="How far the plan is").wait_for()
+    visitor.require_accessible()
+    plan = page.get_by_role("region", name="The plan")
+    plan.wait_for(timeout=240_000)  # without reloading by hand
+    assert readable(expected["statement"]) in plan.inner_text()
+    assert plan.locator("tbody tr").count() == len(expected["recordings"])
+    visitor.require_accessible()
+    page.get_by_text("The same by request").click()
+    command = page.get_by_label("Shell").inner_text()
+    assert "--preload-n 0.3 2.5 --indenter-radius-mm 4.0 --indenter-radius-mm 8.0 --recordings 5" in command
+
+
+@pytest.mark.parametrize(
+    ("query", "told"),
+    [
+        ({"lowest_preload_n": "3", "highest_preload_n": "1"}, r"lowest and highest preload \[N\].*the lowest first"),
+        ({"lowest_preload_n": "0", "highest_preload_n": "1"}, "must be above 0"),
+        ({"indenter_radius_mm": "4 big"}, r"radii of the spheres at hand \[mm\]: big – must be a number"),
+        ({"indenter_radius_mm": "4 nan"}, "must be above 0"),
+        ({"indenter_radius_mm": "1 2 3 4 5 6 7 8 9"}, "at most 8 numbers"),
+        ({"offset_mm": "-1"}, "distances beside the sensor.*must be 0 or more"),
+        ({"dynamic_force_n": "inf"}, "dynamic forces of the shaker.*must be above 0"),
+        ({"recordings": "0"}, "recordings at most: 0 – must be a whole number from 1 to 50"),
+    ],
+)
+def test_limits_that_no_rig_has_are_refused(
+    server: Server, diagnosis_id: str, query: dict[str, str], told: str
+) -> None:
+    place = f"{server.http.base_url}/diagnoses/{diagnosis_id}/plan"
+    shown = httpx.get(place, params=query, headers=BROWSING, timeout=60).text
+    assert re.search(told, shown) is not None, shown

@@ -1,0 +1,208 @@
+"""An exported skin on the upload page: seen, brought in once, refused where it is damaged or contradicts the store."""
+
+import io
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from urllib.parse import quote
+
+import h5py
+import httpx
+import pytest
+
+from tests.service.pages.conftest import Visit
+from tests.service.pages.test_pages_security import BROWSING, token_of
+from tests.service.pages.test_pages_upload import as_json, file, look_at
+from tests.support.diagnosed import diagnosed, report, resonant
+from tests.support.store_server import Place, Server, campaign, running
+
+SKIN = 'palm "3" <b>'
+PATH = quote(SKIN, safe="")
+
+
+@pytest.fixture(scope="module")
+def export(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """A skin of three campaigns, one with an excluded recording, one diagnosed; its model was adopted and withdrawn."""
+    with running(Place(tmp_path_factory.mktemp("source")), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
+        http = server.http
+        for name in ("monday", "tuesday"):
+            kept = http.post("/v1/campaigns", json=campaign(name), params={"skin": SKIN}).json()["id"]
+        left_out = {"recording": "s1-2N", "reason": "cable loose"}
+        assert http.post(f"/v1/campaigns/{kept}/exclusions", json=left_out).status_code == 200
+        _, diagnosis_id = diagnosed(server, resonant("array"), report(), SKIN)
+        adopted = http.post(f"/v1/skins/{PATH}/model", json={"diagnosis_id": diagnosis_id})
+        assert adopted.is_success, adopted.text
+        withdrawn = http.delete(f"/v1/skins/{PATH}/model", params={"reason": "wrong diagnosis"})
+        assert withdrawn.is_success, withdrawn.text
+        return http.get(f"/v1/skins/{PATH}/export").content
+
+
+@pytest.fixture(scope="module")
+def empty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """Where nothing ever comes in."""
+    with running(Place(tmp_path_factory.mktemp("empty"))) as started:
+        yield started
+
+
+@pytest.fixture
+def sender(empty: Server) -> Iterator[httpx.Client]:
+    with httpx.Client(base_url=empty.http.base_url, headers=BROWSING, timeout=60) as client:
+        yield client
+
+
+def kept(server: Server) -> list[str]:
+    return [entry["name"] for entry in server.http.get("/v1/campaigns", params={"state": "all"}).json()["campaigns"]]
+
+
+def looked_at(client: httpx.Client, content: bytes) -> str:
+    """The page of an upload."""
+    form = {"form_token": token_of(client.get("/upload").text)}
+    answer = client.post("/upload", data=form, files={"file": ("skin.h5", content)}, follow_redirects=True)
+    assert answer.status_code == 200, answer.text
+    return answer.text
+
+
+def test_an_exported_skin_comes_in_where_somebody_says_so(reader: Visit, idle: Server, export: bytes) -> None:
+    page = reader.page
+    look_at(reader, [file("palm.h5", export)])
+    status = page.get_by_role("status")
+    assert "3 campaigns" in status.inner_text()
+    assert "none of them here yet" in status.inner_text()
+    assert page.get_by_role("heading", level=1).inner_text() == f"Skin {SKIN}"
+    told = page.get_by_role("region", name="Adopted models").inner_text()
+    assert "contact resonance" in told
+    assert ", withdrawn " in told
+    row = page.get_by_role("row", name="tuesday").inner_text().split("\t")
+    assert (row[2:]) == ["6", "1", "not yet"]
+    reader.require_accessible()
+    assert kept(idle) == []
+    page.get_by_role("button", name="Bring it in").click()
+    page.wait_for_url("**/skins/*")
+    assert page.get_by_role("heading", level=1).inner_text() == f"Skin {SKIN}"
+    assert sorted(kept(idle)) == ["array", "monday", "tuesday"]
+    said = page.get_by_role("status").first.inner_text()
+    assert "version 1" in said
+    assert "wrong diagnosis" in said
+    look_at(reader, [file("palm.h5", export)], skin="another name")
+    assert "All of it is here already" in page.locator(".adopted").inner_text()
+    assert "keeps its name" in page.locator("main").inner_text()
+    assert page.get_by_role("button", name="Bring it in").count() == 0
+    monday = next(entry for entry in idle.http.get("/v1/campaigns").json()["campaigns"] if entry["name"] == "monday")
+    withdrawn = idle.http.post(f"/v1/campaigns/{monday['id']}/withdraw", json={"reason": "fell down"})
+    assert withdrawn.status_code == 200
+    look_at(reader, [file("palm.h5", export)])
+    alert = page.get_by_role("alert").inner_text()
+    assert "'monday'" in alert
+    assert "differs" in alert
+    assert "differs" in page.get_by_role("row", name="monday").inner_text()
+    assert page.get_by_role("button", name="Bring it in").count() == 0
+    reader.require_accessible()
+    page.get_by_role("button", name="Discard").click()
+    page.wait_for_url("**/upload")
+
+
+def _cut(content: bytes) -> bytes:
+    return content[: len(content) // 2]
+
+
+def _newer(content: bytes) -> bytes:
+    held = io.BytesIO(content)
+    with h5py.File(held, "r+") as opened:
+        opened.attrs["schema"] = "skin-export/2"
+    return held.getvalue()
+
+
+def _spoilt(content: bytes) -> bytes:
+    held = io.BytesIO(content)
+    with h5py.File(held, "r+") as opened:
+        name = sorted(opened["campaigns"])[0]
+        opened[f"campaigns/{name}/arrays/frf_re_pc_per_n"][0] = float("nan")
+    return held.getvalue()
+
+
+def _other(_content: bytes) -> bytes:
+    held = io.BytesIO()
+    with h5py.File(held, "w") as opened:
+        opened["pressure"] = [1.0, 2.0]
+    return held.getvalue()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("spoil", "told"),
+    [
+        (_cut, "was cut off"),
+        (_newer, "skin-export/2; this one reads skin-export/1"),
+        (_spoilt, "frf_re_pc_per_n"),
+        (_other, "no campaign"),
+    ],
+)
+def test_a_file_that_cannot_come_in_says_what_is_wrong_with_it(
+    sender: httpx.Client, empty: Server, export: bytes, spoil: Callable[[bytes], bytes], told: str
+) -> None:
+    shown = looked_at(sender, spoil(export))
+    assert "It cannot be read" in shown
+    assert told in shown
+    assert "Bring it in" not in shown
+    assert kept(empty) == []
+
+
+def test_an_exported_skin_comes_alone(sender: httpx.Client, export: bytes) -> None:
+    form = {"form_token": token_of(sender.get("/upload").text)}
+    both = [("file", ("a.json", as_json(campaign("beside")).encode())), ("file", ("skin.h5", export))]
+    both_seen = sender.post("/upload", data=form, files=both, follow_redirects=True)
+    assert "it comes in alone" in both_seen.text
+    shown = sender.get(both_seen.url.copy_with(query=b"file=1")).text
+    assert "it comes in alone" in shown
+    assert "Nothing is wrong with the file" in shown
+    assert "Put it right in the file" not in shown
+
+
+@pytest.mark.slow
+def test_bringing_a_skin_in_needs_the_session_s_own_form_and_is_done_once(tmp_path: Path, export: bytes) -> None:
+    with (
+        running(Place(tmp_path / "third")) as server,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as own,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as other,
+    ):
+        form, stolen = ({"form_token": token_of(client.get("/upload").text)} for client in (own, other))
+        place = own.post("/upload", data=form, files={"file": ("skin.h5", export)}).headers["location"]
+        assert own.post(f"{place}/skin", data={"form_token": "x"}).status_code == 403
+        other_site = {"Origin": "https://example.org"}
+        assert own.post(f"{place}/skin", data=form, headers=other_site).status_code == 403
+        assert other.post(f"{place}/skin", data=stolen).status_code == 404
+        assert kept(server) == []
+        first, second = (own.post(f"{place}/skin", data=form) for _ in range(2))
+        assert first.headers["location"] == second.headers["location"] == f"/skins/{PATH}"
+        assert len(kept(server)) == 3
+        again = own.post("/upload", data=form, files={"file": ("a.json", as_json(campaign("plain")))})
+        assert own.post(f"{again.headers['location']}/skin", data=form).status_code == 404
+
+
+def test_who_may_read_only_brings_no_skin_in(locked: tuple[Server, dict[str, str]], export: bytes) -> None:
+    server, keys = locked
+    origin = {"Origin": str(server.http.base_url).rstrip("/")}
+    with (
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING | origin, timeout=60) as writer,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING | origin, timeout=60) as somebody,
+    ):
+        for client, key in ((writer, keys["write"]), (somebody, keys["read"])):
+            client.post("/login", data={"form_token": token_of(client.get("/login").text), "key": key})
+        form = {"form_token": token_of(somebody.get("/upload").text)}
+        sent = somebody.post("/upload", data=form, files={"file": ("skin.h5", export)})
+        assert (sent.status_code, "scope read" in sent.text) == (403, True)
+        own = {"form_token": token_of(writer.get("/upload").text)}
+        place = writer.post("/upload", data=own, files={"file": ("skin.h5", export)}).headers["location"]
+        assert somebody.post(f"{place}/skin", data=form).status_code == 403
+        assert SKIN not in [entry["id"] for entry in server.http.get("/v1/skins").json()["skins"]]
+
+
+@pytest.mark.slow
+def test_an_export_beyond_the_limit_is_refused(tmp_path: Path, export: bytes) -> None:
+    with (
+        running(Place(tmp_path / "small"), UNDERSKIN_MAX_UPLOAD_MB="0.02") as server,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING) as somebody,
+    ):
+        form = {"form_token": token_of(somebody.get("/upload").text)}
+        answer = somebody.post("/upload", data=form, files={"file": ("skin.h5", export)})
+        assert (answer.status_code, "UNDERSKIN_MAX_UPLOAD_MB" in answer.text) == (413, True)
+        assert kept(server) == []

@@ -1,0 +1,203 @@
+"""Uploads in the browser: understood, corrected, joined, and kept or not at all."""
+
+import httpx
+import pytest
+from playwright.sync_api import FilePayload
+
+from tests.service.pages.conftest import Visit
+from tests.service.pages.lab_files import SHAKER_RIG, shaker_tdms
+from tests.service.pages.test_pages_security import HOSTILE
+from tests.support.repository import ROOT
+from tests.support.store_server import Server, campaign
+from underskin.recordings import rig_description
+
+GAIN = 7.4
+TEMPLATE = ROOT / "examples" / "formats" / "template.csv"
+
+
+def file(name: str, content: bytes | str) -> FilePayload:
+    return {"name": name, "mimeType": "", "buffer": content.encode() if isinstance(content, str) else content}
+
+
+def look_at(visitor: Visit, files: list[FilePayload], *, rig: str = "", skin: str = "") -> None:
+    page = visitor.page
+    visitor.go("/upload")
+    page.get_by_label("Files").set_input_files(files)
+    page.get_by_label("Skin").fill(skin)
+    if rig:
+        page.get_by_label("Rig description").set_input_files(file("rig.yaml", rig))
+    page.get_by_role("button", name="Look at them").click()
+    page.wait_for_url("**/upload/*")
+
+
+def as_json(document: dict[str, object]) -> str:
+    return httpx.Request("POST", "http://x", json=document).content.decode()
+
+
+def campaigns_of(server: Server, skin: str) -> list[str]:
+    answer = server.http.get("/v1/campaigns", params={"skin": skin}).json()
+    return [entry["id"] for entry in answer["campaigns"]]
+
+
+def test_a_bad_recording_is_explained_field_by_field(visitor: Visit, server: Server) -> None:
+    document = campaign("one bad", id="one-bad")
+    document["recordings"][1] |= {"preload_n": -2.0, "sensor": "nowhere"}
+    look_at(visitor, [file("one bad.json", as_json(document))])
+    page = visitor.page
+    assert "5 recordings understood, 1 refused" in page.get_by_role("status").inner_text()
+    row = page.get_by_role("row", name="preload_n")
+    assert "-2.0" in row.inner_text()
+    assert "greater than 0" in row.inner_text()
+    assert campaigns_of(server, "one-bad") == []
+    page.get_by_role("button", name="Keep 5 recordings").click()
+    page.wait_for_url("**/campaigns/*")
+    assert len(campaigns_of(server, "one-bad")) == 1
+
+
+def test_a_rig_description_reads_a_recording_and_its_form_keeps_what_it_says(visitor: Visit, server: Server) -> None:
+    page = visitor.page
+    look_at(visitor, [file("press.tdms", shaker_tdms(GAIN))], rig=SHAKER_RIG, skin="shaker")
+    page.get_by_text("1 recording understood").wait_for()
+    visitor.drawn(2)
+    shown = page.get_by_role("row", name="press").last.inner_text()
+    assert float(shown.split()[-1]) == pytest.approx(GAIN, rel=0.02)
+    page.get_by_text("What the channels are").click()
+    assert page.get_by_label("Sign of Amplifier").input_value() == "-1"
+    page.get_by_label("Sensitivity of Amplifier", exact=True).fill("5")  # as if the range had been another
+    page.get_by_role("button", name="Read it so").click()
+    page.get_by_text("1 recording understood").wait_for()
+    shown = page.get_by_role("row", name="press").last.inner_text()
+    assert float(shown.split()[-1]) == pytest.approx(2 * GAIN, rel=0.02)
+    page.get_by_text("What the channels are").click()
+    with page.expect_download() as saving:
+        page.get_by_role("link", name="Save this as a rig description").click()
+    saved = rig_description.parse(saving.value.path().read_bytes(), "rig.json")
+    assert saved.channels["charge_pc"].sensitivity == 5
+    page.get_by_role("button", name="Keep 1 recording").click()
+    page.wait_for_url("**/campaigns/*")
+    kept = server.http.get("/v1/skins/shaker").json()["rig"]
+    assert kept["channels"]["charge_pc"]["sensitivity"] == 5
+    assert kept["recording"]["dwell_s"] == 30  # which the form does not show
+    look_at(visitor, [file("next.tdms", shaker_tdms(GAIN))], skin="shaker")  # read as the last one was
+    page.get_by_text("1 recording understood").wait_for()
+
+
+def test_a_mapping_that_cannot_be_used_says_why(visitor: Visit) -> None:
+    page = visitor.page
+    look_at(visitor, [file("press.tdms", shaker_tdms(GAIN))], rig=SHAKER_RIG)
+    page.get_by_text("What the channels are").click()
+    page.get_by_label("Unit of the sensitivity of Amplifier").fill("")
+    page.get_by_role("button", name="Read it so").click()
+    alert = page.get_by_role("alert")
+    assert "channels.charge_pc.sensitivity" in alert.inner_text()
+    visitor.require_accessible()
+    page.get_by_label("Unit of the sensitivity of Amplifier").fill("mV/N")
+    page.get_by_label("sphere radius R [mm]", exact=True).fill("5")
+    page.get_by_label("Layout").fill("s01 0")
+    page.get_by_role("button", name="Read it so").click()
+    assert "name, x [mm], y [mm]" in alert.inner_text()
+    assert page.get_by_label("sphere radius R [mm]", exact=True).input_value() == "5"  # what was typed is still there
+    assert page.get_by_label("Layout").input_value() == "s01 0"
+    page.get_by_label("Layout").fill("s01 0 0")
+    page.get_by_label("sphere radius R [mm]", exact=True).fill("")
+    page.get_by_role("button", name="Read it so").click()
+    page.get_by_role("heading", name="It cannot be read so").wait_for()
+    assert "Amplifier" in page.get_by_role("row", name="file").inner_text()
+    page.get_by_label("Unit of the sensitivity of Amplifier").fill("mV/pC")
+    page.get_by_role("button", name="Read it so").click()
+    assert "fill it in below" in page.get_by_role("row", name="sphere radius R [mm]").inner_text()
+
+
+def test_the_table_that_is_offered_can_be_sent(visitor: Visit) -> None:
+    page = visitor.page
+    visitor.go("/upload")
+    with page.expect_download() as saving:
+        page.get_by_role("link", name="this table").click()
+    offered = saving.value.path().read_bytes()
+    assert offered == TEMPLATE.read_bytes()
+    look_at(visitor, [file("template.csv", offered)])
+    assert "understood" in page.get_by_role("status").inner_text()
+    assert page.get_by_role("button", name="Keep").count() == 1
+
+
+def test_files_that_are_dropped_are_looked_at(visitor: Visit) -> None:
+    page = visitor.page
+    visitor.go("/upload")
+    page.evaluate(
+        """text => {
+            const carried = new DataTransfer();
+            carried.items.add(new File([text], "dropped.json"));
+            const how = { dataTransfer: carried, bubbles: true, cancelable: true };
+            document.body.dispatchEvent(new DragEvent("drop", how));
+        }""",
+        as_json(campaign("dropped")),
+    )
+    page.wait_for_url("**/upload/*")
+    assert "6 recordings understood" in page.get_by_role("status").inner_text()
+
+
+def test_files_of_one_day_become_one_campaign_or_one_each(visitor: Visit, server: Server) -> None:
+    page = visitor.page
+    both = [file(f"{name}.json", as_json(campaign(name, id="day"))) for name in ("morning", "evening")]
+    look_at(visitor, both)
+    assert "12 recordings understood" in page.get_by_role("status").inner_text()
+    page.get_by_role("link", name="evening.json").click()
+    visitor.drawn(1)
+    page.get_by_label("Name of the campaign").fill("the whole day")
+    page.get_by_role("button", name="Keep 12 recordings").click()
+    page.wait_for_url("**/campaigns/*")
+    assert page.get_by_role("heading", level=1).inner_text() == "the whole day"
+    look_at(visitor, both)
+    page.get_by_label("a campaign each").check()
+    page.get_by_role("button", name="Keep 12 recordings").click()
+    page.wait_for_url("**/skins/day")
+    assert len(campaigns_of(server, "day")) == 3
+
+
+def test_files_of_two_skins_are_not_joined_and_nothing_is_kept(visitor: Visit, server: Server) -> None:
+    page = visitor.page
+    thin, thick = campaign("thin"), campaign("thick")
+    thick["skin"]["thickness_mm"] = 5.0
+    look_at(visitor, [file("thin.json", as_json(thin)), file("thick.json", as_json(thick))], skin="two-skins")
+    page.get_by_role("button", name="Keep 12 recordings").click()
+    assert "skin.thickness_mm" in page.get_by_role("alert").inner_text()
+    assert campaigns_of(server, "two-skins") == []
+
+
+def test_a_campaign_is_corrected_by_a_newer_file(visitor: Visit, server: Server) -> None:
+    page = visitor.page
+    wrong = server.http.post("/v1/campaigns", json=campaign("slip", id="corrected")).json()["id"]
+    visitor.go(f"/campaigns/{wrong}")
+    page.get_by_text("or correct or withdraw").click()
+    page.get_by_role("link", name="Upload a corrected version").click()
+    page.get_by_label("Files").set_input_files([file("right.json", as_json(campaign("right", id="corrected")))])
+    page.get_by_role("button", name="Look at them").click()
+    page.wait_for_url("**/upload/*")
+    assert wrong in page.locator("form.keep").inner_text()
+    visitor.require_accessible()
+    page.get_by_label("Why").fill("the modulus of another batch")
+    page.get_by_role("button", name="Keep 6 recordings").click()
+    page.wait_for_url("**/campaigns/*")
+    right = page.url.rpartition("/")[2]
+    found = server.http.get(f"/v1/campaigns/{wrong}").json()
+    assert (found["corrected_by"], found["state"]) == (right, "corrected")
+    visitor.go(f"/upload?skin=corrected&corrects={wrong}")  # once more, though it is corrected already
+    page.get_by_label("Files").set_input_files([file("again.json", as_json(campaign("again", id="corrected")))])
+    page.get_by_role("button", name="Look at them").click()
+    page.wait_for_url("**/upload/*")
+    page.get_by_label("Why").fill("another slip")
+    page.get_by_role("button", name="Keep 6 recordings").click()
+    assert "corrected" in page.get_by_role("alert").inner_text()
+    assert page.get_by_label("Why").input_value() == "another slip"
+    assert campaigns_of(server, "corrected") == [right]
+
+
+def test_hostile_names_in_files_stay_text(visitor: Visit) -> None:
+    page = visitor.page
+    page.on("dialog", lambda dialog: visitor.wrong.append(dialog.message))
+    name = HOSTILE.replace("/", "|")
+    look_at(visitor, [file(f"{name}.tdms", shaker_tdms(GAIN, load_cell=name))], skin=HOSTILE)
+    visitor.drawn(1)
+    assert page.locator("img[src=x]").count() == 0
+    assert "<script>" in page.get_by_role("heading", level=1).inner_text()
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth + 1")

@@ -1,0 +1,121 @@
+"""Uploads by hand-made requests: kept once, each its session's own, and none of whom may not, or beyond the limits."""
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from service.ingest.uploads import Upload
+from service.pages.upload.pending_uploads import PendingUploads
+from service.store.errors import Missing
+from tests.service.pages.test_pages_security import BROWSING, token_of
+from tests.service.pages.test_pages_upload import as_json, campaigns_of
+from tests.support.store_server import Place, Server, campaign, running
+
+
+@pytest.fixture
+def sender(server: Server) -> Iterator[httpx.Client]:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
+        yield client
+
+
+def posted(client: httpx.Client, name: str = "by hand") -> str:
+    """The address of an upload."""
+    form = {"form_token": token_of(client.get("/upload").text), "skin": name}
+    answer = client.post("/upload", data=form, files={"file": ("a.json", as_json(campaign(name)))})
+    assert answer.status_code == 303, answer.text
+    return answer.headers["location"]
+
+
+def test_kept_twice_is_kept_once_and_what_is_discarded_is_gone(sender: httpx.Client, server: Server) -> None:
+    place = posted(sender, "twice")
+    form = {"form_token": token_of(sender.get(place).text), "skin": "twice"}
+    first, second = (sender.post(f"{place}/keep", data=form) for _ in range(2))
+    assert first.headers["location"] == second.headers["location"]
+    assert len(campaigns_of(server, "twice")) == 1
+    assert sender.get(place).headers["location"] == first.headers["location"]
+    place = posted(sender, "discarded")
+    assert sender.post(f"{place}/discard", data=form).status_code == 303
+    assert sender.get(place).status_code == 404
+    assert campaigns_of(server, "discarded") == []
+    assert list((server.place.folder / "uploads").rglob(f"shelf-{Path(place).name}/*")) == []
+
+
+def test_an_upload_is_its_session_s_own(sender: httpx.Client, server: Server) -> None:
+    place = posted(sender)
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING) as other:
+        form = {"form_token": token_of(other.get("/upload").text), "skin": "stolen"}
+        assert other.get(place).status_code == 404
+        for path in ("keep", "discard", "mapping"):
+            assert other.post(f"{place}/{path}", data=form).status_code == 404
+        assert other.get(f"{place}/0/frf.csv").status_code == 404
+    rows = list(csv.DictReader(sender.get(f"{place}/0/frf.csv").text.splitlines()))
+    assert len(rows) == 6 * 20
+    assert sender.get(f"{place}/1/frf.csv").status_code == 404
+
+
+def test_an_upload_needs_the_session_s_own_form(sender: httpx.Client) -> None:
+    files = {"file": ("a.json", as_json(campaign("forged")))}
+    token = token_of(sender.get("/upload").text)
+    assert sender.post("/upload", data={"form_token": "x"}, files=files).status_code == 403
+    assert sender.post("/upload", files=files).status_code == 403
+    other_site = {"Origin": "https://example.org"}
+    assert sender.post("/upload", data={"form_token": token}, files=files, headers=other_site).status_code == 403
+    assert sender.post("/upload", data={"form_token": token}).status_code in (415, 422)  # no file
+    place = posted(sender)
+    for path in ("keep", "discard", "mapping"):
+        assert sender.post(f"{place}/{path}", data={"form_token": "x"}).status_code == 403
+
+
+def test_who_may_read_only_uploads_nothing(locked: tuple[Server, dict[str, str]]) -> None:
+    server, keys = locked
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING) as somebody:
+        somebody.post("/login", data={"form_token": token_of(somebody.get("/login").text), "key": keys["read"]})
+        shown = somebody.get("/upload").text
+        assert "may read only" in shown
+        assert 'type="file"' not in shown
+        form = {"form_token": token_of(shown)}
+        own = {"Origin": str(server.http.base_url).rstrip("/")}
+        files = {"file": ("a.json", as_json(campaign("locked")))}
+        answer = somebody.post("/upload", data=form, files=files, headers=own)
+        assert answer.status_code == 403
+        assert "scope read" in answer.text
+
+
+@pytest.mark.slow
+def test_an_upload_beyond_the_limit_is_refused_on_a_page(tmp_path: Path) -> None:
+    with (
+        running(Place(tmp_path / "small"), UNDERSKIN_MAX_UPLOAD_MB="0.1") as server,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING) as somebody,
+    ):
+        form = {"form_token": token_of(somebody.get("/upload").text)}
+        answer = somebody.post("/upload", data=form, files={"file": ("a.csv", b"1,2\n" * 50_000)})
+        assert answer.status_code == 413
+        assert "UNDERSKIN_MAX_UPLOAD_MB" in answer.text
+        assert "<h1>" in answer.text
+
+
+def upload(folder: Path, size: int) -> Upload:
+    path = folder / f"{len(list(folder.iterdir()))}"
+    path.write_bytes(b"x" * size)
+    return Upload(path, "a", "file", "", in_form=True)
+
+
+def test_the_shelf_holds_no_more_than_one_upload_may(tmp_path: Path) -> None:
+    arriving, shelf_folder = tmp_path / "arriving", tmp_path / "shelf"
+    arriving.mkdir()
+    shelf_folder.mkdir()
+    pending_uploads = PendingUploads(shelf_folder, 1000)
+    first, second = (pending_uploads.put(cookie, [upload(arriving, 400)]) for cookie in ("one", "two"))
+    assert pending_uploads.find("one", first.id) is first
+    third = pending_uploads.put("three", [upload(arriving, 400)])
+    with pytest.raises(Missing):
+        pending_uploads.find("two", second.id)  # looked at longest ago
+    assert pending_uploads.find("one", first.id) is first
+    again = pending_uploads.put("one", [upload(arriving, 100)])  # a session has one
+    with pytest.raises(Missing):
+        pending_uploads.find("one", first.id)
+    assert sum(path.stat().st_size for path in shelf_folder.rglob("*") if path.is_file()) == 500
+    assert [pending_uploads.find("one", again.id), pending_uploads.find("three", third.id)] == [again, third]

@@ -1,0 +1,162 @@
+"""A newcomer's way: the example, its skin, a campaign, figures saved, with a real browser."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from tests.service.pages.conftest import Visit
+
+EXAMPLE = "/skins/example"
+
+
+@pytest.fixture
+def newcomer(reader: Visit) -> Visit:
+    """Somebody who loads the example."""
+    reader.go("/")
+    reader.page.get_by_role("button", name="Load the example skin").click()
+    reader.page.wait_for_url(f"**{EXAMPLE}")
+    return reader
+
+
+def test_from_the_start_to_a_campaign(newcomer: Visit) -> None:
+    page = newcomer.page
+    newcomer.drawn(2)
+    newcomer.require_accessible()
+    page.get_by_role("link", name="Skins").first.click()
+    row = page.get_by_role("row", name="example, after six months")
+    assert "64 recordings" in row.inner_text()
+    assert row.locator("svg polyline").count() == 1
+    newcomer.require_accessible()
+    row.get_by_role("link", name="example, after six months").click()
+    newcomer.drawn(4)
+    assert "d33 of the array" in page.get_by_role("main").inner_text()
+    newcomer.require_accessible()
+    page.get_by_label("Lines of").select_option("s03")
+    page.wait_for_url("**show=s03*")
+    newcomer.drawn(4)
+    assert page.locator("#figure-frf .legend .traces").count() == 8
+
+
+def test_loading_the_example_again_adds_nothing(newcomer: Visit) -> None:
+    newcomer.go("/")
+    newcomer.page.get_by_role("button", name="Load the example skin").click()
+    newcomer.page.wait_for_url(f"**{EXAMPLE}")
+    assert newcomer.page.get_by_role("row", name="example, ").count() == 4
+
+
+def test_a_figure_is_saved_as_it_is_and_its_numbers_too(newcomer: Visit, downloads: Path) -> None:
+    page = newcomer.page
+    newcomer.drawn(2)
+    figure = page.locator("#figure-history")
+    for kind, start in (("SVG", b"<svg"), ("PNG", b"\x89PNG")):
+        with page.expect_download() as saving:
+            figure.get_by_role("button", name=kind).click()
+        saving.value.save_as(downloads / kind)
+        assert (downloads / kind).read_bytes().startswith(start)
+    with page.expect_download() as saving:
+        figure.get_by_role("link", name="CSV").click()
+    saving.value.save_as(downloads / "numbers.csv")
+    rows = list(csv.DictReader((downloads / "numbers.csv").read_text().splitlines()))
+    assert len(rows) == 4 * 8
+    assert 12 < float(rows[0]["d33_pc_per_n"]) < 15
+
+
+def test_the_request_that_a_page_names_returns_the_same(newcomer: Visit) -> None:
+    newcomer.page.get_by_text("The same by request").click()
+    command = newcomer.page.get_by_label("Shell").inner_text()
+    path = command.removeprefix("curl -s ").strip().removeprefix(newcomer.address)
+    shown = newcomer.page.request.get(newcomer.address + path).json()
+    assert [entry["sensor"] for entry in shown["sensors"]] == [f"s{number:02d}" for number in range(1, 9)]
+
+
+def test_times_are_in_the_viewer_s_zone(newcomer: Visit) -> None:
+    time = newcomer.page.locator("table time").last
+    assert time.get_attribute("datetime") == "2024-05-14T08:30:00.000000Z"
+    assert "10:30" in time.inner_text()  # in Rome
+
+
+def test_what_is_not_there_is_said_on_a_page(visitor: Visit) -> None:
+    visitor.go("/skins/nobody")
+    assert "There is no skin 'nobody'." in visitor.page.get_by_role("alert").inner_text()
+    visitor.require_accessible()
+    assert visitor.wrong.pop().startswith("Failed to load resource")  # the browser says so of every 404
+
+
+def test_a_slider_of_the_design_view_answers_at_once(newcomer: Visit) -> None:
+    page = newcomer.page
+    page.get_by_role("link", name="Design view").click()
+    newcomer.drawn(2)
+    newcomer.require_accessible()
+    told = page.locator("[data-told=resolution] b")
+    before = float(told.inner_text().split()[0])
+    assert before == pytest.approx(3.34, abs=0.01)  # the paper's geometry
+    slider = page.get_by_label("thickness h, slider")
+    with page.expect_response("**/design/answer?*"):
+        for _ in range(5):
+            slider.press("ArrowRight")
+    page.wait_for_function(
+        "before => parseFloat(document.querySelector('[data-told=resolution] b').textContent) > before", arg=before
+    )
+    page.wait_for_url("**thickness_mm=2.*")
+    page.locator("#pitch_mm").fill("1")
+    page.get_by_role("alert").get_by_text("cannot overlap").wait_for()
+
+
+def test_d33_over_a_band_of_one_s_own(newcomer: Visit) -> None:
+    page = newcomer.page
+    page.get_by_role("link", name="example, as built").click()
+    page.get_by_text("Average over another band").click()
+    page.get_by_label("from").fill("5")
+    page.get_by_label("to", exact=True).fill("50")
+    page.get_by_role("button", name="Average").click()
+    page.get_by_text("Averaged over your own band, 5 to 50").wait_for()
+    newcomer.drawn(4)
+    page.get_by_text("The same by request").click()
+    assert "band_low_hz=5.0&band_high_hz=50.0" in page.get_by_label("Shell").inner_text()
+
+
+def test_loads_on_the_skin_s_array(newcomer: Visit) -> None:
+    page = newcomer.page
+    page.get_by_role("main").get_by_role("link", name="Loads").click()
+    page.get_by_label("Loads, one a line").fill("0 0 4 1\n")
+    page.get_by_role("button", name="Compute").click()
+    newcomer.drawn(1)
+    newcomer.require_accessible()
+    cells = page.get_by_role("row", name="s01").locator("td").all_inner_texts()
+    d33 = float(page.get_by_label("d33").input_value())
+    assert float(cells[2]) == pytest.approx(7.5 * d33 / 14, abs=0.3)  # the prototype's FRF times 1 N
+    page.get_by_label("Loads, one a line").fill("0 0 4")
+    page.get_by_role("button", name="Compute").click()
+    page.get_by_role("alert").get_by_text("must be x y R F").wait_for()
+
+
+def test_no_page_is_wider_than_a_phone(newcomer: Visit) -> None:
+    page = newcomer.page
+    page.set_viewport_size({"width": 390, "height": 844})
+    campaign = page.get_by_role("link", name="example, as built").get_attribute("href")
+    for path in ("/", EXAMPLE, str(campaign), "/upload", "/design", "/loads"):
+        newcomer.go(path)
+        newcomer.drawn(page.locator(".plot").count())
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390, path
+
+
+def test_a_figure_s_times_are_in_the_viewer_s_zone(newcomer: Visit) -> None:
+    page = newcomer.page
+    newcomer.drawn(2)
+    first = page.locator("#figure-history .plot").evaluate("plot => plot.data[0].x[0]")
+    assert first.startswith("2024-05-14T10:30")  # in Rome
+    assert "Europe/Rome" in page.locator("#figure-history .plot").evaluate("plot => plot.layout.xaxis.title.text")
+
+
+def test_who_chose_is_where_he_was(newcomer: Visit) -> None:
+    page = newcomer.page
+    page.get_by_label("Colour by").select_option("trend")
+    page.wait_for_url("**show=trend*")
+    page.wait_for_function("document.activeElement.id === 'show'")
+
+
+def test_the_numbers_of_the_map_hold_what_colours_it(newcomer: Visit) -> None:
+    rows = list(csv.DictReader(newcomer.page.request.get(f"{newcomer.address}{EXAMPLE}/map.csv").text().splitlines()))
+    assert len(rows) == 8
+    assert all(float(row["slope_pc_per_n_per_year"]) < 0 for row in rows)  # the example ages

@@ -1,0 +1,129 @@
+"""A rig description as a form has it: guessed, filled in, read back."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from service.pages.upload.file_summary import ChannelSummary
+from service.pages.upload.mapping import CHANNELS, KINDS, document_of, field_words, guessed, sensors_text, what_to_do
+from tests.support.repository import ROOT
+from underskin import InvalidInput
+from underskin.recordings import rig_description
+from underskin.requirement import Mention, Requirement
+from underskin.units import checked
+
+RIGS = sorted((ROOT / "examples" / "formats" / "rigs").glob("*.yaml"))
+
+
+def channel(name: str, unit: str, *, is_complex: bool = False) -> ChannelSummary:
+    return ChannelSummary(name, unit, 10, 0.0, 1.0, is_complex)
+
+
+def form_of(document: dict[str, Any]) -> dict[str, str]:
+    """What a browser sends back of a form that nobody changed, for a file that labels units as the rig says."""
+    form = {"kind": document.get("kind", "frf"), "sensors": sensors_text(document)}
+    form |= {name: f"{value:g}" for name, value in document["skin"].items() if isinstance(value, float | int)}
+    for name, value in document.get("recording", {}).items():
+        form |= {f"{name}-from": value["property"]} if isinstance(value, dict) else {name: str(value)}
+    for number, (field, how) in enumerate(document["channels"].items()):
+        label = how.get("labelled", "")
+        told = {"channel": how["channel"], "is": field, "unit": how.get("unit", ""), "label": label}
+        told |= {name: str(how.get(name, "")) for name in ("sign", "sensitivity", "sensitivity_unit")}
+        form |= {f"{name}-{number}": text for name, text in told.items()}
+    return form | ({"units_checked": "yes"} if document.get("units_checked") else {})
+
+
+@pytest.mark.parametrize("file", RIGS, ids=lambda file: str(file.stem))
+def test_a_form_that_nobody_changed_says_the_same(file: Path) -> None:
+    document = yaml.safe_load(file.read_text())
+    found, wrong = document_of(form_of(document), document)
+    rig_description.from_dict(found)
+    assert wrong == []
+    assert found == document | {"recording": document.get("recording", {})}
+
+
+def test_every_channel_of_every_kind_can_be_chosen() -> None:
+    assert {name for kind in KINDS for name in rig_description.channel_fields(kind)} == set(CHANNELS)
+
+
+def test_channels_and_what_a_file_states_are_guessed_by_unit_and_name() -> None:
+    channels = [channel("Kraftmessdose", "mN"), channel("Charge amplifier", "V"), channel("temperature", "V")]
+    found = guessed(channels, {"preload [mN]": 500.0, "sensor": "s01", "operator": "me"}, {"thickness_mm": 2.5})
+    assert found["kind"] == "frf"
+    assert found["channels"] == {
+        "force_n": {"channel": "Kraftmessdose"},
+        "charge_pc": {"channel": "Charge amplifier"},
+    }
+    assert found["recording"] == {"preload_n": {"property": "preload [mN]"}, "sensor": {"property": "sensor"}}
+    assert found["skin"] == {"poisson_ratio": 0.5, "thickness_mm": 2.5}
+    curve = guessed([channel("z", "um"), channel("F", "uN"), channel("t", "s")], {}, {})
+    assert curve["kind"] == "indentation"
+    assert set(curve["channels"]) == {"displacement_mm", "force_n", "time_s"}
+
+
+def test_a_testing_machine_s_table_is_guessed_to_be_a_compression() -> None:
+    table = [channel("Time (s)", "s"), channel("Compression (mm)", "mm"), channel("Load (N)", "N")]
+    found = guessed([*table, channel("Engineering Strain [-]", "-")], {}, {})
+    assert found["kind"] == "compression"
+    named = {field: how["channel"] for field, how in found["channels"].items()}
+    assert named == {"time_s": "Time (s)", "displacement_mm": "Compression (mm)", "force_n": "Load (N)"}
+    assert guessed([channel("Displacement (mm)", "mm"), channel("Load (N)", "N")], {}, {})["kind"] == "indentation"
+
+
+def test_both_parts_of_an_frf_are_guessed_and_complex_ones_and_the_sample_rate() -> None:
+    parts = [channel("frequency", ""), channel("FRF real", "pC/N"), channel("FRF imaginary", "pC/N")]
+    assert set(guessed(parts, {}, {})["channels"]) == {"frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n"}
+    assert guessed([channel("H1", "pC/N", is_complex=True)], {}, {})["channels"] == {"frf_pc_per_n": {"channel": "H1"}}
+    stated = guessed([channel("force", ""), channel("charge", "")], {"Sampling rate": 1000.0}, {})
+    assert stated["recording"] == {"sample_rate_hz": {"property": "Sampling rate"}}
+
+
+def test_what_is_missing_is_said_in_the_form_s_words() -> None:
+    assert field_words("frf_im_pc_per_n") == "FRF, imaginary part"
+    missing = {"code": "required", "field": "frf_im_pc_per_n", "value": None, "allowed": "required"}
+    assert what_to_do(missing) == "required: say below which channel it is"
+    needs = " needs one of force, such as N"
+    refused = Requirement("channel 'force_n': its unit 'V' is one of voltage; ", Mention("force_n"), needs)
+    told = what_to_do({"code": "unreadable_file", "field": "file", "value": "x.csv", "allowed": refused})
+    assert told == "channel 'force_n': its unit 'V' is one of voltage; force needs one of force, such as N"
+    with pytest.raises(InvalidInput) as error:
+        checked("thickness_mm", 2500.0)
+    unlikely = error.value.allowed
+    told = what_to_do({"code": "unlikely_magnitude", "field": "skin.thickness_mm", "value": 2500, "allowed": unlikely})
+    assert "(or tick “Take unlikely magnitudes as they are”)" in told
+    assert "units_checked" not in told
+    assert "fill it in below" in what_to_do({**missing, "field": "sample_rate_hz"})
+
+
+def test_a_unit_other_than_the_label_says_that_the_label_is_wrong() -> None:
+    form = {"kind": "frf", "channel-0": "F", "is-0": "force_n", "label-0": "g", "unit-0": "N"}
+    assert document_of(form, {})[0]["channels"]["force_n"] == {"channel": "F", "labelled": "g", "unit": "N"}
+    same = {**form, "label-0": "N"}
+    assert document_of(same, {})[0]["channels"]["force_n"] == {"channel": "F"}
+
+
+def test_what_cannot_be_said_is_named_and_what_was_typed_is_kept() -> None:
+    layout = "s1, 0, 0\ns2, 8\ns3, a, 0"
+    found, (wrong,) = document_of({"sensors": layout, "thickness_mm": "2,5"}, {})
+    assert wrong.field == "skin.sensors"
+    assert "line 2" in wrong.allowed
+    assert found["skin"]["thickness_mm"] == 2.5
+    assert sensors_text(found) == layout
+    twice = {"channel-0": "a", "is-0": "force_n", "channel-1": "b", "is-1": "force_n"}
+    found, (wrong,) = document_of(twice, {})
+    assert wrong.allowed == "a is force already: set one of the two to “not used”"
+    assert found["channels"] == {"force_n": {"channel": "a"}}
+
+
+@pytest.mark.parametrize("line", ["s1, 0.5, 8", "s1; 0,5; 8", "s1\t0,5\t8", "s1 0.5 8", "s1   0,5 8"])
+def test_a_layout_is_written_as_people_write_it(line: str) -> None:
+    found, wrong = document_of({"sensors": line}, {})
+    assert wrong == []
+    assert found["skin"]["sensors"] == [{"id": "s1", "x_mm": 0.5, "y_mm": 8.0}]
+
+
+def test_the_time_of_a_table_is_found_so_that_no_sample_rate_is_missing() -> None:
+    found = guessed([channel("Time (s)", "s"), channel("Force (N)", "N"), channel("Charge (pC)", "pC")], {}, {})
+    assert found["channels"]["time_s"] == {"channel": "Time (s)"}

@@ -1,0 +1,124 @@
+"""Backup and restore while the server runs; migrations after a backup; a newer schema."""
+
+import sqlite3
+import subprocess
+import threading
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from service.store import Database, backup, campaigns, open_store
+from service.store.restore import restore
+from tests.support.store_server import Place, Server, campaign, running
+from underskin.recordings.campaign import parse
+
+
+def names(server: Server) -> set[str]:
+    return {entry["name"] for entry in server.http.get("/v1/campaigns?limit=200&state=all").json()["campaigns"]}
+
+
+def send(server: Server, name: str) -> None:
+    assert server.http.post("/v1/campaigns", json=campaign(name)).status_code == 201
+
+
+def test_a_backup_brings_back_what_was_there(server: Server, tmp_path: Path) -> None:
+    file = tmp_path / "kept.backup"
+    send(server, "before")
+    done = server.place.command("backup", str(file))
+    assert done.returncode == 0, done.stderr
+    send(server, "after")
+    done = server.place.command("restore", str(file))
+    assert done.returncode == 0, done.stderr
+    assert names(server) == {"before"}
+    send(server, "later")
+    assert names(server) == {"before", "later"}
+    (undo,) = (server.place.folder / "backups").iterdir()
+    assert server.place.command("restore", str(undo)).returncode == 0
+    assert names(server) == {"before", "after"}
+
+
+def test_a_backup_moves_to_another_machine(server: Server, tmp_path: Path) -> None:
+    if server.place.database_url:
+        return  # the other machine would be another database: the next line's restore is the same
+    send(server, "moved")
+    assert server.place.command("backup", str(tmp_path / "b")).returncode == 0
+    other = Place(tmp_path / "other")
+    assert other.command("restore", str(tmp_path / "b")).returncode == 0
+    with running(other) as there:
+        assert names(there) == {"moved"}
+
+
+def test_what_is_acknowledged_during_a_restore_is_in_the_store_or_in_its_backup(
+    place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = open_store(place.database_url, place.folder)
+    file, undo = (tmp_path / f"{name}{backup.suffix(store)}" for name in ("file", "undo"))
+    undo = place.folder / "backups" / undo.name
+    backup.make(store, file)
+    make = backup.make
+
+    def write() -> None:
+        with store.writing() as connection:
+            campaigns.add(connection, campaigns.NewCampaign(parse(campaign("meanwhile")), None))
+
+    writer = threading.Thread(target=write)
+
+    def make_and_be_written(database: Database, target: Path) -> None:
+        make(database, target)
+        writer.start()
+        writer.join(2)  # time for a write that does not wait
+
+    monkeypatch.setattr(backup, "make", make_and_be_written)
+    restore(store, file, undo)
+    writer.join()
+    with store.reading() as connection:
+        assert [row.name for row in campaigns.listed(connection, campaigns.CampaignFilters(), None, 9)] == ["meanwhile"]
+    store.close()
+
+
+def test_a_backup_of_sqlite_is_one_file_that_is_only_read(tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir()
+    store = open_store("", tmp_path / "data")
+    file = tmp_path / "alone" / "kept"
+    backup.make(store, file)
+    backup.verify(store, file)
+    restore(store, file, tmp_path / "data" / "backups" / "undo")
+    store.close()
+    assert file.read_bytes()[18:20] == b"\x01\x01"  # SQLite's header: no write-ahead log
+    assert [path.name for path in file.parent.iterdir()] == ["kept"]
+    with closing(sqlite3.connect(tmp_path / "data" / "underskin.sqlite3")) as connection:
+        assert connection.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+
+
+def test_what_is_no_backup_is_refused_and_changes_nothing(server: Server, tmp_path: Path) -> None:
+    send(server, "kept")
+    good = tmp_path / "good"
+    assert server.place.command("backup", str(good)).returncode == 0
+    cut = tmp_path / "cut"
+    cut.write_bytes(good.read_bytes()[: good.stat().st_size // 2])
+    foreign = tmp_path / "foreign"
+    foreign.write_text("not a backup")
+    for file in (cut, foreign, tmp_path / "absent"):
+        done = server.place.command("restore", str(file))
+        assert (done.returncode, str(file) in done.stderr) == (2, True), done.stderr
+    assert names(server) == {"kept"}
+
+
+def test_a_newer_schema_refuses_to_start(place: Place) -> None:
+    with running(place) as server:
+        send(server, "kept")
+    _execute(place, "UPDATE alembic_version SET version_num = '9999'")
+    done = place.command("serve", "--port", "0")
+    assert done.returncode != 0
+    assert "9999" in done.stderr
+    assert "newer" in done.stderr
+
+
+def _execute(place: Place, statement: str) -> None:
+    if place.database_url:
+        subprocess.run(["psql", place.database_url, "--command", statement], check=True, capture_output=True)
+    else:
+        with closing(sqlite3.connect(place.folder / "underskin.sqlite3")) as connection:
+            connection.execute(statement)
+            connection.commit()

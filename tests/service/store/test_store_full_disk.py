@@ -1,0 +1,85 @@
+"""A full disk: 507, nothing acknowledged that is not kept, and what is kept can be read."""
+
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import orjson
+import pytest
+
+from tests.support import postgres
+from tests.support.store_server import Place, Server, campaign, running
+
+
+@pytest.fixture
+def small_disk() -> Iterator[Path]:
+    """A folder with room for 16 MB."""
+    folder = Path(tempfile.mkdtemp(prefix="underskin-small-"))
+    mount = ["mount", "-t", "tmpfs", "-o", "size=16m", "tmpfs", str(folder)]
+    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True).returncode != 0:
+        folder.rmdir()
+        pytest.skip("mounting a small disk takes root")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", "--lazy", str(folder)], check=True)
+        folder.rmdir()
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def cramped(request: pytest.FixtureRequest, small_disk: Path, tmp_path: Path) -> Iterator[Place]:
+    """A store with little room: its data folder, or its database's tablespace."""
+    if request.param == "sqlite":
+        yield Place(small_disk)
+        return
+    cluster: postgres.Cluster = request.getfixturevalue("cluster")
+    shutil.chown(small_disk, postgres.USER, postgres.USER)
+    (tmp_path / "data").mkdir()
+    url = cluster.new_database(tablespace=small_disk)
+    yield Place(tmp_path / "data", url)
+    cluster.drop(url)
+
+
+def test_a_full_disk_refuses_and_keeps_what_it_acknowledged(cramped: Place) -> None:
+    acknowledged: dict[str, str] = {}
+    with running(cramped) as server:
+        statuses: list[int] = []
+        while statuses[-3:] != [507] * 3:
+            assert len(statuses) < 300, "the disk does not fill"
+            name = f"run {len(statuses)}"
+            answer = server.http.post("/v1/campaigns", json=campaign(name, sensors=20, lines=100))
+            statuses.append(answer.status_code)
+            assert answer.status_code in (201, 507), answer.text
+            if answer.status_code == 201:
+                acknowledged[answer.json()["id"]] = name
+        assert statuses[0] == 201
+        assert answer.headers["content-type"] == "application/problem+json"
+        require_kept(server, acknowledged)
+        one = next(iter(acknowledged))
+        reads = ["/v1/sigma?a_over_h=0.3&rt_over_h=0.6", "/v1/skins", f"/v1/campaigns/{one}/d33", "/ready"]
+        reads.append(f"/v1/campaigns/{one}/d33?band_low_hz=10&band_high_hz=100")
+        assert {path: server.http.get(path).status_code for path in reads} == dict.fromkeys(reads, 200)
+        server.kill()
+    with running(cramped) as server:
+        require_kept(server, acknowledged)
+
+
+def test_an_upload_that_does_not_fit_is_refused_as_it_streams(small_disk: Path) -> None:
+    with running(Place(small_disk)) as server:
+        document = orjson.dumps(campaign("one")) + b" " * 20_000_000
+        answer = server.http.post("/v1/campaigns", files={"file": ("big.json", document)})
+        assert answer.status_code == 507
+        assert server.http.post("/v1/campaigns", json=campaign("small")).status_code == 201
+
+
+def require_kept(server: Server, acknowledged: dict[str, str]) -> None:
+    """The store holds these campaigns, whole, and no other."""
+    page = server.http.get("/v1/campaigns?limit=200&state=all").json()["campaigns"]
+    assert {entry["id"]: entry["name"] for entry in page} == acknowledged
+    for campaign_id, name in acknowledged.items():
+        sent = campaign(name, sensors=20, lines=100)
+        sent["skin"]["d33_pc_per_n"] = None
+        assert server.http.get(f"/v1/campaigns/{campaign_id}/document").json() == sent

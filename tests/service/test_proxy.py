@@ -1,0 +1,234 @@
+"""The site file that docs/deploy.md hands out, in a real nginx with TLS in front of a real server."""
+
+import os
+import re
+import shutil
+import socket
+import ssl
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from service.settings import Settings
+from tests.support.repository import ROOT
+
+SITE = ROOT / "deploy" / "nginx.conf"
+NAME = "skin.example.org"
+TIMEOUT_S = 2  # instead of the site file's, which are longer
+NGINX = shutil.which("nginx", path=os.environ["PATH"] + os.pathsep + "/usr/sbin")
+OPENSSL = shutil.which("openssl")
+
+pytestmark = [
+    pytest.mark.server,
+    pytest.mark.skipif(NGINX is None, reason="nginx is not installed"),
+    pytest.mark.skipif(OPENSSL is None, reason="openssl, which makes the certificate, is not installed"),
+]
+
+# What a whole nginx.conf says around a site; everything it writes stays in the folder.
+MAIN = """
+{user}
+daemon off;
+pid {folder}/nginx.pid;
+error_log stderr;
+events {{ }}
+http {{
+    access_log off;
+    client_body_temp_path {folder}/body;
+    proxy_temp_path {folder}/proxy;
+    fastcgi_temp_path {folder}/fastcgi;
+    uwsgi_temp_path {folder}/uwsgi;
+    scgi_temp_path {folder}/scgi;
+    include {folder}/site.conf;
+}}
+"""
+
+
+def free_port() -> int:
+    """A port that nobody listens on now."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port: int = listener.getsockname()[1]
+    return port
+
+
+def wait_until_open(port: int, process: "subprocess.Popen[bytes]") -> None:
+    """Return once `process` listens."""
+    deadline = time.monotonic() + 30
+    while time.monotonic() < deadline:
+        assert process.poll() is None, f"{process.args!r} ended with status {process.returncode}"
+        try:
+            socket.create_connection(("127.0.0.1", port), timeout=1).close()
+        except OSError:
+            time.sleep(0.05)
+        else:
+            return
+    raise AssertionError(f"nobody listens on port {port}")
+
+
+def make_certificate(folder: Path) -> None:
+    """A self-signed certificate for NAME."""
+    subject = ["-subj", f"/CN={NAME}", "-addext", f"subjectAltName=DNS:{NAME}"]
+    files = ["-keyout", str(folder / "privkey.pem"), "-out", str(folder / "fullchain.pem")]
+    make = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-noenc", "-days", "2", *subject, *files]
+    subprocess.run(make, check=True, capture_output=True)
+
+
+def site(folder: Path, service: int, tls: int, plain: int) -> str:
+    """The site file with this test's ports, certificate and timeouts in place of a real machine's."""
+    text = SITE.read_text()
+    places = {
+        "server 127.0.0.1:8000;": f"server 127.0.0.1:{service};",
+        "listen 443 ssl": f"listen 127.0.0.1:{tls} ssl",
+        "listen [::]:443 ssl http2;": "",
+        "listen 80;": f"listen 127.0.0.1:{plain};",
+        "listen [::]:80;": "",
+        "client_header_timeout     10s;": f"client_header_timeout {TIMEOUT_S}s;",
+        "client_body_timeout       30s;": f"client_body_timeout {TIMEOUT_S}s;",
+        "/etc/ssl/underskin/": f"{folder}/",
+    }
+    for there, here in places.items():
+        assert there in text
+        text = text.replace(there, here)
+    return text
+
+
+@pytest.fixture(scope="module")
+def proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[httpx.Client, int]]:
+    """A client that speaks TLS to nginx, and nginx's plain port; nginx passes on to `underskin serve`."""
+    folder = tmp_path_factory.mktemp("proxy")
+    make_certificate(folder)
+    service, tls, plain = free_port(), free_port(), free_port()
+    (folder / "site.conf").write_text(site(folder, service, tls, plain))
+    user = "user root;" if os.geteuid() == 0 else ""
+    (folder / "nginx.conf").write_text(MAIN.format(user=user, folder=folder))
+    settings = {"UNDERSKIN_DATA": str(folder / "data"), "UNDERSKIN_HOSTS": NAME, "UNDERSKIN_MAX_BODY_MB": "1"}
+    serve = [str(Path(sys.executable).with_name("underskin")), "serve", "--port", str(service)]
+    nginx = [str(NGINX), "-e", "stderr", "-p", str(folder), "-c", str(folder / "nginx.conf")]
+    trust = ssl.create_default_context(cafile=folder / "fullchain.pem")
+    make_key = [str(Path(sys.executable).with_name("underskin")), "key", "create", "proxy", "--scope", "write"]
+    key = subprocess.run(make_key, env=os.environ | settings, check=True, capture_output=True, text=True).stdout.strip()
+    headers = {"Host": NAME, "Authorization": f"Bearer {key}"}
+    with subprocess.Popen(serve, env=os.environ | settings) as server, subprocess.Popen(nginx) as front:
+        try:
+            wait_until_open(service, server)
+            wait_until_open(tls, front)
+            with httpx.Client(verify=trust, base_url=f"https://127.0.0.1:{tls}", headers=headers) as client:
+                yield client, plain
+        finally:
+            front.terminate()
+            server.terminate()
+
+
+def ask(client: httpx.Client, method: str, path: str, **options: Any) -> httpx.Response:
+    """A request whose TLS names and verifies NAME."""
+    return client.request(method, path, extensions={"sni_hostname": NAME}, **options)
+
+
+def test_a_request_through_tls_is_answered(proxy: tuple[httpx.Client, int]) -> None:
+    client, _ = proxy
+    answer = ask(client, "GET", "/v1/sigma?a_over_h=0.3&rt_over_h=0.6")
+    assert answer.status_code == 200
+    assert answer.json()["sigma"] == pytest.approx(0.936505, abs=2e-6)
+
+
+def test_the_request_id_of_nginx_comes_back(proxy: tuple[httpx.Client, int]) -> None:
+    client, _ = proxy
+    request_ids = [ask(client, "GET", "/health").headers["X-Request-ID"] for _ in range(2)]
+    assert all(len(request_id) == 32 for request_id in request_ids)
+    assert len(set(request_ids)) == 2
+
+
+def test_the_service_sees_the_clients_host(proxy: tuple[httpx.Client, int]) -> None:
+    client, _ = proxy
+    assert ask(client, "GET", "/health", headers={"Host": "elsewhere.example.org"}).status_code == 421
+
+
+@pytest.mark.parametrize(("origin", "status"), [(f"https://{NAME}", 200), ("https://elsewhere.example.org", 403)])
+def test_a_page_of_the_same_name_may_post(proxy: tuple[httpx.Client, int], origin: str, status: int) -> None:
+    client, _ = proxy
+    columns = {"a_over_h": [0.3], "rt_over_h": [0.6]}
+    assert ask(client, "POST", "/v1/sigma", json=columns, headers={"Origin": origin}).status_code == status
+
+
+def test_the_services_body_limit_rules(proxy: tuple[httpx.Client, int]) -> None:
+    client, _ = proxy
+    columns = {"a_over_h": [0.3] * 300_000, "rt_over_h": 0.6}
+    answer = ask(client, "POST", "/v1/sigma", json=columns)
+    assert answer.status_code == 413
+    assert answer.headers["Content-Type"] == "application/problem+json"
+
+
+def test_a_batch_under_the_limit_passes(proxy: tuple[httpx.Client, int]) -> None:
+    client, _ = proxy
+    answer = ask(client, "POST", "/v1/sigma", json={"a_over_h": [0.3] * 100_000, "rt_over_h": 0.6})
+    assert len(answer.json()["sigma"]) == 100_000
+
+
+def too_large(answer: httpx.Response) -> dict[str, Any]:
+    """The problem that both nginx and the service answer where a body is too large."""
+    assert (answer.status_code, answer.headers["Content-Type"]) == (413, "application/problem+json")
+    problem: dict[str, Any] = answer.json()
+    assert set(problem) == {"type", "title", "status", "detail", "request_id", "errors"}
+    assert problem["type"] == "urn:underskin:problem:body-too-large"
+    return problem
+
+
+@pytest.mark.parametrize("chunked", [False, True])
+def test_the_proxy_passes_on_no_login_form_that_is_too_long(proxy: tuple[httpx.Client, int], chunked: bool) -> None:
+    client, _ = proxy
+    form = b"key=" + b"k" * 10_000
+    content = (piece for piece in (form[:1000], form[1000:])) if chunked else form
+    headers = {"Content-Type": "application/x-www-form-urlencoded", "Accept": "application/json"}
+    answer = ask(client, "POST", "/login", content=content, headers=headers)
+    assert "what the proxy passes on" in too_large(answer)["detail"]
+
+
+def test_the_proxy_passes_on_uploads_beyond_the_limit_of_other_bodies(proxy: tuple[httpx.Client, int]) -> None:
+    client, _ = proxy
+    document = b" " * 70_000_000
+    assert ask(client, "POST", "/v1/campaigns", files={"file": ("blank.json", document)}).status_code == 422
+    assert "the proxy" in too_large(ask(client, "POST", "/v1/sigma", content=document))["detail"]
+
+
+def test_the_site_s_limits_are_those_of_the_settings() -> None:
+    sizes = dict(re.findall(r"client_max_body_size +(\d+)(m);", SITE.read_text()))
+    assert set(sizes) == {f"{Settings.model_fields[name].default:g}" for name in ("max_body_mb", "max_upload_mb")}
+
+
+def test_the_proxy_takes_the_longest_address_of_a_page_and_no_longer_header(proxy: tuple[httpx.Client, int]) -> None:
+    client, _ = proxy
+    assert ask(client, "GET", f"/v1/sigma?a_over_h=0.3&rt_over_h={'0' * 50_000}0.6").status_code == 200
+    assert ask(client, "GET", "/health", headers={"X-Long": "k" * 70_000}).status_code == 400
+
+
+@pytest.mark.parametrize(
+    "begun", ["GET /health HTTP/1.1\r\n", f"POST /login HTTP/1.1\r\nHost: {NAME}\r\nContent-Length: 9\r\n\r\nkey="]
+)
+def test_who_does_not_go_on_is_disconnected(proxy: tuple[httpx.Client, int], begun: str) -> None:
+    client, _ = proxy
+    trust = ssl.create_default_context()
+    trust.check_hostname, trust.verify_mode = False, ssl.CERT_NONE
+    with (
+        socket.create_connection(("127.0.0.1", client.base_url.port or 0), timeout=TIMEOUT_S + 20) as plain,
+        trust.wrap_socket(plain, server_hostname=NAME) as connection,
+    ):
+        connection.sendall(begun.encode())
+        start = time.monotonic()
+        try:
+            connection.recv(1)  # b"", or the start of a refusal
+        except TimeoutError:
+            pytest.fail("the connection stays open")
+        except OSError:
+            pass  # a reset is as good as an end
+        assert TIMEOUT_S - 0.5 < time.monotonic() - start < TIMEOUT_S + 15
+
+
+def test_plain_http_is_sent_to_tls(proxy: tuple[httpx.Client, int]) -> None:
+    _, plain = proxy
+    answer = httpx.get(f"http://127.0.0.1:{plain}/v1/tables", headers={"Host": NAME})
+    assert (answer.status_code, answer.headers["Location"]) == (301, f"https://{NAME}/v1/tables")

@@ -1,0 +1,204 @@
+"""Adopted models withdrawn: none is in force, the version stays, and goes where the skin goes."""
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import h5py
+import httpx
+import numpy as np
+import orjson
+import pytest
+
+from service.auth.keys import KeyStore
+from tests.service.usecases.test_adopted_models import FREQUENCY, PRESSED
+from tests.support.diagnosed import D33, diagnosed, report, resonant
+from tests.support.store_server import Place, Server, running
+from underskin import Client, ServiceError
+
+ASKED = {**PRESSED, "model": "adopted", "skin_id": "palm", "frequency_hz": FREQUENCY}
+LINES = {"band_hz": [1, 1000], "frf_re_pc_per_n": [[7.0, 7.0, 7.0]], "frf_im_pc_per_n": [[0.0, 0.0, 0.0]]}
+
+
+@pytest.fixture
+def client(server: Server) -> Iterator[Client]:
+    with Client(str(server.http.base_url)) as opened:
+        yield opened
+
+
+def by_the_adopted_model(server: Server, campaign_id: str) -> list[tuple[int, str]]:
+    """Status and detail of all that is answered by a skin's adopted model."""
+    answers = [
+        server.http.post("/v1/frf", json={**ASKED, "d33_pc_per_n": D33}),
+        server.http.post("/v1/d33", json={**ASKED, **LINES}),
+        server.http.get(f"/v1/campaigns/{campaign_id}/d33?model=adopted"),
+        server.http.get("/v1/skins/palm/history?model=adopted"),
+        server.http.get("/v1/skins/palm/model"),
+    ]
+    return [(answer.status_code, str(answer.json().get("detail"))) for answer in answers]
+
+
+def point_ids(client: Client) -> set[str]:
+    """Ids of the models that the values of the skin's history rest on."""
+    history = client.skins.history("palm", model="adopted")
+    return {point["model_id"] for entry in history["sensors"] for point in entry["points"]}
+
+
+def test_without_it_the_skin_answers_as_one_that_never_had_a_model(server: Server, client: Client) -> None:
+    campaign_id, diagnosis_id = diagnosed(server, resonant("array"), report())
+    never = by_the_adopted_model(server, campaign_id)
+    assert {status for status, _ in never} == {404}
+    first = client.skins.adopt("palm", diagnosis_id)
+    assert {status for status, _ in by_the_adopted_model(server, campaign_id)} == {200}
+    assert point_ids(client) == {first["id"]}
+    paper = client.skins.history("palm")
+    gone = client.skins.withdraw_model("palm", " wrong diagnosis ")
+    assert by_the_adopted_model(server, campaign_id) == never
+    assert client.skins.history("palm") == paper
+    assert gone == {name: first[name] for name in gone} | {
+        "withdrawn_at": gone["withdrawn_at"], "withdrawn_from": None, "withdraw_reason": "wrong diagnosis",
+    }  # fmt: skip
+    assert gone["withdrawn_at"] > first["adopted_at"]
+    assert client.skins.models("palm") == [{**first, **gone}]  # nothing else of it has changed
+    with pytest.raises(ServiceError, match=r"404.*no adopted model"):
+        client.skins.withdraw_model("palm", "again")
+    again = client.skins.adopt("palm", diagnosis_id)
+    assert (again["version"], again["withdrawn_at"]) == (2, None)
+    assert again["id"] != first["id"]
+    assert point_ids(client) == {again["id"]}
+    assert client.skins.models("palm") == [again, {**first, **gone}]
+
+
+def test_versions_before_it_do_not_come_back(server: Server, client: Client) -> None:
+    adopted = []
+    for name in ("monday", "tuesday"):
+        _, diagnosis_id = diagnosed(server, resonant(name), report())
+        adopted.append(client.skins.adopt("palm", diagnosis_id))
+    client.skins.withdraw_model("palm", "neither")
+    with pytest.raises(ServiceError, match="no adopted model"):
+        client.skins.model("palm")
+    assert [entry["withdraw_reason"] for entry in client.skins.models("palm")] == ["neither", None]
+    assert client.skins.adopt("palm", adopted[0]["diagnosis_id"])["version"] == 3
+
+
+def test_of_joined_skins_the_last_adoption_is_withdrawn(server: Server, client: Client) -> None:
+    for skin in ("a", "b"):
+        _, diagnosis_id = diagnosed(server, resonant(skin), report(), skin)
+        client.skins.adopt(skin, diagnosis_id)
+    client.skins.join("a", "b", "one skin")
+    assert client.skins.withdraw_model("b", "of both")["skin_id"] == "b"
+    for skin in ("a", "b"):
+        with pytest.raises(ServiceError, match="no adopted model"):
+            client.skins.model(skin)
+
+
+def test_a_model_that_serves_nothing_can_be_withdrawn(server: Server, client: Client) -> None:
+    campaign_id, diagnosis_id = diagnosed(server, resonant("array"), report())
+    client.skins.adopt("palm", diagnosis_id)
+    client.campaigns.withdraw(campaign_id, "fell down")
+    assert by_the_adopted_model(server, campaign_id)[0][0] == 409
+    client.skins.withdraw_model("palm", "of a campaign that fell down")
+    assert by_the_adopted_model(server, campaign_id)[0][0] == 404
+
+
+@pytest.mark.parametrize("query", ["", "?reason=", "?reason=%20", f"?reason={'x' * 1001}"])
+def test_a_reason_is_asked_for(server: Server, client: Client, query: str) -> None:
+    _, diagnosis_id = diagnosed(server, resonant("array"), report())
+    adopted = client.skins.adopt("palm", diagnosis_id)
+    refused = server.http.delete(f"/v1/skins/palm/model{query}")
+    assert refused.status_code == 422, refused.text
+    assert client.skins.model("palm") == adopted
+
+
+def test_it_is_withdrawn_once(server: Server, client: Client) -> None:
+    _, diagnosis_id = diagnosed(server, resonant("array"), report())
+    client.skins.adopt("palm", diagnosis_id)
+
+    def withdraw(reason: str, **headers: str) -> httpx.Response:
+        return server.http.delete("/v1/skins/palm/model", params={"reason": reason}, headers=headers)
+
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(withdraw, [f"reason {number}" for number in range(4)]))
+    assert sorted(answer.status_code for answer in answers) == [200, 404, 404, 404]
+    (done,) = (answer.json() for answer in answers if answer.status_code == 200)
+    assert [entry["withdraw_reason"] for entry in client.skins.models("palm")] == [done["withdraw_reason"]]
+    client.skins.adopt("palm", diagnosis_id)
+    first = withdraw("wrong", **{"Idempotency-Key": "once"})
+    newest = client.skins.adopt("palm", diagnosis_id)
+    assert withdraw("wrong", **{"Idempotency-Key": "once"}).json() == first.json()
+    assert withdraw("other", **{"Idempotency-Key": "once"}).status_code == 422
+    assert client.skins.model("palm") == newest
+
+
+def test_who_withdrew_it_is_kept_and_who_may_read_only_cannot(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    reading, writing = (KeyStore(folder).create(f"the {scope}er", scope) for scope in ("read", "write"))
+    with running(Place(folder), key=writing, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
+        address = str(server.http.base_url)
+        with Client(address, api_key=writing) as writer, Client(address, api_key=reading) as reader:
+            _, diagnosis_id = diagnosed(server, resonant("array"), report())
+            adopted = writer.skins.adopt("palm", diagnosis_id)
+            with pytest.raises(ServiceError, match="403"):
+                reader.skins.withdraw_model("palm", "no")
+            assert reader.skins.model("palm") == adopted
+            assert writer.skins.withdraw_model("palm", "yes")["withdrawn_from"] == "the writeer"
+
+
+def test_it_is_elsewhere_and_after_a_restore_as_it_was_here(
+    server: Server, elsewhere: Server, client: Client, tmp_path: Path
+) -> None:
+    _, diagnosis_id = diagnosed(server, resonant("array"), report())
+    client.skins.adopt("palm", diagnosis_id)
+    in_force, withdrawn = tmp_path / "in-force.h5", tmp_path / "withdrawn.h5"
+    client.skins.export("palm", in_force)
+    client.skins.withdraw_model("palm", "wrong diagnosis")
+    kept = client.skins.models("palm")
+    client.skins.export("palm", withdrawn)
+    with Client(str(elsewhere.http.base_url)) as there:
+        assert there.skins.load(withdrawn)["kept"] == 1
+        assert there.skins.load(withdrawn)["present"] == 1
+        assert there.skins.models("palm") == kept
+        with pytest.raises(ServiceError, match="no adopted model"):
+            there.skins.model("palm")
+        with pytest.raises(ServiceError, match="Model 1 of skin 'palm' is there already and differs"):
+            there.skins.load(in_force)
+        assert there.skins.adopt("palm", diagnosis_id)["version"] == 2
+    backup = tmp_path / "backup"
+    assert server.place.command("backup", str(backup)).returncode == 0
+    client.skins.adopt("palm", diagnosis_id)
+    done = server.place.command("restore", str(backup))
+    assert done.returncode == 0, done.stderr
+    assert client.skins.models("palm") == kept
+    with pytest.raises(ServiceError, match="no adopted model"):
+        client.skins.model("palm")
+
+
+@pytest.mark.parametrize(
+    ("change", "status"),
+    [
+        ({"withdrawn_at": "2026-11-21T20:00:00.000000Z"}, 422),  # without a reason
+        ({"withdraw_reason": "without a time"}, 422),
+        ({"withdrawn_at": "yesterday", "withdraw_reason": "wrong"}, 422),
+        (None, 200),
+    ],
+)
+def test_files_of_an_older_underskin_come_in_and_spoilt_ones_do_not(
+    server: Server, elsewhere: Server, client: Client, tmp_path: Path, change: dict[str, Any] | None, status: int
+) -> None:
+    _, diagnosis_id = diagnosed(server, resonant("array"), report())
+    adopted = client.skins.adopt("palm", diagnosis_id)
+    file = tmp_path / "palm.h5"
+    client.skins.export("palm", file)
+    with h5py.File(file, "r+") as opened:
+        (row,) = orjson.loads(opened["models"][()].tobytes())
+        older = {name: value for name, value in row.items() if not name.startswith("withdr")}
+        assert len(older) == len(row) - 3
+        del opened["models"]
+        opened["models"] = np.frombuffer(orjson.dumps([older if change is None else row | change]), np.uint8)
+    answer = elsewhere.http.post(
+        "/v1/skins/import", content=file.read_bytes(), headers={"Content-Type": "application/octet-stream"}
+    )
+    assert answer.status_code == status, answer.text
+    found = elsewhere.http.get("/v1/skins/palm/model")
+    assert (found.json() if status == 200 else found.status_code) == (adopted if status == 200 else 404)

@@ -1,0 +1,44 @@
+"""The tables against FElupe, an independent finite-element code, at finite strain."""
+
+import numpy as np
+import pytest
+
+from tablegen import linear_layer
+from tests.support import felupe_layer
+from underskin.surrogate.sigma_table import load_table
+
+POINTS = [
+    (0.1, 0.0, 0.01),
+    (0.1, 0.2, 0.1),
+    (0.3, 0.6, 0.1),
+    (1.0, 1.0, 0.03),
+    (2.0, 0.6, 0.1),
+    (3.0, 3.0, 0.1),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("a", "rho", "load"), POINTS)
+def test_tables_agree_with_an_independent_code(a: float, rho: float, load: float) -> None:
+    (independent,) = felupe_layer.sigma(a, [rho], load)
+    assert load_table().sigma(a, rho, load).sigma == pytest.approx(independent, rel=3e-5)
+
+
+def test_independent_code_meets_the_exact_linear_layer() -> None:
+    """What the comparison above can resolve: FElupe's own error where the exact answer is known."""
+    rho = [0.0, 0.2, 0.6, 1.0, 3.0]
+    layer = felupe_layer.FelupeLayer(0.3)
+    layer.apply(1e-5)
+    layer.solve(tolerance=1e-4)
+    np.testing.assert_allclose(layer.sigma(rho), linear_layer.sigma(0.3, np.array(rho)), rtol=3e-5)
+
+
+def test_both_codes_meet_the_finite_strain_values_on_record() -> None:
+    """σ(L)/σ(0) at a/h = 0.3, ρ = 0.6 from an earlier, third computation (± 5e-5)."""
+    record = {1e-3: 1.01293, 1e-2: 1.02966, 3e-2: 1.04522, 1e-1: 1.07489}
+    table, layer = load_table(), felupe_layer.FelupeLayer(0.3)
+    for load, ratio in record.items():
+        layer.apply(felupe_layer.peak_pressure(load))
+        layer.solve()
+        assert layer.sigma([0.6])[0] / linear_layer.sigma(0.3, 0.6) == pytest.approx(ratio, abs=1e-4)
+        assert table.sigma(0.3, 0.6, load).sigma / table.sigma(0.3, 0.6, 0.0).sigma == pytest.approx(ratio, abs=1e-4)

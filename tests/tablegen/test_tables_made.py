@@ -1,0 +1,66 @@
+"""The shipped tables are what the code makes: some points are solved anew, and the sources are those on record."""
+
+import json
+from types import ModuleType
+
+import h5py
+import numpy as np
+import pytest
+
+from tablegen import contact_table, influence_table, sigma_table
+from tablegen.contact_interpolation import ContactInterpolation
+from tablegen.sweep import sources_hash
+from underskin.surrogate.sigma_table import tables_folder
+
+MADE_BY = {"sigma.h5": sigma_table, "influence.h5": influence_table, "contact.h5": contact_table}
+
+
+@pytest.mark.parametrize(("name", "maker"), MADE_BY.items())
+def test_the_sources_on_record_are_these(name: str, maker: ModuleType) -> None:
+    """In the table itself, or in `sources.json` for a table that was made before the digest left names out."""
+    later = json.loads((tables_folder() / "sources.json").read_text(encoding="utf-8"))[name]
+    with h5py.File(tables_folder() / name) as file:
+        on_record = [file.attrs["tablegen_sources_sha256"]]
+        if later["data_sha256"] == file.attrs["data_sha256"]:
+            on_record.append(later["sources_sha256"])
+    assert sources_hash(maker.SOURCES) in on_record, "run `make tables`"
+
+
+@pytest.mark.slow
+def test_sigma_solved_anew() -> None:
+    nodes = sigma_table.DEFAULT_NODES
+    with h5py.File(tables_folder() / "sigma.h5") as file:
+        kept, linear_error = file["sigma/sigma"][:], file["sigma/fem_linear_error"][:]
+    for number in (7, 41):
+        column = sigma_table.solve_piece(float(nodes.a[number]), nodes, sigma_table.ORDER)
+        # Where nothing is added to the exact linear layer, the column's own share is the whole difference.
+        change = kept[number] - kept[number][:, :1]
+        assert np.abs(column["sigma_change"] - change).max() < 1e-10
+        assert np.abs(column["linear_error"] / kept[number][:, 0] - linear_error[number]).max() < 1e-9
+
+
+@pytest.mark.slow
+def test_influence_solved_anew() -> None:
+    axes = influence_table.DEFAULT_AXES
+    with h5py.File(tables_folder() / "influence.h5") as file:
+        normal, tangential = file["influence/gamma_n"][:], file["influence/gamma_t"][:]
+    for i, j in ((0, 0), (6, 9)):
+        solved = influence_table.solve_piece(
+            float(axes[0][i]), float(axes[1][j]), axes[2], axes[3], influence_table.ORDER
+        )
+        assert np.abs(solved["normal"] - normal[i, j]).max() < 1e-9
+        assert np.abs(solved["tangential"] - tangential[i, j]).max() < 1e-9
+
+
+@pytest.mark.slow
+def test_contact_solved_anew() -> None:
+    """The table holds a spline through the solved edges, at other spheres: within its own error."""
+    table = ContactInterpolation(tables_folder() / "contact.h5")
+    _, cbrt_load, rho = contact_table.DEFAULT_AXES
+    edge = float(contact_table.DEFAULT_EDGES[len(contact_table.DEFAULT_EDGES) // 2])
+    solved = contact_table.solve_piece(edge, rho, cbrt_load[1:], contact_table.ORDER)
+    answer = table.contact(solved["radius"], cbrt_load[1:] ** 3)
+    inside = answer.inside
+    assert inside.sum() > 3
+    hertz = np.cbrt(9 / 16 * solved["radius"] ** 3 * cbrt_load[1:] ** 3)
+    assert answer.a_over_h[inside] == pytest.approx(solved["values"][inside, 0] * hertz[inside], rel=1e-5)
