@@ -52,7 +52,7 @@ def of_inversion(inversion: "Inversion") -> dict[str, Any]:
                 strict=True,
             )
         ],
-        "findings": list(inversion.findings),
+        "findings": [finding.sentence for finding in inversion.findings],
     }  # fmt: skip
 
 
