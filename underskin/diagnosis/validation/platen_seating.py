@@ -29,7 +29,7 @@ def without_seating(
 
     A law that needs a curve's whole history, such as relaxation, cannot be fitted to the rest: nothing is tried.
     """
-    imitated = [name for name in names if CATALOGUE[name].imitated_by_seating]
+    imitated = [name for name in names if name in CATALOGUE and CATALOGUE[name].imitated_by_seating]
     if not imitated or any(CATALOGUE[name].needs_history for name in names):
         return None
     if not all(_is_pressed(entry) for entry in campaign.recordings):
