@@ -186,6 +186,7 @@ class Other(Ageing):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [["diagnose", "examples/campaigns/2017-07.json"], ["serve", "--port", "0"]])
 def test_the_command_line_and_the_start_of_the_service_say_what_is_refused(command: list[str], tmp_path: Path) -> None:
     folder = installed(tmp_path / "site", GROUP, "Other", TAKEN)
@@ -311,6 +312,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_one_of_another_package_is_composed_drawn_adopted_and_found_by_worker_processes(tmp_path: Path) -> None:
     site = tmp_path / "site"
     shutil.copytree(EXAMPLE / "lab_skin", site / "lab_skin")
@@ -327,6 +329,7 @@ def test_one_of_another_package_is_composed_drawn_adopted_and_found_by_worker_pr
     assert answer.stdout == "used\n"
 
 
+@pytest.mark.slow
 def test_the_texts_are_there_without_docstrings() -> None:
     """`python -OO` drops docstrings and asserts; a statement and a report need the mechanisms' texts."""
     script = (

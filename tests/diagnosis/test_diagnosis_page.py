@@ -122,6 +122,7 @@ def test_it_says_all_that_the_report_says(text: str, document: dict[str, Any]) -
     assert [name for name in CATALOGUE if "_" in name and name in tags.text] == []  # no names of the code
 
 
+@pytest.mark.slow
 def test_markup_in_a_campaign_stays_text(text: str) -> None:
     tags = Tags(text)
     assert f"Diagnosis of palm {HOSTILE}" in tags.text
@@ -135,6 +136,7 @@ def test_markup_in_a_campaign_stays_text(text: str) -> None:
     assert "\\u0026lt;a href" in drawn or "&lt;a href" in drawn
 
 
+@pytest.mark.slow
 def test_it_needs_nothing_from_outside(text: str) -> None:
     tags = Tags(text)
     assert [attributes for tag, attributes in tags.tags if {"src", "href"} & set(attributes)] == []
@@ -162,6 +164,7 @@ def test_a_browser_draws_every_figure(text: str, tmp_path: Path) -> None:
     assert "<img src=x" not in drawn
 
 
+@pytest.mark.slow
 def test_figures_show_the_report_s_numbers(found: Diagnosis, document: dict[str, Any]) -> None:
     drawn = figures(found, document)
     bars = drawn["explanations"].data[0]
@@ -176,6 +179,7 @@ def test_figures_show_the_report_s_numbers(found: Diagnosis, document: dict[str,
         assert prior[1] - prior[0] > ends[1] - ends[0]
 
 
+@pytest.mark.slow
 def test_after_the_points_lie_within_the_noise_s_band(found: Diagnosis, document: dict[str, Any]) -> None:
     traces = figures(found, document)["before_after"].data
     bands = [trace for trace in traces if trace.fill == "toself"]
@@ -191,6 +195,7 @@ def test_after_the_points_lie_within_the_noise_s_band(found: Diagnosis, document
     assert after < 0.1 < 0.2 < before
 
 
+@pytest.mark.slow
 def test_the_map_shows_where_the_misfit_is(found: Diagnosis, document: dict[str, Any]) -> None:
     drawn = figures(found, document)["where"]
     cells, (outline,) = np.abs(np.asarray(drawn.data[0].z, dtype=float)), drawn.layout.shapes
@@ -284,6 +289,7 @@ def test_a_single_file_is_diagnosed_with_one_blas_thread(tmp_path: Path) -> None
     assert done.stdout.strip() == "{1}"
 
 
+@pytest.mark.slow
 def test_a_cluster_that_does_not_answer_is_named(tmp_path: Path) -> None:
     pytest.importorskip("distributed", reason="the cluster extra is not installed")
     address = "tcp://127.0.0.1:1"

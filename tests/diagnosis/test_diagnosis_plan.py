@@ -64,6 +64,7 @@ def test_a_plan_keeps_within_the_limits(narrow: Left) -> None:
         assert entry["position_mm"] == [0.0, 0.0]
 
 
+@pytest.mark.slow
 def test_the_sentence_names_all_that_it_separates(narrow: Left) -> None:
     planned = narrow.plan()
     assert len(planned["separates"]) >= 2
@@ -81,6 +82,7 @@ def test_where_the_campaign_s_own_settings_tell_nothing_others_are_tried(twins: 
     assert "beyond what this campaign did" in planned["statement"]
 
 
+@pytest.mark.slow
 def test_where_nothing_can_be_planned_it_is_said_why(twins: Left) -> None:
     planned = twins.plan(preload_n=(0.3, 2.4))
     assert planned["recordings"] == []

@@ -24,6 +24,7 @@ def test_tables_agree_with_an_independent_code(a: float, rho: float, load: float
     assert load_table().sigma(a, rho, load).sigma == pytest.approx(independent, rel=3e-5)
 
 
+@pytest.mark.slow
 def test_independent_code_meets_the_exact_linear_layer() -> None:
     """What the comparison above can resolve: FElupe's own error where the exact answer is known."""
     rho = [0.0, 0.2, 0.6, 1.0, 3.0]
@@ -33,6 +34,7 @@ def test_independent_code_meets_the_exact_linear_layer() -> None:
     np.testing.assert_allclose(layer.sigma(rho), linear_layer.sigma(0.3, np.array(rho)), rtol=3e-5)
 
 
+@pytest.mark.slow
 def test_both_codes_meet_the_finite_strain_values_on_record() -> None:
     """σ(L)/σ(0) at a/h = 0.3, ρ = 0.6 from an earlier, third computation (± 5e-5)."""
     record = {1e-3: 1.01293, 1e-2: 1.02966, 3e-2: 1.04522, 1e-1: 1.07489}

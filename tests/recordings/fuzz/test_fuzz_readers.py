@@ -129,6 +129,7 @@ def damaged(draw: st.DrawFn, files: list[bytes]) -> bytes:
     return data
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
 def test_damaged_files_are_refused_with_their_name(reader: Reader) -> None:
     files = sound_files()[reader.kind]

@@ -55,6 +55,7 @@ def consume(store: Database, row: AnyRow) -> None:
         pass
 
 
+@pytest.mark.slow
 def test_a_document_takes_the_memory_of_a_few_recordings(place: Place, tmp_path: Path) -> None:
     store = open_store(place.database_url, place.folder)
     sent = parse(large())
