@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from underskin import ExtensionError, FileError, InvalidInput, extensions
+from underskin.autodiff import Differentiated
 from underskin.mechanisms import CATALOGUE, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
-from underskin.mechanisms.autodiff import Differentiated
 from underskin.mechanisms.base import AXES, NEEDED_FIELDS, UNITS, ActsOn
 from underskin.mechanisms.contract import HOOKS, check
 from underskin.mechanisms.models.contact_state import Contacts

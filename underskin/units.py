@@ -6,19 +6,20 @@ finite, not positive, or of unlikely magnitude, and guesses the unit that was me
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from underskin.errors import ErrorCode, InvalidInput
+from underskin.errors import UNITS_CHECKED, ErrorCode, InvalidInput, Requirement
 from underskin.findings import sentences
 from underskin.findings.arguments import UnitGuess
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.requirement import UNITS_CHECKED, Requirement
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+Array = NDArray[Any]  # float64 or complex128
 
 
 @dataclass(frozen=True)

@@ -70,7 +70,7 @@ def _work(job: Job, campaign: bytes, say: Callable[[dict[str, Any]], None]) -> N
     from underskin.errors import TableError
     from underskin.findings.codes import Reason
     from underskin.findings.finding import Finding
-    from underskin.process_limits import limit_process
+    from underskin.parallel import limit_process
     from underskin.recordings.campaign import parse
     from underskin.surrogate.sigma_table import load_table
 

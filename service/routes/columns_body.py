@@ -9,7 +9,7 @@ from service.middleware.unique_keys import require_unique_keys
 from service.problems import Refusal, from_validation
 from service.schemas.columns import ColumnsRequest
 from underskin import InvalidInput
-from underskin.columns import CsvError, from_csv
+from underskin.prediction.columns import CsvError, from_csv
 
 Kind = TypeVar("Kind", bound=ColumnsRequest)
 

@@ -86,7 +86,7 @@ def sphere_pressures(
     different, row = np.unique(load, return_inverse=True)
     alpha = _grid().curves(layer).at_load(different, np.zeros_like(different)).alpha.value
     known = np.isfinite(alpha)
-    shapes = iter(ContactEquation(alpha[known]).solve(layer).sphere_shape[0] if known.any() else ())
+    shapes = iter(ContactEquation(alpha[known]).solve(layer).sphere_shape.value if known.any() else ())
     pressures = [SpherePressure(float(a) * thickness, next(shapes)) if a == a else None for a in alpha]
     return [pressures[i] for i in row]
 

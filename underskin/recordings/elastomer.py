@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from underskin.errors import ErrorCode, InvalidInput
+from underskin.errors import ErrorCode, InvalidInput, Mention, Requirement
 from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
-from underskin.requirement import Mention, Requirement
 from underskin.units import Floats, to_lab, to_si
 
 _STRAIGHT = 0.02  # largest departure from a straight line, of the stress it spans

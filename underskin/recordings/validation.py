@@ -14,10 +14,9 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from underskin.errors import ErrorCode, InvalidInput
+from underskin.errors import REQUIRED, ErrorCode, InvalidInput
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings.shown_values import LONGEST_NAME, named, shown
-from underskin.requirement import REQUIRED
 from underskin.units import Floats, checked
 
 Model = TypeVar("Model")

@@ -24,9 +24,8 @@ from numpy.typing import NDArray
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.pickup_rows import PickedRows
 from underskin.diagnosis.noise.noise_levels import NoiseLevels, SeveralLevels
-from underskin.mechanisms.autodiff import Array
 from underskin.mechanisms.models.composed import Prediction
-from underskin.units import Floats
+from underskin.units import Array, Floats
 
 _FROM_SLOPES = 1e-3  # m: a recording whose response changes by more than itself over this way is led by its slopes
 

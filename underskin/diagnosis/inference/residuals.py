@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.mechanisms.autodiff import Array
-from underskin.units import Floats
+from underskin.units import Array, Floats
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.mechanisms.autodiff import Array
-from underskin.units import Floats
+from underskin.units import Array, Floats
 
 _ONE_SIGN = 0.8
 _DRAWS, _SEED = 1000, 20180207

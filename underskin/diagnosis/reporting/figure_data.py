@@ -14,9 +14,8 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.residuals import whole_prediction
 from underskin.diagnosis.localisation.region import axis_values
 from underskin.diagnosis.reporting.report import Diagnosis
-from underskin.mechanisms.autodiff import Array
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.units import Complexes, Floats
+from underskin.units import Array, Complexes, Floats
 
 _MOST_POINTS = 600
 _LEAST_BINS = 8  # of the lines, so that a shape over them can be seen in campaigns of any size

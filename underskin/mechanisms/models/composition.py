@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.autodiff import Differentiated, variables
 from underskin.errors import InvalidInput
-from underskin.mechanisms.autodiff import Array, Differentiated, variables
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Unsupported, Values
 from underskin.recordings.conditions import Conditions
-from underskin.units import Floats
+from underskin.units import Array, Floats
 
 SENSOR_SPREAD = 0.01  # sd of the logarithms of the sensors' gains, without `sensor_spread`
 

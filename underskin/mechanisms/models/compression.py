@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.autodiff import Differentiated, constant
 from underskin.errors import InvalidInput
-from underskin.mechanisms.autodiff import Differentiated, constant
 from underskin.mechanisms.base import Mechanism, Parameter, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
 from underskin.mechanisms.models.curve_state import Curve, stiffened

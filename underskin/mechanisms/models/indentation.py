@@ -11,8 +11,8 @@ from functools import cache, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.autodiff import Differentiated, constant, where
 from underskin.errors import InvalidInput
-from underskin.mechanisms.autodiff import Differentiated, constant, where
 from underskin.mechanisms.base import Mechanism, Parameter, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
 from underskin.mechanisms.models.contact_stage import layer_curves

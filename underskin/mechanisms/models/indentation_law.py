@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.mechanisms.autodiff import Differentiated, chain, where
+from underskin.autodiff import Differentiated, chain, where
 from underskin.mechanisms.models.curve_state import Curve, stiffened
 from underskin.physics.contact_curves import REACH, ContactCurves
 from underskin.units import Floats
@@ -176,18 +176,18 @@ class Sphere:
         root = None if work is None else self.radius * (work / (modulus * h * h * h)) ** 0.5
         rows = layer.at_radius(alpha.value, np.zeros_like(alpha.value) if root is None else root.value)
 
-        def differentiated(value: Floats, slopes: Floats) -> Differentiated:
-            by_alpha, by_root, by_poisson_ratio, _ = slopes
+        def by_parameters(quantity: Differentiated) -> Differentiated:
+            by_alpha, by_root, by_poisson_ratio, _ = quantity.slopes
             terms = [(by_alpha, alpha), (by_poisson_ratio, self.curve.poisson_ratio)]
-            return chain(value, *terms, *([] if root is None else [(by_root, root)]))
+            return chain(quantity.value, *terms, *([] if root is None else [(by_root, root)]))
 
         scale = modulus * h * h * h / self.radius
-        force = scale * differentiated(rows.load.value, rows.load.slopes)
-        depth = h * h / self.radius * differentiated(rows.depth.value, rows.depth.slopes)
-        stiffness = 2.0 * modulus * a * differentiated(rows.stiffness.value, rows.stiffness.slopes)
+        force = scale * by_parameters(rows.load)
+        depth = h * h / self.radius * by_parameters(rows.depth)
+        stiffness = 2.0 * modulus * a * by_parameters(rows.stiffness)
         if root is None:
             return ContactAt(depth, force, stiffness, None)
-        pushing = scale * differentiated(rows.sphere_load.value, rows.sphere_load.slopes)
+        pushing = scale * by_parameters(rows.sphere_load)
         return ContactAt(depth, force, stiffness, (pushing - force) / stiffness)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import jv
 
-from underskin.mechanisms.autodiff import Differentiated
+from underskin.autodiff import Differentiated
 from underskin.mechanisms.models.contact_stage import Pressed
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.off_centre_response import OffsetSigma
@@ -70,6 +70,7 @@ def _transforms(
     """p̂ · M · disc (contacts, k) with its derivatives by a/h, rT/h and what follows, and what follows."""
     shape = _half_space_shape(k, pressed) if layer is None else _layer_shape(pressed, layer)
     transmission = layer_of(contacts).transmission(k)
+    by_poisson_ratio, by_slip = transmission.slopes
     disc, by_rho = _disc(k, rt_over_h)
     passed = transmission.value * disc
     entries = [shape.value * passed, shape.by_alpha * passed, shape.value * (transmission.value * by_rho)]
@@ -78,10 +79,10 @@ def _transforms(
         entries.append(shape.by_share * passed)
         further.append(pressed.sphere_share)
     if contacts.poisson_ratio.slopes.any():
-        entries.append(shape.value * (transmission.by_poisson_ratio * disc) + shape.by_poisson_ratio * passed)
+        entries.append(shape.value * (by_poisson_ratio * disc) + shape.by_poisson_ratio * passed)
         further.append(contacts.poisson_ratio)
     if contacts.slip is not None:
-        entries.append(shape.value * (transmission.by_slip * disc) + shape.by_slip * passed)
+        entries.append(shape.value * (by_slip * disc) + shape.by_slip * passed)
         further.append(contacts.slip)
     return np.stack(entries), tuple(further)
 
@@ -115,15 +116,17 @@ def _layer_shape(pressed: Pressed, layer: ContactCurves) -> _Shape:
     to_coefficients = layer.interval.coefficients(np.eye(len(layer.interval.nodes)))
     at, slope = basis @ to_coefficients, basis @ layer.interval.derivative(to_coefficients)
 
-    def mixed(weights: Floats, which: int) -> Floats:
-        sphere = weights @ layer.sphere_transform[which]
+    def mixed(weights: Floats, sphere: Floats, punch: Floats) -> Floats:
+        of_sphere = weights @ sphere
         if pressed.sphere_share is None:
-            return sphere
-        punch = weights @ layer.punch_transform[which]
-        return punch + share * (sphere - punch)
+            return of_sphere
+        of_punch = weights @ punch
+        return of_punch + share * (of_sphere - of_punch)
 
-    difference = at @ (layer.sphere_transform[0] - layer.punch_transform[0])
-    return _Shape(mixed(at, 0), mixed(slope, 0), difference, mixed(at, 1), mixed(at, 2))
+    sphere, punch = layer.sphere_transform, layer.punch_transform
+    by_layer = [mixed(at, *slopes) for slopes in zip(sphere.slopes, punch.slopes, strict=True)]
+    value, by_alpha = (mixed(weights, sphere.value, punch.value) for weights in (at, slope))
+    return _Shape(value, by_alpha, at @ (sphere.value - punch.value), *by_layer)
 
 
 def _disc(k: Floats, rt_over_h: float) -> tuple[Floats, Floats]:

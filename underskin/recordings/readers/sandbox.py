@@ -18,7 +18,7 @@ import numpy as np
 import orjson
 
 from underskin.errors import ErrorCode, FileError
-from underskin.process_limits import limit_process
+from underskin.parallel import limit_process
 from underskin.recordings.channels import Block, Channel, Contents
 from underskin.recordings.readers.formats import parse
 from underskin.recordings.shown_values import shown
