@@ -1,7 +1,7 @@
 """Processes for many independent computations, and what a process may take of the machine.
 
-Each process of a pool is a fresh interpreter with one BLAS thread, so results do not depend on the number of cores. They
-end with the process that started them, however that one ends.
+Each process of a pool is a fresh interpreter with one BLAS thread, so results do not depend on the number of cores.
+They end with the process that started them, however that one ends.
 """
 
 import os

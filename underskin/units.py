@@ -122,7 +122,7 @@ def checked(name: str, value: ArrayLike, *, units_checked: bool = False) -> Floa
         unlikely = (size < low) | (size > high)
         if unlikely.any():
             first = float(size.flat[int(np.argmax(unlikely))])
-            _refuse(name, values, unlikely, _slip(field, first), ErrorCode.UNLIKELY_MAGNITUDE)
+            _refuse(name, values, unlikely, _likely_range(field, first), ErrorCode.UNLIKELY_MAGNITUDE)
     return values * field.to_si
 
 
@@ -175,7 +175,7 @@ def _refuse(name: str, values: Floats, bad: NDArray[np.bool_], allowed: str, cod
         raise InvalidInput(name, float(values.flat[first]), allowed, index=first if values.ndim else None, code=code)
 
 
-def _slip(field: LabField, size: float) -> Requirement:
+def _likely_range(field: LabField, size: float) -> Requirement:
     """The allowed range, and the unit that was probably meant."""
     assert field.likely is not None
     low, high = field.likely

@@ -149,7 +149,7 @@ def adopted(report: Mapping[str, Any], campaign: Campaign) -> AdoptedModel:
     if not any(isinstance(entry, FrfRecording) for entry in campaign.recordings):
         raise InvalidInput("diagnosis_id", "a diagnosis of curves", "must be of a campaign with recordings of kind frf")
     parameters = {
-        entry["name"]: {found["name"]: float(found["value"]) for found in entry["parameters"]}
+        entry["name"]: {parameter["name"]: float(parameter["value"]) for parameter in entry["parameters"]}
         for entry in report["mechanisms"]
     }
     frf = [mechanism for name, mechanism in CATALOGUE.items() if name in parameters and "frf" in mechanism.kinds]

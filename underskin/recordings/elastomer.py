@@ -70,23 +70,23 @@ class IndentationModulus:
 
 @dataclass(frozen=True)
 class RecordingModulus:
-    """What a recording says of the elastomer; `found` is the reason where it says nothing."""
+    """What a recording says of the elastomer; `result` is the reason where it says nothing."""
 
     recording: str
     kind: str
-    found: CompressionModulus | IndentationModulus | InvalidInput
+    result: CompressionModulus | IndentationModulus | InvalidInput
 
 
 def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
     """What each recording of kind `compression` or `indentation` says of the elastomer."""
     return [
-        RecordingModulus(recording.id, recording.kind, _found(recording, campaign.skin.poisson_ratio))
+        RecordingModulus(recording.id, recording.kind, _result(recording, campaign.skin.poisson_ratio))
         for recording in campaign.recordings
         if not isinstance(recording, FrfRecording)
     ]
 
 
-def _found(
+def _result(
     recording: CompressionRecording | IndentationRecording, poisson_ratio: float
 ) -> CompressionModulus | IndentationModulus | InvalidInput:
     try:

@@ -9,7 +9,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 
 def reasons(document: Mapping[str, Any], answer: Columns, table: SigmaTable) -> list[str]:
-    """Of each row outside the table, which value is and what is allowed; `document`: the request that `found` is of."""
+    """Of each row outside the table, which value is and what is allowed; `document`: the request of the answer."""
     numbers = [answer.full(name) for name in ("a_over_h", "rt_over_h", "load_parameter")]
     status = answer.status()
     skin = document["youngs_modulus_mpa"], document["poisson_ratio"]

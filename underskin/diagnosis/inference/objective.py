@@ -107,7 +107,7 @@ class Evaluator:
         return NoiseLevels(gain, level, float(position), float(spread), pickup, self._smooth(point))
 
     def _own_levels(self, covariance: Floats) -> tuple[Floats | float, Floats | float, Floats | None]:
-        """p, τ and the pick-up (…, picked rows) that covariance parameters (…, parameters) hold."""
+        """p, τ and the pick-up (…, pick-up rows) that covariance parameters (…, parameters) hold."""
         position: Floats | float = np.exp(covariance[..., POSITION]) if self.hypothesis.placed else 0.0
         spread: Floats | float = SENSOR_SPREAD
         values = {}

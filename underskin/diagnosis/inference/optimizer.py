@@ -89,12 +89,12 @@ class Fitter(Evaluator):
         if not self.hypothesis.lines.curves:
             return self.settle(self._descend(self.settle(self.evaluate(start), 3), 1), 2)
         # Small smooth error and close fit, or large and loose: each may be a maximum of its own.
-        found = []
+        fits = []
         for smooth in (self.hypothesis.smooth.low, self.hypothesis.smooth.middle):
             begin = replace(start, covariance=np.array([GAIN_PRIOR.middle, 0.0, smooth]))
             fitted = self.settle(self._descend(self.evaluate(begin), 0), _CURVE_SETTLING)
-            found.append(self.settle(self._descend(fitted, 1), _CURVE_SETTLING))
-        return min(found, key=lambda at: at.cost)
+            fits.append(self.settle(self._descend(fitted, 1), _CURVE_SETTLING))
+        return min(fits, key=lambda at: at.cost)
 
     def _descend(self, best: Evaluated, settling: int) -> Evaluated:
         """Steps of the mean parameters, each followed by so many of the covariance's."""
@@ -128,15 +128,15 @@ class Fitter(Evaluator):
     def with_growth(self, at: Evaluated) -> Evaluated:
         """With ∂ log |t|²/∂θ (recordings, parameters) of the position's slopes t, by differences."""
         slopes = at.moments.log_slopes
-        found = np.zeros((len(slopes), len(self.parameters)))
+        growth = np.zeros((len(slopes), len(self.parameters)))
         for place in self.places:
             step = _SLOPE_STEP * (self.high[place] - self.low[place])
             moved = at.point.fit.copy()
             moved[place] += step if moved[place] + step <= self.high[place] else -step
-            found[:, place] = (self.evaluate(replace(at.point, fit=moved)).moments.log_slopes - slopes) / (
+            growth[:, place] = (self.evaluate(replace(at.point, fit=moved)).moments.log_slopes - slopes) / (
                 moved[place] - at.point.fit[place]
             )
-        return replace(at, growth=found)
+        return replace(at, growth=growth)
 
     def _step(self, at: Evaluated, damping: float) -> tuple[Floats, float]:
         """A damped Gauss–Newton step of the mean parameters within the bounds, and what the gradient says it gains."""

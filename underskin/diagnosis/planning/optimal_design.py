@@ -21,7 +21,7 @@ from underskin.diagnosis.data.names import EXPLAINED, in_words
 from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.planning.rig_limits import Limits, candidates, inferred, wider
 from underskin.diagnosis.selection.search import Answer, Search
-from underskin.formatting import in_percent
+from underskin.findings.formatting import in_percent
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.registry import CATALOGUE

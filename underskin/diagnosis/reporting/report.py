@@ -21,8 +21,8 @@ from underskin.diagnosis.reporting.numbers import parameter, place_of, probabili
 from underskin.diagnosis.reporting.statements import (
     UNDECIDABLE,
     answer_statement,
+    insufficient_statement,
     location_statement,
-    nothing_told,
     why_not,
 )
 from underskin.diagnosis.selection.search import Answer, Search
@@ -77,7 +77,7 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
         return {
             **document,
             "probability": 1.0,
-            "statement": nothing_told(diagnosis.lacking),
+            "statement": insufficient_statement(diagnosis.lacking),
             "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "Nothing was located."},
             "mechanisms": [],
             "alternatives": [],

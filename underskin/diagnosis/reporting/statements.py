@@ -19,14 +19,14 @@ from underskin.diagnosis.localisation.residual_shape import (
 )
 from underskin.diagnosis.selection.search import Answer
 from underskin.findings.english import lacking
+from underskin.findings.formatting import in_digits, in_percent
 from underskin.findings.lacking import Lacking
-from underskin.formatting import in_digits, in_percent
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE
 
 _WORTH_NAMING = 0.02
 _UNTHOUGHT_AT_MOST = 0.016  # of none_of_these, where no process shows
-_NOTHING_TOLD = "The recordings cannot tell anything: "
+_INSUFFICIENT = "The recordings cannot tell anything: "
 _IN_PERCENT = 90.0  # beyond it an effect is said as a factor
 
 
@@ -48,15 +48,15 @@ def answer_statement(
     return " ".join(part for part in parts if part)
 
 
-def nothing_told(what: Lacking | None) -> str:
+def insufficient_statement(what: Lacking | None) -> str:
     """The statement on a campaign from which nothing can be concluded."""
     assert what is not None
-    return f"{_NOTHING_TOLD}{lacking(what)}."
+    return f"{_INSUFFICIENT}{lacking(what)}."
 
 
 def lacking_part(statement: str) -> str:
-    """What is lacking, with its full stop, out of the statement that `nothing_told` made."""
-    return statement.removeprefix(_NOTHING_TOLD)
+    """What is lacking, with its full stop, out of the statement that `insufficient_statement` made."""
+    return statement.removeprefix(_INSUFFICIENT)
 
 
 def first_and_rest(statement: str) -> tuple[str, str]:

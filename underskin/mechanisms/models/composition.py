@@ -25,7 +25,7 @@ class Prediction:
     slopes: Array  # (parameters, rows)
     position_slopes: Array | None  # (2, rows) ∂value/∂x, ∂value/∂y of the contact's place [1/m] (frf)
     pickup: Floats | None  # sd of mains pick-up [C/N], of real and of imaginary part, on the rows that it reaches
-    picked: NDArray[np.intp] | None  # those rows
+    pickup_rows: NDArray[np.intp] | None  # those rows
     # (rows,) False where the contact lies beyond the tables, which are continued there, or the sensor's disc beyond the
     # stress profile, behind whose end the value is 0
     inside: NDArray[np.bool_]
@@ -34,8 +34,8 @@ class Prediction:
     def pickup_variance(self) -> Floats:
         """Of real and of imaginary part (rows,) [(C/N)²]."""
         variance = np.zeros(len(self.value))
-        if self.pickup is not None and self.picked is not None:
-            variance[self.picked] = self.pickup**2
+        if self.pickup is not None and self.pickup_rows is not None:
+            variance[self.pickup_rows] = self.pickup**2
         return variance
 
 

@@ -98,7 +98,7 @@ class FrfModel:
             slopes=slopes[:count],
             position_slopes=slopes[count:],
             pickup=None if self.pickup is None else self.pickup.deviation(_by_name(own)),
-            picked=None if self.pickup is None else self.pickup.rows,
+            pickup_rows=None if self.pickup is None else self.pickup.rows,
             inside=inside[self.design.point][self.recording],
         )
 

@@ -144,7 +144,7 @@ def times_of(recordings: Sequence[CurveConditions]) -> Floats:
 
 
 def _since(marked: NDArray[np.bool_], first: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """From the first row where it is `found` on, in each recording."""
+    """From the first row where it is `marked` on, in each recording."""
     total = np.cumsum(marked)
     before = np.maximum.accumulate(np.where(first, total - marked, 0))
     return np.asarray(total > before)
