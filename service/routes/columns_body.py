@@ -11,10 +11,10 @@ from service.schemas.columns import ColumnsRequest
 from underskin import InvalidInput
 from underskin.prediction.columns import CsvError, from_csv
 
-Kind = TypeVar("Kind", bound=ColumnsRequest)
+RequestKind = TypeVar("RequestKind", bound=ColumnsRequest)
 
 
-def parse(kind: type[Kind], body: bytes, content_type: str) -> Kind:
+def parse(kind: type[RequestKind], body: bytes, content_type: str) -> RequestKind:
     """The request in `body`; raises Refusal 400 (unreadable), 415 (another type) or 422 (a field is wrong)."""
     fields = (
         _from_csv(kind, body)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from service.schemas.columns_answer import Columns
-from underskin.prediction.domain_checks import Pressed, beyond
+from underskin.prediction.domain_checks import RowConditions, beyond
 from underskin.surrogate.sigma_table import SigmaTable
 
 
@@ -14,7 +14,7 @@ def reasons(document: Mapping[str, Any], answer: Columns, table: SigmaTable) -> 
     status = answer.status()
     skin = document["youngs_modulus_mpa"], document["poisson_ratio"]
     return [
-        f"row {row + 1}, " + beyond(Pressed(force, radius, *skin), [float(part[row]) for part in numbers], table)
+        f"row {row + 1}, " + beyond(RowConditions(force, radius, *skin), [float(part[row]) for part in numbers], table)
         for row, (force, radius) in enumerate(zip(document["preload_n"], document["indenter_radius_mm"], strict=True))
         if status[row] != "ok"
     ]

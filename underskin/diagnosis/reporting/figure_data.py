@@ -13,7 +13,7 @@ from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import whole_prediction
 from underskin.diagnosis.localisation.region import axis_values
-from underskin.diagnosis.reporting.report import Diagnosis
+from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Array, Complexes, Floats
 
@@ -54,7 +54,7 @@ class Levels:
 class Thinned:
     """Which rows each point is the mean of."""
 
-    def __init__(self, diagnosis: Diagnosis, problem: FittingProblem, shown: Explanation) -> None:
+    def __init__(self, diagnosis: DiagnosisResult, problem: FittingProblem, shown: Explanation) -> None:
         """One point a recording unless region or explanation run along the lines."""
         self.lines = lines = problem.lines
         self.problem = problem

@@ -10,7 +10,7 @@ from typing import Any
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, own_places
-from underskin.diagnosis.localisation.effect_size import Effect
+from underskin.diagnosis.localisation.effect_size import EffectSize
 from underskin.diagnosis.localisation.permutation_test import AxisResult
 from underskin.diagnosis.localisation.region import reaches_all_along
 from underskin.diagnosis.localisation.residual_shape import REACHES_NOISE, Shape
@@ -39,7 +39,7 @@ _LEAST_PROBABILITY = 0.005
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class DiagnosisResult:
     """Everything that the steps worked out about one campaign; `search` is None where the data were too few."""
 
     name: str
@@ -50,14 +50,14 @@ class Diagnosis:
     problem: FittingProblem | None = None
     axes: Sequence[AxisResult] = ()
     region: Mapping[str, list[float | str]] = field(default_factory=dict)
-    effect: Effect | None = None
+    effect: EffectSize | None = None
     groups: Sequence[cross_validation.HeldOut] = ()
     confounded: Sequence[Confounding] = ()
     shape: Shape | None = None  # of what remains, where no mechanism describes it
     next_experiment: Mapping[str, Any] = field(default_factory=dict)
 
 
-def verdict(diagnosis: Diagnosis) -> str:
+def verdict(diagnosis: DiagnosisResult) -> str:
     """The verdict that the probabilities give, as DESIGN.md defines it."""
     if diagnosis.search is None:
         return "insufficient_data"
@@ -69,7 +69,7 @@ def verdict(diagnosis: Diagnosis) -> str:
     return "explained" if leader.probability >= EXPLAINED else "ambiguous"
 
 
-def report(diagnosis: Diagnosis) -> dict[str, Any]:
+def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     """The document; plain JSON values."""
     stated = verdict(diagnosis)
     document: dict[str, Any] = {"schema": SCHEMA, "campaign": diagnosis.name, "verdict": stated}
@@ -167,7 +167,7 @@ def _alternatives(answers: Sequence[Answer]) -> list[dict[str, Any]]:
     return alternatives
 
 
-def _location(diagnosis: Diagnosis, problem: FittingProblem, agrees: bool) -> dict[str, Any]:
+def _location(diagnosis: DiagnosisResult, problem: FittingProblem, agrees: bool) -> dict[str, Any]:
     assert diagnosis.effect is not None
     effect, region = diagnosis.effect, diagnosis.region
     whole = {name: reaches_all_along(problem.lines, name, ends) for name, ends in region.items()}

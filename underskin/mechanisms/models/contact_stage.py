@@ -19,7 +19,7 @@ from underskin.units import Floats
 
 
 @dataclass(frozen=True)
-class Pressed:
+class PressedContacts:
     """Contacts (rows,) under their loads."""
 
     a_over_h: Differentiated
@@ -33,20 +33,20 @@ def layer_curves(grid: CurveGrid, layer: Layer) -> ContactCurves:
     return grid.curves(layer)
 
 
-def press(contacts: Contacts, curves: ContactCurves | None) -> Pressed:
+def press(contacts: Contacts, curves: ContactCurves | None) -> PressedContacts:
     """The contacts under their forces; `curves`, of the layer at hand, where the contact is the layer's."""
     if curves is not None:
         return _on_layer(contacts, curves)
     if contacts.work_of_adhesion is None:
-        return Pressed(contacts.hertz_radius / contacts.thickness, contacts.cbrt_load, None)
+        return PressedContacts(contacts.hertz_radius / contacts.thickness, contacts.cbrt_load, None)
     pull = (1.5 * np.pi) * contacts.indenter_radius * contacts.work_of_adhesion
     root = 2.0 * (pull * (contacts.force + pull)) ** 0.5
     equivalent = contacts.force + 2.0 * pull + root
     radius = cbrt(0.75 * contacts.indenter_radius * equivalent / contacts.reduced_modulus)
-    return Pressed(radius / contacts.thickness, contacts.cbrt_load, equivalent / contacts.force)
+    return PressedContacts(radius / contacts.thickness, contacts.cbrt_load, equivalent / contacts.force)
 
 
-def _on_layer(contacts: Contacts, curves: ContactCurves) -> Pressed:
+def _on_layer(contacts: Contacts, curves: ContactCurves) -> PressedContacts:
     scale = contacts.reduced_modulus * contacts.thickness**3.0
     load = contacts.force * contacts.indenter_radius / scale
     adhesion = contacts.work_of_adhesion
@@ -64,10 +64,10 @@ def _on_layer(contacts: Contacts, curves: ContactCurves) -> Pressed:
         return chain(np.where(beyond, otherwise, quantity.value), *terms)
 
     share = None if root is None else by_parameters(solved.sphere_load, load.value) / load
-    return Pressed(by_parameters(solved.alpha, REACH), contacts.cbrt_load, share)
+    return PressedContacts(by_parameters(solved.alpha, REACH), contacts.cbrt_load, share)
 
 
-def stiffness(contacts: Contacts, pressed: Pressed, curves: ContactCurves) -> Differentiated:
+def stiffness(contacts: Contacts, pressed: PressedContacts, curves: ContactCurves) -> Differentiated:
     """dF/dδ = 2 E' a S(a/h) [N/m] of the layer at the contact radius in force, the edge held, E' unrelaxed."""
     alpha = pressed.a_over_h
     at_radius = curves.stiffness_at(np.minimum(alpha.value, REACH))

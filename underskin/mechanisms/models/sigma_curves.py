@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import jv
 
 from underskin.autodiff import Differentiated
-from underskin.mechanisms.models.contact_stage import Pressed
+from underskin.mechanisms.models.contact_stage import PressedContacts
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.off_centre_response import OffsetSigma
 from underskin.physics.contact_curves import REACH, ContactCurves
@@ -36,7 +36,7 @@ class SigmaCurves:
 
 
 def sigma_curves(
-    sigma: OffsetSigma, contacts: Contacts, pressed: Pressed, rho: Differentiated, layer: ContactCurves | None
+    sigma: OffsetSigma, contacts: Contacts, pressed: PressedContacts, rho: Differentiated, layer: ContactCurves | None
 ) -> SigmaCurves:
     """The curves of all contacts; `layer` where the contact is the layer's own."""
     variables = (pressed.a_over_h, pressed.cbrt_load, rho)
@@ -58,14 +58,14 @@ def layer_of(contacts: Contacts) -> Layer:
     return Layer(float(contacts.poisson_ratio.value[0]), slip)
 
 
-def _as_in_the_table(contacts: Contacts, pressed: Pressed) -> bool:
+def _as_in_the_table(contacts: Contacts, pressed: PressedContacts) -> bool:
     nu = contacts.poisson_ratio
     incompressible = nu.value[0] == INCOMPRESSIBLE and not nu.slopes.any()
     return pressed.sphere_share is None and contacts.slip is None and bool(incompressible)
 
 
 def _transforms(
-    k: Floats, contacts: Contacts, pressed: Pressed, rt_over_h: float, layer: ContactCurves | None
+    k: Floats, contacts: Contacts, pressed: PressedContacts, rt_over_h: float, layer: ContactCurves | None
 ) -> tuple[Floats, tuple[Differentiated, ...]]:
     """p̂ · M · disc (contacts, k) with its derivatives by a/h, rT/h and what follows, and what follows."""
     shape = _half_space_shape(k, pressed) if layer is None else _layer_shape(pressed, layer)
@@ -98,7 +98,7 @@ class _Shape:
     by_slip: Floats | float = 0.0
 
 
-def _half_space_shape(k: Floats, pressed: Pressed) -> _Shape:
+def _half_space_shape(k: Floats, pressed: PressedContacts) -> _Shape:
     alpha = pressed.a_over_h.value[:, None]
     argument = alpha * k
     sphere, punch = hertz_transform(argument), punch_transform(argument)
@@ -110,7 +110,7 @@ def _half_space_shape(k: Floats, pressed: Pressed) -> _Shape:
     return _Shape(punch + share * (sphere - punch), punch_slope + share * (sphere_slope - punch_slope), sphere - punch)
 
 
-def _layer_shape(pressed: Pressed, layer: ContactCurves) -> _Shape:
+def _layer_shape(pressed: PressedContacts, layer: ContactCurves) -> _Shape:
     share = 1.0 if pressed.sphere_share is None else pressed.sphere_share.value[:, None]
     basis = layer.interval.basis(pressed.a_over_h.value)
     to_coefficients = layer.interval.coefficients(np.eye(len(layer.interval.nodes)))
