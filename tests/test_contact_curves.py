@@ -5,7 +5,7 @@ import pytest
 from scipy.special import j0
 
 from tests.sphere_contact import SphereOnLayer
-from underskin.physics.contact_curves import REACH, ContactRows, CurveGrid
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactRows, CurveGrid
 from underskin.physics.contact_integral_equation import ContactEquation, mode_transforms
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average
@@ -30,7 +30,7 @@ def _dimensionless(setup: SphereOnLayer, force: Floats) -> tuple[Floats, Floats]
 def test_rows_equal_single_contacts(body: Layer, work_of_adhesion: float) -> None:
     setup = SphereOnLayer(RADIUS, MODULUS, THICKNESS, body, work_of_adhesion)
     lowest = setup.pull_off().contact_radius if work_of_adhesion else 0.0
-    radii = lowest + (REACH * THICKNESS - lowest) * np.array([0.01, 0.1, 0.5, 0.99])
+    radii = lowest + (LARGEST_A_OVER_H * THICKNESS - lowest) * np.array([0.01, 0.1, 0.5, 0.99])
     exact = [setup.at_radius(radius) for radius in radii]
     forces = np.array([contact.force for contact in exact])
     rows = GRID.curves(body).at_load(*_dimensionless(setup, forces))

@@ -106,8 +106,8 @@ class ScatterPosterior:
             # A variance known only roughly: the Student t whose own variance has the same mean and spread.
             freedom = 4 + 2 * variance**2 / np.maximum(unsure, 1e-12 * variance**2)
             scale = np.sqrt(variance * (freedom - 2) / freedom + between)
-        reach = student.ppf((1 + _LEVEL) / 2, freedom) * scale
-        return Estimate(value, np.sqrt(variance + between), value - reach, value + reach)
+        half_width = student.ppf((1 + _LEVEL) / 2, freedom) * scale
+        return Estimate(value, np.sqrt(variance + between), value - half_width, value + half_width)
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,9 @@ from underskin.physics.contact_integral_equation import ContactEquation, mode_tr
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
-REACH = 4.0  # largest a/h
+LARGEST_A_OVER_H = 4.0  # largest a/h
 _NODES = 28
-_TABLE: Floats = REACH / 128 * np.arange(1.0, 129.0)  # of a/h, for first guesses
+_TABLE: Floats = LARGEST_A_OVER_H / 128 * np.arange(1.0, 129.0)  # of a/h, for first guesses
 _SMALLEST = 1e-12
 _TOLERANCE = 1e-7  # of the last step; the remaining error is about its square
 _ITERATIONS = 60
@@ -44,7 +44,7 @@ _STIFFNESS: _Law = ((1.0, 0.0, 4, False),)
 class ContactRows:
     """Contacts (rows,) with derivatives by the given quantity (P or α), U, ν and the slip of the glue line.
 
-    NaN where there is none: below pull-off, or beyond a/h = REACH.
+    NaN where there is none: below pull-off, or beyond a/h = LARGEST_A_OVER_H.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class CurveGrid:
     """
 
     def __init__(self, wave_numbers: Floats) -> None:
-        self.interval = ChebyshevInterval(REACH, _NODES)
+        self.interval = ChebyshevInterval(LARGEST_A_OVER_H, _NODES)
         self.equation = ContactEquation(self.interval.nodes)
         s = np.multiply.outer(self.interval.nodes, wave_numbers)
         self.transforms = mode_transforms(s, self.equation.modes).transpose(0, 2, 1)
@@ -142,7 +142,7 @@ class ContactCurves:
         Parameters
         ----------
         alpha : ndarray, (rows,)
-            a/h, above 0 and up to REACH.
+            a/h, above 0 and up to LARGEST_A_OVER_H.
         root_adhesion : ndarray, (rows,)
             U [-].
         """
@@ -157,18 +157,18 @@ class ContactCurves:
         return ContactRows(Differentiated(alpha, one), *map(rows, laws))
 
     def stiffness_at(self, alpha: Floats) -> Differentiated:
-        """S at a/h (rows,) from 0 to REACH, with derivatives by α, ν and the slip."""
+        """S at a/h (rows,) from 0 to LARGEST_A_OVER_H, with derivatives by α, ν and the slip."""
         value, *slopes = self._evaluated(self.interval.basis(alpha))[:, _STIFFNESS[0][2]]
         return Differentiated(value, np.stack(slopes))
 
     def _newton(self, target: Floats, root_adhesion: Floats, start: Floats) -> Floats:
         """α; the law of load is convex: from the stable side the steps end at its root, or cross its minimum."""
-        alpha = np.clip(start, _SMALLEST, REACH)
+        alpha = np.clip(start, _SMALLEST, LARGEST_A_OVER_H)
         for _ in range(_ITERATIONS):
             value, by_alpha, *_rest = _law(_LOAD, alpha, root_adhesion, self._evaluated(self.interval.basis(alpha)))
-            lost = (by_alpha <= 0) | ((alpha == REACH) & (value < target))
+            lost = (by_alpha <= 0) | ((alpha == LARGEST_A_OVER_H) & (value < target))
             step = np.where(lost, np.nan, (value - target) / by_alpha)
-            alpha = np.clip(alpha - step, alpha / 4, REACH)
+            alpha = np.clip(alpha - step, alpha / 4, LARGEST_A_OVER_H)
             if not (np.abs(step) > _TOLERANCE * alpha).any():
                 break
         return np.where(alpha > 2 * _SMALLEST, alpha, np.nan)

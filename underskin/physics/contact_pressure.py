@@ -13,12 +13,12 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import legendre
 
-from underskin.physics.contact_curves import REACH, CurveGrid
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
 from underskin.physics.contact_integral_equation import ContactEquation
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
-MOST_A_OVER_H = REACH
+MOST_A_OVER_H = LARGEST_A_OVER_H
 HERTZ_SHAPE: Floats = np.array([1.0, 1 / np.sqrt(5)])
 
 

@@ -172,8 +172,8 @@ def implausible_d33(report: Mapping[str, Any]) -> str | None:
     if not {"low", "high"} <= set(interval):
         return None
     d33 = float(np.sqrt(interval["low"] * interval["high"]))
-    doubt = plausibility.doubt_of(d33)
-    return None if doubt is None else f"{d33:.4g} pC/N, {sentences.D33_DOUBTS[doubt]}"
+    implausible = plausibility.implausibility(d33)
+    return None if implausible is None else f"{d33:.4g} pC/N, {sentences.IMPLAUSIBLE_D33[implausible]}"
 
 
 def _on_fit(parameter: Parameter, value: float) -> float:

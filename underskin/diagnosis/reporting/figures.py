@@ -127,13 +127,13 @@ def before_and_after(
     ids = [escape(entry.id) for entry in thinned.lines.campaign.recordings]
     for place, (points, colour, marker) in enumerate(((before, _ORANGE, "square"), (after, _BLUE, "circle")), start=1):
         predicted, measured = (_part(diagnosis, column)[0] for column in (points.predicted, points.measured))
-        reach = np.linspace(predicted.min(), predicted.max(), _BAND)
+        along = np.linspace(predicted.min(), predicted.max(), _BAND)
         # Where all predictions are alike the band would have no width along the abscissa.
-        reach = reach if np.ptp(reach) > 0 else reach + np.linspace(-1, 1, _BAND) * (np.abs(reach).max() or 1.0) * 0.05
-        half = _SIGMAS * np.hypot(points.gain * reach, float(np.median(points.deviation)))
+        along = along if np.ptp(along) > 0 else along + np.linspace(-1, 1, _BAND) * (np.abs(along).max() or 1.0) * 0.05
+        half = _SIGMAS * np.hypot(points.gain * along, float(np.median(points.deviation)))
         figure.add_scatter(
-            x=[*reach, *reach[::-1]],
-            y=[*(reach + half), *(reach - half)[::-1]],
+            x=[*along, *along[::-1]],
+            y=[*(along + half), *(along - half)[::-1]],
             fill="toself",
             fillcolor="rgba(0,0,0,0.15)",
             line={"width": 0},
@@ -144,7 +144,7 @@ def before_and_after(
             col=place,
         )
         figure.add_scatter(
-            x=reach, y=reach, mode="lines", line={"color": "#000000", "width": 1}, name="measured = predicted",
+            x=along, y=along, mode="lines", line={"color": "#000000", "width": 1}, name="measured = predicted",
             hoverinfo="skip", showlegend=place == 1, row=1, col=place,
         )  # fmt: skip
         figure.add_scatter(

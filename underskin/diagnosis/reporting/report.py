@@ -129,10 +129,10 @@ def _d33(
     if problem.lines.curves or leader.explanation is None or leader.probability < EXPLAINED:
         return None, []
     d33 = parameter(shown, place_of(shown, "d33"))
-    doubt = plausibility.doubt_of(d33["value"])
+    implausible = plausibility.implausibility(d33["value"])
     reached = fit["after"]["rmse_percent"] <= REACHES_NOISE * fit["noise_floor_percent"]
-    finding = Finding(Reason.D33_FITTED, "", "d33_pc_per_n", {"d33_pc_per_n": d33["value"], "doubt": doubt})
-    return {**d33, "quotable": reached and doubt is None}, [finding] if doubt else []
+    finding = Finding(Reason.D33_FITTED, "", "d33_pc_per_n", {"d33_pc_per_n": d33["value"], "kind": implausible})
+    return {**d33, "quotable": reached and implausible is None}, [finding] if implausible else []
 
 
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:

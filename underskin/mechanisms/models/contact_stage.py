@@ -13,7 +13,7 @@ import numpy as np
 
 from underskin.autodiff import Differentiated, cbrt, chain
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.physics.contact_curves import REACH, ContactCurves, CurveGrid
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactCurves, CurveGrid
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
@@ -64,13 +64,13 @@ def _on_layer(contacts: Contacts, curves: ContactCurves) -> PressedContacts:
         return chain(np.where(beyond, otherwise, quantity.value), *terms)
 
     share = None if root is None else by_parameters(solved.sphere_load, load.value) / load
-    return PressedContacts(by_parameters(solved.alpha, REACH), contacts.cbrt_load, share)
+    return PressedContacts(by_parameters(solved.alpha, LARGEST_A_OVER_H), contacts.cbrt_load, share)
 
 
 def stiffness(contacts: Contacts, pressed: PressedContacts, curves: ContactCurves) -> Differentiated:
     """dF/dδ = 2 E' a S(a/h) [N/m] of the layer at the contact radius in force, the edge held, E' unrelaxed."""
     alpha = pressed.a_over_h
-    at_radius = curves.stiffness_at(np.minimum(alpha.value, REACH))
+    at_radius = curves.stiffness_at(np.minimum(alpha.value, LARGEST_A_OVER_H))
     by_alpha, by_poisson_ratio, by_slip = at_radius.slopes
     terms = [(by_alpha, alpha), (by_poisson_ratio, contacts.poisson_ratio)]
     terms += [] if contacts.slip is None else [(by_slip, contacts.slip)]

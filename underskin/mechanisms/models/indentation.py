@@ -35,7 +35,7 @@ from underskin.recordings.campaign import IndentationRecording
 from underskin.recordings.conditions import Conditions, CurveConditions, IndentationConditions, SkinDescription
 from underskin.units import Floats, to_si
 
-_CONTACT_SD, _CONTACT_REACH = 0.1, 0.8  # of the range of displacement: the contact point's prior and bounds
+_CONTACT_SD, _CONTACT_BOUND = 0.1, 0.8  # of the range of displacement: the contact point's prior and bounds
 
 
 class IndentationModel:
@@ -180,7 +180,7 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
             if refused is not None and span == 0:
                 raise refused
             largest = float(np.abs(entry.force_n).max())
-        per_recording.append(contact_point(entry.id, begins, _CONTACT_SD * span, _CONTACT_REACH * span))
+        per_recording.append(contact_point(entry.id, begins, _CONTACT_SD * span, _CONTACT_BOUND * span))
         per_recording.append(force_offset(entry.id, largest))
     if refused is not None and not estimates:
         raise refused

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from underskin.autodiff import Differentiated, chain, where
 from underskin.mechanisms.models.curve_state import Curve, stiffened
-from underskin.physics.contact_curves import REACH, ContactCurves
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactCurves
 from underskin.units import Floats
 
 _STRAIN = 0.2
@@ -125,7 +125,7 @@ class Sphere:
         low, high = least, most
         a = np.sqrt(self.radius * np.maximum(target, _SMALLEST_TRAVEL)) + 2 * least
         if self.layer is not None:  # a² = Rδ/B, B(a/h) of a bonded incompressible layer within some percent
-            alpha = a / self._largest * REACH
+            alpha = a / self._largest * LARGEST_A_OVER_H
             a = a * np.sqrt((1 + 1.25 * alpha) / (1 + 0.35 * alpha))
         a = np.minimum(a, 0.5 * (low + np.minimum(most, 2 * a)))
         for _ in range(_STEPS):
@@ -157,7 +157,7 @@ class Sphere:
         if self.layer is None:
             return np.inf
         assert self.curve.thickness is not None
-        return REACH * float(self.curve.thickness.value[0])
+        return LARGEST_A_OVER_H * float(self.curve.thickness.value[0])
 
     def _on_half_space(self, a: Differentiated) -> ContactAt:
         modulus, work = self.curve.reduced_modulus, self.curve.work_of_adhesion

@@ -19,7 +19,7 @@ from underskin.autodiff import Differentiated
 from underskin.mechanisms.models.contact_stage import PressedContacts
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.off_centre_response import OffsetSigma
-from underskin.physics.contact_curves import REACH, ContactCurves
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactCurves
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average, hertz_transform, punch_transform
 from underskin.physics.skin import INCOMPRESSIBLE
@@ -49,7 +49,7 @@ def sigma_curves(
     linear = sigma.linear_curves(transforms)
     coefficients = np.concatenate([strained.coefficients, linear[3:]])
     coefficients[[0, 1, 3]] += linear[:3]
-    return SigmaCurves(coefficients, variables + further, strained.inside & (a_over_h < REACH))
+    return SigmaCurves(coefficients, variables + further, strained.inside & (a_over_h < LARGEST_A_OVER_H))
 
 
 def layer_of(contacts: Contacts) -> Layer:
