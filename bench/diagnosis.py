@@ -21,7 +21,7 @@ _ONE = """
 import json, resource, sys, time
 from bench.diagnosed import recorded
 from underskin.diagnosis.pipeline import diagnosis_report
-from underskin.surrogate import load_table
+from underskin.surrogate.sigma_table import load_table
 
 preloads_n = 0.3, 0.5, 0.7, 1, 1.3, 1.6, 2, 2.3, 2.6, 3
 effects, position_mm = json.loads(sys.argv[1])

@@ -1,6 +1,5 @@
-"""Mechanisms and file formats of other packages: what is refused when they are loaded, and in which words."""
+"""Mechanisms of other packages: what is refused when they are loaded, and in which words."""
 
-import io
 import os
 import pickle
 import shutil
@@ -13,10 +12,11 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from tests.support.installed_package import installed
 from tests.support.repository import ROOT
-from underskin import ExtensionError, FileError, InvalidInput, extensions
+from underskin import ExtensionError, InvalidInput, extensions
+from underskin.autodiff import Differentiated
 from underskin.mechanisms import CATALOGUE, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
-from underskin.mechanisms.autodiff import Differentiated
 from underskin.mechanisms.base import AXES, NEEDED_FIELDS, UNITS, ActsOn
 from underskin.mechanisms.contract import HOOKS, check
 from underskin.mechanisms.models.contact_state import Contacts
@@ -25,7 +25,6 @@ from underskin.mechanisms.models.pickup import Pickup, together
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.registry import GROUP, built_in
 from underskin.recordings.conditions import Conditions
-from underskin.recordings.readers import formats
 
 EXAMPLE = ROOT / "examples" / "lab-skin"
 
@@ -163,15 +162,6 @@ def test_the_page_lists_all_that_a_mechanism_may_state() -> None:
         assert f"`{hook}(" in page, hook
 
 
-def installed(folder: Path, group: str, target: str, source: str) -> Path:
-    """A package as an installer leaves it."""
-    (folder / "lab_tools-2.1.dist-info").mkdir(parents=True)
-    (folder / "lab_tools.py").write_text(source, encoding="utf-8")
-    (folder / "lab_tools-2.1.dist-info" / "METADATA").write_text("Name: lab-tools\nVersion: 2.1\n")
-    (folder / "lab_tools-2.1.dist-info" / "entry_points.txt").write_text(f"[{group}]\nthing = lab_tools:{target}\n")
-    return folder
-
-
 def underskin(*arguments: str, path: Path, data: Path) -> "subprocess.CompletedProcess[str]":
     environment = os.environ | {"UNDERSKIN_DATA": str(data)}
     environment["PYTHONPATH"] = os.pathsep.join([str(path), *filter(None, [os.environ.get("PYTHONPATH")])])
@@ -222,65 +212,6 @@ def test_a_module_that_cannot_be_imported_is_refused(
 def test_without_other_packages_the_catalogue_is_that_of_this_one() -> None:
     assert tuple(CATALOGUE.values()) == built_in()
     assert CATALOGUE.packages == {}
-
-
-@pytest.fixture
-def format_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Installs a file format and loads it."""
-
-    def load(source: str) -> Mapping[str, formats.FileFormat]:
-        head = (
-            "from underskin.recordings.channels import Block, Channel, Contents\n"
-            "from underskin.recordings.readers.formats import FileFormat\n"
-        )
-        monkeypatch.syspath_prepend(installed(tmp_path, formats.GROUP, "THING", head + source))
-        monkeypatch.delitem(sys.modules, "lab_tools", raising=False)
-        formats.formats_of_other_packages.cache_clear()
-        return formats.formats_of_other_packages()
-
-    yield load
-    formats.formats_of_other_packages.cache_clear()
-
-
-@pytest.mark.parametrize(
-    ("source", "field", "reason"),
-    [
-        ("THING = print", "the entry point", "FileFormat"),
-        ("THING = FileFormat('', ('.lab',), print)", "name", "text"),
-        ("THING = FileFormat('CSV', ('.lab',), print)", "name", "taken"),
-        ("THING = FileFormat('lab', (), print)", "suffixes", "at least one"),
-        ("THING = FileFormat('lab', ('lab',), print)", "suffixes", "point"),
-        ("THING = FileFormat('lab', ('.csv',), print)", "suffixes", "taken"),
-        ("THING = FileFormat('lab', ('.lab',), 3)", "read", "function"),
-    ],
-)
-def test_a_file_format_that_cannot_be_used_is_refused(source: str, field: str, reason: str, format_of: Any) -> None:
-    with pytest.raises(ExtensionError, match=reason) as refusal:
-        format_of(source)
-    assert refusal.value.package == "lab-tools 2.1"
-    assert refusal.value.field == field
-
-
-def test_a_file_is_read_by_the_format_of_its_suffix(format_of: Any) -> None:
-    format_of(
-        "THING = FileFormat('lab', ('.lab',), lambda stream, file: Contents((), {'said': stream.read().decode()}))"
-    )
-    stream = io.BytesIO(b"anything")
-    assert formats.detect(stream, "Monday.LAB") == "lab"
-    assert formats.is_parsed_apart("lab")
-    answer = formats.parse("lab", stream, "Monday.LAB")
-    assert not isinstance(answer, dict)
-    assert answer.properties == {"said": "anything"}
-
-
-@pytest.mark.parametrize(
-    ("answer", "reason"),
-    [("None", "must answer with Contents"), ("Contents((Block('1', (Channel('F', 'N', [1.0]),)),))", "one axis")],
-)
-def test_what_a_reader_of_another_package_answers_is_checked(answer: str, reason: str, format_of: Any) -> None:
-    format_of(f"THING = FileFormat('lab', ('.lab',), lambda stream, file: {answer})")
-    with pytest.raises(FileError, match=reason):
-        formats.parse("lab", io.BytesIO(b"x"), "a.lab")
 
 
 USE = """

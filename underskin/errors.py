@@ -10,8 +10,10 @@ UnderskinError
 └── Unreachable       no answer from the server: nothing listens there, or time ran out (raised by the client)
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Any, Self
 
 
 class ErrorCode(StrEnum):
@@ -33,6 +35,43 @@ class ErrorCode(StrEnum):
     UNUSABLE_SIGNAL = "unusable_signal"
     UNREADABLE_FILE = "unreadable_file"
     WHOLE_SKIN = "whole_skin"
+
+
+@dataclass(frozen=True)
+class Mention:
+    """A field in what a value must be; `words` stand for it where its users know it by its name."""
+
+    field: str
+    words: str = ""
+
+    def __str__(self) -> str:
+        return self.words or self.field
+
+
+class Requirement(str):
+    """What a refused value must be: plain parts, and mentions of other fields kept apart from them.
+
+    As a text it has the mentions as they stand. An interface whose users know the fields by other names, such as a
+    form, words the mentions itself.
+    """
+
+    __slots__ = ("parts",)
+    parts: tuple[str | Mention, ...]
+
+    def __new__(cls, *parts: str | Mention) -> Self:
+        """Parts that are requirements themselves are taken apart."""
+        flat = tuple(one for part in parts for one in (part.parts if isinstance(part, Requirement) else (part,)))
+        made = super().__new__(cls, "".join(map(str, flat)))
+        made.parts = flat
+        return made
+
+    def worded(self, word: Callable[[Mention], str]) -> str:
+        """The sentence with each mention as `word` has it."""
+        return "".join(word(part) if isinstance(part, Mention) else part for part in self.parts)
+
+
+REQUIRED = Requirement("required")  # of a field that was left out
+UNITS_CHECKED = Mention("units_checked", " (or set units_checked to true)")  # which takes an unlikely magnitude
 
 
 class UnderskinError(Exception):

@@ -6,19 +6,20 @@ finite, not positive, or of unlikely magnitude, and guesses the unit that was me
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from underskin.errors import ErrorCode, InvalidInput
+from underskin.errors import UNITS_CHECKED, ErrorCode, InvalidInput, Requirement
 from underskin.findings import sentences
 from underskin.findings.arguments import UnitGuess
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.requirement import UNITS_CHECKED, Requirement
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+Array = NDArray[Any]  # float64 or complex128
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ def checked(name: str, value: ArrayLike, *, units_checked: bool = False) -> Floa
         unlikely = (size < low) | (size > high)
         if unlikely.any():
             first = float(size.flat[int(np.argmax(unlikely))])
-            _refuse(name, values, unlikely, _slip(field, first), ErrorCode.UNLIKELY_MAGNITUDE)
+            _refuse(name, values, unlikely, _likely_range(field, first), ErrorCode.UNLIKELY_MAGNITUDE)
     return values * field.to_si
 
 
@@ -174,7 +175,7 @@ def _refuse(name: str, values: Floats, bad: NDArray[np.bool_], allowed: str, cod
         raise InvalidInput(name, float(values.flat[first]), allowed, index=first if values.ndim else None, code=code)
 
 
-def _slip(field: LabField, size: float) -> Requirement:
+def _likely_range(field: LabField, size: float) -> Requirement:
     """The allowed range, and the unit that was probably meant."""
     assert field.likely is not None
     low, high = field.likely

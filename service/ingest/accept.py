@@ -165,7 +165,7 @@ def _kept(
         return {**result, "status": "refused", "id": None, "skin_id": None, "recordings": refused}
     notes = [
         *checked.notes,
-        *_stays(connection, checked.campaign, options),
+        *_other_skin(connection, checked.campaign, options),
         *_repeats(connection, checked.campaign, options),
     ]
     result["notes"] = notes
@@ -179,7 +179,7 @@ def _kept(
     return {**result, "status": "ok", "id": campaign_id, "skin_id": skin_id, "recordings": stored + refused}
 
 
-def _stays(connection: Connection, campaign: Campaign, options: IngestOptions) -> list[str]:
+def _other_skin(connection: Connection, campaign: Campaign, options: IngestOptions) -> list[str]:
     """What is said of a correction that names another skin than that of the campaign it corrects."""
     named = campaign.skin.id
     if options.corrects is None or options.skin is not None or named is None:

@@ -116,7 +116,7 @@ async def _body(request: Request, most_bytes: float) -> AsyncIterator[bytes]:
 
 
 async def _whole(body: AsyncIterator[bytes], folder: Path) -> Upload:
-    part = _Part(folder / "0")
+    part = _FormPart(folder / "0")
     try:
         async for chunk in body:
             part.write(chunk)
@@ -142,7 +142,7 @@ async def _parts(body: AsyncIterator[bytes], folder: Path, boundary: bytes) -> l
 
 
 @dataclass
-class _Part:
+class _FormPart:
     """A file under way."""
 
     path: Path
@@ -172,7 +172,7 @@ class _Form:
         self._folder = folder
         self._name = b""
         self._value = b""
-        self.parts: list[_Part] = []
+        self.parts: list[_FormPart] = []
         self.ended = False
 
     def callbacks(self) -> "MultipartCallbacks":
@@ -194,7 +194,7 @@ class _Form:
     def _begin(self) -> None:
         if len(self.parts) == _MOST_PARTS:
             raise Refusal(413, f"The form has more than {_MOST_PARTS} parts; send fewer files a request.")
-        self.parts.append(_Part(self._folder / str(len(self.parts))))
+        self.parts.append(_FormPart(self._folder / str(len(self.parts))))
 
     def _header_field(self, data: bytes, start: int, end: int) -> None:
         self._name = _short(self._name + data[start:end])

@@ -20,7 +20,7 @@ from service.store.tables import AnyRow
 from underskin.recordings.readers import json_file
 
 if TYPE_CHECKING:
-    from underskin.diagnosis.planning.rig_limits import Limits
+    from underskin.diagnosis.planning.rig_limits import RigLimits
 
 _REMEMBERED = 50
 _MOST_WAITING = 8
@@ -56,7 +56,7 @@ class Planner:
         self._worker: Worker | None = None
         self._threads: set[threading.Thread] = set()
 
-    def plan(self, row: AnyRow, limits: "Limits") -> Planned:
+    def plan(self, row: AnyRow, limits: "RigLimits") -> Planned:
         """That of a diagnosis within these limits: begun where it is not known, or failed a minute ago; raises
         Refusal 503 where too many wait, or where this server runs no diagnoses."""
         key = (str(row.id), repr(limits))
@@ -87,7 +87,7 @@ class Planner:
         for thread in threads:
             thread.join(_JOIN_S)
 
-    def _job(self, row: AnyRow, limits: "Limits", planned: Planned) -> None:
+    def _job(self, row: AnyRow, limits: "RigLimits", planned: Planned) -> None:
         try:
             with self._turn:
                 if not self._ending.is_set():
@@ -99,7 +99,7 @@ class Planner:
             with self._lock:
                 self._threads.discard(threading.current_thread())
 
-    def _run(self, row: AnyRow, limits: "Limits", planned: Planned) -> None:
+    def _run(self, row: AnyRow, limits: "RigLimits", planned: Planned) -> None:
         planned.state = "running"
         with self._store.reading() as connection:
             campaign, _ = diagnoses.campaign_of(connection, row)

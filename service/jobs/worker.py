@@ -24,7 +24,7 @@ _NICENESS = 10
 class Job:
     """What a worker needs beside the campaign: where its bytes end, the table to use, what was left out and why.
 
-    With `limits` (of `Limits`, by name) it plans the next experiment within them, and makes no report.
+    With `limits` (of `RigLimits`, by name) it plans the next experiment within them, and makes no report.
     """
 
     campaign_bytes: int
@@ -64,13 +64,13 @@ def main() -> None:
 def _work(job: Job, campaign: bytes, say: Callable[[dict[str, Any]], None]) -> None:
     """The report, with what was left out of it among the findings; then the figures, without which it is kept too."""
     from underskin.diagnosis.pipeline import diagnose
-    from underskin.diagnosis.planning.rig_limits import Limits
+    from underskin.diagnosis.planning.rig_limits import RigLimits
     from underskin.diagnosis.reporting.figures import figures
     from underskin.diagnosis.reporting.report import report
     from underskin.errors import TableError
     from underskin.findings.codes import Reason
     from underskin.findings.finding import Finding
-    from underskin.process_limits import limit_process
+    from underskin.parallel import limit_process
     from underskin.recordings.campaign import parse
     from underskin.surrogate.sigma_table import load_table
 
@@ -78,7 +78,7 @@ def _work(job: Job, campaign: bytes, say: Callable[[dict[str, Any]], None]) -> N
     if table.sha256 != job.table_sha256:
         raise TableError(f"{job.table} changed since the server started: restart it")
     limit_process(job.memory_bytes)
-    limits = Limits(**job.limits or {})
+    limits = RigLimits(**job.limits or {})
     diagnosis = diagnose(parse(orjson.loads(campaign)), table, lambda share: say({"progress": share}), limits)
     if job.limits is not None:
         say({"plan": dict(diagnosis.next_experiment)})

@@ -9,12 +9,12 @@ from service.middleware.unique_keys import require_unique_keys
 from service.problems import Refusal, from_validation
 from service.schemas.columns import ColumnsRequest
 from underskin import InvalidInput
-from underskin.columns import CsvError, from_csv
+from underskin.prediction.columns import CsvError, from_csv
 
-Kind = TypeVar("Kind", bound=ColumnsRequest)
+RequestKind = TypeVar("RequestKind", bound=ColumnsRequest)
 
 
-def parse(kind: type[Kind], body: bytes, content_type: str) -> Kind:
+def parse(kind: type[RequestKind], body: bytes, content_type: str) -> RequestKind:
     """The request in `body`; raises Refusal 400 (unreadable), 415 (another type) or 422 (a field is wrong)."""
     fields = (
         _from_csv(kind, body)

@@ -33,7 +33,7 @@ class Idempotency:
         self._key = idempotency_key
 
     def answer(self, store: Database, body: Any, act: Callable[[Connection], dict[str, Any]]) -> dict[str, Any]:
-        """What `act` answers in a transaction of its own, or what it answered before; `told` is the request's body."""
+        """What `act` answers in a transaction of its own, or what it answered before; `body` is the request's."""
         if self._key is None:
             with store.writing() as connection:
                 return act(connection)

@@ -11,7 +11,7 @@ from service.middleware.unique_keys import JsonRoute
 from service.problems import Refusal
 from service.routes.idempotency import Idempotent
 from service.schemas import diagnoses as answers
-from service.schemas.campaigns import Reason
+from service.schemas.campaigns import ReasonText
 from service.store import models, skins
 from service.usecases import models as usecase
 
@@ -43,7 +43,7 @@ def adopt(skin_id: SkinId, adoption: answers.Adoption, idempotency: Idempotent, 
 )
 def withdraw(
     skin_id: SkinId,
-    reason: Annotated[Reason, Query(description="Why; kept with it.")],
+    reason: Annotated[ReasonText, Query(description="Why; kept with it.")],
     idempotency: Idempotent,
     store: Store,
 ) -> answers.ModelVersion:

@@ -10,7 +10,7 @@ from underskin.errors import ErrorCode
 
 State = Literal["current", "corrected", "withdrawn"]
 
-Reason = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=1000)]
+ReasonText = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=1000)]
 
 
 class SendOptions(BaseModel):
@@ -24,7 +24,7 @@ class SendOptions(BaseModel):
         description="The campaign that this one replaces; it stays, unused. The new one is of the same skin, whatever "
         "it says, unless `skin` says otherwise.",
     )
-    reason: Reason | None = Field(default=None, description="Why it is corrected.")
+    reason: ReasonText | None = Field(default=None, description="Why it is corrected.")
     all_or_nothing: bool = Field(default=False, description="Keep nothing where any recording is refused.")
     together: str | None = Field(
         default=None,
@@ -140,11 +140,11 @@ class _Request(BaseModel):
 class Withdrawal(_Request):
     """Takes a campaign out of all figures; it stays."""
 
-    reason: Reason = Field(description="Why; shown with every figure that leaves it out.")
+    reason: ReasonText = Field(description="Why; shown with every figure that leaves it out.")
 
 
 class Exclusion(_Request):
     """Takes a recording out of all figures; it stays."""
 
     recording: str = Field(description="Its id in the campaign.", examples=["r1"])
-    reason: Reason = Field(description="Why; shown with every figure that leaves it out.")
+    reason: ReasonText = Field(description="Why; shown with every figure that leaves it out.")

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from service.schemas.columns import ColumnsRequest, NonNegative, Status
 from service.schemas.columns_answer import AnswerInColumns
 
-Model = Literal["layer", "half_space"]
+SigmaModelName = Literal["layer", "half_space"]
 
 _A = "Contact radius over skin thickness, a/h [-]."
 _RHO = "Sensor radius over skin thickness, rT/h [-]; 0 is a point sensor."
@@ -21,7 +21,7 @@ class SigmaColumns(ColumnsRequest):
     a_over_h: NonNegative = Field(description=_A)
     rt_over_h: NonNegative = Field(description=_RHO)
     load_parameter: NonNegative = Field(default=0.0, description=_LOAD)
-    model: Model = Field(default="layer", description=_MODEL)
+    model: SigmaModelName = Field(default="layer", description=_MODEL)
 
 
 class SigmaAnswer(AnswerInColumns):
@@ -39,7 +39,7 @@ class SigmaQuery(BaseModel):
     a_over_h: float = Field(ge=0, allow_inf_nan=False, description=_A, examples=[0.3])
     rt_over_h: float = Field(ge=0, allow_inf_nan=False, description=_RHO, examples=[0.6])
     load_parameter: float = Field(default=0.0, ge=0, allow_inf_nan=False, description=_LOAD, examples=[0.01])
-    model: Model = Field(default="layer", description=_MODEL)
+    model: SigmaModelName = Field(default="layer", description=_MODEL)
 
 
 class OneSigma(BaseModel):

@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.schemas.campaigns import Reason
+from service.schemas.campaigns import ReasonText
 
 
 class JoinedSkin(BaseModel):
@@ -46,7 +46,7 @@ class Join(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
     skin_id: str = Field(description="The skin that counts as this one from now on.", examples=["palm-3b"])
-    reason: Reason = Field(description="Why.")
+    reason: ReasonText = Field(description="Why.")
 
 
 class Point(BaseModel):

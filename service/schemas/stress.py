@@ -6,11 +6,11 @@ from service.schemas.columns_answer import AnswerInColumns, FindingModel
 from underskin.array_stress.request import MOST_CONTACTS
 
 
-class _Part(BaseModel):
+class _StressModel(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
 
-class StressSensor(_Part):
+class StressSensor(_StressModel):
     """A sensor of the array."""
 
     id: str = Field(description="Its name, one of its own.")
@@ -18,7 +18,7 @@ class StressSensor(_Part):
     y_mm: float = Field(description="Its centre along the skin's width [mm].")
 
 
-class StressContact(_Part):
+class StressContact(_StressModel):
     """A rigid sphere, pressed in without friction; its tangential force is spread like its pressure."""
 
     x_mm: float = Field(description="Centre of the contact, in the sensors' frame [mm].")
@@ -30,7 +30,7 @@ class StressContact(_Part):
     )
 
 
-class StressMap(_Part):
+class StressMap(_StressModel):
     """Pressure into the skin, constant around each of evenly spaced places."""
 
     x_mm: list[float] = Field(min_length=2, description="Places of the columns, evenly spaced, ascending [mm].")
@@ -38,7 +38,7 @@ class StressMap(_Part):
     pressure_mpa: list[list[float]] = Field(min_length=2, description="Pressure, y × x, at least 0 [MPa].")
 
 
-class StressRequest(_Part):
+class StressRequest(_StressModel):
     """A skin with its sensors, and either contacts or a pressure map."""
 
     thickness_mm: float = Field(gt=0, description="Thickness h of the layer over the sensors [mm].")

@@ -1,7 +1,7 @@
 """Diagnoses: asked for, claimed by one server, kept alive while they run, ended once.
 
-A server that runs a diagnosis says every few seconds that it is alive. One that has been silent for SILENT_S is taken
-for dead, and the diagnosis is claimed again, by the same server after a restart or by another.
+A server that runs a diagnosis says every few seconds that it is alive. One that has not done so for HEARTBEAT_TIMEOUT_S
+is taken for dead, and the diagnosis is claimed again, by the same server after a restart or by another.
 """
 
 import secrets
@@ -22,7 +22,7 @@ from service.store.times import now
 from underskin.recordings.campaign import Campaign
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]
-SILENT_S = 10.0
+HEARTBEAT_TIMEOUT_S = 10.0
 _ENDED = ("done", "failed", "cancelled")
 _USABLE = ("queued", "running", "done")
 
@@ -140,14 +140,14 @@ def cancel(connection: Connection, diagnosis_id: str) -> None:
 
 
 def claim(connection: Connection, server: str, table_sha256: str, version: str) -> AnyRow | None:
-    """Take the next diagnosis to run: a queued one, or a running one whose server is silent; None where there is none.
+    """Take the next diagnosis to run: a queued one, or one whose server is taken for dead; None where there is none.
 
     Servers that claim at once do not get the same one. It is run with the table and the version of the server that has
     it now, whatever they were when it was asked for.
     """
     clock = _clock(connection)
-    silent = (diagnoses.c.alive_at < clock - SILENT_S) & (diagnoses.c.claimed_by != server)
-    waiting = (diagnoses.c.state == "queued") | ((diagnoses.c.state == "running") & silent)
+    abandoned = (diagnoses.c.alive_at < clock - HEARTBEAT_TIMEOUT_S) & (diagnoses.c.claimed_by != server)
+    waiting = (diagnoses.c.state == "queued") | ((diagnoses.c.state == "running") & abandoned)
     query = select(diagnoses.c.number, diagnoses.c.id).where(waiting).order_by(diagnoses.c.number).limit(1)
     row = connection.execute(query.with_for_update(skip_locked=True)).first()
     if row is None:

@@ -31,7 +31,7 @@ _WITHDRAWAL = ("withdrawn_at", "withdrawn_from", "withdraw_reason")
 _MODEL = ("id", "skin_id", "version", "adopted_at", "adopted_from", *_WITHDRAWAL)
 
 
-class _Row(BaseModel):
+class _ExportedModel(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
 
@@ -72,7 +72,7 @@ class _Report(BaseModel):
     provenance: dict[str, Any]
 
 
-class DiagnosisRow(_Row):
+class DiagnosisRow(_ExportedModel):
     """A row of diagnoses."""
 
     id: Annotated[str, StringConstraints(pattern=r"^d-[0-9a-f]{16}$")]
@@ -92,7 +92,7 @@ class DiagnosisRow(_Row):
     report: dict[str, Any] | None
 
 
-class ModelRow(_Row):
+class ModelRow(_ExportedModel):
     """A row of models."""
 
     id: Annotated[str, StringConstraints(pattern=r"^m-[0-9a-f]{16}$")]

@@ -84,7 +84,7 @@ class CheckedOverview:
 
 
 @dataclass(frozen=True)
-class CheckedCampaign:
+class ImportedCampaign:
     """A campaign with its row and its exclusions, ready to be kept."""
 
     row: dict[str, Any]
@@ -107,7 +107,7 @@ def overview(exported: Overview) -> CheckedOverview:
     return CheckedOverview(rows, rigs)
 
 
-def campaign(exported: ExportedCampaign, name: str, skins: Sequence[SkinRow]) -> CheckedCampaign:
+def campaign(exported: ExportedCampaign, name: str, skins: Sequence[SkinRow]) -> ImportedCampaign:
     """The campaign that the file has under `name`, checked as an upload is."""
     state = CampaignRow.model_validate(exported.about)
     _require(state.id == name, "id", state.id, f"must be {name}, as the file names it")
@@ -130,7 +130,7 @@ def campaign(exported: ExportedCampaign, name: str, skins: Sequence[SkinRow]) ->
         "recorded_at": codec.earliest(parsed),
         "revision": 0,
     }
-    return CheckedCampaign(row, parsed, exclusions)
+    return ImportedCampaign(row, parsed, exclusions)
 
 
 def _require_joined(root: str, rows: Sequence[SkinRow]) -> None:

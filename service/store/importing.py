@@ -13,7 +13,7 @@ from service.store.campaigns import rows_of
 from service.store.engine import Database
 from service.store.errors import Conflict
 from service.store.export import exported
-from service.store.import_checks import CheckedCampaign, CheckedOverview, SkinRow
+from service.store.import_checks import CheckedOverview, ImportedCampaign, SkinRow
 from service.store.tables import AnyRow, recordings, rigs
 from service.store.tables import campaigns as campaigns_table
 from service.store.tables import skins as skins_table
@@ -64,7 +64,7 @@ def add_skins(store: Database, checked: CheckedOverview) -> None:
                 connection.execute(insert(rigs), rig)
 
 
-def add(store: Database, checked: CheckedCampaign) -> None:
+def add(store: Database, checked: ImportedCampaign) -> None:
     """Keep a campaign that is not there."""
     with store.writing() as connection:
         made = connection.execute(insert(campaigns_table).returning(campaigns_table.c.number), checked.row)

@@ -60,16 +60,16 @@ def of_moduli(recordings: Sequence["RecordingModulus"]) -> tuple[list[dict[str, 
     """The entries of `moduli`, and those of `left_out` for recordings that tell none."""
     moduli, left_out = [], []
     for one in recordings:
-        if isinstance(one.found, InvalidInput):
-            left_out.append({"recording": one.recording, "reason": str(one.found)})
+        if isinstance(one.result, InvalidInput):
+            left_out.append({"recording": one.recording, "reason": str(one.result)})
             continue
         moduli.append(
             {
                 "recording": one.recording,
                 "kind": one.kind,
-                "youngs_modulus_mpa": float(to_lab("youngs_modulus_mpa", one.found.modulus)),
-                "youngs_modulus_uncertainty_mpa": float(to_lab("youngs_modulus_mpa", one.found.uncertainty)),
-                "statement": one.found.statement,
+                "youngs_modulus_mpa": float(to_lab("youngs_modulus_mpa", one.result.modulus)),
+                "youngs_modulus_uncertainty_mpa": float(to_lab("youngs_modulus_mpa", one.result.uncertainty)),
+                "statement": one.result.statement,
             }
         )
     return moduli, left_out

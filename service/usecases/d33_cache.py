@@ -168,16 +168,16 @@ def _inverted(
     from underskin.inversion.invert import invert
     from underskin.recordings import elastomer, plausibility
 
-    moduli, silent = of_moduli(elastomer.of_campaign(campaign))
+    moduli, without_modulus = of_moduli(elastomer.of_campaign(campaign))
     try:
         inversion = invert(campaign, table, band_hz)
     except InvalidInput as error:
         if band_hz is not None and error.field == "band_hz":
             raise
         findings = [finding.sentence for finding in plausibility.implausible(campaign)]
-        return {**_none(str(error)), "findings": findings, "moduli": moduli, "left_out": silent}, None
+        return {**_none(str(error)), "findings": findings, "moduli": moduli, "left_out": without_modulus}, None
     left_out = [{"recording": None, "reason": left.sentence} for left in inversion.left_out]
-    return {**of_inversion(inversion), "moduli": moduli, "left_out": left_out + silent}, inversion
+    return {**of_inversion(inversion), "moduli": moduli, "left_out": left_out + without_modulus}, inversion
 
 
 def _none(reason: str) -> dict[str, Any]:

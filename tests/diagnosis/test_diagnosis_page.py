@@ -22,7 +22,7 @@ from underskin.cli.app import app
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.figures import figures
 from underskin.diagnosis.reporting.html_report import page
-from underskin.diagnosis.reporting.report import Diagnosis, report
+from underskin.diagnosis.reporting.report import DiagnosisResult, report
 from underskin.diagnosis.reporting.wording import readable
 from underskin.mechanisms import compose
 from underskin.mechanisms.registry import CATALOGUE
@@ -83,17 +83,17 @@ def hostile() -> Campaign:
 
 
 @pytest.fixture(scope="module")
-def found() -> Diagnosis:
+def found() -> DiagnosisResult:
     return diagnose(hostile(), load_table())
 
 
 @pytest.fixture(scope="module")
-def document(found: Diagnosis) -> dict[str, Any]:
+def document(found: DiagnosisResult) -> dict[str, Any]:
     return report(found)
 
 
 @pytest.fixture(scope="module")
-def text(found: Diagnosis, document: dict[str, Any]) -> str:
+def text(found: DiagnosisResult, document: dict[str, Any]) -> str:
     return page(document, figures(found, document))
 
 
@@ -165,7 +165,7 @@ def test_a_browser_draws_every_figure(text: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_figures_show_the_report_s_numbers(found: Diagnosis, document: dict[str, Any]) -> None:
+def test_figures_show_the_report_s_numbers(found: DiagnosisResult, document: dict[str, Any]) -> None:
     drawn = figures(found, document)
     bars = drawn["explanations"].data[0]
     assert next(iter(bars.y)) == "contact resonance"
@@ -180,7 +180,7 @@ def test_figures_show_the_report_s_numbers(found: Diagnosis, document: dict[str,
 
 
 @pytest.mark.slow
-def test_after_the_points_lie_within_the_noise_s_band(found: Diagnosis, document: dict[str, Any]) -> None:
+def test_after_the_points_lie_within_the_noise_s_band(found: DiagnosisResult, document: dict[str, Any]) -> None:
     traces = figures(found, document)["before_after"].data
     bands = [trace for trace in traces if trace.fill == "toself"]
     outside = []
@@ -196,7 +196,7 @@ def test_after_the_points_lie_within_the_noise_s_band(found: Diagnosis, document
 
 
 @pytest.mark.slow
-def test_the_map_shows_where_the_misfit_is(found: Diagnosis, document: dict[str, Any]) -> None:
+def test_the_map_shows_where_the_misfit_is(found: DiagnosisResult, document: dict[str, Any]) -> None:
     drawn = figures(found, document)["where"]
     cells, (outline,) = np.abs(np.asarray(drawn.data[0].z, dtype=float)), drawn.layout.shapes
     inside = cells[:, int(outline.x0 + 0.5) : int(outline.x1 + 0.5)]

@@ -15,9 +15,9 @@ from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.planning.optimal_design import plan
-from underskin.diagnosis.planning.rig_limits import Limits
+from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.selection.search import Answer, Search, search
-from underskin.formatting import in_percent
+from underskin.findings.formatting import in_percent
 from underskin.mechanisms import compose
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable, load_table
@@ -40,7 +40,7 @@ class Left:
         self.search = search(self.problem)
 
     def plan(self, **limits: Any) -> dict[str, Any]:
-        return plan(self.problem, self.search, Limits(**limits))
+        return plan(self.problem, self.search, RigLimits(**limits))
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +103,7 @@ def test_rivals_without_a_law_and_curves_have_a_document_too(narrow: Left, table
             return [Answer(leader, 0.6), Answer(None, 0.4)]
 
     torn = Torn(narrow.search.explanations, (process,), narrow.search.unsupported)
-    planned = plan(narrow.problem, torn, Limits())
+    planned = plan(narrow.problem, torn, RigLimits())
     assert planned["recordings"] == []
     assert "something without a name" in planned["statement"]
     assert diagnose(indentation_campaign(), table).next_experiment is not None

@@ -12,7 +12,7 @@ from underskin.diagnosis.data.dataset import Lines, lines
 from underskin.diagnosis.inference.evidence import laplace
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.optimizer import Fitter
-from underskin.diagnosis.localisation.effect_size import Effect, effect
+from underskin.diagnosis.localisation.effect_size import EffectSize, effect
 from underskin.diagnosis.localisation.permutation_test import AxisResult, Undecidable
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
@@ -22,7 +22,7 @@ from underskin.diagnosis.reporting.statements import answer_statement, location_
 from underskin.diagnosis.selection.occam_correction import fit_and_plausibility, without_occam
 from underskin.diagnosis.selection.search import Answer
 from underskin.diagnosis.validation.identifiability import Confounding, left_open
-from underskin.formatting import in_percent
+from underskin.findings.formatting import in_percent
 from underskin.mechanisms.base import Kind
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Floats
@@ -40,7 +40,7 @@ def recorded(table: SigmaTable) -> Lines:
     return lines(campaign(Made(repeats=3, gain=GAIN), table))
 
 
-def effect_of(recorded: Lines, off: Floats) -> Effect:
+def effect_of(recorded: Lines, off: Floats) -> EffectSize:
     """Of recordings that lie above a model by `off` (recordings,)."""
     model = recorded.value / (1 + off)[recorded.recording]
     return effect(recorded, model, np.ones(len(model), dtype=bool), 0.0, 1.0)
@@ -73,13 +73,15 @@ AXES = [AxisResult("preload_n", 0.001, 0.5), AxisResult("load_cycles", None, 0.0
 
 def test_a_location_has_units_and_leaves_out_what_spans_a_whole_axis() -> None:
     ranges: dict[str, list[float | str]] = {"preload_n": [2.0, 3.0], "load_cycles": [0.0, 108200.0]}
-    size = Effect(-36.94, -40.04, -33.02, True)
+    size = EffectSize(-36.94, -40.04, -33.02, True)
     said = location_statement(AXES, ranges, {"preload_n": False, "load_cycles": True}, size)
     assert said == (
         "The misfit depends on preload; most of it lies at preload 2 to 3 N, where the response is 36.9 % below the "
         "model (95 %: 33 to 40 %); whether it depends on load cycles, this design cannot tell."
     )
-    both = location_statement(AXES, ranges, {"preload_n": True, "load_cycles": True}, Effect(12.0, 9.0, 15.0, False))
+    both = location_statement(
+        AXES, ranges, {"preload_n": True, "load_cycles": True}, EffectSize(12.0, 9.0, 15.0, False)
+    )
     assert "spread over all of the recordings" in both
     assert "off by 12 % (root mean square" in both
 
@@ -87,14 +89,17 @@ def test_a_location_has_units_and_leaves_out_what_spans_a_whole_axis() -> None:
 @pytest.mark.parametrize(
     ("size", "said"),
     [
-        (Effect(-132.0, -140.0, -125.0, True), "the other sign than the model's, -0.32 times it (95 %: -0.4 to -0.25)"),
-        (Effect(-95.0, -96.0, -94.0, True), "the response is 0.05 times the model's (95 %: 0.04 to 0.06)"),
-        (Effect(2820.0, 2700.0, 2970.0, True), "the response is 29 times the model's (95 %: 28 to 31)"),
-        (Effect(1500.0, 1400.0, 1600.0, False), "off by 1500 % (root mean square"),
-        (Effect(0.5, -0.3, 0.9, True), "0.5 % above the model (95 %: -0.3 to +0.9 %)"),
+        (
+            EffectSize(-132.0, -140.0, -125.0, True),
+            "the other sign than the model's, -0.32 times it (95 %: -0.4 to -0.25)",
+        ),
+        (EffectSize(-95.0, -96.0, -94.0, True), "the response is 0.05 times the model's (95 %: 0.04 to 0.06)"),
+        (EffectSize(2820.0, 2700.0, 2970.0, True), "the response is 29 times the model's (95 %: 28 to 31)"),
+        (EffectSize(1500.0, 1400.0, 1600.0, False), "off by 1500 % (root mean square"),
+        (EffectSize(0.5, -0.3, 0.9, True), "0.5 % above the model (95 %: -0.3 to +0.9 %)"),
     ],
 )
-def test_large_effects_are_factors(size: Effect, said: str) -> None:
+def test_large_effects_are_factors(size: EffectSize, said: str) -> None:
     assert said in location_statement(AXES, {}, {}, size)
 
 
@@ -114,7 +119,7 @@ def test_a_probability_is_never_certain_and_the_same_everywhere(table: SigmaTabl
 
 def test_within_the_noise_nothing_is_said_to_lie_anywhere() -> None:
     said = location_statement(
-        AXES, {"preload_n": [2.0, 3.0]}, {"preload_n": False}, Effect(0.05, -1, 1, True), agrees=True
+        AXES, {"preload_n": [2.0, 3.0]}, {"preload_n": False}, EffectSize(0.05, -1, 1, True), agrees=True
     )
     assert said.startswith("What is left is within the noise, though more of it goes along with preload than chance")
     assert "above the model" not in said

@@ -14,7 +14,7 @@ from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.selection.frequency_gp import frequency_bins
-from underskin.diagnosis.selection.recording_gp import GainResidual, Scatter
+from underskin.diagnosis.selection.recording_gp import GainResidual, ScatterNode
 from underskin.recordings.campaign import from_dict
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
@@ -84,7 +84,7 @@ def test_the_evidence_of_a_process_is_that_of_the_whole_covariance(table: SigmaT
     sets = np.random.default_rng(1).normal(size=(3, problem.lines.recordings, 4))
     known = residual.fixed @ residual.fixed.T
 
-    def log_density(scatter: Scatter, shapes: np.ndarray) -> float:
+    def log_density(scatter: ScatterNode, shapes: np.ndarray) -> float:
         whole = np.diag(scatter.variance) + known + shapes @ shapes.T
         density = multivariate_normal(np.zeros(len(whole)), whole).logpdf(scatter.residual)
         return scatter.log_weight + float(density)

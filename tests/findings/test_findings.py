@@ -13,7 +13,7 @@ import pytest
 from tests.support.repository import ROOT
 from underskin.errors import ErrorCode, FileError, InvalidInput
 from underskin.findings import english, sentences
-from underskin.findings.arguments import D33Doubt, DefectKind, UnitGuess
+from underskin.findings.arguments import DefectKind, ImplausibleD33, UnitGuess
 from underskin.findings.codes import FindingCode, Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
@@ -53,7 +53,7 @@ def test_each_code_has_a_reason_and_each_reason_words() -> None:
     assert {reason.code for reason in Reason} == set(FindingCode)
     assert set(english.ENGLISH) == set(Reason)
     assert set(english.LACKING) == set(Lack)
-    assert set(sentences.D33_DOUBTS) == set(D33Doubt)
+    assert set(sentences.IMPLAUSIBLE_D33) == set(ImplausibleD33)
     assert set(sentences.DEFECTS) == set(DefectKind)
 
 
@@ -99,7 +99,7 @@ def test_a_finding_states_its_arguments() -> None:
     }
     assert finding.sentence == "recording b: the same numbers as recording 'a': left out"
     row = Finding(
-        Reason.D33_OF_ROW, "", "d33_pc_per_n", {"d33_pc_per_n": -3.0, "doubt": D33Doubt.NEGATIVE, "more": 2}, 4
+        Reason.D33_OF_ROW, "", "d33_pc_per_n", {"d33_pc_per_n": -3.0, "kind": ImplausibleD33.NEGATIVE, "more": 2}, 4
     )
     assert row.in_columns() == {
         "code": "implausible_d33",

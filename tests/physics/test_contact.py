@@ -40,7 +40,7 @@ def test_every_row_of_the_oracle() -> None:
     assert len(rows) == 60
     solved = ContactEquation(rows[:, 0]).solve(Layer())
     for found, expected in zip((solved.sphere_force, solved.sphere_depth, solved.stiffness), rows.T[1:], strict=True):
-        assert found[0] == pytest.approx(expected, rel=6e-8)
+        assert found.value == pytest.approx(expected, rel=6e-8)
     setup = SphereOnLayer(RADIUS, MODULUS, THICKNESS, Layer())
     for a, force, depth, stiffness in rows[::12]:
         radius = a * THICKNESS
@@ -71,12 +71,12 @@ def test_the_surface_takes_the_indenters_shape(body: Layer) -> None:
         deflected: Floats = half_space - j0(np.multiply.outer(r, k)) @ (weight * body.stiffening(k).value * transform)
         return deflected
 
-    punch = deflection(solved.punch_shape[0, 0])
+    punch = deflection(solved.punch_shape.value[0])
     assert punch == pytest.approx(punch[0], rel=1e-10)
-    sphere = deflection(solved.sphere_shape[0, 0])
-    force = 4 / 3 * alpha**3 * solved.sphere_force[0, 0]  # E' = h = R = 1; φ is force/(2πα) times the shape
+    sphere = deflection(solved.sphere_shape.value[0])
+    force = 4 / 3 * alpha**3 * solved.sphere_force.value[0]  # E' = h = R = 1; φ is force/(2πα) times the shape
     surface = 2 * force / (2 * np.pi * alpha) * sphere
-    assert surface == pytest.approx(alpha**2 * solved.sphere_depth[0, 0] - r**2 / 2, abs=1e-9)
+    assert surface == pytest.approx(alpha**2 * solved.sphere_depth.value[0] - r**2 / 2, abs=1e-9)
 
 
 def test_a_thick_layer_gives_hertz() -> None:

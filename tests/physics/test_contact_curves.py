@@ -5,7 +5,7 @@ import pytest
 from scipy.special import j0
 
 from tests.support.sphere_contact import SphereOnLayer
-from underskin.physics.contact_curves import REACH, ContactRows, CurveGrid
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactRows, CurveGrid
 from underskin.physics.contact_integral_equation import ContactEquation, mode_transforms
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average
@@ -30,7 +30,7 @@ def _dimensionless(setup: SphereOnLayer, force: Floats) -> tuple[Floats, Floats]
 def test_rows_equal_single_contacts(body: Layer, work_of_adhesion: float) -> None:
     setup = SphereOnLayer(RADIUS, MODULUS, THICKNESS, body, work_of_adhesion)
     lowest = setup.pull_off().contact_radius if work_of_adhesion else 0.0
-    radii = lowest + (REACH * THICKNESS - lowest) * np.array([0.01, 0.1, 0.5, 0.99])
+    radii = lowest + (LARGEST_A_OVER_H * THICKNESS - lowest) * np.array([0.01, 0.1, 0.5, 0.99])
     exact = [setup.at_radius(radius) for radius in radii]
     forces = np.array([contact.force for contact in exact])
     rows = GRID.curves(body).at_load(*_dimensionless(setup, forces))
@@ -60,8 +60,8 @@ def test_stress_from_the_points_in_a(body: Layer) -> None:
             (solved.sphere_shape, curves.sphere_transform),
             (solved.punch_shape, curves.punch_transform),
         ):
-            exact = np.einsum("akn,an,k->a", transforms, shape[0], weight)
-            found = basis @ curves.interval.coefficients(nodes[0] @ weight)
+            exact = np.einsum("akn,an,k->a", transforms, shape.value, weight)
+            found = basis @ curves.interval.coefficients(nodes.value @ weight)
             assert found == pytest.approx(exact, abs=1e-6)
 
 
@@ -89,10 +89,10 @@ def test_derivatives_of_the_transforms() -> None:
         (GRID.curves(Layer(0.4 + step, 0.3)), GRID.curves(Layer(0.4 - step, 0.3))),
         (GRID.curves(Layer(0.4, 0.3 + step)), GRID.curves(Layer(0.4, 0.3 - step))),
     ]
-    for index, (higher, lower) in enumerate(neighbours, start=1):
+    for index, (higher, lower) in enumerate(neighbours):
         for name in ("sphere_transform", "punch_transform"):
-            difference = (getattr(higher, name)[0] - getattr(lower, name)[0]) / (2 * step)
-            assert getattr(curves, name)[index] == pytest.approx(difference, abs=1e-8)
+            difference = (getattr(higher, name).value - getattr(lower, name).value) / (2 * step)
+            assert getattr(curves, name).slopes[index] == pytest.approx(difference, abs=1e-8)
 
 
 def test_a_whole_contact_is_the_sum_of_sphere_and_punch() -> None:
@@ -103,7 +103,7 @@ def test_a_whole_contact_is_the_sum_of_sphere_and_punch() -> None:
     load, adhesion = _dimensionless(setup, np.array([contact.force]))
     rows = curves.at_load(load, adhesion)
     punch = rows.load.value - rows.sphere_load.value
-    whole = rows.sphere_load.value * curves.sphere_transform[0, node] + punch * curves.punch_transform[0, node]
+    whole = rows.sphere_load.value * curves.sphere_transform.value[node] + punch * curves.punch_transform.value[node]
     exact = contact.pressure_transform(K * curves.interval.nodes[node]) / contact.force
     assert whole / load == pytest.approx(exact, abs=1e-8)
 
@@ -122,10 +122,10 @@ def test_no_contact_is_nan() -> None:
 def test_stiffness_at_a_given_radius() -> None:
     alpha, step = np.array([0.0, 0.3, 2.0, 3.9]), 1e-5
     found = GRID.curves(Layer(0.4, 0.3)).stiffness_at(alpha)
-    assert found[0, 0] == pytest.approx(1.0, abs=1e-8)
+    assert found.value[0] == pytest.approx(1.0, abs=1e-8)
     exact = ContactEquation(alpha[1:]).solve(Layer(0.4, 0.3)).stiffness
-    assert found[[0, 2, 3], 1:] == pytest.approx(exact, rel=1e-6)
-    neighbours = (
-        ContactEquation(np.concatenate([alpha[1:] - step, alpha[1:] + step])).solve(Layer(0.4, 0.3)).stiffness[0]
-    )
-    assert found[1, 1:] == pytest.approx((neighbours[3:] - neighbours[:3]) / (2 * step), rel=1e-6)
+    assert found.value[1:] == pytest.approx(exact.value, rel=1e-6)
+    assert found.slopes[1:, 1:] == pytest.approx(exact.slopes, rel=1e-6)
+    around = np.concatenate([alpha[1:] - step, alpha[1:] + step])
+    neighbours = ContactEquation(around).solve(Layer(0.4, 0.3)).stiffness.value
+    assert found.slopes[0, 1:] == pytest.approx((neighbours[3:] - neighbours[:3]) / (2 * step), rel=1e-6)

@@ -17,7 +17,7 @@ from tests.support.instrument_files import hdf5, tdms
 from underskin.errors import FileError
 from underskin.recordings import read_contents, read_file
 from underskin.recordings.channels import Contents
-from underskin.recordings.readers.sandbox import Limits, call_apart, parse_apart
+from underskin.recordings.readers.sandbox import ParsingLimits, call_apart, parse_apart
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_a_small_file_that_unfolds_beyond_the_memory_limit_is_refused() -> None:
         stream.write(data)
         stream.flush()
         with pytest.raises(FileError, match=r"bomb\.mat: .*more than 0\.1 GB of memory"):
-            parse_apart("MATLAB", stream, "bomb.mat", Limits(memory_bytes=107_374_182))
+            parse_apart("MATLAB", stream, "bomb.mat", ParsingLimits(memory_bytes=107_374_182))
 
 
 @pytest.mark.slow
@@ -92,7 +92,7 @@ def test_attributes_named_as_no_field_is_are_refused_one_by_one() -> None:
 
 def test_a_file_that_takes_too_long_is_refused(stream: BinaryIO) -> None:
     with pytest.raises(FileError, match=r"slow\.tdms: reading it as TDMS took more than 0\.02 s"):
-        parse_apart("TDMS", stream, "slow.tdms", Limits(seconds=0.02))
+        parse_apart("TDMS", stream, "slow.tdms", ParsingLimits(seconds=0.02))
 
 
 def die(_stream: BinaryIO) -> None:

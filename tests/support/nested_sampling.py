@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import dynesty
 import numpy as np
 
-from underskin.diagnosis.inference.hypothesis import CovarianceParameter, Point
+from underskin.diagnosis.inference.hypothesis import CovarianceParameter, FitPoint
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.units import Floats
 
@@ -20,7 +20,7 @@ _MOST_UNIFORM = 6  # parameters up to which dynesty draws uniformly
 class Posterior:
     """One hypothesis' likelihood and prior as functions of all its parameters x: the mean's, then the covariance's."""
 
-    def __init__(self, fitter: Fitter, around: Point) -> None:
+    def __init__(self, fitter: Fitter, around: FitPoint) -> None:
         """`around` gives the place where the sensors' gains are linearised first."""
         self.fitter, self._around = fitter, around
         self._mean = [fitter.parameters[place] for place in fitter.places]

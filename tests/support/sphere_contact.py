@@ -70,17 +70,17 @@ class SphereOnLayer:
         if not 0 < alpha <= LARGEST:
             raise InvalidInput("contact_radius", contact_radius, f"must be above 0 and at most {LARGEST:g} thicknesses")
         solved = ContactEquation(np.array([alpha])).solve(self.layer)
-        stiffness = 2 * self.plane_modulus * contact_radius * solved.stiffness[0, 0]
-        sphere = self._force_unit * 4 / 3 * alpha**3 * solved.sphere_force[0, 0]
-        punch = -self._force_unit * self._root_adhesion * np.sqrt(8 * np.pi * alpha**3) * solved.edge_force[0, 0]
-        depth = alpha**2 * solved.sphere_depth[0, 0]
-        depth -= self._root_adhesion * np.sqrt(2 * np.pi * alpha) * solved.edge_depth[0, 0]
+        stiffness = 2 * self.plane_modulus * contact_radius * solved.stiffness.value[0]
+        sphere = self._force_unit * 4 / 3 * alpha**3 * solved.sphere_force.value[0]
+        punch = -self._force_unit * self._root_adhesion * np.sqrt(8 * np.pi * alpha**3) * solved.edge_force.value[0]
+        depth = alpha**2 * solved.sphere_depth.value[0]
+        depth -= self._root_adhesion * np.sqrt(2 * np.pi * alpha) * solved.edge_depth.value[0]
         return SphereContact(
             contact_radius=contact_radius,
             force=sphere + punch,
             indentation=depth * self.thickness**2 / self.indenter_radius,
             stiffness=stiffness,
-            _modes=sphere * solved.sphere_shape[0, 0] + punch * solved.punch_shape[0, 0],
+            _modes=sphere * solved.sphere_shape.value[0] + punch * solved.punch_shape.value[0],
         )
 
     def at_force(self, force: float) -> SphereContact:

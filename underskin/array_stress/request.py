@@ -11,12 +11,11 @@ from typing import Annotated, Any
 import numpy as np
 
 from underskin.array_stress import pressure_map
-from underskin.errors import InvalidInput
+from underskin.errors import InvalidInput, Mention, Requirement
 from underskin.recordings import validation as field
 from underskin.recordings.conditions import Sensors
 from underskin.recordings.readers import json_file
 from underskin.recordings.shown_values import shown
-from underskin.requirement import Mention, Requirement
 from underskin.units import Floats
 
 MOST_CONTACTS = 1000

@@ -20,7 +20,7 @@ from underskin.cli import diagnose, invert_files, store, stress
 from underskin.errors import UnderskinError
 
 if TYPE_CHECKING:
-    from underskin.prediction.answers import Answer
+    from underskin.prediction.answers import ComputedColumns
     from underskin.surrogate.sigma_table import SigmaTable
     from underskin.units import Floats
 
@@ -138,9 +138,9 @@ def d33(
     units_checked: UnitsChecked = False,
     input_file: Input = None,
     csv: Csv = False,
-    files: invert_files.Files = None,
+    files: invert_files.FilesArgument = None,
     rig: invert_files.Rig = None,
-    band: invert_files.Band = None,
+    band: invert_files.BandOption = None,
     figures: invert_files.Figures = None,
     together: invert_files.Together = None,
 ) -> None:
@@ -179,11 +179,11 @@ def _answer(
     defaults: Mapping[str, float | None],
     input_file: str | None,
     as_csv: bool,
-    compute: "Callable[[SigmaTable, Mapping[str, Floats]], Answer]",
+    compute: "Callable[[SigmaTable, Mapping[str, Floats]], ComputedColumns]",
 ) -> None:
     """Gather the columns, compute, and write inputs and results."""
     from underskin.cli import columns
-    from underskin.columns import rows
+    from underskin.prediction.columns import rows
     from underskin.surrogate.sigma_table import load_table
 
     gathered = columns.gather(options, defaults, input_file)

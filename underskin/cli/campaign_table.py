@@ -13,7 +13,7 @@ from rich.text import Text
 
 from underskin.cli.columns import PIPED_WIDTH
 from underskin.errors import InvalidInput
-from underskin.formatting import significant
+from underskin.findings.formatting import significant
 from underskin.inversion.invert import Inversion
 from underskin.inversion.mixed_model import Estimate
 from underskin.recordings import plausibility
@@ -45,7 +45,7 @@ class InvertedFile:
     @property
     def is_of_use(self) -> bool:
         """Whether the inversion gave d33 or a modulus."""
-        measured = any(not isinstance(modulus.found, InvalidInput) for modulus in self.moduli)
+        measured = any(not isinstance(modulus.result, InvalidInput) for modulus in self.moduli)
         return isinstance(self.inversion, Inversion) or measured
 
     @property
@@ -65,8 +65,8 @@ class InvertedFile:
         for problem in self.reading.problems:
             notes.append(f"left out: recording {problem.recording}: {problem.as_error(problem.field)}")
         for modulus in self.moduli:
-            if isinstance(modulus.found, InvalidInput):
-                notes.append(f"left out: recording {modulus.recording}: {modulus.found}")
+            if isinstance(modulus.result, InvalidInput):
+                notes.append(f"left out: recording {modulus.recording}: {modulus.result}")
         if isinstance(self.inversion, Inversion):
             notes += [f"left out: {left.sentence}" for left in self.inversion.left_out]
         return notes
@@ -80,7 +80,7 @@ def write_tables(everything: Iterable[InvertedFile]) -> None:
         if isinstance(entry.inversion, Inversion):
             console.print(_array(entry.inversion))
             console.print(_sensors(entry.inversion))
-        if any(not isinstance(modulus.found, InvalidInput) for modulus in entry.moduli):
+        if any(not isinstance(modulus.result, InvalidInput) for modulus in entry.moduli):
             console.print(_elastomer(entry.moduli))
         for note in entry.notes:
             console.print(Text(note), soft_wrap=True)
@@ -161,9 +161,9 @@ def _sensors(inversion: Inversion) -> Table:
 def _elastomer(moduli: Sequence[RecordingModulus]) -> Table:
     table = _table("recording", "E\nMPa", "±\nMPa", remark="from")
     for modulus in moduli:
-        if not isinstance(modulus.found, InvalidInput):
-            numbers = to_lab("youngs_modulus_mpa", [modulus.found.modulus, modulus.found.uncertainty]).tolist()
-            table.add_row(Text(modulus.recording), *_short(numbers), f"{modulus.kind}: {modulus.found.statement}")
+        if not isinstance(modulus.result, InvalidInput):
+            numbers = to_lab("youngs_modulus_mpa", [modulus.result.modulus, modulus.result.uncertainty]).tolist()
+            table.add_row(Text(modulus.recording), *_short(numbers), f"{modulus.kind}: {modulus.result.statement}")
     return table
 
 

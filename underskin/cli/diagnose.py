@@ -15,14 +15,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from underskin.cli.store import LOCAL, Key, Url, connect
+from underskin.cli.store import LOCAL, KeyOption, Url, connect
 from underskin.errors import UnderskinError
 from underskin.parallel import one_blas_thread, processes
 
 if TYPE_CHECKING:
     from underskin.client.service_client import Client
 
-Files = Annotated[list[Path] | None, typer.Argument(help="Campaigns (campaign/1, JSON, or any format that is read).")]
+FilesArgument = Annotated[
+    list[Path] | None, typer.Argument(help="Campaigns (campaign/1, JSON, or any format that is read).")
+]
 _REPORTS = Path("diagnosis")
 
 Workers = Annotated[int, typer.Option(min=0, help="Processes; 0 is one for each core.")]
@@ -44,7 +46,7 @@ def add_commands(app: typer.Typer) -> None:
 
 
 def diagnose(
-    files: Files = None,
+    files: FilesArgument = None,
     output_dir: Annotated[Path, typer.Option(help="Folder for the reports; made where it does not exist.")] = _REPORTS,
     html: Annotated[bool, typer.Option("--html", help="Also write each report as a page with figures.")] = False,
     workers: Workers = 0,
@@ -56,7 +58,7 @@ def diagnose(
         list[str] | None, typer.Option(help="Id of a campaign that the service keeps and diagnoses; repeatable.")
     ] = None,
     url: Url = LOCAL,
-    key: Key = None,
+    key: KeyOption = None,
 ) -> None:
     """Where recordings and model disagree, and what physics the model left out: one report a campaign."""
     from rich.console import Console
@@ -254,12 +256,12 @@ def plan(
     """
     one_blas_thread()
     from underskin.diagnosis.pipeline import diagnose as work_out
-    from underskin.diagnosis.planning.rig_limits import Limits
+    from underskin.diagnosis.planning.rig_limits import RigLimits
     from underskin.recordings import read_file
     from underskin.surrogate.sigma_table import load_table
 
     campaign = read_file(file, file.name).campaign
-    limits = Limits(
+    limits = RigLimits(
         preload_n=preload_n,
         indenter_radius_mm=indenter_radius_mm,
         dynamic_force_n=dynamic_force_n,

@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 _BandHz = tuple[float, float]
 
-Files = Annotated[
+FilesArgument = Annotated[
     list[Path] | None, typer.Argument(help="Campaigns, or files as instruments write them; each is inverted by itself.")
 ]
 Together = Annotated[
     str | None, typer.Option(metavar="NAME", help="Join the FILEs, all of one skin, into one campaign called NAME.")
 ]
 Rig = Annotated[Path | None, typer.Option(help="Rig description, for files that hold channels.")]
-Band = Annotated[
+BandOption = Annotated[
     str | None, typer.Option(metavar="LOW,HIGH", help="Average FILE from LOW to HIGH [Hz], not over its flat zone.")
 ]
 Figures = Annotated[

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from underskin.errors import UnderskinError
-from underskin.formatting import significant
+from underskin.findings.formatting import significant
 
 if TYPE_CHECKING:
     from underskin.client.service_client import Client
 
 Url = Annotated[str, typer.Option(envvar="UNDERSKIN_URL", help="Where the service is.")]
-Key = Annotated[
+KeyOption = Annotated[
     str | None, typer.Option(envvar="UNDERSKIN_API_KEY", help="API key of scope write, where keys are needed.")
 ]
 LOCAL = "http://127.0.0.1:8000"
@@ -34,7 +34,7 @@ def import_files(
         typer.Option("--all-or-nothing", help="Keep nothing of a file, or of a campaign, with a refused recording."),
     ] = False,
     url: Url = LOCAL,
-    key: Key = None,
+    key: KeyOption = None,
 ) -> None:
     """Send files to the service, one after the other or together; exit status 2 where anything was refused."""
     from rich.console import Console
@@ -59,7 +59,7 @@ def export_skin(
     skin: Annotated[str, typer.Argument(help="The skin.")],
     file: Annotated[Path, typer.Argument(help="The HDF5 file to write.")],
     url: Url = LOCAL,
-    key: Key = None,
+    key: KeyOption = None,
 ) -> None:
     """Write all that the service keeps of a skin into one HDF5 file, for `underskin import` elsewhere."""
     if not file.parent.is_dir():

@@ -15,7 +15,7 @@ from underskin.client.http_session import Session
 from underskin.errors import Unreachable
 
 _POLL_S = 0.5
-_SILENT_S = 60.0
+_ANSWER_TIMEOUT_S = 60.0
 
 
 class Diagnoses:
@@ -59,7 +59,7 @@ class Diagnoses:
                 if diagnosis["state"] not in ("queued", "running"):
                     return diagnosis
             except Unreachable:
-                if time.monotonic() - answered_at > _SILENT_S:
+                if time.monotonic() - answered_at > _ANSWER_TIMEOUT_S:
                     raise
             if timeout is not None and time.monotonic() - start > timeout:
                 raise TimeoutError(f"diagnosis {diagnosis_id} is not done after {timeout:g} s; it goes on")

@@ -22,8 +22,8 @@ from underskin.diagnosis.localisation.residual_shape import (
     largest_floor_percent,
 )
 from underskin.diagnosis.planning.optimal_design import plan
-from underskin.diagnosis.planning.rig_limits import Limits
-from underskin.diagnosis.reporting.report import Diagnosis, report
+from underskin.diagnosis.planning.rig_limits import RigLimits
+from underskin.diagnosis.reporting.report import DiagnosisResult, report
 from underskin.diagnosis.screening.curve_unit_errors import without_inconsistent
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.physical_limits import without_extremes
@@ -46,12 +46,12 @@ _CURVES: tuple[Kind, ...] = ("indentation", "compression")
 _LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
 
 Progress = Callable[[float], None]
-NO_LIMITS = Limits()
+NO_LIMITS = RigLimits()
 
 
 def diagnose(
-    campaign: Campaign, table: SigmaTable, progress: Progress = lambda _: None, limits: Limits = NO_LIMITS
-) -> Diagnosis:
+    campaign: Campaign, table: SigmaTable, progress: Progress = lambda _: None, limits: RigLimits = NO_LIMITS
+) -> DiagnosisResult:
     """What recordings and model disagree about, and what physics was left out.
 
     Deterministic, but for a campaign that states times to come (underskin.campaign_findings). Raises InvalidInput where
@@ -61,12 +61,12 @@ def diagnose(
     return replace(diagnosis, findings=tuple(dict.fromkeys((*implausible(campaign), *diagnosis.findings))))
 
 
-def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits: Limits) -> Diagnosis:
+def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits: RigLimits) -> DiagnosisResult:
     provenance = _provenance(table)
     progress(0.05)
     possible = without_extremes(campaign)
     if possible.findings and possible.lacking:
-        return Diagnosis(campaign.name, possible.findings, provenance, lacking=possible.lacking)
+        return DiagnosisResult(campaign.name, possible.findings, provenance, lacking=possible.lacking)
     campaign, findings = possible.campaign, list(possible.findings)
     for kind in () if any(isinstance(entry, FrfRecording) for entry in campaign.recordings) else _CURVES:
         if all(entry.kind != kind for entry in campaign.recordings):
@@ -75,7 +75,7 @@ def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits
         curves = without_inconsistent(usable, kind)
         findings += [*unusable, *curves.findings]
         if curves.findings and curves.lacking:
-            return Diagnosis(campaign.name, findings, provenance, lacking=curves.lacking)
+            return DiagnosisResult(campaign.name, findings, provenance, lacking=curves.lacking)
         rows = curve_lines(curves.campaign, kind)
         if rows.recordings:
             problem = FittingProblem(rows, table)
@@ -89,7 +89,7 @@ def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits
     inspected = inspect(replace(campaign, recordings=frf), table)
     findings += inspected.findings
     if inspected.lacking:
-        return Diagnosis(campaign.name, findings, provenance, lacking=inspected.lacking)
+        return DiagnosisResult(campaign.name, findings, provenance, lacking=inspected.lacking)
     problem = frf_problem(inspected.campaign, inspected.uneven, table)
     return _work_out(campaign.name, problem, search(problem), findings, provenance, progress, limits)
 
@@ -101,8 +101,8 @@ def _work_out(
     findings: Sequence[Finding],
     provenance: dict[str, Any],
     progress: Progress,
-    limits: Limits,
-) -> Diagnosis:
+    limits: RigLimits,
+) -> DiagnosisResult:
     """All steps after the search."""
     progress(0.65)
     confounded = confounding(problem)
@@ -128,9 +128,9 @@ def _work_out(
         shown = result.shown_or_nothing(leader)
     floor = largest_floor_percent(problem, nothing, groups)
     if leader.explanation is nothing and floor > _LARGEST_FLOOR:
-        return Diagnosis(name, findings, provenance, lacking=Lacking(Lack.NOISE, {"floor_percent": floor}))
+        return DiagnosisResult(name, findings, provenance, lacking=Lacking(Lack.NOISE, {"floor_percent": floor}))
     shape = describe(problem, shown) if leader.explanation is None else None
-    return Diagnosis(
+    return DiagnosisResult(
         name,
         (*findings, *above_noise(problem, shown, groups)),
         provenance,
@@ -158,7 +158,7 @@ def diagnosis_report(
     return report(diagnosis)
 
 
-def with_refused(diagnosis: Diagnosis, refused: Sequence[RecordingProblem]) -> Diagnosis:
+def with_refused(diagnosis: DiagnosisResult, refused: Sequence[RecordingProblem]) -> DiagnosisResult:
     """The diagnosis with recordings that were refused when they were read named first among its findings."""
     problems = [
         Finding(

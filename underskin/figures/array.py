@@ -76,8 +76,8 @@ def _scale(values: Floats, quantity: Quantity) -> dict[str, Any]:
     """The colours' scale and its ends: one for all traces."""
     known = values[np.isfinite(values)]
     if quantity.diverging:
-        reach = float(np.abs(known).max(initial=0.0)) or 1.0
-        return {"colorscale": "PuOr_r", "cmin": -reach, "cmax": reach}
+        largest = float(np.abs(known).max(initial=0.0)) or 1.0
+        return {"colorscale": "PuOr_r", "cmin": -largest, "cmax": largest}
     ends = {"cmin": float(known.min()), "cmax": float(known.max())} if len(known) else {}
     return {"colorscale": "Cividis", **ends}
 

@@ -69,9 +69,9 @@ def array_response(design: Design, pitch_mm: float) -> go.Figure:
     percent = 100 * design.response / design.response[0]
     places = np.concatenate([-offset[:0:-1], offset])
     mirrored = np.concatenate([percent[:0:-1], percent])
-    reach = (_SENSORS + 0.5) * pitch_mm
+    half_width = (_SENSORS + 0.5) * pitch_mm
     for number in range(-_SENSORS, _SENSORS + 1):
-        near = np.abs(places + number * pitch_mm) <= reach
+        near = np.abs(places + number * pitch_mm) <= half_width
         figure.add_scatter(
             x=(places + number * pitch_mm)[near], y=mirrored[near], mode="lines",
             name=f"sensor at {number * pitch_mm:g} mm",
@@ -85,6 +85,6 @@ def array_response(design: Design, pitch_mm: float) -> go.Figure:
             line={"color": COLOURS[6], "width": 2}, marker={"symbol": "line-ns-open", "size": 12},
             hoverinfo="name",
         )  # fmt: skip
-    figure.update_xaxes(title="place of the contact [mm]", range=[-reach, reach])
+    figure.update_xaxes(title="place of the contact [mm]", range=[-half_width, half_width])
     figure.update_yaxes(title="response [%]")
     return styled(figure, "What a row of sensors sees", 380)

@@ -12,7 +12,7 @@ from underskin.figures.style import COLOURS, DASHES, ZONE, label, styled
 from underskin.recordings.frf.summary import FrfLines, FrfSpread
 from underskin.units import Floats
 
-Trace = dict[str, Any]
+PlotlyTrace = dict[str, Any]
 
 _AXES = ("", "2", "3")  # of the panels
 _UNITS = (" pC/N", "°", "")
@@ -24,7 +24,7 @@ _WIDE = 3.0  # largest magnitude over the median, from which on the axis is loga
 
 def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | None) -> go.Figure:
     """Median magnitude and phase and lowest coherence of each condition, with the range of its magnitudes as a band."""
-    traces: list[Trace] = []
+    traces: list[PlotlyTrace] = []
     for number, spread in enumerate(spreads):
         colour, dash = _look(spread, spreads)
         name = f"{spread.indenter_radius_mm:.3g} mm, {spread.preload_n:.3g} N ({spread.recordings})"
@@ -48,7 +48,7 @@ def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | No
 
 def frf_recordings(recordings: Sequence[FrfLines], zone_hz: tuple[float, float] | None) -> go.Figure:
     """Each recording's lines."""
-    traces: list[Trace] = []
+    traces: list[PlotlyTrace] = []
     for number, entry in enumerate(recordings):
         line = {
             "color": COLOURS[number % len(COLOURS)],
@@ -62,7 +62,7 @@ def frf_recordings(recordings: Sequence[FrfLines], zone_hz: tuple[float, float] 
 
 def _lines(
     name: str, group: str, frequency_hz: Floats, parts: Sequence[Floats], line: dict[str, Any]
-) -> Iterator[Trace]:
+) -> Iterator[PlotlyTrace]:
     """Magnitude, phase and coherence in three panels, without those that were not recorded.
 
     Traces are given as dictionaries, which plotly validates once.
@@ -84,7 +84,7 @@ def _lines(
             }
 
 
-def _finished(traces: Sequence[Trace], zone_hz: tuple[float, float] | None, title: str) -> go.Figure:
+def _finished(traces: Sequence[PlotlyTrace], zone_hz: tuple[float, float] | None, title: str) -> go.Figure:
     figure = make_subplots(3, 1, shared_xaxes=True, vertical_spacing=0.04, row_heights=[0.5, 0.27, 0.23])
     figure.add_traces(traces)
     if zone_hz is not None:
@@ -106,7 +106,7 @@ def _finished(traces: Sequence[Trace], zone_hz: tuple[float, float] | None, titl
     return styled(figure, title, _HEIGHT)
 
 
-def _magnitude_axis(traces: Sequence[Trace]) -> dict[str, Any]:
+def _magnitude_axis(traces: Sequence[PlotlyTrace]) -> dict[str, Any]:
     """A logarithmic axis where a resonance exceeds the other values by far."""
     values = _values(traces, "y")
     values = values[values > 0]
@@ -114,7 +114,7 @@ def _magnitude_axis(traces: Sequence[Trace]) -> dict[str, Any]:
     return {"type": "log", "dtick": 1} if wide else {"rangemode": "tozero"}
 
 
-def _values(traces: Sequence[Trace], axis: str) -> Floats:
+def _values(traces: Sequence[PlotlyTrace], axis: str) -> Floats:
     """All that lies along an axis."""
     return np.concatenate([np.zeros(0), *(trace["y"] for trace in traces if trace.get("yaxis") == axis)])
 

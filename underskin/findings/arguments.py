@@ -19,7 +19,7 @@ class UnitGuess:
     off_by: int = 0
 
 
-class D33Doubt(StrEnum):
+class ImplausibleD33(StrEnum):
     """Why a d33 is implausible."""
 
     TOO_LARGE = "too_large"

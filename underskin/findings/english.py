@@ -150,14 +150,14 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.TIME_TOO_OLD: lambda written, year, more: (
         f"recorded_at is {written}, before {year}: was the clock not set?{sentences.more_alike(more, 'recording')}"
     ),
-    Reason.D33_FITTED: lambda d33_pc_per_n, doubt: (
-        f"d33 comes out as {d33_pc_per_n:.4g} pC/N, {sentences.D33_DOUBTS[doubt]}"
+    Reason.D33_FITTED: lambda d33_pc_per_n, kind: (
+        f"d33 comes out as {d33_pc_per_n:.4g} pC/N, {sentences.IMPLAUSIBLE_D33[kind]}"
     ),
-    Reason.D33_OF_ARRAY: lambda d33_pc_per_n, doubt: (
-        f"d33 of the array is {d33_pc_per_n:.3g} pC/N, {sentences.D33_DOUBTS[doubt]}"
+    Reason.D33_OF_ARRAY: lambda d33_pc_per_n, kind: (
+        f"d33 of the array is {d33_pc_per_n:.3g} pC/N, {sentences.IMPLAUSIBLE_D33[kind]}"
     ),
-    Reason.D33_OF_ROW: lambda d33_pc_per_n, doubt, more: (
-        f"d33 is {d33_pc_per_n:.3g} pC/N, {sentences.D33_DOUBTS[doubt]}{sentences.more_rows(more)}"
+    Reason.D33_OF_ROW: lambda d33_pc_per_n, kind, more: (
+        f"d33 is {d33_pc_per_n:.3g} pC/N, {sentences.IMPLAUSIBLE_D33[kind]}{sentences.more_rows(more)}"
     ),
     Reason.DEFECT: sentences.defect,
     Reason.DEFECTS_LEFT_OUT: sentences.defects_left_out,

@@ -3,16 +3,16 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from underskin.findings.arguments import D33Doubt, DefectKind, UnitGuess
-from underskin.formatting import in_digits, significant
+from underskin.findings.arguments import DefectKind, ImplausibleD33, UnitGuess
+from underskin.findings.formatting import in_digits, significant
 
 _MOST_SENSORS = 3  # named one by one
 
-D33_DOUBTS: Mapping[D33Doubt, str] = {
-    D33Doubt.TOO_LARGE: "more than sensors have: was mV/pC meant, not mV/nC, or N, not mN, or fC, not pC?",
-    D33Doubt.TOO_SMALL: "less than sensors have: was mV/nC meant, not mV/pC, or mN, not N, or nC, not pC?",
-    D33Doubt.NEGATIVE: "negative: is the sign of charge or force turned?",
-    D33Doubt.NOT_PVDF: "which PVDF cannot have: it and its copolymers have 10 to 40",
+IMPLAUSIBLE_D33: Mapping[ImplausibleD33, str] = {
+    ImplausibleD33.TOO_LARGE: "more than sensors have: was mV/pC meant, not mV/nC, or N, not mN, or fC, not pC?",
+    ImplausibleD33.TOO_SMALL: "less than sensors have: was mV/nC meant, not mV/pC, or mN, not N, or nC, not pC?",
+    ImplausibleD33.NEGATIVE: "negative: is the sign of charge or force turned?",
+    ImplausibleD33.NOT_PVDF: "which PVDF cannot have: it and its copolymers have 10 to 40",
 }
 DEFECTS: Mapping[DefectKind, str] = {
     DefectKind.OVERLOAD: "stay at the end of the range: overload",

@@ -21,16 +21,16 @@ def findings_of(
     recorded: Sequence[FrfRecording], measured: Sequence[Frf], level: Floats, array: Estimate | None
 ) -> tuple[Finding, ...]:
     """Of time series: defects, and a mean force that contradicts the preload; of the level [C/N] and of the array's
-    d33 slips of units and sign."""
+    d33 errors of units and sign."""
     defects = [
         Finding(Reason.DEFECT, item.id, defect.channel, asdict(defect))
         for item, frf in zip(recorded, measured, strict=True)
         for defect in frf.defects
     ]
     typical = to_lab("frf_pc_per_n", np.nanmedian(np.abs(level)))
-    slips = [replace(finding, reason=Reason.UNUSUAL_MEDIAN_FRF) for finding in unusual("frf_pc_per_n", typical)]
-    doubts = [] if array is None else plausibility.of_array(float(to_lab("d33_pc_per_n", array.value)))
-    return (*defects, *_preloads(recorded), *slips, *doubts)
+    unit_errors = [replace(finding, reason=Reason.UNUSUAL_MEDIAN_FRF) for finding in unusual("frf_pc_per_n", typical)]
+    implausible = [] if array is None else plausibility.of_array(float(to_lab("d33_pc_per_n", array.value)))
+    return (*defects, *_preloads(recorded), *unit_errors, *implausible)
 
 
 def _preloads(recorded: Sequence[FrfRecording]) -> list[Finding]:

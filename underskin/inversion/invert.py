@@ -17,7 +17,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.inversion import mixed_model
 from underskin.inversion.findings import findings_of
-from underskin.inversion.mixed_model import Estimate, MixedModel, Rows
+from underskin.inversion.mixed_model import Estimate, LevelRows, MixedModel
 from underskin.inversion.outliers import outlying
 from underskin.inversion.sensor_flags import Flag, population_flags, scatter_flags
 from underskin.physics.charge_response import gain
@@ -238,7 +238,7 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
     sensor, d33, noise = rows.sensor[good], rows.d33[good], rows.d33_uncertainty[good]
     unfit, pilot = population_flags(ids, sensor, d33, noise)
     mean, variance = mean[:, good], variance[:, good]
-    measured = Rows(d33, noise, pilot[sensor], mean, variance)
+    measured = LevelRows(d33, noise, pilot[sensor], mean, variance)
     plain = np.array([number not in unfit for number in sensor])
     model = None
     if plain.any():
@@ -278,7 +278,7 @@ def _outliers(rows: RecordingD33, position: Floats) -> NDArray[np.intp]:
     return good[far]
 
 
-def _expected_scatter(model: MixedModel, rows: Rows) -> Floats:
+def _expected_scatter(model: MixedModel, rows: LevelRows) -> Floats:
     """The relative scatter of each recording, line noise included."""
     nearest = int(np.argmin(np.abs(mixed_model.POSITIONS - float(model.position.value))))
     position = np.maximum(rows.position_variance[nearest], 0)

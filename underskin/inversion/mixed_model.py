@@ -42,7 +42,7 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Rows:
+class LevelRows:
     """Recordings: `z` and `line` (u) in one unit, `pilot` a first value of each one's d33, along which the gain's
     variance is built, and m_i and v_i at each of POSITIONS (positions, rows)."""
 
@@ -52,9 +52,9 @@ class Rows:
     position_mean: Floats
     position_variance: Floats
 
-    def part(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> "Rows":
+    def part(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> "LevelRows":
         """Some of the rows."""
-        return Rows(
+        return LevelRows(
             self.z[chosen],
             self.line[chosen],
             self.pilot[chosen],
@@ -71,17 +71,17 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Scatter:
+class ScatterPosterior:
     """What is known of gain and position scatter: `weights` (positions, gains) that sum to 1."""
 
     weights: Floats
 
-    def d33(self, rows: Rows, group: NDArray[np.intp], count: int) -> Estimate:
+    def d33(self, rows: LevelRows, group: NDArray[np.intp], count: int) -> Estimate:
         """The d33 of each group of recordings, from the recordings of that group alone.
 
         Parameters
         ----------
-        rows : Rows
+        rows : LevelRows
             The recordings [C/N].
         group : (rows,) array of int
             The number of each one's group, from 0.
@@ -106,8 +106,8 @@ class Scatter:
             # A variance known only roughly: the Student t whose own variance has the same mean and spread.
             freedom = 4 + 2 * variance**2 / np.maximum(unsure, 1e-12 * variance**2)
             scale = np.sqrt(variance * (freedom - 2) / freedom + between)
-        reach = student.ppf((1 + _LEVEL) / 2, freedom) * scale
-        return Estimate(value, np.sqrt(variance + between), value - reach, value + reach)
+        half_width = student.ppf((1 + _LEVEL) / 2, freedom) * scale
+        return Estimate(value, np.sqrt(variance + between), value - half_width, value + half_width)
 
 
 @dataclass(frozen=True)
@@ -118,15 +118,15 @@ class MixedModel:
     spread: Estimate
     gain: Estimate
     position: Estimate
-    scatter: Scatter
+    scatter: ScatterPosterior
 
 
-def fit(rows: Rows, sensor: NDArray[np.intp]) -> MixedModel:
+def fit(rows: LevelRows, sensor: NDArray[np.intp]) -> MixedModel:
     """The mixed model of recordings of an array.
 
     Parameters
     ----------
-    rows : Rows
+    rows : LevelRows
         The recordings [C/N].
     sensor : (rows,) array of int
         The number of each one's sensor, from 0.
@@ -160,14 +160,14 @@ def fit(rows: Rows, sensor: NDArray[np.intp]) -> MixedModel:
         _scale_estimate(posterior.sum(axis=(0, 1)), spreads),
         _scale_estimate(posterior.sum(axis=(0, 2)), GAINS),
         _scale_estimate(posterior.sum(axis=(1, 2)), POSITIONS),
-        Scatter(posterior.sum(axis=2)),
+        ScatterPosterior(posterior.sum(axis=2)),
     )
 
 
-def prior_scatter() -> Scatter:
+def prior_scatter() -> ScatterPosterior:
     """What is known of the scatters before any recording."""
     weights = _prior(SPREADS[:1])[..., 0]
-    return Scatter(weights / weights.sum())
+    return ScatterPosterior(weights / weights.sum())
 
 
 def _prior(spreads: Floats) -> Floats:

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+from underskin.autodiff import Differentiated
 from underskin.errors import UnderskinError
-from underskin.mechanisms.autodiff import Array, Differentiated
 from underskin.recordings.conditions import Conditions
-from underskin.units import Floats
+from underskin.units import Array, Floats
 
 if TYPE_CHECKING:
     from underskin.mechanisms.models.contact_state import Contacts

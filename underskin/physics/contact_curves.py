@@ -19,14 +19,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from underskin.autodiff import Differentiated
 from underskin.physics.chebyshev import ChebyshevInterval
 from underskin.physics.contact_integral_equation import ContactEquation, mode_transforms
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
-REACH = 4.0  # largest a/h
+LARGEST_A_OVER_H = 4.0  # largest a/h
 _NODES = 28
-_TABLE: Floats = REACH / 128 * np.arange(1.0, 129.0)  # of a/h, for first guesses
+_TABLE: Floats = LARGEST_A_OVER_H / 128 * np.arange(1.0, 129.0)  # of a/h, for first guesses
 _SMALLEST = 1e-12
 _TOLERANCE = 1e-7  # of the last step; the remaining error is about its square
 _ITERATIONS = 60
@@ -40,41 +41,28 @@ _STIFFNESS: _Law = ((1.0, 0.0, 4, False),)
 
 
 @dataclass(frozen=True)
-class ValueWithSlopes:
-    """A quantity of each contact with its derivatives.
-
-    Attributes
-    ----------
-    value : ndarray, (rows,)
-    slopes : ndarray, (4, rows)
-        Derivatives with respect to the given quantity (P or α), U, ν and the slip of the glue line.
-    """
-
-    value: Floats
-    slopes: Floats
-
-
-@dataclass(frozen=True)
 class ContactRows:
-    """Contacts (rows,); NaN where there is none: below pull-off, or beyond a/h = REACH.
+    """Contacts (rows,) with derivatives by the given quantity (P or α), U, ν and the slip of the glue line.
+
+    NaN where there is none: below pull-off, or beyond a/h = LARGEST_A_OVER_H.
 
     Attributes
     ----------
-    alpha : ValueWithSlopes
+    alpha : Differentiated
         a/h.
-    load, depth : ValueWithSlopes
+    load, depth : Differentiated
         P and Δ.
-    sphere_load : ValueWithSlopes
+    sphere_load : Differentiated
         Ps, the share of the sphere in P; that of the punch is P − Ps ≤ 0.
-    stiffness : ValueWithSlopes
+    stiffness : Differentiated
         S = (dF/dδ at a fixed edge)/(2 E' a); without adhesion this is the total dF/dδ.
     """
 
-    alpha: ValueWithSlopes
-    load: ValueWithSlopes
-    depth: ValueWithSlopes
-    sphere_load: ValueWithSlopes
-    stiffness: ValueWithSlopes
+    alpha: Differentiated
+    load: Differentiated
+    depth: Differentiated
+    sphere_load: Differentiated
+    stiffness: Differentiated
 
 
 class CurveGrid:
@@ -87,7 +75,7 @@ class CurveGrid:
     """
 
     def __init__(self, wave_numbers: Floats) -> None:
-        self.interval = ChebyshevInterval(REACH, _NODES)
+        self.interval = ChebyshevInterval(LARGEST_A_OVER_H, _NODES)
         self.equation = ContactEquation(self.interval.nodes)
         s = np.multiply.outer(self.interval.nodes, wave_numbers)
         self.transforms = mode_transforms(s, self.equation.modes).transpose(0, 2, 1)
@@ -103,22 +91,24 @@ class ContactCurves:
 
     Attributes
     ----------
-    sphere_transform, punch_transform : ndarray, (3, points, k)
-        At the points `interval.nodes` in α: the value, and its derivatives with respect to ν and to the slip.
+    sphere_transform, punch_transform : Differentiated, (points, k)
+        At the points `interval.nodes` in α, with derivatives by ν and by the slip.
     """
 
     def __init__(self, grid: CurveGrid, layer: Layer) -> None:
         self.interval = grid.interval
         solved = grid.equation.solve(layer)
-        names = (solved.sphere_force, solved.edge_force, solved.sphere_depth, solved.edge_depth, solved.stiffness)
-        coefficients = self.interval.coefficients(np.stack(names, axis=-1).transpose(1, 0, 2))  # (count, 3, 5)
+        ratios = (solved.sphere_force, solved.edge_force, solved.sphere_depth, solved.edge_depth, solved.stiffness)
+        at_nodes = np.stack([_stacked(ratio) for ratio in ratios], axis=-1).transpose(1, 0, 2)
+        coefficients = self.interval.coefficients(at_nodes)  # (count, 3, 5)
         slopes = self.interval.derivative(coefficients[:, :1])
         self._coefficients = np.concatenate([coefficients[:, :1], slopes, coefficients[:, 1:]], axis=1)
         at = self._evaluated(grid.table_basis)
         self._start = _Start(at)
-        shapes = np.concatenate([solved.sphere_shape, solved.punch_shape]).transpose(1, 0, 2)
+        shapes = np.concatenate([_stacked(solved.sphere_shape), _stacked(solved.punch_shape)]).transpose(1, 0, 2)
         transforms = (shapes @ grid.transforms).transpose(1, 0, 2)
-        self.sphere_transform, self.punch_transform = transforms[:3], transforms[3:]
+        self.sphere_transform = Differentiated(transforms[0], transforms[1:3])
+        self.punch_transform = Differentiated(transforms[3], transforms[4:])
 
     def at_load(self, load: Floats, root_adhesion: Floats) -> ContactRows:
         """Contacts under given loads, on the branch that is stable under force control.
@@ -137,14 +127,14 @@ class ContactCurves:
         _, by_alpha, *partial = _law(_LOAD, alpha, root_adhesion, at)
         slopes = np.stack([1 / by_alpha, *(-x / by_alpha for x in partial)])
 
-        def rows(law: _Law) -> ValueWithSlopes:
+        def rows(law: _Law) -> Differentiated:
             value, by_alpha, *partial = _law(law, alpha, root_adhesion, at)
             total = by_alpha * slopes
             total[1:] += partial
-            return ValueWithSlopes(value, total)
+            return Differentiated(value, total)
 
         laws = (_LOAD, _DEPTH, _SPHERE_LOAD, _STIFFNESS)
-        return ContactRows(ValueWithSlopes(alpha, slopes), *map(rows, laws))
+        return ContactRows(Differentiated(alpha, slopes), *map(rows, laws))
 
     def at_radius(self, alpha: Floats, root_adhesion: Floats) -> ContactRows:
         """Contacts of given radii, stable or not.
@@ -152,32 +142,33 @@ class ContactCurves:
         Parameters
         ----------
         alpha : ndarray, (rows,)
-            a/h, above 0 and up to REACH.
+            a/h, above 0 and up to LARGEST_A_OVER_H.
         root_adhesion : ndarray, (rows,)
             U [-].
         """
         at = self._evaluated(self.interval.basis(alpha))
         one = np.outer([1.0, 0.0, 0.0, 0.0], np.ones_like(alpha))
 
-        def rows(law: _Law) -> ValueWithSlopes:
+        def rows(law: _Law) -> Differentiated:
             value, *slopes = _law(law, alpha, root_adhesion, at)
-            return ValueWithSlopes(value, np.stack(slopes))
+            return Differentiated(value, np.stack(slopes))
 
         laws = (_LOAD, _DEPTH, _SPHERE_LOAD, _STIFFNESS)
-        return ContactRows(ValueWithSlopes(alpha, one), *map(rows, laws))
+        return ContactRows(Differentiated(alpha, one), *map(rows, laws))
 
-    def stiffness_at(self, alpha: Floats) -> Floats:
-        """S at a/h (rows,) from 0 to REACH: its value and derivatives with respect to α, ν and slip, (4, rows)."""
-        return self._evaluated(self.interval.basis(alpha))[:, _STIFFNESS[0][2]]
+    def stiffness_at(self, alpha: Floats) -> Differentiated:
+        """S at a/h (rows,) from 0 to LARGEST_A_OVER_H, with derivatives by α, ν and the slip."""
+        value, *slopes = self._evaluated(self.interval.basis(alpha))[:, _STIFFNESS[0][2]]
+        return Differentiated(value, np.stack(slopes))
 
     def _newton(self, target: Floats, root_adhesion: Floats, start: Floats) -> Floats:
         """α; the law of load is convex: from the stable side the steps end at its root, or cross its minimum."""
-        alpha = np.clip(start, _SMALLEST, REACH)
+        alpha = np.clip(start, _SMALLEST, LARGEST_A_OVER_H)
         for _ in range(_ITERATIONS):
             value, by_alpha, *_rest = _law(_LOAD, alpha, root_adhesion, self._evaluated(self.interval.basis(alpha)))
-            lost = (by_alpha <= 0) | ((alpha == REACH) & (value < target))
+            lost = (by_alpha <= 0) | ((alpha == LARGEST_A_OVER_H) & (value < target))
             step = np.where(lost, np.nan, (value - target) / by_alpha)
-            alpha = np.clip(alpha - step, alpha / 4, REACH)
+            alpha = np.clip(alpha - step, alpha / 4, LARGEST_A_OVER_H)
             if not (np.abs(step) > _TOLERANCE * alpha).any():
                 break
         return np.where(alpha > 2 * _SMALLEST, alpha, np.nan)
@@ -204,6 +195,11 @@ class _Start:
         unstable = np.interp(root_adhesion ** (2 / 3), self._critical, self._alpha)
         start: Floats = np.maximum(np.interp(root, self._root, self._alpha), 1.02 * unstable)
         return start
+
+
+def _stacked(x: Differentiated) -> Floats:
+    """The value and its derivatives along the first axis: one product with a matrix serves all of them."""
+    return np.concatenate([x.value[None], x.slopes])
 
 
 def _law(law: _Law, alpha: Floats, root_adhesion: Floats, at: Floats) -> Floats:

@@ -9,8 +9,7 @@ Lengths in units of the thickness, α = a/h (Lebedev and Ufliand 1958):
 α √(4n + 1) j₂ₙ(kα), and the Galerkin matrix is (π/2) I − α ∫ (1 − K) j jᵀ dk, symmetric. f = 1 is the flat punch φ₀
 and f = (t/α)² gives φ₂; a sphere without adhesion is φ_s = φ₂(α)/φ₀(α) φ₀ − φ₂, which is 0 at the edge.
 
-An array that depends on the layer holds, along its first axis, the value, its derivative with respect to the Poisson
-ratio, and its derivative with respect to the slip of the glue line.
+What depends on the layer carries its derivatives by the Poisson ratio and by the slip of the glue line.
 """
 
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import spherical_jn
 
+from underskin.autodiff import Differentiated, constant
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
@@ -27,29 +27,29 @@ _FIRST_PANELS = (0.0, 0.02, 0.15, 0.7)  # on a nearly frictionless base, K chang
 
 @dataclass(frozen=True)
 class EdgeSolutions:
-    """Contacts of radii α (m,): ratios (3, m) to the half space at the same radius, and shapes (3, m, n).
+    """Contacts of radii α (m,): ratios (m,) to the half space at the same radius, and shapes (m, n).
 
     Attributes
     ----------
-    sphere_force : ndarray, (3, m)
+    sphere_force : Differentiated, (m,)
         F R/(E' h³) over 4α³/3.
-    sphere_depth : ndarray, (3, m)
+    sphere_depth : Differentiated, (m,)
         δ R/h² over α².
-    stiffness : ndarray, (3, m)
+    stiffness : Differentiated, (m,)
         dF/dδ at a fixed edge over 2E'a.
-    edge_force, edge_depth : ndarray, (3, m)
+    edge_force, edge_depth : Differentiated, (m,)
         Force and depth of a flat punch per value φ(a) at its edge.
-    sphere_shape, punch_shape : ndarray, (3, m, n)
+    sphere_shape, punch_shape : Differentiated, (m, n)
         Legendre coefficients of φ over ∫φ dt.
     """
 
-    sphere_force: Floats
-    sphere_depth: Floats
-    stiffness: Floats
-    edge_force: Floats
-    edge_depth: Floats
-    sphere_shape: Floats
-    punch_shape: Floats
+    sphere_force: Differentiated
+    sphere_depth: Differentiated
+    stiffness: Differentiated
+    edge_force: Differentiated
+    edge_depth: Differentiated
+    sphere_shape: Differentiated
+    punch_shape: Differentiated
 
 
 class ContactEquation:
@@ -73,32 +73,35 @@ class ContactEquation:
     def solve(self, layer: Layer) -> EdgeSolutions:
         """Solve all contacts on one layer."""
         punch, square = self._flat_and_square(layer)
-        punch_edge, square_edge = punch @ self._edge, square @ self._edge
-        depth = _over(square_edge, punch_edge)
-        sphere = _times(depth[..., None], punch) - square
+        punch_edge, square_edge = self._at_the_edge(punch), self._at_the_edge(square)
+        depth = square_edge / punch_edge
+        sphere = _last_axis(depth, None) * punch - square
         return EdgeSolutions(
-            sphere_force=3 * np.pi / 4 * sphere[..., 0],
+            sphere_force=3 * np.pi / 4 * _last_axis(sphere, 0),
             sphere_depth=depth,
-            stiffness=np.pi / 2 * punch[..., 0],
-            edge_force=_over(punch[..., 0], punch_edge),
-            edge_depth=_over(_constant(2 / np.pi, punch_edge), punch_edge),
-            sphere_shape=_over(sphere, sphere[..., :1]),
-            punch_shape=_over(punch, punch[..., :1]),
+            stiffness=np.pi / 2 * _last_axis(punch, 0),
+            edge_force=_last_axis(punch, 0) / punch_edge,
+            edge_depth=constant(2 / np.pi, 2) / punch_edge,
+            sphere_shape=sphere / _last_axis(sphere, slice(1)),
+            punch_shape=punch / _last_axis(punch, slice(1)),
         )
 
-    def _flat_and_square(self, layer: Layer) -> tuple[Floats, Floats]:
-        """φ₀ and φ₂, (3, m, n)."""
+    def _at_the_edge(self, modes: Differentiated) -> Differentiated:
+        """φ(α), (m,), from the coefficients (m, n)."""
+        return Differentiated(modes.value @ self._edge, modes.slopes @ self._edge)
+
+    def _flat_and_square(self, layer: Layer) -> tuple[Differentiated, Differentiated]:
+        """φ₀ and φ₂, (m, n)."""
         stiffening = layer.stiffening(self._k)
-        kernels = (stiffening.value, stiffening.by_poisson_ratio, stiffening.by_slip)
-        matrix, *slopes = (self._galerkin(kernel) for kernel in kernels)
+        matrix, *slopes = (self._galerkin(kernel) for kernel in (stiffening.value, *stiffening.slopes))
         right = np.zeros((self.modes, 2))
         right[0] = 1, 1 / 3
         right[1, 1] = -2 / (3 * np.sqrt(5))
         inverse = np.linalg.inv(np.pi / 2 * np.eye(self.modes) - matrix)
         solution = inverse @ right
-        changes = [inverse @ (slope @ solution) for slope in slopes]
-        stacked = np.stack([solution, *changes])
-        return stacked[..., 0], stacked[..., 1]
+        changes = np.stack([inverse @ (slope @ solution) for slope in slopes])
+        both = Differentiated(solution, changes)
+        return _last_axis(both, 0), _last_axis(both, 1)
 
     def _galerkin(self, kernel: Floats) -> Floats:
         """α ∫ kernel j jᵀ dk, (m, n, n)."""
@@ -134,17 +137,6 @@ def _nodes(largest: float) -> tuple[Floats, Floats]:
     return k.ravel(), (half * w).ravel()
 
 
-def _times(x: Floats, y: Floats) -> Floats:
-    """The product with its derivatives."""
-    return np.concatenate([x[:1] * y[:1], x[1:] * y[:1] + x[:1] * y[1:]])
-
-
-def _over(x: Floats, y: Floats) -> Floats:
-    """The quotient with its derivatives."""
-    quotient = x[:1] / y[:1]
-    return np.concatenate([quotient, (x[1:] - quotient * y[1:]) / y[:1]])
-
-
-def _constant(value: float, like: Floats) -> Floats:
-    """A number whose derivatives are 0."""
-    return np.concatenate([np.full_like(like[:1], value), np.zeros_like(like[1:])])
+def _last_axis(x: Differentiated, index: int | slice | None) -> Differentiated:
+    """x[..., index] with its derivatives."""
+    return Differentiated(x.value[..., index], x.slopes[..., index])

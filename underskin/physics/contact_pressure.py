@@ -13,12 +13,12 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import legendre
 
-from underskin.physics.contact_curves import REACH, CurveGrid
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
 from underskin.physics.contact_integral_equation import ContactEquation
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
-MOST_A_OVER_H = REACH
+MOST_A_OVER_H = LARGEST_A_OVER_H
 HERTZ_SHAPE: Floats = np.array([1.0, 1 / np.sqrt(5)])
 
 
@@ -86,7 +86,7 @@ def sphere_pressures(
     different, row = np.unique(load, return_inverse=True)
     alpha = _grid().curves(layer).at_load(different, np.zeros_like(different)).alpha.value
     known = np.isfinite(alpha)
-    shapes = iter(ContactEquation(alpha[known]).solve(layer).sphere_shape[0] if known.any() else ())
+    shapes = iter(ContactEquation(alpha[known]).solve(layer).sphere_shape.value if known.any() else ())
     pressures = [SpherePressure(float(a) * thickness, next(shapes)) if a == a else None for a in alpha]
     return [pressures[i] for i in row]
 

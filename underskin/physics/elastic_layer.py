@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from underskin.autodiff import Differentiated
 from underskin.errors import InvalidInput
 from underskin.physics.hankel_transform import hertz_transform, normal_stress, tangential_stress
 from underskin.units import Floats
@@ -51,19 +52,10 @@ def slip(glue_stiffness: float) -> float:
 
 
 @dataclass(frozen=True)
-class Sloped:
-    """A function of the wave number, (k,), with its derivatives with respect to ν and to the slip."""
-
-    value: Floats
-    by_poisson_ratio: Floats
-    by_slip: Floats
-
-
-@dataclass(frozen=True)
 class Layer:
     """An elastic layer of unit thickness.
 
-    Its functions take wave numbers k ≥ 0 in units of 1/h, (k,), and return `Sloped`.
+    Its functions take wave numbers k ≥ 0 in units of 1/h, (k,); their derivatives are those by ν and by the slip.
 
     Parameters
     ----------
@@ -87,51 +79,47 @@ class Layer:
         if not 0 <= self.slip <= 1:
             raise InvalidInput("slip", self.slip, "must be 0 (bonded) to 1 (frictionless)")
 
-    def transmission(self, k: Floats) -> Sloped:
+    def transmission(self, k: Floats) -> Differentiated:
         """Normal transmission M(k), 1 at k = 0, as `hankel_transform.normal_stress` takes it (γ_n, σ)."""
         k, decay, cosh, sinh = _scaled_hyperbolic(k)
         bonded = (cosh + k * sinh) * decay, -k * sinh * decay, np.zeros_like(k)
         return self._ratio(k, bonded, (sinh + k * cosh) * decay)
 
-    def tangential_transmission(self, k: Floats) -> Sloped:
+    def tangential_transmission(self, k: Floats) -> Differentiated:
         """Tangential transmission M_t(k), 0 at k = 0, as `hankel_transform.tangential_stress` takes it (γ_t)."""
         k, decay, cosh, sinh = _scaled_hyperbolic(k)
         bonded = k * cosh * decay, (sinh - k * cosh) * decay, np.zeros_like(k)
         return self._ratio(k, bonded, k * sinh * decay)
 
-    def compliance(self, k: Floats) -> Sloped:
+    def compliance(self, k: Floats) -> Differentiated:
         """Compliance K(k): surface deflection over that of the half space of the same ν; 0 at k = 0, 1 at k = ∞."""
         k, decay, cosh, sinh = _scaled_hyperbolic(k)
         bonded = _sinh_cosh_minus(k), 2 * k * decay**2, -(cosh * sinh + k * decay**2)
         return self._ratio(k, bonded, sinh**2)
 
-    def stiffening(self, k: Floats) -> Sloped:
+    def stiffening(self, k: Floats) -> Differentiated:
         """1 − K(k), exact to rounding where K is close to 1; falls like k² e^(−2k)."""
         k, decay, _, sinh = _scaled_hyperbolic(k)
         square, far = k * (1 + k), decay**2
         bonded = (1 + square - sinh) * far, -2 * square * far, (square + sinh) * far
         return self._ratio(k, bonded, (k + sinh) * far)
 
-    def _ratio(self, k: Floats, bonded: tuple[Floats, Floats, Floats], glue: Floats) -> Sloped:
+    def _ratio(self, k: Floats, bonded: tuple[Floats, Floats, Floats], glue: Floats) -> Differentiated:
         """[(1 − s) (b₀ + b₁ p + b₂ p²) + 2ks (1 − p) g]/[the same of D], all scaled by e^(−2k); s is the slip."""
         _, decay, cosh, sinh = _scaled_hyperbolic(k)
         square = (k * decay) ** 2
-        top, top_by_p, top_by_s = self._mixed(k, bonded, glue)
-        bottom, bottom_by_p, bottom_by_s = self._mixed(
-            k, (cosh**2 + square, -2 * square, square - sinh**2), cosh * sinh + k * decay**2
-        )
-        value = top / bottom
-        by_p = (top_by_p - value * bottom_by_p) / bottom
-        by_slip = (top_by_s - value * bottom_by_s) / bottom
-        return Sloped(value, -by_p / (2 * (1 - self.poisson_ratio) ** 2), by_slip)
+        denominator = cosh**2 + square, -2 * square, square - sinh**2
+        ratio = self._mixed(k, bonded, glue) / self._mixed(k, denominator, cosh * sinh + k * decay**2)
+        by_p, by_slip = ratio.slopes
+        return Differentiated(ratio.value, np.stack([-by_p / (2 * (1 - self.poisson_ratio) ** 2), by_slip]))
 
-    def _mixed(self, k: Floats, bonded: tuple[Floats, Floats, Floats], glue: Floats) -> tuple[Floats, Floats, Floats]:
+    def _mixed(self, k: Floats, bonded: tuple[Floats, Floats, Floats], glue: Floats) -> Differentiated:
         """(1 − s) (b₀ + b₁ p + b₂ p²) + 2ks (1 − p) g with its derivatives with respect to p and s."""
         p, s = (1 - 2 * self.poisson_ratio) / (2 - 2 * self.poisson_ratio), self.slip
         constant, linear, quadratic = bonded
         held, yielding = constant + p * (linear + p * quadratic), 2 * k * (1 - p) * glue
         by_p = (1 - s) * (linear + 2 * p * quadratic) - 2 * k * s * glue
-        return (1 - s) * held + s * yielding, by_p, yielding - held
+        return Differentiated((1 - s) * held + s * yielding, np.stack([by_p, yielding - held]))
 
 
 def gamma_n(layer: Layer, offset: ArrayLike, rho: ArrayLike) -> Floats:

@@ -149,7 +149,7 @@ def adopted(report: Mapping[str, Any], campaign: Campaign) -> AdoptedModel:
     if not any(isinstance(entry, FrfRecording) for entry in campaign.recordings):
         raise InvalidInput("diagnosis_id", "a diagnosis of curves", "must be of a campaign with recordings of kind frf")
     parameters = {
-        entry["name"]: {found["name"]: float(found["value"]) for found in entry["parameters"]}
+        entry["name"]: {parameter["name"]: float(parameter["value"]) for parameter in entry["parameters"]}
         for entry in report["mechanisms"]
     }
     frf = [mechanism for name, mechanism in CATALOGUE.items() if name in parameters and "frf" in mechanism.kinds]
@@ -172,8 +172,8 @@ def implausible_d33(report: Mapping[str, Any]) -> str | None:
     if not {"low", "high"} <= set(interval):
         return None
     d33 = float(np.sqrt(interval["low"] * interval["high"]))
-    doubt = plausibility.doubt_of(d33)
-    return None if doubt is None else f"{d33:.4g} pC/N, {sentences.D33_DOUBTS[doubt]}"
+    implausible = plausibility.implausibility(d33)
+    return None if implausible is None else f"{d33:.4g} pC/N, {sentences.IMPLAUSIBLE_D33[implausible]}"
 
 
 def _on_fit(parameter: Parameter, value: float) -> float:

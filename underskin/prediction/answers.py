@@ -15,12 +15,12 @@ from underskin.prediction.pressed_skin import Transmission, transmission
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, checked, finite, non_negative, to_lab, to_si
 
-Model = Literal["layer", "half_space"]
+SigmaModelName = Literal["layer", "half_space"]
 _FRF_UNCERTAINTY = "frf_uncertainty_pc_per_n"
 
 
 @dataclass(frozen=True)
-class Answer:
+class ComputedColumns:
     """Columns by field name, and which rows are inside the `domain` (NaN in what depends on σ where not)."""
 
     columns: Mapping[str, Floats]
@@ -29,17 +29,17 @@ class Answer:
     findings: Sequence[Finding] = ()
 
 
-def sigma(table: SigmaTable, given: Mapping[str, Floats], model: Model) -> Answer:
+def sigma(table: SigmaTable, given: Mapping[str, Floats], model: SigmaModelName) -> ComputedColumns:
     """σ from `a_over_h`, `rt_over_h` and `load_parameter`; raises InvalidInput."""
     a, rho, load = (non_negative(name, given[name]) for name in ("a_over_h", "rt_over_h", "load_parameter"))
     if model == "layer":
         answer, domain = table.sigma(a, rho, load), _table_domain(table)
     else:
         answer, domain = half_space.sigma_in_domain(a, rho), f"a/h and rT/h 0 to {half_space.DOMAIN_END:g}"
-    return Answer({"sigma": answer.sigma, "rel_error": answer.rel_error}, answer.inside, domain)
+    return ComputedColumns({"sigma": answer.sigma, "rel_error": answer.rel_error}, answer.inside, domain)
 
 
-def frf(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Answer:
+def frf(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> ComputedColumns:
     """FRF of a sensor under a preloaded sphere, FRF = d33 (3/2) (rT/h)² σ, and what leads to it.
 
     Parameters
@@ -50,7 +50,7 @@ def frf(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> 
 
     Returns
     -------
-    Answer
+    ComputedColumns
         A row is inside where the table holds it and its FRF is finite.
 
     Raises
@@ -64,7 +64,7 @@ def frf(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> 
     return _skin_answer(table, reached, {**lab_columns(reached), "frf_pc_per_n": frf}, frf)
 
 
-def d33(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Answer:
+def d33(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> ComputedColumns:
     """d33 of a sensor from the measured plateau of its FRF, d33 = FRF / ((3/2) (rT/h)² σ), and what leads to it.
 
     Parameters
@@ -76,7 +76,7 @@ def d33(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> 
 
     Returns
     -------
-    Answer
+    ComputedColumns
         With the FRF and its uncertainty. A row is inside where the table holds it and its d33 is finite. Findings name
         magnitudes that look wrong.
 
@@ -124,10 +124,12 @@ def lab_columns(reached: Transmission) -> dict[str, Floats]:
     }
 
 
-def _skin_answer(table: SigmaTable, reached: Transmission, columns: Mapping[str, Floats], result: Floats) -> Answer:
+def _skin_answer(
+    table: SigmaTable, reached: Transmission, columns: Mapping[str, Floats], result: Floats
+) -> ComputedColumns:
     """A row whose result is not finite is outside, as one that the table does not hold."""
     domain = f"{_table_domain(table)}, Poisson's ratio 0.5"
-    return Answer(columns, reached.inside & np.isfinite(result), domain)
+    return ComputedColumns(columns, reached.inside & np.isfinite(result), domain)
 
 
 def _table_domain(table: SigmaTable) -> str:

@@ -20,7 +20,7 @@ _LIKE_MILLI = 100.0  # N: from here on a preload that fits as 1/1000 may be in m
 
 
 @dataclass(frozen=True)
-class Pressed:
+class RowConditions:
     """A row's force, sphere and elastomer, as a lab writes them."""
 
     preload_n: float
@@ -41,7 +41,7 @@ def reasons(
     for row, recording in enumerate(recorded):
         if skin.poisson_ratio != INCOMPRESSIBLE or not transmitted.inside[row]:
             assert skin.youngs_modulus_mpa is not None
-            pressed = Pressed(
+            pressed = RowConditions(
                 recording.preload_n, recording.indenter_radius_mm, skin.youngs_modulus_mpa, skin.poisson_ratio
             )
             limit = beyond(pressed, [float(part[row]) for part in _numbers(transmitted)], table)
@@ -63,7 +63,7 @@ def _numbers(transmitted: Transmission) -> tuple[Floats, Floats, Floats]:
     )
 
 
-def beyond(pressed: Pressed, numbers: Sequence[float], table: SigmaTable) -> str:
+def beyond(pressed: RowConditions, numbers: Sequence[float], table: SigmaTable) -> str:
     """What of ν, or of `numbers`, a/h, rT/h and L, is outside the table's domain, with F, R and E."""
     if pressed.poisson_ratio != INCOMPRESSIBLE:
         return f"Poisson's ratio = {pressed.poisson_ratio:g}: the table is of incompressible elastomer, 0.5"

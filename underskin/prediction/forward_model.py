@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.errors import InvalidInput
-from underskin.mechanisms.autodiff import Array
 from underskin.mechanisms.base import Kind, Mechanism, Parameter
 from underskin.mechanisms.models.composed import Model, forward_model
 from underskin.mechanisms.models.composition import chosen, kind_of, parameters_together
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.conditions import Conditions, FrfConditions
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import to_lab
+from underskin.units import Array, to_lab
 
 _NOTHING: Mapping[str, float] = {}
 

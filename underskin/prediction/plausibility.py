@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.findings.arguments import D33Doubt
+from underskin.findings.arguments import ImplausibleD33
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.units import LAB, Floats, unusual
@@ -19,21 +19,21 @@ _OF_PVDF = 1.0, 100.0  # pC/N: PVDF and its copolymers have 10 to 40
 
 def of_array(d33: float) -> list[Finding]:
     """What looks wrong in an array's d33 [pC/N]."""
-    doubt = doubt_of(d33)
-    arguments = {"d33_pc_per_n": d33, "doubt": doubt}
-    return [] if doubt is None else [Finding(Reason.D33_OF_ARRAY, "", "d33_pc_per_n", arguments)]
+    implausible = implausibility(d33)
+    arguments = {"d33_pc_per_n": d33, "kind": implausible}
+    return [] if implausible is None else [Finding(Reason.D33_OF_ARRAY, "", "d33_pc_per_n", arguments)]
 
 
-def doubt_of(d33: float) -> D33Doubt | None:
+def implausibility(d33: float) -> ImplausibleD33 | None:
     """Why PVDF cannot have a d33 [pC/N]; None of one that it may have."""
-    doubt = next((doubt for doubt, rows in _doubtful(np.array(d33)).items() if rows), None)
-    if doubt is not None or _OF_PVDF[0] <= d33 <= _OF_PVDF[1]:
-        return doubt
-    return D33Doubt.NOT_PVDF
+    implausible = next((implausible for implausible, rows in _implausible_rows(np.array(d33)).items() if rows), None)
+    if implausible is not None or _OF_PVDF[0] <= d33 <= _OF_PVDF[1]:
+        return implausible
+    return ImplausibleD33.NOT_PVDF
 
 
 def of_rows(frf: Floats, d33: Floats) -> list[Finding]:
-    """Of measured FRF and the d33 that they mean, a row each [pC/N]: the first row of each doubt.
+    """Of measured FRF and the d33 that they mean, a row each [pC/N]: the first row of each kind.
 
     A row whose FRF is named already is not named for its d33 as well.
     """
@@ -44,18 +44,18 @@ def of_rows(frf: Floats, d33: Floats) -> list[Finding]:
 
 
 def _first(d33: Floats) -> Iterator[Finding]:
-    for doubt, rows in _doubtful(d33).items():
+    for implausible, rows in _implausible_rows(d33).items():
         if rows.any():
             first = int(np.argmax(rows))
-            arguments = {"d33_pc_per_n": float(d33.flat[first]), "doubt": doubt, "more": int(rows.sum()) - 1}
+            arguments = {"d33_pc_per_n": float(d33.flat[first]), "kind": implausible, "more": int(rows.sum()) - 1}
             yield Finding(Reason.D33_OF_ROW, "", "d33_pc_per_n", arguments, index=first if d33.ndim else None)
 
 
-def _doubtful(d33: Floats) -> dict[D33Doubt, NDArray[np.bool_]]:
+def _implausible_rows(d33: Floats) -> dict[ImplausibleD33, NDArray[np.bool_]]:
     """Which entries [pC/N] are doubtful; none where there is no value (NaN)."""
     size = np.abs(d33)
     return {
-        D33Doubt.TOO_LARGE: size > _MOST_D33,
-        D33Doubt.TOO_SMALL: size < _LEAST_D33,
-        D33Doubt.NEGATIVE: d33 < 0,
+        ImplausibleD33.TOO_LARGE: size > _MOST_D33,
+        ImplausibleD33.TOO_SMALL: size < _LEAST_D33,
+        ImplausibleD33.NEGATIVE: d33 < 0,
     }

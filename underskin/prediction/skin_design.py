@@ -134,7 +134,7 @@ def resolution(offset: Floats, response: Floats, pitch: float, nearest: float, d
     width = 2 * float(np.interp(float(response[0]) / 2, response[pair], offset[pair]))
     spacing = max(pitch, width / _FINEST)
     distances = np.linspace(nearest, nearest + 4 * spacing + 3 * width, _DISTANCES)
-    seen = np.array([_told_apart(offset, response, spacing, distance, dip) for distance in distances])
+    seen = np.array([_separated(offset, response, spacing, distance, dip) for distance in distances])
     always, sometimes = (np.asarray(part) for part in (seen.all(axis=1), seen.any(axis=1)))
     settled = len(distances) - int(np.argmin(always[::-1])) if not always.all() else 0
     between, amid = (
@@ -150,7 +150,7 @@ def resolution(offset: Floats, response: Floats, pitch: float, nearest: float, d
     )
 
 
-def _told_apart(offset: Floats, response: Floats, spacing: float, distance: float, dip: float) -> NDArray[np.bool_]:
+def _separated(offset: Floats, response: Floats, spacing: float, distance: float, dip: float) -> NDArray[np.bool_]:
     """Whether two contacts show as two, for each placement of the row of sensors."""
     half = distance / 2
     count = int(np.ceil((half + spacing) / spacing)) + 1

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from underskin.errors import ErrorCode, InvalidInput
+from underskin.errors import REQUIRED, ErrorCode, InvalidInput, Mention, Requirement
 from underskin.recordings import validation as field
 from underskin.recordings.conditions import (
     CompressionConditions,
@@ -20,7 +20,6 @@ from underskin.recordings.conditions import (
     SkinDescription,
 )
 from underskin.recordings.shown_values import named, shown
-from underskin.requirement import REQUIRED, Mention, Requirement
 from underskin.units import Complexes, Floats
 
 SCHEMA = "campaign/1"

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from underskin.errors import ErrorCode, InvalidInput
+from underskin.errors import ErrorCode, InvalidInput, Mention, Requirement
 from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
-from underskin.requirement import Mention, Requirement
 from underskin.units import Floats, to_lab, to_si
 
 _STRAIGHT = 0.02  # largest departure from a straight line, of the stress it spans
@@ -71,23 +70,23 @@ class IndentationModulus:
 
 @dataclass(frozen=True)
 class RecordingModulus:
-    """What a recording says of the elastomer; `found` is the reason where it says nothing."""
+    """What a recording says of the elastomer; `result` is the reason where it says nothing."""
 
     recording: str
     kind: str
-    found: CompressionModulus | IndentationModulus | InvalidInput
+    result: CompressionModulus | IndentationModulus | InvalidInput
 
 
 def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
     """What each recording of kind `compression` or `indentation` says of the elastomer."""
     return [
-        RecordingModulus(recording.id, recording.kind, _found(recording, campaign.skin.poisson_ratio))
+        RecordingModulus(recording.id, recording.kind, _result(recording, campaign.skin.poisson_ratio))
         for recording in campaign.recordings
         if not isinstance(recording, FrfRecording)
     ]
 
 
-def _found(
+def _result(
     recording: CompressionRecording | IndentationRecording, poisson_ratio: float
 ) -> CompressionModulus | IndentationModulus | InvalidInput:
     try:

@@ -22,13 +22,15 @@ from underskin.errors import FileError
 from underskin.recordings.readers.hdf5_damage import damage
 from underskin.recordings.readers.hdf5_file import MAGIC
 from underskin.recordings.readers.hdf5_links import refuse_outside
-from underskin.recordings.readers.sandbox import Limits, call_apart
+from underskin.recordings.readers.sandbox import ParsingLimits, call_apart
 from underskin.units import Floats
 
 SCHEMA = "skin-export/1"
 _ANY_SCHEMA = "skin-export/"
 _NOTHING = np.empty(0)
-_LIMITS = Limits(unfolding=1000.0)  # a column of a simulated campaign may hold one value, and its gzip next to nothing
+_LIMITS = ParsingLimits(
+    unfolding=1000.0
+)  # a column of a simulated campaign may hold one value, and its gzip next to nothing
 
 
 @dataclass(frozen=True, eq=False)

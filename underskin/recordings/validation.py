@@ -14,13 +14,12 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from underskin.errors import ErrorCode, InvalidInput
+from underskin.errors import REQUIRED, ErrorCode, InvalidInput
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings.shown_values import LONGEST_NAME, named, shown
-from underskin.requirement import REQUIRED
 from underskin.units import Floats, checked
 
-Model = TypeVar("Model")
+BuiltModel = TypeVar("BuiltModel")
 Check = Callable[[str, Any, bool], Any]  # name, value, units_checked
 
 _LARGEST_COUNT = 2**53
@@ -66,7 +65,7 @@ def mapping(field: str, value: Any) -> Mapping[str, Any]:
     return value
 
 
-def build(model: type[Model], prefix: str, document: Any, units_checked: bool) -> Model:
+def build(model: type[BuiltModel], prefix: str, document: Any, units_checked: bool) -> BuiltModel:
     """A model of a document; raises InvalidInput at the first field refused, its name led by `prefix`."""
     values, refused = check_fields(model, mapping(prefix, document), units_checked=units_checked)
     if refused:

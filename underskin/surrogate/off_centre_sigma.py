@@ -68,11 +68,11 @@ def positioned_sigma(
     largest_scatter_over_h
         Up to which standard deviation of the position, over the thickness, `scattered` will be asked for.
     """
-    farthest, largest_disc = table.profile_reach, table.domain["rt_over_h"][1]
+    farthest, largest_disc = table.profile_end, table.domain["rt_over_h"][1]
     disc_known = rt_over_h <= largest_disc
     rt_over_h = min(rt_over_h, largest_disc)
-    reach = float(np.max(offset_over_h, initial=0.0)) + 4 * largest_scatter_over_h
-    offsets = _grid(min(reach + 4 * _SPACING, farthest - rt_over_h))
+    largest_offset = float(np.max(offset_over_h, initial=0.0)) + 4 * largest_scatter_over_h
+    offsets = _grid(min(largest_offset + 4 * _SPACING, farthest - rt_over_h))
     radii = np.minimum(_grid(min(offsets[-1] + rt_over_h + 4 * _SPACING, farthest)), farthest)
     profile = table.profile(radii, a_over_h[:, None], load_parameter[:, None])
     sigma = profile @ _disc_average(radii, offsets, rt_over_h).T
@@ -84,7 +84,7 @@ def positioned_sigma(
 
 def sigma_beside(table: SigmaTable, a_over_h: float, rt_over_h: float, load_parameter: float) -> tuple[Floats, Floats]:
     """Offsets e/h, from 0 as far as the table's profile reaches, and σ there of one contact; NaN outside the domain."""
-    farthest = table.profile_reach
+    farthest = table.profile_end
     offsets = _grid(farthest - rt_over_h)
     radii = np.minimum(_grid(farthest), farthest)
     profile = table.profile(radii, a_over_h, load_parameter)

@@ -48,7 +48,7 @@ class SigmaTable(Table):
         }
 
     @property
-    def profile_reach(self) -> float:
+    def profile_end(self) -> float:
         """The largest r/h of the profile, included."""
         return float(self._profile_axes[1][-1])
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from underskin.autodiff import Differentiated
 from underskin.mechanisms import Kind, Mechanism, Normal, Parameter, Stage, Values
-from underskin.mechanisms.autodiff import Differentiated
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.recordings.conditions import Conditions

@@ -56,7 +56,7 @@ def campaign(
         row = campaigns.find(connection, campaign_id)
         recordings = campaigns.recordings_of(connection, row.number)
         latest = diagnoses.listed(connection, diagnoses.DiagnosisFilters(campaign=campaign_id), None, _MOST_DIAGNOSES)
-        told_of = verdicts.of_rows(connection, latest)
+        verdict_of = verdicts.of_rows(connection, latest)
     answer, numbers = d33_cache.with_numbers(store, table, row, band)
     sensors = sorted({entry.sensor for entry in recordings if entry.sensor is not None})
     show = show if show in {"", *sensors, *(entry.id for entry in recordings)} else ""
@@ -71,7 +71,7 @@ def campaign(
         recordings=recordings,
         most_listed=_MOST_LISTED,
         sensors=sensors,
-        diagnoses=list(told_of.values()),
+        diagnoses=list(verdict_of.values()),
         figures=figures(store, row, answer, numbers, show, curves=any(entry.kind != "frf" for entry in recordings)),
         show=show,
         band=band,

@@ -83,7 +83,7 @@ def at_once(request: Request, store: Store, table: Table, skin: Annotated[str | 
     return _json(
         request,
         {
-            "told": {entry.name: [entry.text, entry.exact, entry.note] for entry in results(answer)},
+            "results": {entry.name: [entry.text, entry.exact, entry.note] for entry in results(answer)},
             "figures": {figure.name: figure.json for figure in figures},
             "same": [same.curl, same.python],
         },

@@ -20,7 +20,7 @@ from service.store.tables import AnyRow
 from underskin import InvalidInput, UnderskinError
 
 if TYPE_CHECKING:
-    from underskin.diagnosis.planning.rig_limits import Limits
+    from underskin.diagnosis.planning.rig_limits import RigLimits
 
 router = APIRouter(prefix="/diagnoses/{diagnosis_id}/plan")
 
@@ -101,7 +101,7 @@ def _diagnosed(store: Database, diagnosis_id: str) -> tuple[AnyRow, str]:
 
 
 def _limits(given: Mapping[str, str]) -> dict[str, Any]:
-    """The fields of `Limits` that the form gives; raises InvalidInput."""
+    """The fields of `RigLimits` that the form gives; raises InvalidInput."""
     limits: dict[str, Any] = {}
     ends = [given.get(name, "").strip() for name in (_LOWEST, _HIGHEST)]
     if all(ends):
@@ -122,10 +122,10 @@ def _limits(given: Mapping[str, str]) -> dict[str, Any]:
     return limits
 
 
-def _checked(limits: Mapping[str, Any]) -> "Limits":
-    from underskin.diagnosis.planning.rig_limits import Limits
+def _checked(limits: Mapping[str, Any]) -> "RigLimits":
+    from underskin.diagnosis.planning.rig_limits import RigLimits
 
-    return Limits(**limits)
+    return RigLimits(**limits)
 
 
 def _worded(planned: Mapping[str, Any]) -> Markup:

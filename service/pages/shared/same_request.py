@@ -61,13 +61,12 @@ def planned(request: Request, campaign_id: str, options: Sequence[str], limits: 
     fetch = f"{_curl(request, f'/v1/campaigns/{campaign_id}/document')} -o {file}"
     python = (
         "from pathlib import Path\n\n"
+        "from underskin import load_table, read_file\n"
         "from underskin.diagnosis.pipeline import diagnose\n"
-        "from underskin.diagnosis.planning.rig_limits import Limits\n"
-        "from underskin.recordings import read_file\n"
-        "from underskin.surrogate import load_table\n\n"
+        "from underskin.diagnosis.planning.rig_limits import RigLimits\n\n"
         f"campaign = read_file(Path({file!r}), {file!r}).campaign\n"
-        f"found = diagnose(campaign, load_table(), limits=Limits({limits}))\n"
-        "print(dict(found.next_experiment))"
+        f"diagnosis = diagnose(campaign, load_table(), limits=RigLimits({limits}))\n"
+        "print(dict(diagnosis.next_experiment))"
     )
     return SameRequest(f"{fetch}\n{shlex.join(['underskin', 'plan', file, *options])}", python)
 

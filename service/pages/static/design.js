@@ -17,33 +17,33 @@ async function answer() {
   asking?.abort();
   asking = new AbortController();
   const query = new URLSearchParams(new FormData(form));
-  let found;
+  let design;
   try {
-    const told = await fetch(`/design/answer?${query}`, { signal: asking.signal });
-    found = await told.json();
-    if (!told.ok) found = { error: `${found.detail} Reload the page.` };
+    const response = await fetch(`/design/answer?${query}`, { signal: asking.signal });
+    design = await response.json();
+    if (!response.ok) design = { error: `${design.detail} Reload the page.` };
   } catch {
     return; // a later question took this one's place
   }
-  refused.hidden = !found.error;
-  refused.textContent = found.error ?? "";
-  if (found.error) return;
+  refused.hidden = !design.error;
+  refused.textContent = design.error ?? "";
+  if (design.error) return;
   history.replaceState(null, "", `/design?${query}`);
-  for (const [name, [text, exact, note]] of Object.entries(found.told)) {
-    const entry = document.querySelector(`[data-told="${name}"]`);
+  for (const [name, [text, exact, note]] of Object.entries(design.results)) {
+    const entry = document.querySelector(`[data-result="${name}"]`);
     const value = entry.querySelector("b");
     value.textContent = text;
     value.title = exact;
     entry.querySelector(".quiet").textContent = note;
   }
-  for (const [name, figure] of Object.entries(found.figures)) {
+  for (const [name, figure] of Object.entries(design.figures)) {
     const place = document.getElementById(`figure-${name}`);
     place.querySelector('script[type="application/json"]').textContent = figure;
     await redraw(place.querySelector(".plot"));
     const numbers = place.querySelector(".tools a");
     numbers.search = query;
   }
-  document.querySelectorAll(".same code").forEach((code, index) => (code.textContent = found.same[index]));
+  document.querySelectorAll(".same code").forEach((code, index) => (code.textContent = design.same[index]));
 }
 
 for (const slider of form.querySelectorAll("[type=range]")) {

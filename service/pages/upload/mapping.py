@@ -6,10 +6,9 @@ from typing import Any
 
 from service.pages.upload.file_summary import ChannelSummary
 from underskin import InvalidInput
-from underskin.errors import ErrorCode
+from underskin.errors import UNITS_CHECKED, ErrorCode, Mention, Requirement
 from underskin.recordings.readers.unit_labels import lab_field, unit
 from underskin.recordings.rig_description import SCHEMA, channel_fields
-from underskin.requirement import UNITS_CHECKED, Mention, Requirement
 
 KINDS = {
     "frf": "FRF: charge against a shaken force",

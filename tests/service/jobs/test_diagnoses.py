@@ -195,7 +195,7 @@ def test_a_silent_server_loses_what_it_was_at_and_cannot_end_it(place: Place) ->
         row = diagnoses.claim(connection, "first", "table", "1")
         assert row is not None
         assert diagnoses.claim(connection, "second", "table", "1") is None
-        late = table_of_diagnoses.c.alive_at - diagnoses.SILENT_S - 1
+        late = table_of_diagnoses.c.alive_at - diagnoses.HEARTBEAT_TIMEOUT_S - 1
         connection.execute(table_of_diagnoses.update().values(alive_at=late))
         assert diagnoses.claim(connection, "first", "table", "1") is None
         taken = diagnoses.claim(connection, "second", "other", "2")

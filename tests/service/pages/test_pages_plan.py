@@ -12,11 +12,11 @@ from tests.support.diagnosed import asked, awaited, sent, table
 from tests.support.diagnosis_campaigns import campaign
 from tests.support.store_server import Server
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.planning.rig_limits import Limits
+from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.wording import readable
 from underskin.recordings.campaign import to_dict
 
-LIMITS = Limits(preload_n=(0.3, 2.5), indenter_radius_mm=[4.0, 8.0], recordings=5)
+LIMITS = RigLimits(preload_n=(0.3, 2.5), indenter_radius_mm=[4.0, 8.0], recordings=5)
 
 
 @pytest.fixture(scope="module")

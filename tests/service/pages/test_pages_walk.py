@@ -88,7 +88,7 @@ def test_a_slider_of_the_design_view_answers_at_once(newcomer: Visit) -> None:
     page.get_by_role("link", name="Design view").click()
     newcomer.drawn(2)
     newcomer.require_accessible()
-    told = page.locator("[data-told=resolution] b")
+    told = page.locator("[data-result=resolution] b")
     before = float(told.inner_text().split()[0])
     assert before == pytest.approx(3.34, abs=0.01)  # the paper's geometry
     slider = page.get_by_label("thickness h, slider")
@@ -96,7 +96,7 @@ def test_a_slider_of_the_design_view_answers_at_once(newcomer: Visit) -> None:
         for _ in range(5):
             slider.press("ArrowRight")
     page.wait_for_function(
-        "before => parseFloat(document.querySelector('[data-told=resolution] b').textContent) > before", arg=before
+        "before => parseFloat(document.querySelector('[data-result=resolution] b').textContent) > before", arg=before
     )
     page.wait_for_url("**thickness_mm=2.*")
     page.locator("#pitch_mm").fill("1")

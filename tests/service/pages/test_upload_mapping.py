@@ -10,8 +10,8 @@ from service.pages.upload.file_summary import ChannelSummary
 from service.pages.upload.mapping import CHANNELS, KINDS, document_of, field_words, guessed, sensors_text, what_to_do
 from tests.support.repository import ROOT
 from underskin import InvalidInput
+from underskin.errors import Mention, Requirement
 from underskin.recordings import rig_description
-from underskin.requirement import Mention, Requirement
 from underskin.units import checked
 
 RIGS = sorted((ROOT / "examples" / "formats" / "rigs").glob("*.yaml"))

@@ -13,7 +13,7 @@ import numpy as np
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import Evidence, around, integrated
-from underskin.diagnosis.inference.hypothesis import Hypothesis, Point
+from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis
 from underskin.diagnosis.inference.likelihood import Curvature
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.inference.position_curvature import curvature
@@ -67,7 +67,7 @@ class Explanation:
         return self.best.fitter.hypothesis.model
 
     @property
-    def point(self) -> Point:
+    def point(self) -> FitPoint:
         """The most probable parameters."""
         return self.best.at.point
 
@@ -198,7 +198,7 @@ def at_recording(problem: FittingProblem, at: Evaluated) -> np.ndarray:
     )
 
 
-def _placed_start(fitter: Fitter, at: Evaluated) -> Point:
+def _placed_start(fitter: Fitter, at: Evaluated) -> FitPoint:
     """The best of a few scales of positioning scatter, d33 following each."""
     if fitter.holds(at.point):
         return at.point

@@ -69,7 +69,7 @@ class Hypothesis:
 
 
 @dataclass(frozen=True)
-class Point:
+class FitPoint:
     """Where a fit stands: the model's coordinates, the covariance's, and each sensor's most probable log gain."""
 
     fit: Floats

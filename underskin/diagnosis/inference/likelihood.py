@@ -22,11 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.pickup_rows import PickedRows
+from underskin.diagnosis.inference.pickup_rows import PickupRows
 from underskin.diagnosis.noise.noise_levels import NoiseLevels, SeveralLevels
-from underskin.mechanisms.autodiff import Array
 from underskin.mechanisms.models.composed import Prediction
-from underskin.units import Floats
+from underskin.units import Array, Floats
 
 _FROM_SLOPES = 1e-3  # m: a recording whose response changes by more than itself over this way is led by its slopes
 
@@ -75,29 +74,29 @@ class Moments:
         self._residual = residual
         self.second_order = curvature.square
         self._sum_up()
-        self.picked = None if prediction.picked is None else PickedRows(lines, prediction.picked)
+        self.pickup_rows = None if prediction.pickup_rows is None else PickupRows(lines, prediction.pickup_rows)
 
     def summed(self, levels: NoiseLevels | SeveralLevels) -> tuple[Array, Array, Array, Floats | float]:
         """uᵀu, uᵀr and rᵀr less what rows lose to pick-up, and what that adds to the log of the determinant."""
-        if self.picked is None or levels.pickup is None:
+        if self.pickup_rows is None or levels.pickup is None:
             return self.uu, self.ur, self.rr, 0.0
-        lost, log_determinant = self.picked.lost(levels.pickup, levels.level)
-        u, r = self._direction_rows[self.picked.rows], self._residual[self.picked.rows]
+        lost, log_determinant = self.pickup_rows.lost(levels.pickup, levels.level)
+        u, r = self._direction_rows[self.pickup_rows.rows], self._residual[self.pickup_rows.rows]
         uu, ur, rr = (
-            whole - self.picked.over_recordings(lost * (a.conj() * b).real)
+            whole - self.pickup_rows.over_recordings(lost * (a.conj() * b).real)
             for whole, a, b in ((self.uu, u, u), (self.ur, u, r), (self.rr, r, r))
         )
         return uu, ur, rr, log_determinant
 
     def without(self, levels: NoiseLevels) -> "Moments":
         """With all sums less what rows lose to pick-up."""
-        if self.picked is None or levels.pickup is None:
+        if self.pickup_rows is None or levels.pickup is None:
             return self
         other = copy(self)
         other.uu, other.ur, other.rr, _ = self.summed(levels)
         jj, uj, jr = self.slopes
-        (lost, _), rows = self.picked.lost(levels.pickup, levels.level), self.picked.rows
-        slopes, over = self._slope_rows[:, rows], self.picked.over_recordings
+        (lost, _), rows = self.pickup_rows.lost(levels.pickup, levels.level), self.pickup_rows.rows
+        slopes, over = self._slope_rows[:, rows], self.pickup_rows.over_recordings
         real = np.concatenate([slopes.real, slopes.imag], axis=1)
         jj = jj - (real * np.tile(lost, 2)) @ real.T
         uj = uj - over(lost * (self._direction_rows[rows].conj() * slopes).real).T
@@ -186,11 +185,11 @@ class LogLikelihoods:
     def __init__(self, lines: Lines, moments: Moments, levels: NoiseLevels | SeveralLevels) -> None:
         """Take out pick-up, gain and position, recording by recording, then the sensors."""
         self._k2 = k2 = levels.level**2
-        uu, ur, rr, picked = moments.summed(levels)
+        uu, ur, rr, from_pickup = moments.summed(levels)
         along, ur, rr = moments.at_position(levels.position, uu, ur, rr)
         self._along = along
         uu, ur, rr = uu / k2, ur / k2, rr / k2
-        log_determinant: Any = moments.log_determinant + picked
+        log_determinant: Any = moments.log_determinant + from_pickup
         self._uu, self._ur = uu, ur
         a2 = along**2
         variance = levels.gain**2 * a2

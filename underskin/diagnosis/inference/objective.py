@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from underskin.diagnosis.inference.hypothesis import (
+    FitPoint,
     Hypothesis,
-    Point,
     curvature_of_prior,
     own_parameters,
 )
@@ -35,7 +35,7 @@ class Evaluated:
     `growth` of the position's slopes, once a fit has needed it, near there.
     """
 
-    point: Point
+    point: FitPoint
     prediction: Prediction
     moments: Moments
     marginal: Marginal
@@ -74,7 +74,7 @@ class Evaluator:
         sensors = int(hypothesis.lines.sensor.max()) + 1
         self.no_bend = np.zeros(sensors)
 
-    def evaluate(self, point: Point, prediction: Prediction | None = None) -> Evaluated:
+    def evaluate(self, point: FitPoint, prediction: Prediction | None = None) -> Evaluated:
         """Predict, where that was not done already, and weigh."""
         hypothesis = self.hypothesis
         prediction = prediction or hypothesis.model.predict(point.fit)
@@ -92,7 +92,7 @@ class Evaluator:
             point = replace(point, bend=bend)
         return at
 
-    def _weigh(self, point: Point, prediction: Prediction, moments: Moments) -> Evaluated:
+    def _weigh(self, point: FitPoint, prediction: Prediction, moments: Moments) -> Evaluated:
         lines, levels = self.hypothesis.lines, self.levels(point)
         if lines.curves and levels.smooth != moments.ratio * levels.level:
             moments = moments.at_ratio(levels.smooth / levels.level)
@@ -100,14 +100,14 @@ class Evaluator:
         cost = -marginal.log_likelihood - self._log_prior(point)
         return Evaluated(point, prediction, moments, marginal, cost)
 
-    def levels(self, point: Point) -> NoiseLevels:
+    def levels(self, point: FitPoint) -> NoiseLevels:
         """The noise levels at a point."""
         gain, level, *_ = np.exp(point.covariance).tolist()
         position, spread, pickup = self._own_levels(point.covariance)
         return NoiseLevels(gain, level, float(position), float(spread), pickup, self._smooth(point))
 
     def _own_levels(self, covariance: Floats) -> tuple[Floats | float, Floats | float, Floats | None]:
-        """p, τ and the pick-up (…, picked rows) that covariance parameters (…, parameters) hold."""
+        """p, τ and the pick-up (…, pick-up rows) that covariance parameters (…, parameters) hold."""
         position: Floats | float = np.exp(covariance[..., POSITION]) if self.hypothesis.placed else 0.0
         spread: Floats | float = SENSOR_SPREAD
         values = {}
@@ -119,7 +119,7 @@ class Evaluator:
         pickup = self.hypothesis.model.pickup
         return position, spread, None if pickup is None else pickup.deviation(values)
 
-    def _smooth(self, point: Point) -> float:
+    def _smooth(self, point: FitPoint) -> float:
         """η, which follows the two that all recordings have."""
         return float(np.exp(point.covariance[2])) if self.hypothesis.lines.curves else 0.0
 
@@ -130,12 +130,12 @@ class Evaluator:
         whole[self._own] = covariance[self._common :]
         return whole
 
-    def _log_prior(self, point: Point) -> float:
+    def _log_prior(self, point: FitPoint) -> float:
         return self._log_mean_prior(point) + sum(
             entry.log_density(value) for entry, value in zip(self.covariance, point.covariance.tolist(), strict=True)
         )
 
-    def _log_mean_prior(self, point: Point) -> float:
+    def _log_mean_prior(self, point: FitPoint) -> float:
         """Of the parameters that move the mean."""
         places = self.places
         fit = point.fit[places]
@@ -185,14 +185,14 @@ class Evaluator:
         same = at.marginal.levels.position == at.moments.position
         return at if same else self.weighed_anew(at.point, at)
 
-    def weighed_anew(self, point: Point, at: Evaluated) -> Evaluated:
+    def weighed_anew(self, point: FitPoint, at: Evaluated) -> Evaluated:
         """A point with the prediction of another, whose moments are summed at the point's own scatter."""
         lines, curvature = self.hypothesis.lines, self.hypothesis.curvature
         position = self.levels(point).position
         moments = Moments(lines, at.prediction, point.bend[lines.sensor], curvature, position)
         return self._weigh(point, at.prediction, moments)
 
-    def moved(self, point: Point, covariance: Floats) -> Point:
+    def moved(self, point: FitPoint, covariance: Floats) -> FitPoint:
         """The point with other covariance parameters, a mechanism's own among the coordinates of the fit."""
         return replace(point, covariance=covariance, fit=self._with_own(point.fit, covariance))
 

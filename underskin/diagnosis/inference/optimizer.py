@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from underskin.diagnosis.inference.hypothesis import Point
+from underskin.diagnosis.inference.hypothesis import FitPoint
 from underskin.diagnosis.inference.objective import Evaluated, Evaluator
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
 from underskin.mechanisms.models.composed import Prediction
@@ -27,11 +27,11 @@ _MOST_ITERATIONS = 25
 class Fitter(Evaluator):
     """Begins and improves points of one hypothesis."""
 
-    def holds(self, point: Point) -> bool:
+    def holds(self, point: FitPoint) -> bool:
         """Whether a point has this hypothesis' covariance parameters."""
         return len(point.covariance) == len(self.covariance)
 
-    def _uncentred(self, own: Sequence[float] | Floats, parent: Point | None) -> Point:
+    def _uncentred(self, own: Sequence[float] | Floats, parent: FitPoint | None) -> FitPoint:
         """A point with these coordinates of the mechanisms, and the nuisances of a parent or at their centre."""
         fit = np.array([entry.start for entry in self.parameters])
         fit[: len(own)] = own
@@ -42,11 +42,11 @@ class Fitter(Evaluator):
             covariance.append(POSITION_PRIOR.middle)
         if self.hypothesis.lines.curves:
             covariance.append(self.hypothesis.smooth.middle)
-        return Point(fit, np.array([*covariance, *fit[self._own]]), self.no_bend)
+        return FitPoint(fit, np.array([*covariance, *fit[self._own]]), self.no_bend)
 
     def start(
-        self, own: Sequence[float] | Floats, parent: Point | None = None, prediction: Prediction | None = None
-    ) -> Point:
+        self, own: Sequence[float] | Floats, parent: FitPoint | None = None, prediction: Prediction | None = None
+    ) -> FitPoint:
         """A point with these coordinates of the mechanisms, E and h of a parent or their centre, d33 as data say."""
         point = self._uncentred(own, parent)
         fit = point.fit
@@ -60,7 +60,7 @@ class Fitter(Evaluator):
                 fit[place] = np.clip(fit[place] + np.log(ratio), self.low[place], self.high[place])
         return point
 
-    def begin(self, own: Sequence[float] | Floats, parent: Point | None = None) -> Evaluated:
+    def begin(self, own: Sequence[float] | Floats, parent: FitPoint | None = None) -> Evaluated:
         """The start of these coordinates, evaluated with a single prediction where d33 only scales it."""
         prediction = self.hypothesis.model.predict(self._uncentred(own, parent).fit)
         point = self.start(own, parent, prediction)
@@ -84,17 +84,17 @@ class Fitter(Evaluator):
         prediction = _scaled(at.prediction, fit[place] - at.point.fit[place])
         return self.settle(self.weighed_anew(replace(at.point, fit=fit), replace(at, prediction=prediction)), 2)
 
-    def improve(self, start: Point) -> Evaluated:
+    def improve(self, start: FitPoint) -> Evaluated:
         """The most probable point near the start."""
         if not self.hypothesis.lines.curves:
             return self.settle(self._descend(self.settle(self.evaluate(start), 3), 1), 2)
         # Small smooth error and close fit, or large and loose: each may be a maximum of its own.
-        found = []
+        fits = []
         for smooth in (self.hypothesis.smooth.low, self.hypothesis.smooth.middle):
             begin = replace(start, covariance=np.array([GAIN_PRIOR.middle, 0.0, smooth]))
             fitted = self.settle(self._descend(self.evaluate(begin), 0), _CURVE_SETTLING)
-            found.append(self.settle(self._descend(fitted, 1), _CURVE_SETTLING))
-        return min(found, key=lambda at: at.cost)
+            fits.append(self.settle(self._descend(fitted, 1), _CURVE_SETTLING))
+        return min(fits, key=lambda at: at.cost)
 
     def _descend(self, best: Evaluated, settling: int) -> Evaluated:
         """Steps of the mean parameters, each followed by so many of the covariance's."""
@@ -128,15 +128,15 @@ class Fitter(Evaluator):
     def with_growth(self, at: Evaluated) -> Evaluated:
         """With ∂ log |t|²/∂θ (recordings, parameters) of the position's slopes t, by differences."""
         slopes = at.moments.log_slopes
-        found = np.zeros((len(slopes), len(self.parameters)))
+        growth = np.zeros((len(slopes), len(self.parameters)))
         for place in self.places:
             step = _SLOPE_STEP * (self.high[place] - self.low[place])
             moved = at.point.fit.copy()
             moved[place] += step if moved[place] + step <= self.high[place] else -step
-            found[:, place] = (self.evaluate(replace(at.point, fit=moved)).moments.log_slopes - slopes) / (
+            growth[:, place] = (self.evaluate(replace(at.point, fit=moved)).moments.log_slopes - slopes) / (
                 moved[place] - at.point.fit[place]
             )
-        return replace(at, growth=found)
+        return replace(at, growth=growth)
 
     def _step(self, at: Evaluated, damping: float) -> tuple[Floats, float]:
         """A damped Gauss–Newton step of the mean parameters within the bounds, and what the gradient says it gains."""

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.mechanisms.autodiff import Array
-from underskin.units import Floats
+from underskin.units import Array, Floats
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ def line_residuals(problem: FittingProblem, explanation: Explanation) -> tuple[A
     """
     lines, prediction, at = problem.lines, whole_prediction(problem, explanation), explanation.best.at
     first = lines.first
-    further = 0.0 if at.prediction.picked is None else at.pickup_variance / at.marginal.levels.level**2
+    further = 0.0 if at.prediction.pickup_rows is None else at.pickup_variance / at.marginal.levels.level**2
     precision = 1 / (lines.deviation**2 + further)
     along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, first)
     size = np.add.reduceat(precision * np.abs(prediction) ** 2, first)

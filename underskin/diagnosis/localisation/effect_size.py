@@ -13,15 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.mechanisms.autodiff import Array
-from underskin.units import Floats
+from underskin.units import Array, Floats
 
 _ONE_SIGN = 0.8
 _DRAWS, _SEED = 1000, 20180207
 
 
 @dataclass(frozen=True)
-class Effect:
+class EffectSize:
     """In percent of the base model's response; `signed` where all of the region lies on one side of the model."""
 
     percent: float
@@ -30,7 +29,7 @@ class Effect:
     signed: bool
 
 
-def effect(lines: Lines, predicted: Array, rows: NDArray[np.bool_], gain: float, level: float) -> Effect:
+def effect(lines: Lines, predicted: Array, rows: NDArray[np.bool_], gain: float, level: float) -> EffectSize:
     """The size of the misfit on some rows.
 
     Parameters
@@ -48,7 +47,7 @@ def effect(lines: Lines, predicted: Array, rows: NDArray[np.bool_], gain: float,
 
     Returns
     -------
-    Effect
+    EffectSize
         The misfit with its 95 % interval, in percent of the base model's response.
     """
     weight = lines.deviation[rows] ** -2.0
@@ -68,7 +67,7 @@ def effect(lines: Lines, predicted: Array, rows: NDArray[np.bool_], gain: float,
     drawn = np.random.default_rng(_SEED).integers(len(size), size=(_DRAWS, len(size)))
     means, sizes = _ratios(*(column[drawn].sum(axis=1) for column in (square, along, size)))
     low, high = np.quantile(means if signed else sizes, [0.025, 0.975])
-    return Effect(100 * float(mean if signed else rms), 100 * float(low), 100 * float(high), signed)
+    return EffectSize(100 * float(mean if signed else rms), 100 * float(low), 100 * float(high), signed)
 
 
 def _ratios(square: Floats, along: Floats, size: Floats) -> tuple[Floats, Floats]:

@@ -9,8 +9,7 @@ from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.residuals import Residuals
 from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT, AxisResult
-from underskin.mechanisms.autodiff import Array
-from underskin.units import Floats
+from underskin.units import Array, Floats
 
 _MOST_OF_IT = 0.7
 

@@ -54,7 +54,7 @@ class FormKind(StrEnum):
 
 
 @dataclass(frozen=True)
-class Form:
+class ShapeForm:
     """A form, the value `at` which it lies (of periodic ones the period; NaN of none), and its size.
 
     The size is in percent of the response, of curves in percent of the largest force; of circling contacts it is the
@@ -75,7 +75,7 @@ class Shape:
     """The best form of what remains beyond some mechanisms; None where no simple form fits."""
 
     beyond: tuple[str, ...]
-    form: Form | None
+    form: ShapeForm | None
     of_curves: bool
 
 
@@ -131,7 +131,7 @@ def _is_above_noise(smooth: float, noise: float) -> bool:
     return smooth > max(_ABOVE_NOISE * noise, _LEAST_REMAINDER)
 
 
-def _along_curves(problem: FittingProblem, explanation: Explanation) -> list[Form]:
+def _along_curves(problem: FittingProblem, explanation: Explanation) -> list[ShapeForm]:
     """The best forms of the residual, relative to each curve's largest force, over displacement and over time."""
     lines = problem.lines
     assert lines.smooth is not None
@@ -145,11 +145,11 @@ def _along_curves(problem: FittingProblem, explanation: Explanation) -> list[For
     return forms
 
 
-def _over_axes(problem: FittingProblem, explanation: Explanation) -> list[Form]:
+def _over_axes(problem: FittingProblem, explanation: Explanation) -> list[ShapeForm]:
     """The best forms over each of the recordings' axes, and over the lines'."""
     levels = explanation.best.at.marginal.levels
     left = residuals(problem, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
-    forms: list[Form] = []
+    forms: list[ShapeForm] = []
     for name, column in _axes(problem.lines.campaign).items():
         for index in range(column.shape[1]):
             component = None if column.shape[1] == 1 else index
@@ -176,14 +176,14 @@ def _axes(campaign: Campaign) -> dict[str, Floats]:
     return {**axes, ORDER: order(campaign)[:, None]}
 
 
-def _circling(problem: FittingProblem, explanation: Explanation, left: Residuals) -> list[Form]:
+def _circling(problem: FittingProblem, explanation: Explanation, left: Residuals) -> list[ShapeForm]:
     """A contact that circles about its place while recordings are made, with the period that fits best."""
     rank = order(problem.lines.campaign)
     slopes = 1e-3 * relative_place_slopes(explanation.best.at).T  # per mm
     if not np.abs(slopes).max() > 0 or len(rank) < _LEAST_IN_ORDER:
         return []
     root = 1 / left.gain_deviation
-    best: list[Form] = []
+    best: list[ShapeForm] = []
     plain = float((((left.gain - np.average(left.gain, weights=root**2)) * root) ** 2).sum())
     for period in 2 * len(rank) / np.arange(1, len(rank)):
         angle = 2 * np.pi * rank / period
@@ -194,11 +194,11 @@ def _circling(problem: FittingProblem, explanation: Explanation, left: Residuals
         gain = 0.5 * (plain - square - 5 * np.log(len(rank)))
         if gain > (best[0].gain if best else 0.0):
             size = float(np.hypot(waves @ coefficients[1:3], waves @ coefficients[3:5]).max())
-            best = [Form(FormKind.CIRCLING, float(period), size, gain=gain)]
+            best = [ShapeForm(FormKind.CIRCLING, float(period), size, gain=gain)]
     return best
 
 
-def _best_form(x: Floats, values: Floats, weight: Floats, axis: str) -> list[Form]:
+def _best_form(x: Floats, values: Floats, weight: Floats, axis: str) -> list[ShapeForm]:
     """The form of largest information criterion, where one beats a constant; values (rows, parts)."""
     if np.ptp(x) <= 0:
         return []
@@ -210,14 +210,14 @@ def _best_form(x: Floats, values: Floats, weight: Floats, axis: str) -> list[For
         return float((((values - design @ coefficients) * root) ** 2).sum()), coefficients
 
     plain, _ = misfit(np.zeros((len(x), 0)))
-    best: list[Form] = []
+    best: list[ShapeForm] = []
     price = np.log(len(x))
     for basis, shapes, kind, at in _forms(x, axis):
         square, coefficients = misfit(basis)
         gain = 0.5 * (plain - square - price * (shapes + basis.shape[1] * values.shape[1]))
         if gain > (best[0].gain if best else 0.0):
             size = 100 * float(np.abs(basis @ coefficients[1:]).max() if basis.size else 0.0)
-            best = [Form(kind, at, size, axis, gain=float(gain))]
+            best = [ShapeForm(kind, at, size, axis, gain=float(gain))]
     return best
 
 

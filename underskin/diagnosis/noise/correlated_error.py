@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.noise.noise_priors import Plateau
-from underskin.mechanisms.autodiff import Array
-from underskin.units import Floats
+from underskin.units import Array, Floats
 
 USUAL = Plateau.of((1e-3, 1e-2), (1.0, 0.25))
 UNNAMED = Plateau.of((2e-2, 0.5), (0.05, 0.05))

@@ -19,7 +19,7 @@ class NoiseLevels:
 
 @dataclass(frozen=True)
 class SeveralLevels:
-    """K sets of noise levels; each a column (K, 1), or a number that all share; of pick-up (K, picked rows)."""
+    """K sets of noise levels; each a column (K, 1), or a number that all share; of pick-up (K, pick-up rows)."""
 
     gain: Floats
     level: Floats

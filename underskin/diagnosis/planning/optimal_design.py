@@ -19,9 +19,9 @@ import numpy as np
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import EXPLAINED, in_words
 from underskin.diagnosis.inference.explanation import FittingProblem
-from underskin.diagnosis.planning.rig_limits import Limits, candidates, inferred, wider
+from underskin.diagnosis.planning.rig_limits import RigLimits, candidates, inferred, wider
 from underskin.diagnosis.selection.search import Answer, Search
-from underskin.formatting import in_percent
+from underskin.findings.formatting import in_percent
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.registry import CATALOGUE
@@ -36,7 +36,7 @@ _SURVIVES = 0.02
 _RIVALS = 4
 
 
-def plan(problem: FittingProblem, search: Search, limits: Limits) -> dict[str, Any]:
+def plan(problem: FittingProblem, search: Search, limits: RigLimits) -> dict[str, Any]:
     """The recordings to make, in lab units, what they cost, and the chance that they decide; empty if all is decided.
 
     Where several answers remain and no recording can be planned, the document says why, with no recordings in it.
@@ -53,7 +53,7 @@ def plan(problem: FittingProblem, search: Search, limits: Limits) -> dict[str, A
     return {} if surviving[0].probability >= EXPLAINED else _nothing_to_plan(surviving)
 
 
-def _planned(problem: FittingProblem, surviving: Sequence[Answer], limits: Limits, beyond: bool) -> dict[str, Any]:
+def _planned(problem: FittingProblem, surviving: Sequence[Answer], limits: RigLimits, beyond: bool) -> dict[str, Any]:
     """The best recordings within these limits; empty where none brings anything."""
     allowed = candidates(problem.lines.campaign, limits)
     rivals, outlook, allowed = _outlook(problem, surviving, allowed)
@@ -179,7 +179,7 @@ class _Outlook:
         return list(dict.fromkeys(ends))
 
 
-def _choose(outlook: _Outlook, candidates: Sequence[FrfConditions], limits: Limits) -> tuple[list[int], float]:
+def _choose(outlook: _Outlook, candidates: Sequence[FrfConditions], limits: RigLimits) -> tuple[list[int], float]:
     """Recordings, two and then one at a time, until they decide or a further one brings too little."""
     promising = outlook.promising
     chosen: list[int] = []

@@ -21,7 +21,7 @@ _LOUDER, _LONGER = (
 
 
 @dataclass(frozen=True)
-class Limits:
+class RigLimits:
     """What the rig can do, in lab units; what is left None is inferred from the campaign.
 
     Raises InvalidInput where no rig could: a force, a radius or a count not above zero, a distance or a time below it.
@@ -57,7 +57,7 @@ class Limits:
         )
 
 
-def inferred(conditions: Conditions, limits: Limits) -> Limits:
+def inferred(conditions: Conditions, limits: RigLimits) -> RigLimits:
     """The limits, those left open as the campaign did it: its spheres, amplitudes, dwells and distances from the
     sensor, its preloads and a quarter beyond the highest."""
     entries = frf_of(conditions)
@@ -74,7 +74,7 @@ def inferred(conditions: Conditions, limits: Limits) -> Limits:
     )
 
 
-def wider(conditions: Conditions, limits: Limits) -> Limits:
+def wider(conditions: Conditions, limits: RigLimits) -> RigLimits:
     """Inferred limits with what most rigs can do besides: a larger dynamic force, a longer dwell, half and all of the
     thickness beside the sensor."""
     thickness = conditions.skin.thickness_mm
@@ -94,7 +94,7 @@ def _ends(values: Sequence[float]) -> list[float]:
     return sorted({min(values), max(values)}) if values else []
 
 
-def candidates(conditions: Conditions, limits: Limits) -> list[FrfConditions]:
+def candidates(conditions: Conditions, limits: RigLimits) -> list[FrfConditions]:
     """A recording for every combination within the limits, at the sensor that was recorded most, after all others."""
     entries = frf_of(conditions)
     sensors = [entry.sensor for entry in entries]
@@ -118,7 +118,7 @@ def candidates(conditions: Conditions, limits: Limits) -> list[FrfConditions]:
     ]
 
 
-def _settings(limits: Limits) -> Iterator[tuple[float, float, float, float | None, float]]:
+def _settings(limits: RigLimits) -> Iterator[tuple[float, float, float, float | None, float]]:
     assert limits.preload_n is not None
     forces = sorted({float(f"{force:.2g}") for force in np.geomspace(*limits.preload_n, _PRELOADS)})
     inside = [force for force in forces if limits.preload_n[0] <= force <= limits.preload_n[1]]

@@ -13,10 +13,9 @@ from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import whole_prediction
 from underskin.diagnosis.localisation.region import axis_values
-from underskin.diagnosis.reporting.report import Diagnosis
-from underskin.mechanisms.autodiff import Array
+from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.units import Complexes, Floats
+from underskin.units import Array, Complexes, Floats
 
 _MOST_POINTS = 600
 _LEAST_BINS = 8  # of the lines, so that a shape over them can be seen in campaigns of any size
@@ -55,7 +54,7 @@ class Levels:
 class Thinned:
     """Which rows each point is the mean of."""
 
-    def __init__(self, diagnosis: Diagnosis, problem: FittingProblem, shown: Explanation) -> None:
+    def __init__(self, diagnosis: DiagnosisResult, problem: FittingProblem, shown: Explanation) -> None:
         """One point a recording unless region or explanation run along the lines."""
         self.lines = lines = problem.lines
         self.problem = problem

@@ -16,8 +16,8 @@ from underskin.diagnosis.data.names import SIMPLEST
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, own_places
 from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT
 from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned
-from underskin.diagnosis.reporting.report import Diagnosis
-from underskin.formatting import in_percent
+from underskin.diagnosis.reporting.report import DiagnosisResult
+from underskin.findings.formatting import in_percent
 from underskin.units import Floats
 
 AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in WORDS.items()}
@@ -28,7 +28,7 @@ _BAND = 60  # points along a band
 _ROW, _BETWEEN = 110, 0.65  # height of a parameter's row [pixels], and the share of it that labels need
 
 
-def figures(diagnosis: Diagnosis, document: Mapping[str, Any]) -> dict[str, go.Figure]:
+def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str, go.Figure]:
     """By name: where, before_after, explanations, parameters; those that the diagnosis has. `document`: its report."""
     if diagnosis.search is None or diagnosis.problem is None:
         return {}
@@ -73,7 +73,7 @@ def explanations(document: Mapping[str, Any]) -> go.Figure:
     return _styled(figure)
 
 
-def residual_map(diagnosis: Diagnosis, thinned: Thinned, before: Points) -> go.Figure:
+def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points) -> go.Figure:
     """Measured less the model to which nothing is added, over the located axes; the region outlined.
 
     A cell is the mean over the points in it; out of phase where the misfit lies in the phase.
@@ -116,7 +116,7 @@ def residual_map(diagnosis: Diagnosis, thinned: Thinned, before: Points) -> go.F
 
 
 def before_and_after(
-    diagnosis: Diagnosis, thinned: Thinned, before: Points, after: Points, shown: Explanation
+    diagnosis: DiagnosisResult, thinned: Thinned, before: Points, after: Points, shown: Explanation
 ) -> go.Figure:
     """Measured against predicted, by the model alone and by what is stated, each with the band that noise allows."""
     named = " + ".join(shown.names).replace("_", " ") or "nothing added"
@@ -127,13 +127,13 @@ def before_and_after(
     ids = [escape(entry.id) for entry in thinned.lines.campaign.recordings]
     for place, (points, colour, marker) in enumerate(((before, _ORANGE, "square"), (after, _BLUE, "circle")), start=1):
         predicted, measured = (_part(diagnosis, column)[0] for column in (points.predicted, points.measured))
-        reach = np.linspace(predicted.min(), predicted.max(), _BAND)
+        along = np.linspace(predicted.min(), predicted.max(), _BAND)
         # Where all predictions are alike the band would have no width along the abscissa.
-        reach = reach if np.ptp(reach) > 0 else reach + np.linspace(-1, 1, _BAND) * (np.abs(reach).max() or 1.0) * 0.05
-        half = _SIGMAS * np.hypot(points.gain * reach, float(np.median(points.deviation)))
+        along = along if np.ptp(along) > 0 else along + np.linspace(-1, 1, _BAND) * (np.abs(along).max() or 1.0) * 0.05
+        half = _SIGMAS * np.hypot(points.gain * along, float(np.median(points.deviation)))
         figure.add_scatter(
-            x=[*reach, *reach[::-1]],
-            y=[*(reach + half), *(reach - half)[::-1]],
+            x=[*along, *along[::-1]],
+            y=[*(along + half), *(along - half)[::-1]],
             fill="toself",
             fillcolor="rgba(0,0,0,0.15)",
             line={"width": 0},
@@ -144,7 +144,7 @@ def before_and_after(
             col=place,
         )
         figure.add_scatter(
-            x=reach, y=reach, mode="lines", line={"color": "#000000", "width": 1}, name="measured = predicted",
+            x=along, y=along, mode="lines", line={"color": "#000000", "width": 1}, name="measured = predicted",
             hoverinfo="skip", showlegend=place == 1, row=1, col=place,
         )  # fmt: skip
         figure.add_scatter(
@@ -211,7 +211,7 @@ def _labelled(entry: Mapping[str, Any]) -> str:
     return f"{entry['name'].replace('_', ' ')} {interval}"
 
 
-def _part(diagnosis: Diagnosis, column: np.ndarray[Any, Any]) -> tuple[Floats, str]:
+def _part(diagnosis: DiagnosisResult, column: np.ndarray[Any, Any]) -> tuple[Floats, str]:
     """The real part, or the imaginary where the misfit lies in the phase alone, and what it is called."""
     telling = [entry for entry in diagnosis.axes if entry.p_value is not None and entry.p_value < SIGNIFICANT]
     largest = max(telling, key=lambda entry: entry.share, default=None)
@@ -220,7 +220,7 @@ def _part(diagnosis: Diagnosis, column: np.ndarray[Any, Any]) -> tuple[Floats, s
     return column.real, "in phase"
 
 
-def _map_axes(diagnosis: Diagnosis, thinned: Thinned) -> tuple[str | None, str | None]:
+def _map_axes(diagnosis: DiagnosisResult, thinned: Thinned) -> tuple[str | None, str | None]:
     """Those of the region, then the campaign's, as far as points differ along them; frequency lies on x."""
     every = thinned.axes()
     wanted = [name for name in dict.fromkeys([*diagnosis.region, *every]) if name in every]
@@ -234,7 +234,7 @@ def _one_level(points: Points) -> Levels:
     return Levels(np.zeros(len(points.recording), dtype=np.intp), [""], np.zeros(1), np.zeros(1))
 
 
-def _outline(diagnosis: Diagnosis, axis: str | None, levels: Levels) -> tuple[float, float]:
+def _outline(diagnosis: DiagnosisResult, axis: str | None, levels: Levels) -> tuple[float, float]:
     """From where to where the region reaches on an axis of the map, whose steps are 0, 1, …"""
     ends = diagnosis.region.get(axis or "")
     if ends is None:

@@ -17,7 +17,7 @@ from underskin.diagnosis.reporting import report_view
 from underskin.diagnosis.reporting.figures import explanations
 from underskin.diagnosis.reporting.report_view import Report
 
-Drawn = Mapping[str, str]  # HTML of each figure, by its name
+FigureHtml = Mapping[str, str]  # HTML of each figure, by its name
 
 
 @cache
@@ -37,7 +37,7 @@ def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
     return str(_macros().page(title, report_view.view_of(report), drawn, entries, script))
 
 
-def body_of(report: Report, drawn: Drawn) -> str:
+def body_of(report: Report, drawn: FigureHtml) -> str:
     """What stands below the title, as HTML: one sentence, where, what, how much better, what to measure next."""
     return str(_macros().body(report_view.view_of(report), drawn))
 

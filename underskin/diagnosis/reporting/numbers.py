@@ -37,10 +37,10 @@ def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
     else:
         index = fitter.places.index(place)
         variance = float(explanation.best.covariance[index, index])
-    reach = _QUANTILE * np.sqrt(max(variance, 0.0))
+    half_width = _QUANTILE * np.sqrt(max(variance, 0.0))
     low, high = entry.bounds
     middle = float(point.fit[place])
-    ends = (max(middle - reach, low), min(middle + reach, high))
+    ends = (max(middle - half_width, low), min(middle + half_width, high))
     return {
         "name": entry.name,
         "unit": entry.unit,

@@ -10,7 +10,7 @@ from typing import Any
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, own_places
-from underskin.diagnosis.localisation.effect_size import Effect
+from underskin.diagnosis.localisation.effect_size import EffectSize
 from underskin.diagnosis.localisation.permutation_test import AxisResult
 from underskin.diagnosis.localisation.region import reaches_all_along
 from underskin.diagnosis.localisation.residual_shape import REACHES_NOISE, Shape
@@ -21,8 +21,8 @@ from underskin.diagnosis.reporting.numbers import parameter, place_of, probabili
 from underskin.diagnosis.reporting.statements import (
     UNDECIDABLE,
     answer_statement,
+    insufficient_statement,
     location_statement,
-    nothing_told,
     why_not,
 )
 from underskin.diagnosis.selection.search import Answer, Search
@@ -39,7 +39,7 @@ _LEAST_PROBABILITY = 0.005
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class DiagnosisResult:
     """Everything that the steps worked out about one campaign; `search` is None where the data were too few."""
 
     name: str
@@ -50,14 +50,14 @@ class Diagnosis:
     problem: FittingProblem | None = None
     axes: Sequence[AxisResult] = ()
     region: Mapping[str, list[float | str]] = field(default_factory=dict)
-    effect: Effect | None = None
+    effect: EffectSize | None = None
     groups: Sequence[cross_validation.HeldOut] = ()
     confounded: Sequence[Confounding] = ()
     shape: Shape | None = None  # of what remains, where no mechanism describes it
     next_experiment: Mapping[str, Any] = field(default_factory=dict)
 
 
-def verdict(diagnosis: Diagnosis) -> str:
+def verdict(diagnosis: DiagnosisResult) -> str:
     """The verdict that the probabilities give, as DESIGN.md defines it."""
     if diagnosis.search is None:
         return "insufficient_data"
@@ -69,7 +69,7 @@ def verdict(diagnosis: Diagnosis) -> str:
     return "explained" if leader.probability >= EXPLAINED else "ambiguous"
 
 
-def report(diagnosis: Diagnosis) -> dict[str, Any]:
+def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     """The document; plain JSON values."""
     stated = verdict(diagnosis)
     document: dict[str, Any] = {"schema": SCHEMA, "campaign": diagnosis.name, "verdict": stated}
@@ -77,7 +77,7 @@ def report(diagnosis: Diagnosis) -> dict[str, Any]:
         return {
             **document,
             "probability": 1.0,
-            "statement": nothing_told(diagnosis.lacking),
+            "statement": insufficient_statement(diagnosis.lacking),
             "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "Nothing was located."},
             "mechanisms": [],
             "alternatives": [],
@@ -129,10 +129,10 @@ def _d33(
     if problem.lines.curves or leader.explanation is None or leader.probability < EXPLAINED:
         return None, []
     d33 = parameter(shown, place_of(shown, "d33"))
-    doubt = plausibility.doubt_of(d33["value"])
+    implausible = plausibility.implausibility(d33["value"])
     reached = fit["after"]["rmse_percent"] <= REACHES_NOISE * fit["noise_floor_percent"]
-    finding = Finding(Reason.D33_FITTED, "", "d33_pc_per_n", {"d33_pc_per_n": d33["value"], "doubt": doubt})
-    return {**d33, "quotable": reached and doubt is None}, [finding] if doubt else []
+    finding = Finding(Reason.D33_FITTED, "", "d33_pc_per_n", {"d33_pc_per_n": d33["value"], "kind": implausible})
+    return {**d33, "quotable": reached and implausible is None}, [finding] if implausible else []
 
 
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:
@@ -167,7 +167,7 @@ def _alternatives(answers: Sequence[Answer]) -> list[dict[str, Any]]:
     return alternatives
 
 
-def _location(diagnosis: Diagnosis, problem: FittingProblem, agrees: bool) -> dict[str, Any]:
+def _location(diagnosis: DiagnosisResult, problem: FittingProblem, agrees: bool) -> dict[str, Any]:
     assert diagnosis.effect is not None
     effect, region = diagnosis.effect, diagnosis.region
     whole = {name: reaches_all_along(problem.lines, name, ends) for name, ends in region.items()}

@@ -7,7 +7,7 @@ from typing import Any, Literal
 from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.statements import first_and_rest, lacking_part
 from underskin.diagnosis.reporting.wording import axis, error, group, interval, number, plain, readable, unit, words
-from underskin.formatting import in_percent
+from underskin.findings.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
 
 _VERDICTS = {
@@ -52,7 +52,7 @@ Report = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Text:
+class TextBlock:
     """A paragraph, a note in small print, or a heading within a section."""
 
     text: str
@@ -60,7 +60,7 @@ class Text:
 
 
 @dataclass(frozen=True)
-class Table:
+class TableBlock:
     """Rows of texts below their heads."""
 
     heads: Sequence[str]
@@ -69,14 +69,14 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Figure:
+class FigureBlock:
     """The place of a figure that may have been drawn."""
 
     name: str
     kind: Literal["figure"] = "figure"
 
 
-Block = Text | Table | Figure
+ReportBlock = TextBlock | TableBlock | FigureBlock
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Section:
     """Blocks below a title."""
 
     title: str
-    blocks: Sequence[Block]
+    blocks: Sequence[ReportBlock]
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def provenance_of(report: Report) -> list[tuple[str, str]]:
     ]
 
 
-def plan_of(planned: Mapping[str, Any]) -> list[Block]:
+def plan_of(planned: Mapping[str, Any]) -> list[ReportBlock]:
     """A report's `next_experiment` that is not empty."""
     if not planned["recordings"]:
         return _paragraphs(readable(planned["statement"]))
@@ -137,12 +137,12 @@ def plan_of(planned: Mapping[str, Any]) -> list[Block]:
     )
     return [
         *_paragraphs(readable(planned["statement"])),
-        Table([axis(name) for name in heads], rows),
+        TableBlock([axis(name) for name in heads], rows),
         *_paragraphs(chance),
     ]
 
 
-def _where(report: Report) -> list[Block]:
+def _where(report: Report) -> list[ReportBlock]:
     location = report["location"]
     rows = [
         (
@@ -152,63 +152,63 @@ def _where(report: Report) -> list[Block]:
         )
         for entry in location["axes"]
     ]
-    blocks: list[Block] = [*_paragraphs(location["statement"]), Figure("where")]
+    blocks: list[ReportBlock] = [*_paragraphs(location["statement"]), FigureBlock("where")]
     if rows:
         heads = ("the misfit against", "by chance", "share that no other axis takes up")
-        blocks += [Table(heads, rows), Text(_BY_CHANCE, "note")]
+        blocks += [TableBlock(heads, rows), TextBlock(_BY_CHANCE, "note")]
     return blocks
 
 
-def _what(report: Report) -> list[Block]:
-    blocks: list[Block] = [Figure("explanations")]
+def _what(report: Report) -> list[ReportBlock]:
+    blocks: list[ReportBlock] = [FigureBlock("explanations")]
     for entry in report["mechanisms"]:
         blocks += _mechanism(entry)
-    blocks.append(Figure("parameters"))
+    blocks.append(FigureBlock("parameters"))
     if report["d33"] is not None:
         one = report["d33"]
         value = f"{number(one['value'])} ({interval(one)}) {one['unit']}"
         quotable = one.get("quotable", True)
         blocks += [
-            Text(f"d33 under this explanation: {value}."),
-            Text(_D33 if quotable else _D33_NOT_TO_QUOTE, "note"),
+            TextBlock(f"d33 under this explanation: {value}."),
+            TextBlock(_D33 if quotable else _D33_NOT_TO_QUOTE, "note"),
         ]
     elif report["fit"] is not None and "youngs_modulus" not in report["fit"]["after"]:
-        blocks.append(Text(_NO_D33, "note"))
+        blocks.append(TextBlock(_NO_D33, "note"))
     if report["alternatives"]:
         rows = [
             (" + ".join(map(words, entry["mechanisms"])), in_percent(entry["probability"]), readable(entry["why_not"]))
             for entry in report["alternatives"]
         ]
-        heading = Text("Alternatives, and why not", "heading")
-        blocks += [heading, Table(("explanation", "probability", "why not"), rows)]
+        heading = TextBlock("Alternatives, and why not", "heading")
+        blocks += [heading, TableBlock(("explanation", "probability", "why not"), rows)]
     if report["not_identifiable"]:
         rows = [
             (words(entry["mechanism"]), words(entry["confounded_with"]), readable(entry["reason"]))
             for entry in report["not_identifiable"]
         ]
-        heading = Text("What these recordings cannot tell", "heading")
-        blocks += [heading, Table(("mechanism", "not told from", "because"), rows)]
+        heading = TextBlock("What these recordings cannot tell", "heading")
+        blocks += [heading, TableBlock(("mechanism", "not told from", "because"), rows)]
     return blocks
 
 
-def _mechanism(entry: Mapping[str, Any]) -> list[Block]:
+def _mechanism(entry: Mapping[str, Any]) -> list[ReportBlock]:
     """A mechanism with its probability, its parameters and its law."""
     known = CATALOGUE.get(entry["name"])
     explains = entry["explains_percent"]
     share = "" if explains is None else _SHARE.format(explains)
     present = f"Present with probability {in_percent(entry['probability'])}{share}."
     rows = [(words(one["name"]), number(one["value"]), interval(one), unit(one["unit"])) for one in entry["parameters"]]
-    law = [] if known is None else [Text(f"Law: {known.law} Source: {known.source}", "note")]
+    law = [] if known is None else [TextBlock(f"Law: {known.law} Source: {known.source}", "note")]
     return [
-        Text(words(entry["name"]), "heading"),
+        TextBlock(words(entry["name"]), "heading"),
         *_paragraphs("" if known is None else known.plain),
-        Text(present),
-        Table(("parameter", "value", "95 % interval", "unit"), rows),
+        TextBlock(present),
+        TableBlock(("parameter", "value", "95 % interval", "unit"), rows),
         *law,
     ]
 
 
-def _better(report: Report) -> list[Block]:
+def _better(report: Report) -> list[ReportBlock]:
     fit = report["fit"]
     if fit is None:
         return []
@@ -228,21 +228,24 @@ def _better(report: Report) -> list[Block]:
         for entry in fit["groups"]
     ]
     heads = ("before", "after", "noise floor")
-    blocks: list[Block] = [Table(("error of", *heads), rows), Figure("before_after")]
+    blocks: list[ReportBlock] = [TableBlock(("error of", *heads), rows), FigureBlock("before_after")]
     if groups:
-        blocks += [Text("Group by group", "heading"), Table(("left out", *heads, "chosen without it"), groups)]
-    return [*blocks, Text(_ERROR.format(after=_AFTER.get(report["verdict"], "with what is said above")), "note")]
+        blocks += [
+            TextBlock("Group by group", "heading"),
+            TableBlock(("left out", *heads, "chosen without it"), groups),
+        ]
+    return [*blocks, TextBlock(_ERROR.format(after=_AFTER.get(report["verdict"], "with what is said above")), "note")]
 
 
-def _findings(report: Report) -> list[Block]:
+def _findings(report: Report) -> list[ReportBlock]:
     rows = [
         (entry["recording"] or "all", axis(entry["field"]), readable(entry["statement"]), words(entry["code"]))
         for entry in report["findings"]
     ]
-    return [Table(("recording", "field", "finding", "kind"), rows)] if rows else []
+    return [TableBlock(("recording", "field", "finding", "kind"), rows)] if rows else []
 
 
-def _next(report: Report) -> list[Block]:
+def _next(report: Report) -> list[ReportBlock]:
     planned = report["next_experiment"]
     if planned:
         return plan_of(planned)
@@ -252,5 +255,5 @@ def _next(report: Report) -> list[Block]:
     return _paragraphs(_NOTHING_NEXT.get(report["verdict"], decided))
 
 
-def _paragraphs(text: str) -> list[Block]:
-    return [Text(text)] if text else []
+def _paragraphs(text: str) -> list[ReportBlock]:
+    return [TextBlock(text)] if text else []

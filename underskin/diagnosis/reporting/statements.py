@@ -7,26 +7,26 @@ import numpy as np
 
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import EXPLAINED, SIMPLEST, in_words
-from underskin.diagnosis.localisation.effect_size import Effect
+from underskin.diagnosis.localisation.effect_size import EffectSize
 from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT, AxisResult, Undecidable
 from underskin.diagnosis.localisation.residual_shape import (
     ALONG_CURVES,
     ORDER,
     PRELOAD_BEFORE,
-    Form,
     FormKind,
     Shape,
+    ShapeForm,
 )
 from underskin.diagnosis.selection.search import Answer
 from underskin.findings.english import lacking
+from underskin.findings.formatting import in_digits, in_percent
 from underskin.findings.lacking import Lacking
-from underskin.formatting import in_digits, in_percent
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE
 
 _WORTH_NAMING = 0.02
 _UNTHOUGHT_AT_MOST = 0.016  # of none_of_these, where no process shows
-_NOTHING_TOLD = "The recordings cannot tell anything: "
+_INSUFFICIENT = "The recordings cannot tell anything: "
 _IN_PERCENT = 90.0  # beyond it an effect is said as a factor
 
 
@@ -48,15 +48,15 @@ def answer_statement(
     return " ".join(part for part in parts if part)
 
 
-def nothing_told(what: Lacking | None) -> str:
+def insufficient_statement(what: Lacking | None) -> str:
     """The statement on a campaign from which nothing can be concluded."""
     assert what is not None
-    return f"{_NOTHING_TOLD}{lacking(what)}."
+    return f"{_INSUFFICIENT}{lacking(what)}."
 
 
 def lacking_part(statement: str) -> str:
-    """What is lacking, with its full stop, out of the statement that `nothing_told` made."""
-    return statement.removeprefix(_NOTHING_TOLD)
+    """What is lacking, with its full stop, out of the statement that `insufficient_statement` made."""
+    return statement.removeprefix(_INSUFFICIENT)
 
 
 def first_and_rest(statement: str) -> tuple[str, str]:
@@ -102,7 +102,7 @@ def shape_statement(shape: Shape | None) -> str:
     return f"What remains{beyond} {form}."
 
 
-def _form(form: Form, shape: Shape) -> str:
+def _form(form: ShapeForm, shape: Shape) -> str:
     if form.kind == FormKind.CIRCLING:
         return f"a place that runs round, up to {form.size:.2g} mm off, once in {form.at:.3g} recordings"
     words = _FORMS[form.kind].format(at=form.at, unit=ALONG_CURVES.get(form.axis, ""))
@@ -121,7 +121,7 @@ _FORMS: Mapping[FormKind, str] = {
 _OWN_AXES = {PRELOAD_BEFORE: "the preload of the recording before over its own", ORDER: "the order of recordings"}
 
 
-def _form_axis(form: Form) -> str:
+def _form_axis(form: ShapeForm) -> str:
     words = _OWN_AXES[form.axis] if form.axis in _OWN_AXES else WORDS[form.axis][0]
     return words if form.component is None else f"{words} ({'xy'[form.component]})"
 
@@ -159,7 +159,7 @@ def location_statement(
     axes: Sequence[AxisResult],
     region: Mapping[str, Sequence[float | str]],
     whole: Mapping[str, bool],
-    effect: Effect,
+    effect: EffectSize,
     *,
     agrees: bool = False,
 ) -> str:
@@ -180,7 +180,7 @@ def location_statement(
     return f"The misfit depends on {names}; {where} {_size(effect)}{tail}."
 
 
-def _size(effect: Effect) -> str:
+def _size(effect: EffectSize) -> str:
     low, high = sorted((abs(effect.low), abs(effect.high)))
     if not effect.signed:
         return (
@@ -198,7 +198,7 @@ def _size(effect: Effect) -> str:
     return f"the response is {in_digits(abs(effect.percent), 3)} % {side} the model (95 %: {span} %)"
 
 
-def _times(effect: Effect) -> str:
+def _times(effect: EffectSize) -> str:
     """A large effect as a factor: nothing is more than 100 % below, unless its sign has turned."""
     factor, low, high = (1 + percent / 100 for percent in (effect.percent, effect.low, effect.high))
     span = f"{in_digits(low, 2)} to {in_digits(high, 2)}"

@@ -10,6 +10,7 @@ from functools import partial
 
 import numpy as np
 
+from underskin.diagnosis.data.curve_samples import CurveRecording
 from underskin.diagnosis.data.inspected import Inspected
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -24,8 +25,6 @@ _IMPOSSIBLE_MPA = 1e-6, 1e6  # from foam's to diamond's
 _DEEPEST = 0.85  # of a cylinder's height: there the true stress is tens of moduli
 _FAR = 100.0  # times the declared modulus, or the other curves'
 _REVERSED = -0.5  # correlation of force and displacement
-
-Curve = IndentationRecording | CompressionRecording
 
 
 def without_inconsistent(campaign: Campaign, kind: Kind) -> Inspected:
@@ -51,7 +50,7 @@ def without_inconsistent(campaign: Campaign, kind: Kind) -> Inspected:
     return Inspected(left, findings, None if curves else Lacking(Lack.NO_CURVE))
 
 
-def is_reversed(entry: Curve) -> bool:
+def is_reversed(entry: CurveRecording) -> bool:
     """Whether the force falls as it is pressed."""
     finite = np.isfinite(entry.displacement_mm) & np.isfinite(entry.force_n)
     place, force = entry.displacement_mm[finite], entry.force_n[finite]
@@ -60,16 +59,16 @@ def is_reversed(entry: Curve) -> bool:
     return float(np.corrcoef(place, force)[0, 1]) <= _REVERSED
 
 
-def _upright(curves: Sequence[Curve]) -> tuple[list[Curve], list[Finding]]:
+def _upright(curves: Sequence[CurveRecording]) -> tuple[list[CurveRecording], list[Finding]]:
     """All curves, those whose force falls as they are pressed with the sign reversed."""
     turned = {entry.id for entry in curves if is_reversed(entry)}
     findings = [Finding(Reason.CURVE_REVERSED, entry.id, "force_n") for entry in curves if entry.id in turned]
     return [replace(entry, force_n=-entry.force_n) if entry.id in turned else entry for entry in curves], findings
 
 
-def _once(curves: Sequence[Curve]) -> tuple[list[Curve], list[Finding]]:
+def _once(curves: Sequence[CurveRecording]) -> tuple[list[CurveRecording], list[Finding]]:
     """The curves without copies of earlier ones."""
-    originals: dict[tuple[bytes, bytes], Curve] = {}
+    originals: dict[tuple[bytes, bytes], CurveRecording] = {}
     findings = []
     for entry in curves:
         first = originals.setdefault((entry.displacement_mm.tobytes(), entry.force_n.tobytes()), entry)
@@ -78,7 +77,7 @@ def _once(curves: Sequence[Curve]) -> tuple[list[Curve], list[Finding]]:
     return list(originals.values()), findings
 
 
-def _within_range(curves: Sequence[Curve]) -> tuple[list[Curve], list[Finding]]:
+def _within_range(curves: Sequence[CurveRecording]) -> tuple[list[CurveRecording], list[Finding]]:
     """Those not pressed through nearly the whole sample, or ten times as deep as the sphere is wide."""
     usable, findings = [], []
     for entry in curves:
@@ -100,7 +99,7 @@ def _within_range(curves: Sequence[Curve]) -> tuple[list[Curve], list[Finding]]:
     return usable, findings
 
 
-def _like_others(curves: Sequence[Curve], skin: SkinDescription) -> tuple[list[Curve], list[Finding]]:
+def _like_others(curves: Sequence[CurveRecording], skin: SkinDescription) -> tuple[list[CurveRecording], list[Finding]]:
     """Those whose apparent modulus is of the others' magnitude; of two, the one that is of the declared one's."""
     modulus = np.array([_apparent_mpa(entry, skin.poisson_ratio) for entry in curves])
     if len(curves) < 2 or not np.isfinite(modulus).any():
@@ -126,7 +125,7 @@ def _like_others(curves: Sequence[Curve], skin: SkinDescription) -> tuple[list[C
     return usable, findings
 
 
-def _shared(campaign: Campaign, curves: Sequence[Curve]) -> list[Finding]:
+def _shared(campaign: Campaign, curves: Sequence[CurveRecording]) -> list[Finding]:
     """All curves far from the declared modulus, or from what rubber can be; two far from each other."""
     modulus = np.array([_apparent_mpa(entry, campaign.skin.poisson_ratio) for entry in curves])
     if not np.isfinite(modulus).any():
@@ -144,14 +143,14 @@ def _shared(campaign: Campaign, curves: Sequence[Curve]) -> list[Finding]:
     return [Finding(Reason.MODULUS_BESIDE_RUBBER, "", "force_n", {**needed, "low_mpa": low, "high_mpa": high})]
 
 
-def _possible(campaign: Campaign, curves: Sequence[Curve]) -> bool:
+def _possible(campaign: Campaign, curves: Sequence[CurveRecording]) -> bool:
     """Whether all apparent moduli are of a solid's magnitude."""
     modulus = np.array([_apparent_mpa(entry, campaign.skin.poisson_ratio) for entry in curves])
     known = modulus[np.isfinite(modulus)]
     return bool(((known > _IMPOSSIBLE_MPA[0]) & (known < _IMPOSSIBLE_MPA[1])).all())
 
 
-def _apparent_mpa(entry: Curve, poisson_ratio: float) -> float:
+def _apparent_mpa(entry: CurveRecording, poisson_ratio: float) -> float:
     """NaN where the curve does not press."""
     finite = np.isfinite(entry.displacement_mm) & np.isfinite(entry.force_n)
     place: Floats = entry.displacement_mm[finite]

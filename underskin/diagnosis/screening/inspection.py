@@ -44,9 +44,9 @@ def inspect(campaign: Campaign, table: SigmaTable) -> Inspected:
 def _inspect_lines(campaign: Campaign, recorded: Sequence[FrfRecording], table: SigmaTable) -> Inspected:
     with_lines, of_lines = _with_lines(recorded)
     entries, copies = _without_copies(with_lines)
-    off, slips = single_unit_errors(entries)
+    off, unit_errors = single_unit_errors(entries)
     astray, of_places, misgiven = misplaced(campaign, entries)
-    findings = [*of_lines, *copies, *slips, *of_places]
+    findings = [*of_lines, *copies, *unit_errors, *of_places]
     entries = [entry for entry, wrong in zip(entries, off | astray, strict=True) if not wrong]
     if not entries:
         return _inspected(campaign, entries, findings)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.diagnosis.screening.no_response import dead, silence
+from underskin.diagnosis.screening.no_response import dead, no_response
 from underskin.diagnosis.screening.table_domain import within_tables
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -20,8 +20,8 @@ from underskin.recordings.frf.estimation import lines_of
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
-_SLIPS = (1e3, 1e-3)
-_SLIP_WIDTH = np.log(12.0)
+_UNIT_FACTORS = (1e3, 1e-3)
+_FACTOR_WIDTH = np.log(12.0)
 _LIKELY_D33 = (0.3, 1000.0)  # pC/N; polymers have 5 to 40, ceramics up to some hundred
 _LEAST_RESPONSE = 0.2  # of the campaign's largest prediction: below it, near a crossing of zero, a sign says nothing
 _LOWEST = 5  # one line of so many counts as low, and of evenly spaced ones only the lowest third in log frequency
@@ -41,15 +41,15 @@ class Consistent:
 
 def against_model(campaign: Campaign, entries: list[FrfRecording], table: SigmaTable) -> Consistent:
     """The recordings held against the base model."""
-    silent, variance = silence(entries)
-    if silent.all():
+    unresponsive, variance = no_response(entries)
+    if unresponsive.all():
         finding = Finding(Reason.SILENT_CAMPAIGN, "", "frf_re_pc_per_n", {"recordings": len(entries)})
         return Consistent([], [finding], Lacking(Lack.NO_RESPONSE))
     model = compose((), replace(campaign, recordings=tuple(entries)), table, "frf")
     inside, findings = within_tables(campaign, entries, model, table)
-    ratio, expected = _apparent(entries, model, inside & ~silent)
-    lost, silent_findings = dead(entries, silent & inside, variance, expected)
-    findings += silent_findings
+    ratio, expected = _apparent(entries, model, inside & ~unresponsive)
+    lost, dead_findings = dead(entries, unresponsive & inside, variance, expected)
+    findings += dead_findings
     usable = inside & ~lost
     turned = np.where(_one_sided(entries), ratio, np.nan)
     contradiction = _contradiction(ratio, turned) if len(entries) == 2 else None
@@ -84,8 +84,8 @@ def _off_by_1000(entries: list[FrfRecording], ratio: Floats) -> tuple[Mask, list
     usual = float(np.nanmedian(np.abs(ratio)))
     slip = np.log(np.abs(ratio) / usual) if usual > 0 else np.full(len(ratio), np.nan)
     for number in np.flatnonzero(np.isfinite(slip)):
-        for factor in _SLIPS:
-            if abs(slip[number] - np.log(factor)) < _SLIP_WIDTH:
+        for factor in _UNIT_FACTORS:
+            if abs(slip[number] - np.log(factor)) < _FACTOR_WIDTH:
                 arguments = {"too_large": factor > 1}
                 findings.append(
                     Finding(Reason.RESPONSE_BESIDE_OTHERS, entries[number].id, "frf_re_pc_per_n", arguments)
@@ -114,7 +114,7 @@ def _contradiction(ratio: Floats, turned: Floats) -> Finding | None:
         return None
     if np.prod(turned) < 0:
         return Finding(Reason.TWO_SIGNS, "", "frf_re_pc_per_n")
-    if abs(np.log(high / low) - np.log(1e3)) < _SLIP_WIDTH:
+    if abs(np.log(high / low) - np.log(1e3)) < _FACTOR_WIDTH:
         return Finding(Reason.TWO_RESPONSES, "", "frf_re_pc_per_n", {"ratio": high / low})
     return None
 
@@ -126,7 +126,7 @@ def _of_all(ratio: Floats, declared: float | None) -> list[Finding]:
         return []
     low, high = _LIKELY_D33
     if declared:
-        low, high = (abs(declared) * factor / np.exp(_SLIP_WIDTH) ** side for factor, side in ((1e-3, -1), (1e3, 1)))
+        low, high = (abs(declared) * factor / np.exp(_FACTOR_WIDTH) ** side for factor, side in ((1e-3, -1), (1e3, 1)))
     if low <= d33 <= high:
         return []
     arguments = {"d33_pc_per_n": d33, "declared_pc_per_n": declared, "too_large": bool(d33 > high)}

@@ -2,8 +2,8 @@
 
 The noise of a line is read from how much neighbouring lines differ, σ² = median |z_j+1 − z_j|²/(2 ln 2) of the complex
 values, which a resonance between a few of them does not reach.
-A recording is silent where its mean over n lines is no larger than noise makes it, n |mean|²/σ² < 9 (which noise alone
-exceeds once in 8000 recordings), and its lines are no larger than noise, mean |z|² < 3 σ².
+A recording shows no response where its mean over n lines is no larger than noise makes it, n |mean|²/σ² < 9 (which
+noise alone exceeds once in 8000 recordings), and its lines are no larger than noise, mean |z|² < 3 σ².
 """
 
 from collections.abc import Sequence
@@ -19,15 +19,15 @@ from underskin.units import Floats
 
 _LEAST_LINES = 4
 _MEAN, _LINES = 9.0, 3.0  # over their variance
-_FAINT = 0.1  # of the level to be expected: what else a sensor shows that is silent in most of its recordings
-_AUDIBLE = 16.0  # of the response that the others let expect: only then is a silent recording no recording
+_WEAK = 0.1  # of the level to be expected: what a sensor without response in most recordings shows in the others
+_EXPECTED = 16.0  # of the response that the others let expect: only then is a recording without one left out
 
 Mask = NDArray[np.bool_]
 
 
-def silence(entries: Sequence[FrfRecording]) -> tuple[Mask, Floats]:
-    """Which recordings are silent, and the variance of each one's mean [(C/N)²]; 0 where its lines are too few."""
-    silent, variance = np.zeros(len(entries), dtype=bool), np.zeros(len(entries))
+def no_response(entries: Sequence[FrfRecording]) -> tuple[Mask, Floats]:
+    """Which recordings show none, and the variance of each one's mean [(C/N)²]; 0 where its lines are too few."""
+    unresponsive, variance = np.zeros(len(entries), dtype=bool), np.zeros(len(entries))
     for number, entry in enumerate(entries):
         measured = lines_of(entry)
         order = np.argsort(measured.frequency, kind="stable")
@@ -37,33 +37,33 @@ def silence(entries: Sequence[FrfRecording]) -> tuple[Mask, Floats]:
             continue
         noise = float(np.median(np.abs(np.diff(lines)) ** 2)) / (2 * np.log(2.0))
         variance[number] = noise / len(lines)
-        quiet = float(np.abs(lines.mean()) ** 2) < _MEAN * variance[number]
-        silent[number] = quiet and float(np.mean(np.abs(lines) ** 2)) < _LINES * noise
-    return silent, variance
+        small_mean = float(np.abs(lines.mean()) ** 2) < _MEAN * variance[number]
+        unresponsive[number] = small_mean and float(np.mean(np.abs(lines) ** 2)) < _LINES * noise
+    return unresponsive, variance
 
 
 def dead(
-    entries: Sequence[FrfRecording], silent: Mask, variance: Floats, expected: Floats
+    entries: Sequence[FrfRecording], unresponsive: Mask, variance: Floats, expected: Floats
 ) -> tuple[Mask, list[Finding]]:
-    """Which recordings are silent though the others predict a response well above their noise.
+    """Which recordings show no response though the others predict a response well above their noise.
 
-    Each is a finding of its own, or its sensor is one, where that is silent in most of its recordings and faint in the
-    others, which noise alone does.
+    Each is a finding of its own, or its sensor is one, where that shows none in most of its recordings and a weak
+    one in the others, which noise alone does.
     """
-    lost: Mask = silent & (expected**2 > _AUDIBLE * variance)
+    missing: Mask = unresponsive & (expected**2 > _EXPECTED * variance)
     findings = []
     sensors = np.array([entry.sensor for entry in entries])
     level = np.array([float(np.abs(np.nanmean(lines_of(entry).values))) for entry in entries])
-    for name in dict.fromkeys(sensors[lost].tolist()):
+    for name in dict.fromkeys(sensors[missing].tolist()):
         own = sensors == name
-        if own.sum() > 1 and 2 * lost[own].sum() > own.sum() and (lost | (level < _FAINT * expected))[own].all():
-            lost = lost | own
+        if own.sum() > 1 and 2 * missing[own].sum() > own.sum() and (missing | (level < _WEAK * expected))[own].all():
+            missing = missing | own
             first = entries[int(np.flatnonzero(own)[0])]
             arguments = {"recordings": int(own.sum()), "sensor": name}
             findings.append(Finding(Reason.SILENT_SENSOR, first.id, "frf_re_pc_per_n", arguments))
             continue
         findings += [
             Finding(Reason.SILENT_RECORDING, entries[number].id, "frf_re_pc_per_n")
-            for number in np.flatnonzero(lost & own).tolist()
+            for number in np.flatnonzero(missing & own).tolist()
         ]
-    return lost, findings
+    return missing, findings

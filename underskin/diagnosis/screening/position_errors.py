@@ -14,7 +14,7 @@ from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.units import Floats
 
-_SLIPS = (
+_UNIT_FACTORS = (
     # factor, least distance from the sensor [mm], unit that the places were given in, or the sensors
     (1e3, 1.0, "m", "µm"),
     (1e-3, 200.0, "µm", "m"),
@@ -31,7 +31,7 @@ def misplaced(campaign: Campaign, entries: Sequence[FrfRecording]) -> tuple[Mask
     own, place = _sensors_and_places(campaign, entries)
     alone = np.zeros(len(entries), dtype=bool)
     single, shared = [], []
-    for factor, least, unit, sensors_unit in _SLIPS:
+    for factor, least, unit, sensors_unit in _UNIT_FACTORS:
         given, meant = (np.hypot(*(scale * place - own).T) for scale in (1.0, factor))
         off = (given > least) & (_NEARER * meant < given)
         slip = {"too_small": factor > 1, "given_in": unit}

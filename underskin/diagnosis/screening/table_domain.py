@@ -36,7 +36,7 @@ def within_tables(
         ratios = radius_mm / skin.thickness_mm
         arguments = {"smallest": float(ratios.min()), "largest": float(ratios.max())}
         none_inside = Finding(Reason.NO_CONTACT_WITHIN_TABLES, "", "skin.thickness_mm", arguments)
-        return inside, [none_inside, *_possible_slips(replace(campaign, recordings=tuple(entries)), table)]
+        return inside, [none_inside, *_possible_unit_errors(replace(campaign, recordings=tuple(entries)), table)]
     return inside, [
         Finding(
             Reason.OUT_OF_TABLES_DECLARED,
@@ -53,7 +53,7 @@ def _inside(model: Model, recordings: int) -> Mask:
     return inside
 
 
-def _possible_slips(campaign: Campaign, table: SigmaTable) -> list[Finding]:
+def _possible_unit_errors(campaign: Campaign, table: SigmaTable) -> list[Finding]:
     """Each single field that, taken 1000 times smaller or larger, brings most contacts within the tables."""
     findings = []
     for field, times, units in (

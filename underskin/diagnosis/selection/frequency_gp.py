@@ -16,8 +16,7 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.residuals import line_residuals
 from underskin.diagnosis.noise.noise_priors import LogNormal, level_prior
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, matern, normalised
-from underskin.mechanisms.autodiff import Array
-from underskin.units import Floats
+from underskin.units import Array, Floats
 
 _LINE_LENGTHS = (0.08, 0.25, 0.8)  # of the logarithm of frequency
 _INTERPLAY_LENGTH, _INTERPLAY_LANDMARKS = 0.4, 8  # where both frequency and a recording's axis count

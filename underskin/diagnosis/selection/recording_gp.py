@@ -34,7 +34,7 @@ _FAINT = 1e-12  # of the largest response, below which a recording has no direct
 
 
 @dataclass(frozen=True)
-class Scatter:
+class ScatterNode:
     """One scatter of gain and one of place: log weight, and under it each recording's residual and variance."""
 
     log_weight: float
@@ -112,7 +112,7 @@ class GainResidual:
     def _not_faint(self, size: Floats) -> Floats:
         return np.where(np.abs(size) > self._least, size, self._least)
 
-    def _scatters(self, positions: Floats) -> list[Scatter]:
+    def _scatters(self, positions: Floats) -> list[ScatterNode]:
         """No scatter of position and each of these [m], with each of gain; relative to the model's mean under it."""
         moments, scatters = self._moments, []
         for position, share in _shares(positions).items():
@@ -122,7 +122,7 @@ class GainResidual:
             for gain in _GAINS:
                 log_weight = GAIN_PRIOR.log_density(float(np.log(gain))) + np.log(share) - np.log(np.abs(size)).sum()
                 variance = gain**2 + placed + moments.uu / size**2
-                scatters.append(Scatter(float(log_weight), ur / size - self._known, variance))
+                scatters.append(ScatterNode(float(log_weight), ur / size - self._known, variance))
         return scatters
 
     def moved(self, sets: Floats) -> Floats:
@@ -143,7 +143,7 @@ class GainResidual:
         each = np.array([self._with(sets, amplitudes, entry) for entry in self.usual])
         return np.asarray(logsumexp(each, axis=0) - self._plain)
 
-    def _with(self, sets: Floats, amplitudes: Floats, scatter: Scatter) -> Floats:
+    def _with(self, sets: Floats, amplitudes: Floats, scatter: ScatterNode) -> Floats:
         """log p(residual, features) at one scatter (sets,)."""
         root = 1 / np.sqrt(scatter.variance)
         fixed, z = self.fixed * root[:, None], scatter.residual * root

@@ -164,15 +164,15 @@ def _predict(
     if prediction.position_slopes is not None:
         noise = noise + p2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
         noise = noise + 0.5 * p2**2 * curvature.square[recording] * np.abs(value) ** 2
-    picked_up = 2 * pickup_variance[rows]
-    noise = noise + picked_up
+    pickup_noise = 2 * pickup_variance[rows]
+    noise = noise + pickup_noise
     square = np.abs(left.value - value) ** 2
     first = left.first
     each, expected = np.add.reduceat(square, first), np.add.reduceat(noise, first)
     size = np.add.reduceat(np.abs(value) ** 2, first)
     score = -0.5 * (each / expected + np.log(2 * np.pi * expected / size))
     square_sum, size_sum, noise_sum, score_sum = (float(column.sum()) for column in (square, size, noise, score))
-    return PredictionScore(square_sum, size_sum, noise_sum, score_sum, len(first), float(picked_up.sum()))
+    return PredictionScore(square_sum, size_sum, noise_sum, score_sum, len(first), float(pickup_noise.sum()))
 
 
 def total(held_out: Sequence[HeldOut]) -> tuple[PredictionScore, PredictionScore]:

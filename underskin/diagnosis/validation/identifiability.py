@@ -67,7 +67,7 @@ def confounding(problem: FittingProblem) -> list[Confounding]:
     ratio = TYPICAL if lines.curves else 0.0
     moments = Moments(lines, prediction, np.zeros(lines.recordings), problem.curvature, 0.0, ratio)
     information, _ = Marginal(lines, moments, NoiseLevels(USUAL_GAIN, 1.0, 0.0, SENSOR_SPREAD)).normal_equations()
-    return _told(owners, information, fitter.parameters)
+    return _confounding(owners, information, fitter.parameters)
 
 
 def _shapes(parameters: Sequence[Parameter]) -> list[Floats]:
@@ -84,7 +84,7 @@ def _shapes(parameters: Sequence[Parameter]) -> list[Floats]:
     return shapes
 
 
-def _told(owners: Sequence[str], information: Floats, nuisances: Sequence[Parameter]) -> list[Confounding]:
+def _confounding(owners: Sequence[str], information: Floats, nuisances: Sequence[Parameter]) -> list[Confounding]:
     """From the information on the nuisances and then on every signature, whose mechanisms are `owners`."""
     count = len(nuisances)
     prior = np.diag([entry.prior.sd**-2 if isinstance(entry.prior, Normal) else 0.0 for entry in nuisances])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from underskin.mechanisms.autodiff import Differentiated, chain, log
+from underskin.autodiff import Differentiated, chain, log
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.recordings.conditions import Conditions, frf_of

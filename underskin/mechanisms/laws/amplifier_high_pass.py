@@ -1,6 +1,6 @@
 """The mechanism `amplifier_high_pass`."""
 
-from underskin.mechanisms.autodiff import Differentiated
+from underskin.autodiff import Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from underskin.mechanisms.autodiff import exp
+from underskin.autodiff import exp
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve

@@ -12,7 +12,7 @@ from underskin.mechanisms.models.pickup import Pickup
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.conditions import Conditions, frf_of
 from underskin.recordings.frf.estimation import Frf, lines_of
-from underskin.recordings.frf.mains import HARMONICS, MAINS_HZ, REACH_HZ
+from underskin.recordings.frf.mains import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ
 from underskin.units import Floats
 
 _WIDTH_HZ = 1.5  # where it is asked which mains stand out
@@ -94,7 +94,7 @@ class MainsPickup(Mechanism):
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Lines near the mains are needed."""
         for entry in frf_of(conditions):
-            if any(np.abs(frequencies(entry) - mains).min() < REACH_HZ for mains in MAINS_HZ):
+            if any(np.abs(frequencies(entry) - mains).min() < HARMONIC_WIDTH_HZ for mains in MAINS_HZ):
                 return None
         return "no line lies within 3 Hz of 50 or 60 Hz (frequency_hz)"
 

@@ -4,8 +4,8 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
+from underskin.autodiff import Differentiated
 from underskin.errors import InvalidInput
-from underskin.mechanisms.autodiff import Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.recordings.conditions import Conditions, frf_of, offsets
 

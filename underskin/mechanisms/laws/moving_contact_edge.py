@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from underskin.mechanisms.autodiff import Array, Differentiated
+from underskin.autodiff import Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Stage, Uniform, Values
 from underskin.recordings.conditions import Conditions
-from underskin.units import Floats
+from underskin.units import Array, Floats
 
 _STEP = 1e-3  # of the central difference over F, relative; its error is of the order of the step's square
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from underskin.mechanisms.autodiff import Differentiated, chain
+from underskin.autodiff import Differentiated, chain
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.recordings.conditions import Conditions
 

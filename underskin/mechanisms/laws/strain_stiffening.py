@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from underskin.mechanisms.autodiff import Array, chain
+from underskin.autodiff import chain
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.recordings.conditions import Conditions
+from underskin.units import Array
 
 _STRAIN = 0.2  # of the contact, times R/a
 _NEWTON_STEPS = 8

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from underskin.mechanisms.autodiff import Differentiated, exp
+from underskin.autodiff import Differentiated, exp
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.autodiff import Differentiated, variables
 from underskin.errors import InvalidInput
-from underskin.mechanisms.autodiff import Array, Differentiated, variables
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Unsupported, Values
 from underskin.recordings.conditions import Conditions
-from underskin.units import Floats
+from underskin.units import Array, Floats
 
 SENSOR_SPREAD = 0.01  # sd of the logarithms of the sensors' gains, without `sensor_spread`
 
@@ -25,7 +25,7 @@ class Prediction:
     slopes: Array  # (parameters, rows)
     position_slopes: Array | None  # (2, rows) ∂value/∂x, ∂value/∂y of the contact's place [1/m] (frf)
     pickup: Floats | None  # sd of mains pick-up [C/N], of real and of imaginary part, on the rows that it reaches
-    picked: NDArray[np.intp] | None  # those rows
+    pickup_rows: NDArray[np.intp] | None  # those rows
     # (rows,) False where the contact lies beyond the tables, which are continued there, or the sensor's disc beyond the
     # stress profile, behind whose end the value is 0
     inside: NDArray[np.bool_]
@@ -34,8 +34,8 @@ class Prediction:
     def pickup_variance(self) -> Floats:
         """Of real and of imaginary part (rows,) [(C/N)²]."""
         variance = np.zeros(len(self.value))
-        if self.pickup is not None and self.picked is not None:
-            variance[self.picked] = self.pickup**2
+        if self.pickup is not None and self.pickup_rows is not None:
+            variance[self.pickup_rows] = self.pickup**2
         return variance
 
 

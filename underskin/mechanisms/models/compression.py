@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.autodiff import Differentiated, constant
 from underskin.errors import InvalidInput
-from underskin.mechanisms.autodiff import Differentiated, constant
 from underskin.mechanisms.base import Mechanism, Parameter, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
 from underskin.mechanisms.models.curve_state import Curve, stiffened
@@ -24,7 +24,7 @@ from underskin.recordings.campaign import CompressionRecording
 from underskin.recordings.conditions import CompressionConditions, Conditions, SkinDescription
 from underskin.units import Floats, to_si
 
-_CONTACT_SD, _CONTACT_REACH = 0.01, 0.1  # of the sample's height: the contact point's prior and bounds
+_CONTACT_SD, _CONTACT_BOUND = 0.01, 0.1  # of the sample's height: the contact point's prior and bounds
 
 
 class CompressionModel:
@@ -108,5 +108,5 @@ def _nuisances(recordings: Sequence[CompressionConditions], skin: SkinDescriptio
             begins = float(to_si("displacement_mm", entry.displacement_mm[unloaded]))
         else:
             required_modulus(skin)
-        points.append(contact_point(entry.id, begins, _CONTACT_SD * height, _CONTACT_REACH * height))
+        points.append(contact_point(entry.id, begins, _CONTACT_SD * height, _CONTACT_BOUND * height))
     return [modulus_parameter(skin, estimates), *points]

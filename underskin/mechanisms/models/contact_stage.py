@@ -11,15 +11,15 @@ from functools import lru_cache
 
 import numpy as np
 
-from underskin.mechanisms.autodiff import Differentiated, cbrt, chain
+from underskin.autodiff import Differentiated, cbrt, chain
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.physics.contact_curves import REACH, ContactCurves, CurveGrid, ValueWithSlopes
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactCurves, CurveGrid
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
 
 @dataclass(frozen=True)
-class Pressed:
+class PressedContacts:
     """Contacts (rows,) under their loads."""
 
     a_over_h: Differentiated
@@ -33,20 +33,20 @@ def layer_curves(grid: CurveGrid, layer: Layer) -> ContactCurves:
     return grid.curves(layer)
 
 
-def press(contacts: Contacts, curves: ContactCurves | None) -> Pressed:
+def press(contacts: Contacts, curves: ContactCurves | None) -> PressedContacts:
     """The contacts under their forces; `curves`, of the layer at hand, where the contact is the layer's."""
     if curves is not None:
         return _on_layer(contacts, curves)
     if contacts.work_of_adhesion is None:
-        return Pressed(contacts.hertz_radius / contacts.thickness, contacts.cbrt_load, None)
+        return PressedContacts(contacts.hertz_radius / contacts.thickness, contacts.cbrt_load, None)
     pull = (1.5 * np.pi) * contacts.indenter_radius * contacts.work_of_adhesion
     root = 2.0 * (pull * (contacts.force + pull)) ** 0.5
     equivalent = contacts.force + 2.0 * pull + root
     radius = cbrt(0.75 * contacts.indenter_radius * equivalent / contacts.reduced_modulus)
-    return Pressed(radius / contacts.thickness, contacts.cbrt_load, equivalent / contacts.force)
+    return PressedContacts(radius / contacts.thickness, contacts.cbrt_load, equivalent / contacts.force)
 
 
-def _on_layer(contacts: Contacts, curves: ContactCurves) -> Pressed:
+def _on_layer(contacts: Contacts, curves: ContactCurves) -> PressedContacts:
     scale = contacts.reduced_modulus * contacts.thickness**3.0
     load = contacts.force * contacts.indenter_radius / scale
     adhesion = contacts.work_of_adhesion
@@ -56,22 +56,23 @@ def _on_layer(contacts: Contacts, curves: ContactCurves) -> Pressed:
 
     beyond = np.isnan(solved.alpha.value)  # of the curves' reach, which is beyond the table's
 
-    def differentiated(rows: ValueWithSlopes, otherwise: Floats | float) -> Differentiated:
-        by_load, by_root, by_poisson_ratio, by_slip = np.where(beyond, 0.0, rows.slopes)
+    def by_parameters(quantity: Differentiated, otherwise: Floats | float) -> Differentiated:
+        by_load, by_root, by_poisson_ratio, by_slip = np.where(beyond, 0.0, quantity.slopes)
         terms = [(by_load, load), (by_poisson_ratio, contacts.poisson_ratio)]
         terms += [] if root is None else [(by_root, root)]
         terms += [] if slip is None else [(by_slip, slip)]
-        return chain(np.where(beyond, otherwise, rows.value), *terms)
+        return chain(np.where(beyond, otherwise, quantity.value), *terms)
 
-    share = None if root is None else differentiated(solved.sphere_load, load.value) / load
-    return Pressed(differentiated(solved.alpha, REACH), contacts.cbrt_load, share)
+    share = None if root is None else by_parameters(solved.sphere_load, load.value) / load
+    return PressedContacts(by_parameters(solved.alpha, LARGEST_A_OVER_H), contacts.cbrt_load, share)
 
 
-def stiffness(contacts: Contacts, pressed: Pressed, curves: ContactCurves) -> Differentiated:
+def stiffness(contacts: Contacts, pressed: PressedContacts, curves: ContactCurves) -> Differentiated:
     """dF/dδ = 2 E' a S(a/h) [N/m] of the layer at the contact radius in force, the edge held, E' unrelaxed."""
     alpha = pressed.a_over_h
-    value, by_alpha, by_poisson_ratio, by_slip = curves.stiffness_at(np.minimum(alpha.value, REACH))
+    at_radius = curves.stiffness_at(np.minimum(alpha.value, LARGEST_A_OVER_H))
+    by_alpha, by_poisson_ratio, by_slip = at_radius.slopes
     terms = [(by_alpha, alpha), (by_poisson_ratio, contacts.poisson_ratio)]
     terms += [] if contacts.slip is None else [(by_slip, contacts.slip)]
-    held = 2.0 * contacts.reduced_modulus * alpha * contacts.thickness * chain(value, *terms)
+    held = 2.0 * contacts.reduced_modulus * alpha * contacts.thickness * chain(at_radius.value, *terms)
     return held if contacts.relaxed is None else held / contacts.relaxed

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from underskin.mechanisms.autodiff import Differentiated, cbrt
+from underskin.autodiff import Differentiated, cbrt
 from underskin.units import Floats
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from underskin.mechanisms.autodiff import Differentiated, constant
+from underskin.autodiff import Differentiated, constant
 
 
 @dataclass

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.autodiff import Differentiated, chain, constant, sum_rows
 from underskin.errors import InvalidInput
-from underskin.mechanisms.autodiff import Array, Differentiated, chain, constant, sum_rows
 from underskin.mechanisms.base import Mechanism, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
 from underskin.mechanisms.models.contact_stage import layer_curves, press, stiffness
@@ -26,7 +26,7 @@ from underskin.mechanisms.models.pickup import Pickup, together
 from underskin.mechanisms.models.sigma_curves import layer_of, sigma_curves
 from underskin.recordings.conditions import Conditions
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats, to_si
+from underskin.units import Array, Floats, to_si
 
 _NUISANCE_STRETCH = 1.06  # the thickness' bounds
 _POSITION = 2  # two more variables: the contact's x and y
@@ -98,7 +98,7 @@ class FrfModel:
             slopes=slopes[:count],
             position_slopes=slopes[count:],
             pickup=None if self.pickup is None else self.pickup.deviation(_by_name(own)),
-            picked=None if self.pickup is None else self.pickup.rows,
+            pickup_rows=None if self.pickup is None else self.pickup.rows,
             inside=inside[self.design.point][self.recording],
         )
 

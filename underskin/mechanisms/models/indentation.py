@@ -11,8 +11,8 @@ from functools import cache, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.autodiff import Differentiated, constant, where
 from underskin.errors import InvalidInput
-from underskin.mechanisms.autodiff import Differentiated, constant, where
 from underskin.mechanisms.base import Mechanism, Parameter, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
 from underskin.mechanisms.models.contact_stage import layer_curves
@@ -35,7 +35,7 @@ from underskin.recordings.campaign import IndentationRecording
 from underskin.recordings.conditions import Conditions, CurveConditions, IndentationConditions, SkinDescription
 from underskin.units import Floats, to_si
 
-_CONTACT_SD, _CONTACT_REACH = 0.1, 0.8  # of the range of displacement: the contact point's prior and bounds
+_CONTACT_SD, _CONTACT_BOUND = 0.1, 0.8  # of the range of displacement: the contact point's prior and bounds
 
 
 class IndentationModel:
@@ -144,7 +144,7 @@ def times_of(recordings: Sequence[CurveConditions]) -> Floats:
 
 
 def _since(marked: NDArray[np.bool_], first: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """From the first row where it is `found` on, in each recording."""
+    """From the first row where it is `marked` on, in each recording."""
     total = np.cumsum(marked)
     before = np.maximum.accumulate(np.where(first, total - marked, 0))
     return np.asarray(total > before)
@@ -180,7 +180,7 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
             if refused is not None and span == 0:
                 raise refused
             largest = float(np.abs(entry.force_n).max())
-        per_recording.append(contact_point(entry.id, begins, _CONTACT_SD * span, _CONTACT_REACH * span))
+        per_recording.append(contact_point(entry.id, begins, _CONTACT_SD * span, _CONTACT_BOUND * span))
         per_recording.append(force_offset(entry.id, largest))
     if refused is not None and not estimates:
         raise refused

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.mechanisms.autodiff import Differentiated, chain, where
+from underskin.autodiff import Differentiated, chain, where
 from underskin.mechanisms.models.curve_state import Curve, stiffened
-from underskin.physics.contact_curves import REACH, ContactCurves
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactCurves
 from underskin.units import Floats
 
 _STRAIN = 0.2
@@ -125,7 +125,7 @@ class Sphere:
         low, high = least, most
         a = np.sqrt(self.radius * np.maximum(target, _SMALLEST_TRAVEL)) + 2 * least
         if self.layer is not None:  # a² = Rδ/B, B(a/h) of a bonded incompressible layer within some percent
-            alpha = a / self._largest * REACH
+            alpha = a / self._largest * LARGEST_A_OVER_H
             a = a * np.sqrt((1 + 1.25 * alpha) / (1 + 0.35 * alpha))
         a = np.minimum(a, 0.5 * (low + np.minimum(most, 2 * a)))
         for _ in range(_STEPS):
@@ -157,7 +157,7 @@ class Sphere:
         if self.layer is None:
             return np.inf
         assert self.curve.thickness is not None
-        return REACH * float(self.curve.thickness.value[0])
+        return LARGEST_A_OVER_H * float(self.curve.thickness.value[0])
 
     def _on_half_space(self, a: Differentiated) -> ContactAt:
         modulus, work = self.curve.reduced_modulus, self.curve.work_of_adhesion
@@ -176,18 +176,18 @@ class Sphere:
         root = None if work is None else self.radius * (work / (modulus * h * h * h)) ** 0.5
         rows = layer.at_radius(alpha.value, np.zeros_like(alpha.value) if root is None else root.value)
 
-        def differentiated(value: Floats, slopes: Floats) -> Differentiated:
-            by_alpha, by_root, by_poisson_ratio, _ = slopes
+        def by_parameters(quantity: Differentiated) -> Differentiated:
+            by_alpha, by_root, by_poisson_ratio, _ = quantity.slopes
             terms = [(by_alpha, alpha), (by_poisson_ratio, self.curve.poisson_ratio)]
-            return chain(value, *terms, *([] if root is None else [(by_root, root)]))
+            return chain(quantity.value, *terms, *([] if root is None else [(by_root, root)]))
 
         scale = modulus * h * h * h / self.radius
-        force = scale * differentiated(rows.load.value, rows.load.slopes)
-        depth = h * h / self.radius * differentiated(rows.depth.value, rows.depth.slopes)
-        stiffness = 2.0 * modulus * a * differentiated(rows.stiffness.value, rows.stiffness.slopes)
+        force = scale * by_parameters(rows.load)
+        depth = h * h / self.radius * by_parameters(rows.depth)
+        stiffness = 2.0 * modulus * a * by_parameters(rows.stiffness)
         if root is None:
             return ContactAt(depth, force, stiffness, None)
-        pushing = scale * differentiated(rows.sphere_load.value, rows.sphere_load.slopes)
+        pushing = scale * by_parameters(rows.sphere_load)
         return ContactAt(depth, force, stiffness, (pushing - force) / stiffness)
 
 

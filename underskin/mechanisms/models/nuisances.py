@@ -72,14 +72,14 @@ def required_modulus(skin: SkinDescription) -> float:
     return skin.youngs_modulus_mpa
 
 
-def contact_point(recording: str, middle: float, sd: float, reach: float) -> Parameter:
+def contact_point(recording: str, middle: float, sd: float, bound: float) -> Parameter:
     """The displacement at which the contact of one recording begins, around `middle` [m]."""
-    middle_mm, sd_mm, reach_mm = (float(to_lab("displacement_mm", value)) for value in (middle, sd, reach))
+    middle_mm, sd_mm, bound_mm = (float(to_lab("displacement_mm", value)) for value in (middle, sd, bound))
     return Parameter(
         name=f"contact_point {recording}",
         unit="mm",
-        low=middle_mm - reach_mm,
-        high=middle_mm + reach_mm,
+        low=middle_mm - bound_mm,
+        high=middle_mm + bound_mm,
         prior=Normal(middle_mm, sd_mm),
         scale="linear",
         limit=None,

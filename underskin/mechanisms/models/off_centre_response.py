@@ -54,14 +54,14 @@ class Place:
 
 
 class OffsetSigma:
-    """σ(a/h, L^(1/3), rT/h, e/h) around one rT/h, for offsets up to `reach` (in h).
+    """σ(a/h, L^(1/3), rT/h, e/h) around one rT/h, for offsets up to `largest_offset` (in h).
 
     Attributes: `wavenumber` (k,) in units of 1/h, at which transforms for `linear_curves` are wanted.
     """
 
-    def __init__(self, table: SigmaTable, rt_over_h: float, stretch: float, reach: float) -> None:
+    def __init__(self, table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> None:
         """Tabulate for rT/h up to `stretch` times larger or smaller; takes hundredths to tenths of a second."""
-        offsets = _SPACING * np.arange(-_MIRRORED, int(np.ceil(reach / _SPACING)) + _MIRRORED + 1)
+        offsets = _SPACING * np.arange(-_MIRRORED, int(np.ceil(largest_offset / _SPACING)) + _MIRRORED + 1)
         rho_nodes = max(5, 1 + int(np.ceil(2 * np.log(stretch) / np.log(_RHO_RATIO))))
         rho = rt_over_h * np.geomspace(1 / stretch, stretch, rho_nodes)
         radii = np.arange(0.0, min(PROFILE_END, offsets[-1] + rho[-1]) + _SPACING / 2, _SPACING)
@@ -135,9 +135,9 @@ class OffsetSigma:
 
 
 @lru_cache(maxsize=8)
-def offset_sigma(table: SigmaTable, rt_over_h: float, stretch: float, reach: float) -> OffsetSigma:
+def offset_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> OffsetSigma:
     """The same, kept for the next model of the same skin."""
-    return OffsetSigma(table, rt_over_h, stretch, reach)
+    return OffsetSigma(table, rt_over_h, stretch, largest_offset)
 
 
 def _disc_averages(radii: Floats, offsets: Floats, rt_over_h: float) -> Floats:

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.mechanisms.autodiff import Differentiated, exp, where
+from underskin.autodiff import Differentiated, exp, where
 from underskin.mechanisms.models.indentation_law import ContactAt, Sphere
 from underskin.mechanisms.models.relaxation import faded, lagging
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
-from underskin.mechanisms.autodiff import Differentiated, chain, exp, where
+from underskin.autodiff import Differentiated, chain, exp, where
 from underskin.units import Floats
 
 _SERIES = 1e-3

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import jv
 
-from underskin.mechanisms.autodiff import Differentiated
-from underskin.mechanisms.models.contact_stage import Pressed
+from underskin.autodiff import Differentiated
+from underskin.mechanisms.models.contact_stage import PressedContacts
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.off_centre_response import OffsetSigma
-from underskin.physics.contact_curves import REACH, ContactCurves
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactCurves
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average, hertz_transform, punch_transform
 from underskin.physics.skin import INCOMPRESSIBLE
@@ -36,7 +36,7 @@ class SigmaCurves:
 
 
 def sigma_curves(
-    sigma: OffsetSigma, contacts: Contacts, pressed: Pressed, rho: Differentiated, layer: ContactCurves | None
+    sigma: OffsetSigma, contacts: Contacts, pressed: PressedContacts, rho: Differentiated, layer: ContactCurves | None
 ) -> SigmaCurves:
     """The curves of all contacts; `layer` where the contact is the layer's own."""
     variables = (pressed.a_over_h, pressed.cbrt_load, rho)
@@ -49,7 +49,7 @@ def sigma_curves(
     linear = sigma.linear_curves(transforms)
     coefficients = np.concatenate([strained.coefficients, linear[3:]])
     coefficients[[0, 1, 3]] += linear[:3]
-    return SigmaCurves(coefficients, variables + further, strained.inside & (a_over_h < REACH))
+    return SigmaCurves(coefficients, variables + further, strained.inside & (a_over_h < LARGEST_A_OVER_H))
 
 
 def layer_of(contacts: Contacts) -> Layer:
@@ -58,18 +58,19 @@ def layer_of(contacts: Contacts) -> Layer:
     return Layer(float(contacts.poisson_ratio.value[0]), slip)
 
 
-def _as_in_the_table(contacts: Contacts, pressed: Pressed) -> bool:
+def _as_in_the_table(contacts: Contacts, pressed: PressedContacts) -> bool:
     nu = contacts.poisson_ratio
     incompressible = nu.value[0] == INCOMPRESSIBLE and not nu.slopes.any()
     return pressed.sphere_share is None and contacts.slip is None and bool(incompressible)
 
 
 def _transforms(
-    k: Floats, contacts: Contacts, pressed: Pressed, rt_over_h: float, layer: ContactCurves | None
+    k: Floats, contacts: Contacts, pressed: PressedContacts, rt_over_h: float, layer: ContactCurves | None
 ) -> tuple[Floats, tuple[Differentiated, ...]]:
     """p̂ · M · disc (contacts, k) with its derivatives by a/h, rT/h and what follows, and what follows."""
     shape = _half_space_shape(k, pressed) if layer is None else _layer_shape(pressed, layer)
     transmission = layer_of(contacts).transmission(k)
+    by_poisson_ratio, by_slip = transmission.slopes
     disc, by_rho = _disc(k, rt_over_h)
     passed = transmission.value * disc
     entries = [shape.value * passed, shape.by_alpha * passed, shape.value * (transmission.value * by_rho)]
@@ -78,10 +79,10 @@ def _transforms(
         entries.append(shape.by_share * passed)
         further.append(pressed.sphere_share)
     if contacts.poisson_ratio.slopes.any():
-        entries.append(shape.value * (transmission.by_poisson_ratio * disc) + shape.by_poisson_ratio * passed)
+        entries.append(shape.value * (by_poisson_ratio * disc) + shape.by_poisson_ratio * passed)
         further.append(contacts.poisson_ratio)
     if contacts.slip is not None:
-        entries.append(shape.value * (transmission.by_slip * disc) + shape.by_slip * passed)
+        entries.append(shape.value * (by_slip * disc) + shape.by_slip * passed)
         further.append(contacts.slip)
     return np.stack(entries), tuple(further)
 
@@ -97,7 +98,7 @@ class _Shape:
     by_slip: Floats | float = 0.0
 
 
-def _half_space_shape(k: Floats, pressed: Pressed) -> _Shape:
+def _half_space_shape(k: Floats, pressed: PressedContacts) -> _Shape:
     alpha = pressed.a_over_h.value[:, None]
     argument = alpha * k
     sphere, punch = hertz_transform(argument), punch_transform(argument)
@@ -109,21 +110,23 @@ def _half_space_shape(k: Floats, pressed: Pressed) -> _Shape:
     return _Shape(punch + share * (sphere - punch), punch_slope + share * (sphere_slope - punch_slope), sphere - punch)
 
 
-def _layer_shape(pressed: Pressed, layer: ContactCurves) -> _Shape:
+def _layer_shape(pressed: PressedContacts, layer: ContactCurves) -> _Shape:
     share = 1.0 if pressed.sphere_share is None else pressed.sphere_share.value[:, None]
     basis = layer.interval.basis(pressed.a_over_h.value)
     to_coefficients = layer.interval.coefficients(np.eye(len(layer.interval.nodes)))
     at, slope = basis @ to_coefficients, basis @ layer.interval.derivative(to_coefficients)
 
-    def mixed(weights: Floats, which: int) -> Floats:
-        sphere = weights @ layer.sphere_transform[which]
+    def mixed(weights: Floats, sphere: Floats, punch: Floats) -> Floats:
+        of_sphere = weights @ sphere
         if pressed.sphere_share is None:
-            return sphere
-        punch = weights @ layer.punch_transform[which]
-        return punch + share * (sphere - punch)
+            return of_sphere
+        of_punch = weights @ punch
+        return of_punch + share * (of_sphere - of_punch)
 
-    difference = at @ (layer.sphere_transform[0] - layer.punch_transform[0])
-    return _Shape(mixed(at, 0), mixed(slope, 0), difference, mixed(at, 1), mixed(at, 2))
+    sphere, punch = layer.sphere_transform, layer.punch_transform
+    by_layer = [mixed(at, *slopes) for slopes in zip(sphere.slopes, punch.slopes, strict=True)]
+    value, by_alpha = (mixed(weights, sphere.value, punch.value) for weights in (at, slope))
+    return _Shape(value, by_alpha, at @ (sphere.value - punch.value), *by_layer)
 
 
 def _disc(k: Floats, rt_over_h: float) -> tuple[Floats, Floats]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.mechanisms.autodiff import Differentiated
+from underskin.autodiff import Differentiated
 from underskin.mechanisms.models.indentation_law import Sphere
 from underskin.mechanisms.models.receding_contact import Presses, relaxing
 from underskin.units import Floats

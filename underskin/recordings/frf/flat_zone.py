@@ -17,7 +17,7 @@ from scipy.ndimage import median_filter
 from underskin.errors import ErrorCode, InvalidInput
 from underskin.recordings.frf.estimation import Frf
 from underskin.recordings.frf.flat_zone_reason import levels_of, reason_of
-from underskin.recordings.frf.mains import HARMONICS, MAINS_HZ, REACH_HZ
+from underskin.recordings.frf.mains import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ
 from underskin.units import Complexes, Floats
 
 FLATNESS = 0.02
@@ -197,7 +197,7 @@ def _mains_lines(stacks: Sequence[Stack]) -> tuple[float, ...]:
     harmonics = np.outer(MAINS_HZ, HARMONICS).ravel()
     lines_hz: set[float] = set()
     for stack in stacks:
-        near = np.abs(stack.frequency[:, None] - harmonics).min(axis=1) <= REACH_HZ
+        near = np.abs(stack.frequency[:, None] - harmonics).min(axis=1) <= HARMONIC_WIDTH_HZ
         if not near.any() or len(near) < _NEIGHBOURS:
             continue
         smooth = median_filter(stack.values.real, (1, _NEIGHBOURS), mode="nearest") + 1j * median_filter(

@@ -4,4 +4,4 @@ import numpy as np
 
 MAINS_HZ = (50.0, 60.0)
 HARMONICS = np.arange(1, 6)  # 1: the fundamental
-REACH_HZ = 3.0  # from a harmonic: windows and the drift of mains make lines that wide
+HARMONIC_WIDTH_HZ = 3.0  # from a harmonic: windows and the drift of mains make lines that wide

@@ -18,14 +18,14 @@ import numpy as np
 import orjson
 
 from underskin.errors import ErrorCode, FileError
-from underskin.process_limits import limit_process
+from underskin.parallel import limit_process
 from underskin.recordings.channels import Block, Channel, Contents
 from underskin.recordings.readers.formats import parse
 from underskin.recordings.shown_values import shown
 
 
 @dataclass(frozen=True)
-class Limits:
+class ParsingLimits:
     """What one file may take: `memory_bytes` beyond the interpreter's own, `seconds` by the clock. The answer about it
     may be `unfolding` times as long as the file, and 16 MB."""
 
@@ -38,14 +38,14 @@ class Limits:
         return min(self.memory_bytes, _SHORT_ANSWER + int(self.unfolding * file_bytes))
 
 
-_DEFAULT = Limits()
+_DEFAULT = ParsingLimits()
 _SHORT_ANSWER = 16 << 20
 _INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR")
 _LAST_WORDS = 500
 _LENGTH = struct.Struct("<Q")
 
 
-def parse_apart(name: str, stream: BinaryIO, file: str, limits: Limits = _DEFAULT) -> Contents | dict[str, Any]:
+def parse_apart(name: str, stream: BinaryIO, file: str, limits: ParsingLimits = _DEFAULT) -> Contents | dict[str, Any]:
     """As formats.parse, in a child process; raises FileError also where the child dies or breaks a limit."""
     contents = call_apart(f"{__name__}:_parsed", stream, file, name, what=name, limits=limits)
     if "document" in contents:
@@ -58,7 +58,7 @@ def parse_apart(name: str, stream: BinaryIO, file: str, limits: Limits = _DEFAUL
 
 
 def call_apart(
-    function: str, stream: BinaryIO, file: str, *given: str, what: str, limits: Limits = _DEFAULT
+    function: str, stream: BinaryIO, file: str, *given: str, what: str, limits: ParsingLimits = _DEFAULT
 ) -> dict[str, Any]:
     """What `function` ("module:name", called with the stream and the texts given) answers, in a child process.
 

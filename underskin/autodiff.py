@@ -1,6 +1,6 @@
 """Numbers that carry their derivatives with respect to a model's parameters (forward mode).
 
-Only what the mechanisms need: arithmetic, a few functions, selecting rows, and `chain` for everything else.
+Only what physics and mechanisms need: arithmetic, a few functions, selecting rows, and `chain` for everything else.
 """
 
 from __future__ import annotations
@@ -11,15 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[Any]  # float64 or complex128
-Operand = "Differentiated | Array | float | complex"
+from underskin.units import Array
 
 
 class Differentiated:
-    """An array with its derivatives: `value` (rows,) and `slopes` (parameters, rows).
+    """An array with its derivatives: `value`, mostly (rows,), and `slopes`, with the parameters along its first axis.
 
-    A single row stands for all rows, as NumPy broadcasts. The derivatives are those with respect to the fit coordinates
-    of a model's parameters.
+    A single row stands for all rows, as NumPy broadcasts. In a mechanism the derivatives are those with respect to the
+    fit coordinates of the model's parameters; a function of `underskin.physics` states what its own are taken by.
     """
 
     __slots__ = ("slopes", "value")
