@@ -17,6 +17,7 @@ from typing import Literal
 
 from service.store import data_folder
 from underskin import InvalidInput
+from underskin.errors import not_unique
 
 # Looking at the file takes longer than checking a key.
 _FRESH_S = 0.5
@@ -102,7 +103,7 @@ class KeyStore:
         created = datetime.now(UTC).isoformat(timespec="seconds")
         with self._changing() as keys:
             if any(key.name == name for key in keys):
-                raise InvalidInput("name", name, "must not be the name of another key; revoke that one first")
+                raise not_unique("name", name, "must not be the name of another key; revoke that one first")
             keys.append(Key(name, scope, created, sha256(token.encode()).hexdigest()))
         return token
 

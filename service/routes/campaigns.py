@@ -26,6 +26,7 @@ from service.usecases import campaign_documents, d33_cache
 from service.usecases import campaigns as usecase
 from service.usecases.adopted_models import model_in_force
 from underskin import InvalidInput
+from underskin.errors import wrong_type
 
 router = APIRouter(prefix="/v1", tags=["campaigns"], route_class=JsonRoute)
 
@@ -259,4 +260,4 @@ def _time(name: str, text: str | None) -> str | None:
     try:
         return None if text is None else stored(text)
     except ValueError:
-        raise InvalidInput(name, text, "must be a date and time like 2017-05-03T09:00:00Z") from None
+        raise wrong_type(name, text, "must be a date and time like 2017-05-03T09:00:00Z") from None

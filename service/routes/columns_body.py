@@ -10,6 +10,7 @@ from service.problems import Refusal, from_validation
 from service.schemas.columns import ColumnsRequest
 from underskin import InvalidInput
 from underskin.columns import CsvError, from_csv
+from underskin.errors import wrong_type
 
 Kind = TypeVar("Kind", bound=ColumnsRequest)
 
@@ -67,7 +68,7 @@ def _cells(kind: type[ColumnsRequest], name: str, cells: list[str]) -> Any:
         try:
             numbers.append(float(cell))
         except ValueError:
-            raise InvalidInput(name, cell, "must be a number", index=row) from None
+            raise wrong_type(name, cell, index=row) from None
     return numbers
 
 

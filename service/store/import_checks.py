@@ -14,6 +14,7 @@ from service.schemas.campaigns import RecordingResult
 from service.store import codec
 from service.store.skins import require_usable
 from underskin import InvalidInput
+from underskin.errors import unreadable
 from underskin.recordings import rig_description
 from underskin.recordings.campaign import SCHEMA, Campaign, parse
 from underskin.recordings.skin_export import ExportedCampaign, Overview
@@ -103,7 +104,7 @@ def overview(exported: Overview) -> CheckedOverview:
         try:
             rig_description.from_dict(orjson.loads(rig.document))
         except orjson.JSONDecodeError as error:
-            raise InvalidInput("rigs", None, f"must be JSON: {error.msg}") from None
+            raise unreadable("rigs", None, f"must be JSON: {error.msg}") from None
     return CheckedOverview(rows, rigs)
 
 

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from underskin.errors import ErrorCode, InvalidInput
+from underskin.errors import ErrorCode, InvalidInput, conflicting, not_unique, required, too_few, wrong_type
 from underskin.recordings import validation as field
 from underskin.recordings.conditions import (
     CompressionConditions,
@@ -20,7 +20,7 @@ from underskin.recordings.conditions import (
     SkinDescription,
 )
 from underskin.recordings.shown_values import named, shown
-from underskin.requirement import REQUIRED, Mention, Requirement
+from underskin.requirement import Mention, Requirement
 from underskin.units import Complexes, Floats
 
 SCHEMA = "campaign/1"
@@ -110,7 +110,7 @@ def frf_recordings(campaign: Campaign) -> list[FrfRecording]:
     """The campaign's FRF recordings, in order; raises InvalidInput where there is none."""
     recordings = [entry for entry in campaign.recordings if isinstance(entry, FrfRecording)]
     if not recordings:
-        raise InvalidInput("recordings", "none of kind frf", "must hold at least one")
+        raise too_few("recordings", "none of kind frf", "must hold at least one")
     return recordings
 
 
@@ -132,17 +132,13 @@ def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
     skin = field.build(SkinDescription, "skin", document.get("skin"), units_checked)
     entries = document.get("recordings")
     if not isinstance(entries, list) or not entries:
-        raise InvalidInput(
-            "recordings", shown(entries), "must be a list of at least one recording", code=ErrorCode.WRONG_TYPE
-        )
+        raise wrong_type("recordings", shown(entries), "must be a list of at least one recording")
     good: dict[str, Recording] = {}
     problems: list[RecordingProblem] = []
     for index, entry in enumerate(entries):
         recording, refused = _recording(entry, skin, units_checked)
         if recording is not None and recording.id in good:
-            refused = [
-                InvalidInput("id", recording.id, "must differ from every other recording's", code=ErrorCode.NOT_UNIQUE)
-            ]
+            refused = [not_unique("id", recording.id, "must differ from every other recording's")]
         if recording is not None and not refused:
             good[recording.id] = recording
         label = recording.id if recording is not None else _label(entry, index)
@@ -219,7 +215,7 @@ def _unmet_needs(recording: Recording, skin: SkinDescription) -> list[InvalidInp
         )
     if isinstance(recording, FrfRecording):
         refused += [
-            InvalidInput(f"skin.{name}", None, "required by a recording of kind frf", code=ErrorCode.REQUIRED)
+            required(f"skin.{name}", "required by a recording of kind frf")
             for name in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm")
             if getattr(skin, name) is None
         ]
@@ -236,15 +232,9 @@ def _not_one_of_two_forms(recording: FrfRecording) -> list[InvalidInput]:
     series = [name for name in _TIME_SERIES if getattr(recording, name) is not None]
     lines = [name for name in (*_LINES, "coherence") if getattr(recording, name) is not None]
     if series and lines:
-        return [
-            InvalidInput(series[0], "given", "must be absent where the FRF itself is given", code=ErrorCode.CONFLICTING)
-        ]
+        return [conflicting(series[0], "given", "must be absent where the FRF itself is given")]
     needed = _TIME_SERIES if series else _LINES
-    return [
-        InvalidInput(name, None, REQUIRED, code=ErrorCode.REQUIRED)
-        for name in needed
-        if getattr(recording, name) is None
-    ]
+    return [required(name) for name in needed if getattr(recording, name) is None]
 
 
 def _unequal_lengths(recording: Recording) -> list[InvalidInput]:

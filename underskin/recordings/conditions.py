@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from underskin.errors import InvalidInput
+from underskin.errors import InvalidInput, not_unique, too_few, wrong_type
 from underskin.recordings import validation as field
 from underskin.recordings.shown_values import shown
 from underskin.units import Floats, to_si
@@ -29,12 +29,12 @@ class Sensor:
 
 def _sensors(name: str, value: Any, units_checked: bool) -> tuple[Sensor, ...]:
     if not isinstance(value, list | tuple):
-        raise InvalidInput(name, shown(value), "must be a list of sensors")
+        raise wrong_type(name, shown(value), "must be a list of sensors")
     sensors = [field.build(Sensor, f"{name}[{index}]", entry, units_checked) for index, entry in enumerate(value)]
     seen: set[str] = set()
     for index, sensor in enumerate(sensors):
         if sensor.id in seen:
-            raise InvalidInput(f"{name}[{index}].id", sensor.id, "must differ from every other sensor's")
+            raise not_unique(f"{name}[{index}].id", sensor.id, "must differ from every other sensor's")
         seen.add(sensor.id)
     return tuple(sensors)
 
@@ -206,7 +206,7 @@ def frf_of(conditions: Conditions) -> list[FrfConditions]:
     """Those of FRF recordings, in order; raises InvalidInput where there is none."""
     recordings = [entry for entry in conditions.recordings if isinstance(entry, FrfConditions)]
     if not recordings:
-        raise InvalidInput("recordings", "none of kind frf", "must hold at least one")
+        raise too_few("recordings", "none of kind frf", "must hold at least one")
     return recordings
 
 

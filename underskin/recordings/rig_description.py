@@ -19,7 +19,7 @@ from typing import Annotated, Any
 
 import yaml
 
-from underskin.errors import ErrorCode, FileError, InvalidInput
+from underskin.errors import ErrorCode, FileError, InvalidInput, conflicting, required, too_few
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import COLUMNS, KINDS
 from underskin.recordings.conditions import SkinDescription
@@ -138,28 +138,17 @@ def _channels(kind: str, document: Any) -> dict[str, ChannelMapping]:
     channels = {name: field.build(ChannelMapping, f"channels.{name}", value, False) for name, value in given.items()}
     for name, entry in channels.items():
         if (entry.sensitivity is None) != (entry.sensitivity_unit is None):
-            raise InvalidInput(
-                f"channels.{name}.sensitivity",
-                entry.sensitivity,
-                "needs a sensitivity_unit, and it one",
-                code=ErrorCode.CONFLICTING,
-            )
+            raise conflicting(f"channels.{name}.sensitivity", entry.sensitivity, "needs a sensitivity_unit, and it one")
         if entry.labelled is not None and entry.unit is None:
-            raise InvalidInput(
-                f"channels.{name}.unit",
-                None,
-                "required where labelled says that the label is wrong",
-                code=ErrorCode.REQUIRED,
-            )
+            raise required(f"channels.{name}.unit", "required where labelled says that the label is wrong")
         if entry.stiffness_n_per_mm is not None and (name != "displacement_mm" or "force_n" not in channels):
-            raise InvalidInput(
+            raise conflicting(
                 f"channels.{name}.stiffness_n_per_mm",
                 entry.stiffness_n_per_mm,
                 Requirement("is for ", Mention("displacement_mm")),
-                code=ErrorCode.CONFLICTING,
             )
     if not channels:
-        raise InvalidInput("channels", "none", "must name at least one channel", code=ErrorCode.TOO_FEW)
+        raise too_few("channels", "none", "must name at least one channel")
     return channels
 
 

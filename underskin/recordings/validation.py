@@ -14,10 +14,9 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from underskin.errors import ErrorCode, InvalidInput
+from underskin.errors import ErrorCode, InvalidInput, out_of_range, required, too_few, wrong_type
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings.shown_values import LONGEST_NAME, named, shown
-from underskin.requirement import REQUIRED
 from underskin.units import Floats, checked
 
 Model = TypeVar("Model")
@@ -52,7 +51,7 @@ def check_fields(
         value = document.get(name)
         try:
             if value is None and default is MISSING:
-                raise InvalidInput(name, None, REQUIRED, code=ErrorCode.REQUIRED)
+                raise required(name)
             values[name] = default if value is None else field_check(name, value, units_checked)
         except InvalidInput as refusal:
             refused.append(refusal)
@@ -117,7 +116,7 @@ def positive(field: str, value: Any, units_checked: bool) -> float:  # noqa: ARG
     """A measured or chosen quantity greater than 0, of any magnitude."""
     result = number(field, value)
     if result <= 0:
-        raise InvalidInput(field, result, "must be greater than 0", code=ErrorCode.OUT_OF_RANGE)
+        raise out_of_range(field, result, "must be greater than 0")
     return result
 
 
@@ -125,7 +124,7 @@ def not_negative(field: str, value: Any, units_checked: bool) -> float:  # noqa:
     """A number that is 0 or greater."""
     result = number(field, value)
     if result < 0:
-        raise InvalidInput(field, result, "must be 0 or greater", code=ErrorCode.OUT_OF_RANGE)
+        raise out_of_range(field, result, "must be 0 or greater")
     return result
 
 
@@ -140,7 +139,7 @@ def poisson_ratio(field: str, value: Any, units_checked: bool) -> float:  # noqa
     """0 to 0.5."""
     result = number(field, value)
     if not 0 <= result <= INCOMPRESSIBLE:
-        raise InvalidInput(field, result, f"must be 0 to {INCOMPRESSIBLE}", code=ErrorCode.OUT_OF_RANGE)
+        raise out_of_range(field, result, f"must be 0 to {INCOMPRESSIBLE}")
     return result
 
 
@@ -158,9 +157,7 @@ def time_of_day(field: str, value: Any, units_checked: bool) -> str:
     try:
         datetime.fromisoformat(text)
     except ValueError:
-        raise InvalidInput(
-            field, text, "must be a date and time like 2017-05-03T09:00:00Z", code=ErrorCode.WRONG_TYPE
-        ) from None
+        raise wrong_type(field, text, "must be a date and time like 2017-05-03T09:00:00Z") from None
     return text
 
 
@@ -180,7 +177,7 @@ def series(field: str, value: Any, units_checked: bool) -> Floats:  # noqa: ARG0
     """A column of at least one finite number."""
     column = _column(field, value)
     if column.size == 0:
-        raise InvalidInput(field, shown(value), "must hold at least one number", code=ErrorCode.TOO_FEW)
+        raise too_few(field, shown(value), "must hold at least one number")
     _refuse_where(field, column, ~np.isfinite(column), "must be finite", ErrorCode.NOT_FINITE)
     return column
 
@@ -263,9 +260,7 @@ def _column(field: str, value: Any) -> Floats:
     try:
         return np.array(value, dtype=np.float64)
     except OverflowError:
-        raise InvalidInput(
-            field, shown(value), "holds a number too large to keep", code=ErrorCode.OUT_OF_RANGE
-        ) from None
+        raise out_of_range(field, shown(value), "holds a number too large to keep") from None
 
 
 def _refuse_where(field: str, column: Floats, bad: Any, allowed: str, code: ErrorCode) -> None:
@@ -275,7 +270,7 @@ def _refuse_where(field: str, column: Floats, bad: Any, allowed: str, code: Erro
 
 
 def _wrong_type(field: str, value: Any, allowed: str, index: int | None = None) -> InvalidInput:
-    return InvalidInput(field, shown(value), allowed, index, code=ErrorCode.WRONG_TYPE)
+    return wrong_type(field, shown(value), allowed, index=index)
 
 
 Name = Annotated[str, name]

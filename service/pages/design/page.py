@@ -21,6 +21,7 @@ from service.problems import from_validation
 from service.schemas.design import DesignAnswer, DesignRequest
 from service.usecases.design import design_answer, design_of
 from underskin import InvalidInput, UnderskinError
+from underskin.errors import wrong_type
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/design")
@@ -168,7 +169,7 @@ def _given(request: Request) -> dict[str, float]:
     try:
         return {name: float(value) for name, value in request.query_params.items() if name in names}
     except ValueError:
-        raise InvalidInput("address", request.url.query[:80], "must have numbers") from None
+        raise wrong_type("address", request.url.query[:80], "must have numbers") from None
 
 
 def _asked(values: Mapping[str, float]) -> DesignRequest:

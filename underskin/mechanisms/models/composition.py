@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.errors import InvalidInput
+from underskin.errors import InvalidInput, not_unique
 from underskin.mechanisms.autodiff import Array, Differentiated, variables
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Unsupported, Values
 from underskin.recordings.conditions import Conditions
@@ -118,5 +118,5 @@ def chosen(names: Sequence[str], catalogue: Mapping[str, Mechanism]) -> list[Mec
         if name not in catalogue:
             raise InvalidInput("mechanism", name, f"must be one of {', '.join(catalogue)}")
         if list(names).count(name) > 1:
-            raise InvalidInput("mechanism", name, "must be named once")
+            raise not_unique("mechanism", name, "must be named once")
     return [mechanism for name, mechanism in catalogue.items() if name in names]

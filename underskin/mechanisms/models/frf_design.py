@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from underskin.errors import InvalidInput
+from underskin.errors import required
 from underskin.recordings.conditions import Conditions, FrfConditions, frf_of
 from underskin.units import Floats, to_si
 
@@ -102,7 +102,7 @@ class FrfDesign:
 def frequencies(entry: FrfConditions) -> Floats:
     """The lines of one FRF [Hz]; raises InvalidInput where they are yet to be estimated from a time series."""
     if entry.frequency_hz is None:
-        raise InvalidInput(f"recordings[{entry.id}].frequency_hz", None, "required for a prediction")
+        raise required(f"recordings[{entry.id}].frequency_hz", "required for a prediction")
     return entry.frequency_hz
 
 
