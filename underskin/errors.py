@@ -86,6 +86,11 @@ def out_of_range(field: str, value: Any, allowed: str, index: int | None = None)
     return InvalidInput(field, value, allowed, index, code=ErrorCode.OUT_OF_RANGE)
 
 
+def not_finite(field: str, value: Any, allowed: str = "must be finite", index: int | None = None) -> InvalidInput:
+    """NaN or infinity."""
+    return InvalidInput(field, value, allowed, index, code=ErrorCode.NOT_FINITE)
+
+
 def not_one_of(field: str, value: Any, known: Iterable[str]) -> InvalidInput:
     """A name that is none of those `known`."""
     names = tuple(known)
@@ -139,6 +144,11 @@ class FileError(UnderskinError):
         self.reason = reason
         self.code = code
         super().__init__(": ".join(part for part in (file, place, reason) if part))
+
+    def of_field(self, field: str, file: str | None) -> InvalidInput:
+        """The same error of a field whose value is the file, by the name that it was sent under."""
+        allowed = ": ".join(part for part in (self.place, self.reason) if part)
+        return InvalidInput(field, file, allowed, code=self.code)
 
 
 class TableError(UnderskinError):

@@ -37,5 +37,4 @@ class Requirement(str):
         return "".join(word(part) if isinstance(part, Mention) else part for part in self.parts)
 
 
-REQUIRED = Requirement("required")  # of a field that was left out
 UNITS_CHECKED = Mention("units_checked", " (or set units_checked to true)")  # which takes an unlikely magnitude

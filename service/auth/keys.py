@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 from service.store import data_folder
-from underskin import InvalidInput
-from underskin.errors import not_unique
+from underskin.errors import not_one_of, not_unique
 
 # Looking at the file takes longer than checking a key.
 _FRESH_S = 0.5
@@ -112,7 +111,7 @@ class KeyStore:
         with self._changing() as keys:
             remaining = [key for key in keys if key.name != name]
             if len(remaining) == len(keys):
-                raise InvalidInput("name", name, f"must be one of {[key.name for key in keys]}")
+                raise not_one_of("name", name, (key.name for key in keys))
             keys[:] = remaining
 
     def remove(self) -> None:

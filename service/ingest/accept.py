@@ -14,8 +14,7 @@ from service.ingest.uploads import Upload
 from service.problems import Refusal
 from service.store import answers, campaigns, skins
 from service.store.engine import Database
-from underskin import InvalidInput
-from underskin.errors import FileError, conflicting, required, unreadable
+from underskin.errors import FileError, InvalidInput, conflicting, required
 from underskin.recordings import plausibility, validation
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription, from_dict
@@ -92,7 +91,7 @@ def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> 
                 with upload.path.open("rb") as file:
                     return parse_rig(file.read(LARGEST_BYTES + 1), upload.label or RIG)
             except FileError as error:
-                raise unreadable(RIG, upload.label, f"{error.place}: {error.reason}".lstrip(": ")) from None
+                raise error.of_field(RIG, upload.label) from None
             except InvalidInput as error:
                 label = f"{upload.label}: " if upload.label else f"{RIG}."
                 raise error.at(f"{label}{error.field}") from None

@@ -5,8 +5,7 @@ from collections.abc import Collection, Iterator, Sequence
 
 from service.ingest.uploads import Upload
 from service.problems import invalid_input, unknown_name
-from underskin import InvalidInput
-from underskin.errors import not_unique, wrong_type
+from underskin.errors import InvalidInput, not_unique, wrong_type
 
 FILE = "file"  # a part of this name is a file, also where its sender gives no file name
 _LONGEST_TEXT = 4096  # bytes

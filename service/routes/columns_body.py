@@ -8,9 +8,8 @@ from pydantic_core import from_json
 from service.middleware.unique_keys import require_unique_keys
 from service.problems import Refusal, from_validation
 from service.schemas.columns import ColumnsRequest
-from underskin import InvalidInput
 from underskin.columns import CsvError, from_csv
-from underskin.errors import wrong_type
+from underskin.errors import ErrorCode, InvalidInput, wrong_type
 
 Kind = TypeVar("Kind", bound=ColumnsRequest)
 
@@ -60,7 +59,7 @@ def _from_csv(kind: type[ColumnsRequest], body: bytes) -> dict[str, Any]:
 
 def _cells(kind: type[ColumnsRequest], name: str, cells: list[str]) -> Any:
     if name in kind.json_only:
-        raise InvalidInput(name, cells[0], "cannot be sent as CSV; send application/json")
+        raise wrong_type(name, cells[0], "cannot be sent as CSV; send application/json")
     if name in kind.constants:
         return _constant(name, cells)
     numbers = []
@@ -75,5 +74,7 @@ def _cells(kind: type[ColumnsRequest], name: str, cells: list[str]) -> Any:
 def _constant(name: str, cells: list[str]) -> str | bool:
     for row, cell in enumerate(cells):
         if cell != cells[0]:
-            raise InvalidInput(name, cell, f"must be the same in every row ({cells[0]!r})", index=row)
+            raise InvalidInput(
+                name, cell, f"must be the same in every row ({cells[0]!r})", row, code=ErrorCode.CONFLICTING
+            )
     return {"true": True, "false": False}.get(cells[0].lower(), cells[0])

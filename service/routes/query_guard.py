@@ -6,8 +6,7 @@ from fastapi import Request
 
 from service.problems import invalid_input, unknown_name
 from service.routes.openapi import query_parameters
-from underskin import InvalidInput
-from underskin.errors import not_unique
+from underskin.errors import InvalidInput, not_unique
 
 
 async def known_query(request: Request) -> None:

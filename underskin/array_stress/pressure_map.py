@@ -7,7 +7,16 @@ Separated by commas, or by tabs or semicolons, as spreadsheets copy and save it,
 import math
 from typing import Any
 
-from underskin.errors import FileError, InvalidInput, out_of_range, too_few, unreadable, wrong_type
+from underskin.errors import (
+    ErrorCode,
+    FileError,
+    InvalidInput,
+    not_finite,
+    out_of_range,
+    too_few,
+    unreadable,
+    wrong_type,
+)
 from underskin.recordings.readers import text
 
 _FIELD = "pressure_map"
@@ -25,7 +34,7 @@ def parse(content: bytes, name: str) -> dict[str, Any]:
     for line, cells in rows:
         if len(cells) != len(head):
             allowed = f"must have as many as line {lines[0][0]} has ({len(head)}) (line {line} of {name})"
-            raise InvalidInput(_FIELD, f"{len(cells)} cells", allowed)
+            raise InvalidInput(_FIELD, f"{len(cells)} cells", allowed, code=ErrorCode.UNEQUAL_LENGTHS)
     x, *numbers = [
         [
             _number(cell, decimal, f"line {line}, cell {column + 1} of {name}")
@@ -63,8 +72,9 @@ def _cells(line: str, separator: str, number: int, name: str) -> list[str]:
 
 def _number(cell: str, decimal: str, place: str) -> float:
     value = text.number(cell, decimal)
-    if value is None and text.is_grouped(cell):
-        raise wrong_type(_FIELD, cell[:80], f"{text.ungrouped(cell)} ({place})")
-    if value is None or not math.isfinite(value):
-        raise InvalidInput(_FIELD, cell[:80], f"must be a {'number' if value is None else 'finite number'} ({place})")
+    if value is None:
+        reason = text.ungrouped(cell) if text.is_grouped(cell) else "must be a number"
+        raise wrong_type(_FIELD, cell[:80], f"{reason} ({place})")
+    if not math.isfinite(value):
+        raise not_finite(_FIELD, cell[:80], f"must be a finite number ({place})")
     return value

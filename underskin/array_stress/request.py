@@ -11,7 +11,17 @@ from typing import Annotated, Any
 import numpy as np
 
 from underskin.array_stress import pressure_map
-from underskin.errors import InvalidInput, not_unique, out_of_range, required, too_few, unreadable, wrong_type
+from underskin.errors import (
+    ErrorCode,
+    InvalidInput,
+    conflicting,
+    not_unique,
+    out_of_range,
+    required,
+    too_few,
+    unreadable,
+    wrong_type,
+)
 from underskin.recordings import validation as field
 from underskin.recordings.conditions import Sensors
 from underskin.recordings.readers import json_file
@@ -61,7 +71,8 @@ def _pressure_map(name: str, value: Any, units_checked: bool) -> PressureMap:
     if result.pressure_mpa.shape != shape:
         rows, columns = result.pressure_mpa.shape
         allowed = f"must have a row for each y_mm ({shape[0]}) and a column for each x_mm ({shape[1]})"
-        raise InvalidInput(f"{name}.pressure_mpa", f"{rows} rows, {columns} columns", allowed)
+        sizes = f"{rows} rows, {columns} columns"
+        raise InvalidInput(f"{name}.pressure_mpa", sizes, allowed, code=ErrorCode.UNEQUAL_LENGTHS)
     _refuse_pull(f"{name}.pressure_mpa", result.pressure_mpa)
     return result
 
@@ -134,7 +145,9 @@ def read_request(document: Any) -> LoadCase:
         raise too_few("sensors", shown(request.sensors), "must hold at least one sensor")
     if bool(request.contacts) == (request.pressure_map is not None):
         allowed = Requirement("must be given, or ", Mention("pressure_map"), ", but not both")
-        raise InvalidInput("contacts", shown(request.contacts) if request.contacts else None, allowed)
+        if not request.contacts:
+            raise required("contacts", allowed)
+        raise conflicting("contacts", shown(request.contacts), allowed)
     if request.contacts and request.youngs_modulus_mpa is None:
         allowed = Requirement("is required with ", Mention("contacts"), ", whose radii depend on it")
         raise required("youngs_modulus_mpa", allowed)

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from underskin.columns import CsvError, from_csv, statuses, to_csv
-from underskin.errors import InvalidInput, UnderskinError, not_unique, unreadable, wrong_type
+from underskin.errors import ErrorCode, InvalidInput, UnderskinError, not_unique, unreadable, wrong_type
 from underskin.findings.finding import Finding
 from underskin.formatting import significant
 from underskin.units import LAB, Floats
@@ -90,7 +90,8 @@ def _from_csv(path: str, allowed: Sequence[str]) -> dict[str, Floats]:
         raise unreadable("input", path, str(error)) from error
     for name in columns:
         if name not in allowed:
-            raise InvalidInput("input", path, f"has the column {name!r}; allowed, once each: {', '.join(allowed)}")
+            words = f"has the column {name!r}; allowed, once each: {', '.join(allowed)}"
+        raise InvalidInput("input", path, words, code=ErrorCode.UNKNOWN_FIELD)
     return {name: _numbers(name, cells) for name, cells in columns.items()}
 
 

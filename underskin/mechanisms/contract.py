@@ -10,7 +10,7 @@ from typing import Any, TypeVar, get_args
 
 import numpy as np
 
-from underskin.errors import InvalidInput, not_unique, required
+from underskin.errors import InvalidInput, not_finite, not_unique, required
 from underskin.extensions import described
 from underskin.mechanisms.base import (
     AXES,
@@ -163,7 +163,7 @@ def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
             answer = _called(f"{field} at {place}", partial(model.predict, fit))
         numbers = [answer.value, answer.slopes, *([] if answer.pickup is None else [answer.pickup])]
         if not all(np.isfinite(part).all() for part in numbers):
-            raise InvalidInput(f"{field} at {place}", None, "gives numbers that are not finite")
+            raise not_finite(f"{field} at {place}", None, "gives numbers that are not finite")
 
 
 def _model(mechanism: Mechanism, campaign: Campaign, kind: Kind) -> FrfModel | IndentationModel | CompressionModel:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.errors import InvalidInput, conflicting, out_of_range, required
+from underskin.errors import conflicting, not_one_of, out_of_range, required
 from underskin.mechanisms.autodiff import Array
 from underskin.mechanisms.base import Kind, Mechanism, Parameter
 from underskin.mechanisms.models.composed import Model, forward_model
@@ -132,14 +132,14 @@ def _fit_coordinates(model: Model, values: Mapping[str, float], own: int) -> NDA
     names = [entry.name for entry in model.parameters]
     for name in values:
         if name not in names:
-            raise InvalidInput("parameters", name, f"must be one of {', '.join(names)}")
-    required = {*names[:own], "d33"}
-    return np.array([_coordinate(entry, values.get(entry.name), entry.name in required) for entry in model.parameters])
+            raise not_one_of("parameters", name, names)
+    needed = {*names[:own], "d33"}
+    return np.array([_coordinate(entry, values.get(entry.name), entry.name in needed) for entry in model.parameters])
 
 
-def _coordinate(entry: Parameter, value: float | None, required: bool) -> float:
+def _coordinate(entry: Parameter, value: float | None, needed: bool) -> float:
     if value is None:
-        if required:
+        if needed:
             raise required(f"parameters.{entry.name}", f"required, in {entry.unit}: {entry.reason}")
         return entry.start
     if not entry.low <= value <= entry.high:

@@ -10,7 +10,17 @@ from typing import Any, Self
 
 import numpy as np
 
-from underskin.errors import ErrorCode, InvalidInput, conflicting, not_unique, required, too_few, wrong_type
+from underskin.errors import (
+    ErrorCode,
+    InvalidInput,
+    conflicting,
+    not_one_of,
+    not_unique,
+    required,
+    too_few,
+    unequal_lengths,
+    wrong_type,
+)
 from underskin.recordings import validation as field
 from underskin.recordings.conditions import (
     CompressionConditions,
@@ -19,8 +29,7 @@ from underskin.recordings.conditions import (
     IndentationConditions,
     SkinDescription,
 )
-from underskin.recordings.shown_values import named, shown
-from underskin.requirement import Mention, Requirement
+from underskin.recordings.shown_values import shown
 from underskin.units import Complexes, Floats
 
 SCHEMA = "campaign/1"
@@ -119,14 +128,8 @@ def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
 
     Raises InvalidInput where the campaign itself or its skin cannot be used.
     """
-    document = field.mapping("campaign", document)
-    for name in document:
-        if name not in ("schema", "name", "skin", "recordings", "units_checked"):
-            raise InvalidInput(
-                named(name), shown(document[name]), "unknown field of a campaign", code=ErrorCode.UNKNOWN_FIELD
-            )
-    if document.get("schema") != SCHEMA:
-        raise InvalidInput("schema", shown(document.get("schema")), f"must be {SCHEMA}", code=ErrorCode.NOT_ONE_OF)
+    fields_known = ("schema", "name", "skin", "recordings", "units_checked")
+    document = field.of_schema("campaign", document, SCHEMA, fields_known)
     units_checked = field.flag("units_checked", document.get("units_checked", False), False)
     name = field.name("name", document.get("name"), units_checked)
     skin = field.build(SkinDescription, "skin", document.get("skin"), units_checked)
@@ -195,9 +198,7 @@ def _recording(entry: Any, skin: SkinDescription, units_checked: bool) -> tuple[
         return None, [refusal]
     kind = document.get("kind") or "frf"
     if not isinstance(kind, str) or kind not in KINDS:
-        return None, [
-            InvalidInput("kind", shown(kind), f"must be one of {', '.join(KINDS)}", code=ErrorCode.NOT_ONE_OF)
-        ]
+        return None, [not_one_of("kind", shown(kind), KINDS)]
     values, refused = field.check_fields(KINDS[kind], document, units_checked=units_checked)
     if refused:
         return None, refused
@@ -246,16 +247,7 @@ def _unequal_lengths(recording: Recording) -> list[InvalidInput]:
     if len(set(columns.values())) < 2:
         return []
     first, length = next(iter(columns.items()))
-    return [
-        InvalidInput(
-            name,
-            f"{size} entries",
-            Requirement(f"must have {length} entries, as many as ", Mention(first)),
-            code=ErrorCode.UNEQUAL_LENGTHS,
-        )
-        for name, size in columns.items()
-        if size != length
-    ]
+    return [unequal_lengths(name, size, length, first) for name, size in columns.items() if size != length]
 
 
 def _label(entry: Any, index: int) -> str:

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from underskin.errors import ErrorCode, InvalidInput, too_few, unusable
+from underskin.errors import InvalidInput, too_few, unequal_lengths, unusable
 from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
-from underskin.requirement import Mention, Requirement
 from underskin.units import Floats, to_lab, to_si
 
 _STRAIGHT = 0.02  # largest departure from a straight line, of the stress it spans
@@ -189,8 +188,7 @@ def _amplification(jacobian: Floats) -> float:
 def _loading(along: Floats, load: Floats) -> tuple[Floats, Floats]:
     """The branch up to the largest load."""
     if len(along) != len(load):
-        allowed = Requirement(f"must have {len(along)}, as many as ", Mention("displacement_mm"))
-        raise InvalidInput("force_n", f"{len(load)} entries", allowed, code=ErrorCode.UNEQUAL_LENGTHS)
+        raise unequal_lengths("force_n", len(load), len(along), "displacement_mm")
     top = int(np.argmax(np.abs(load - load[0])))
     if top + 1 < _FEWEST:
         raise too_few("force_n", f"largest at entry {top}", f"must load over at least {_FEWEST} entries")

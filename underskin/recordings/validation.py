@@ -5,7 +5,7 @@ field in its annotation, by one of the types at the end.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, fields
 from datetime import datetime
 from functools import cache
@@ -14,7 +14,17 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from underskin.errors import ErrorCode, InvalidInput, out_of_range, required, too_few, wrong_type
+from underskin.errors import (
+    ErrorCode,
+    InvalidInput,
+    not_finite,
+    not_one_of,
+    out_of_range,
+    required,
+    too_few,
+    unequal_lengths,
+    wrong_type,
+)
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings.shown_values import LONGEST_NAME, named, shown
 from underskin.units import Floats, checked
@@ -36,16 +46,7 @@ def check_fields(
     `model` is a dataclass; a field that has a default may be left out or null.
     """
     known = _checks(model)
-    unknown = (name for name in document if name not in known)
-    refused = [
-        InvalidInput(
-            named(name),
-            shown(document[name]),
-            f"unknown field; known: {', '.join(known)}",
-            code=ErrorCode.UNKNOWN_FIELD,
-        )
-        for name in islice(unknown, _MOST_UNKNOWN)
-    ]
+    refused = _unknown_fields(document, known, f"unknown field; known: {', '.join(known)}")
     values: dict[str, Any] = {}
     for name, (field_check, default) in known.items():
         value = document.get(name)
@@ -56,6 +57,22 @@ def check_fields(
         except InvalidInput as refusal:
             refused.append(refusal)
     return values, refused
+
+
+def _unknown_fields(document: Mapping[str, Any], known: Collection[str], allowed: str) -> list[InvalidInput]:
+    unknown = islice((name for name in document if name not in known), _MOST_UNKNOWN)
+    code = ErrorCode.UNKNOWN_FIELD
+    return [InvalidInput(named(name), shown(document[name]), allowed, code=code) for name in unknown]
+
+
+def of_schema(noun: str, value: Any, schema: str, known: Collection[str]) -> Mapping[str, Any]:
+    """A JSON object that has its `schema` and no unknown field; `noun`: what it is called."""
+    document = mapping(noun, value)
+    if unknown := _unknown_fields(document, known, f"unknown field of a {noun}"):
+        raise unknown[0]
+    if document.get("schema") != schema:
+        raise not_one_of("schema", shown(document.get("schema")), (schema,))
+    return document
 
 
 def mapping(field: str, value: Any) -> Mapping[str, Any]:
@@ -108,7 +125,7 @@ def number(field: str, value: Any, units_checked: bool = False) -> float:  # noq
     except OverflowError:
         result = math.inf
     if not math.isfinite(result):
-        raise InvalidInput(field, shown(result), "must be finite", code=ErrorCode.NOT_FINITE)
+        raise not_finite(field, shown(result))
     return result
 
 
@@ -202,13 +219,7 @@ def rows(field: str, value: Any, units_checked: bool) -> Floats:
     columns = [series(f"{field}[{index}]", row, units_checked) for index, row in enumerate(value)]
     for index, row in enumerate(columns):
         if row.size != columns[0].size:
-            raise InvalidInput(
-                field,
-                f"{row.size} columns",
-                f"must have as many as row 0 ({columns[0].size})",
-                index,
-                code=ErrorCode.UNEQUAL_LENGTHS,
-            )
+            raise unequal_lengths(field, row.size, columns[0].size, "row 0", "columns", index)
     return np.stack(columns)
 
 

@@ -14,10 +14,9 @@ from service.pages.shared.typed_numbers import number
 from service.store import campaigns, skins
 from service.store.engine import Database
 from service.usecases.table_loader import influence_table
-from underskin import InvalidInput, UnderskinError
 from underskin.array_stress.answer import ArrayStress, answer
 from underskin.array_stress.request import read_request
-from underskin.errors import out_of_range, wrong_type
+from underskin.errors import InvalidInput, UnderskinError, out_of_range, wrong_type
 from underskin.surrogate.sigma_table import SigmaTable
 
 _MOST_SENSORS = 10_000

@@ -11,9 +11,8 @@ from service.pages.shared import same_request
 from service.pages.shared.figures import csv_answer, drawn
 from service.pages.shared.html import page
 from service.pages.shared.typed_numbers import numbers
-from underskin import UnderskinError
 from underskin.array_stress.answer import ArrayStress
-from underskin.errors import wrong_type
+from underskin.errors import UnderskinError, wrong_type
 
 router = APIRouter(prefix="/loads")
 

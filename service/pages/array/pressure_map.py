@@ -21,10 +21,9 @@ from service.pages.shared.figures import Drawn, csv_text, drawn
 from service.pages.shared.forms import TOKEN, require_own
 from service.pages.shared.html import page
 from service.store.engine import Database
-from underskin import UnderskinError
 from underskin.array_stress import pressure_map
 from underskin.array_stress.answer import ArrayStress
-from underskin.errors import out_of_range
+from underskin.errors import UnderskinError, out_of_range
 from underskin.recordings.readers import text
 
 router = APIRouter(prefix="/loads/map")

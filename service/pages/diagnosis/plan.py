@@ -17,8 +17,7 @@ from service.problems import Refusal
 from service.store import campaigns, diagnoses
 from service.store.engine import Database
 from service.store.tables import AnyRow
-from underskin import UnderskinError
-from underskin.errors import out_of_range, required
+from underskin.errors import UnderskinError, out_of_range, required
 
 if TYPE_CHECKING:
     from underskin.diagnosis.planning.rig_limits import Limits

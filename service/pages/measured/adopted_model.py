@@ -14,8 +14,7 @@ from service.store.engine import Database
 from service.store.errors import Conflict
 from service.usecases.adopted_models import model_in_force
 from service.usecases.d33 import d33
-from underskin import UnderskinError
-from underskin.errors import required
+from underskin.errors import UnderskinError, required
 from underskin.surrogate.sigma_table import SigmaTable
 
 if TYPE_CHECKING:

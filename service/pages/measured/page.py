@@ -18,13 +18,12 @@ from service.pages.shared.skin_fields import FIELDS as SKIN_FIELDS
 from service.pages.shared.skin_fields import UNITS
 from service.pages.shared.skin_values import start
 from service.pages.shared.typed_numbers import number, numbers
-from service.problems import from_validation
+from service.problems import first_refused
 from service.schemas.columns_answer import Columns
 from service.schemas.d33 import D33Columns
 from service.store.engine import Database
 from service.usecases.d33 import d33
-from underskin import InvalidInput, UnderskinError
-from underskin.errors import too_few, wrong_type
+from underskin.errors import InvalidInput, UnderskinError, too_few, wrong_type
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/d33")
@@ -53,8 +52,7 @@ def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, r
         answer = _answered(table, store, document)
         adopted = by_model(store, table, skin, request.query_params, document)
     except ValidationError as problem:
-        entry = from_validation(problem).errors[0]
-        error = _said(InvalidInput(entry["field"], entry["value"], entry["allowed"], entry["index"]))
+        error = _said(first_refused(problem))
     except UnderskinError as problem:
         error = _said(problem)
     shown = document if adopted is None or adopted.document is None else adopted.document

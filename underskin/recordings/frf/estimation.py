@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import get_window
 
-from underskin.errors import ErrorCode, InvalidInput, out_of_range, too_few, unusable
+from underskin.errors import not_finite, out_of_range, too_few, unequal_lengths, unusable
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.periodic import period_of, without_drift
 from underskin.recordings.frf.signal_checks import Defect, damaged, defects_of_pair
@@ -271,21 +271,12 @@ def _same_line(frequency: float, lines: dict[float, list[tuple[Complexes, Comple
 
 def _check(force: Floats, charge: Floats, sample_rate: float) -> None:
     if len(force) != len(charge):
-        raise InvalidInput(
-            "charge_pc",
-            f"{len(charge)} samples",
-            f"must have {len(force)}, as many as force_n",
-            code=ErrorCode.UNEQUAL_LENGTHS,
-        )
+        raise unequal_lengths("charge_pc", len(charge), len(force), "force_n", "samples")
     if len(force) < 8:
         raise too_few("force_n", f"{len(force)} samples", "must have at least 8")
     if not (np.isfinite(sample_rate) and sample_rate > 0):
-        raise InvalidInput(
-            "sample_rate_hz", sample_rate, "must be finite and greater than 0", code=ErrorCode.NOT_FINITE
-        )
+        raise not_finite("sample_rate_hz", sample_rate, "must be finite and greater than 0")
     for name, signal in (("force_n", force), ("charge_pc", charge)):
         bad: NDArray[np.bool_] = ~np.isfinite(signal)
         if bad.any():
-            raise InvalidInput(
-                name, "not finite", "must be finite", index=int(np.argmax(bad)), code=ErrorCode.NOT_FINITE
-            )
+            raise not_finite(name, "not finite", index=int(np.argmax(bad)))
