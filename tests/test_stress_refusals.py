@@ -75,7 +75,7 @@ REFUSED: list[tuple[Callable[[Document], Any], str, str]] = [
         "does not pull; so are [1][0], [1][1], [1][2], [1][3] and 4 more",
     ),
     (map_of(pressure_mpa=[[0.1, 0.1]] * 3), "pressure_map.pressure_mpa", "must have a row for each y_mm (2)"),
-    (map_of(pressure_mpa=[[0.1, 0.1], [0.1]]), "pressure_map.pressure_mpa", "must have 2 columns, as many as row 0"),
+    (map_of(pressure_mpa=[[0.1, 0.1], [0.1]]), "pressure_map.pressure_mpa", "must have as many as row 0"),
     (map_of(pressure_mpa=[]), "pressure_map.pressure_mpa", "must be a list of rows"),
     (map_of(x_mm=[1.0, 1.0]), "pressure_map.x_mm", "must be greater than the entry before"),
     (map_of(x_mm=[0.0, 1.0, 3.0]), "pressure_map.x_mm", "evenly spaced"),

@@ -107,7 +107,7 @@ def unequal_lengths(
     field: str, size: int, expected: int, like: str, noun: str = "entries", index: int | None = None
 ) -> InvalidInput:
     """A column, or a row, of another length than the one called `like`."""
-    allowed = Requirement(f"must have {expected} {noun}, as many as ", Mention(like))
+    allowed = Requirement(f"must have as many {noun} as ", Mention(like), f" ({expected})")
     return InvalidInput(field, f"{size} {noun}", allowed, index, code=ErrorCode.UNEQUAL_LENGTHS)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from underskin.errors import InvalidInput, UnderskinError, not_unique, wrong_type
+from underskin.errors import FileError, InvalidInput, UnderskinError, not_unique, wrong_type
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -54,7 +54,7 @@ class _FileErrors:
             yield
         except (UnderskinError, OSError) as error:
             self.count += 1
-            line = str(error) if name in str(error) else f"{name}: {error}"
+            line = str(error) if isinstance(error, FileError) else f"{name}: {error}"
             self._console.print(f"underskin: {line}", markup=False, highlight=False, soft_wrap=True)
 
 

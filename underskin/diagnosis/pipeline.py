@@ -142,7 +142,7 @@ def _work_out(
         groups=groups,
         confounded=left_open(confounded, result.answers),
         shape=shape,
-        next_experiment=plan(problem, result, limits),
+        plan=plan(problem, result, limits),
     )
 
 

@@ -22,7 +22,6 @@ from underskin.errors import (
     out_of_range,
     required,
     too_few,
-    unequal_lengths,
     wrong_type,
 )
 from underskin.physics.skin import INCOMPRESSIBLE
@@ -219,7 +218,8 @@ def rows(field: str, value: Any, units_checked: bool) -> Floats:
     columns = [series(f"{field}[{index}]", row, units_checked) for index, row in enumerate(value)]
     for index, row in enumerate(columns):
         if row.size != columns[0].size:
-            raise unequal_lengths(field, row.size, columns[0].size, "row 0", "columns", index)
+            allowed = f"must have as many as row 0 ({columns[0].size})"
+            raise InvalidInput(field, f"{row.size} columns", allowed, index, code=ErrorCode.UNEQUAL_LENGTHS)
     return np.stack(columns)
 
 
