@@ -12,17 +12,7 @@ import numpy as np
 
 from underskin.errors import InvalidInput, not_finite, not_unique, required
 from underskin.extensions import described
-from underskin.mechanisms.base import (
-    AXES,
-    NEEDED_FIELDS,
-    UNITS,
-    Kind,
-    Mechanism,
-    Normal,
-    Parameter,
-    Stage,
-    Uniform,
-)
+from underskin.mechanisms.base import AXES, NEEDED_FIELDS, UNITS, Kind, Mechanism, Normal, Parameter, Stage, Uniform
 from underskin.mechanisms.models.compression import CompressionModel
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.models.indentation import IndentationModel

@@ -54,8 +54,4 @@ def _first(d33: Floats) -> Iterator[Finding]:
 def _doubtful(d33: Floats) -> dict[D33Doubt, NDArray[np.bool_]]:
     """Which entries [pC/N] are doubtful; none where there is no value (NaN)."""
     size = np.abs(d33)
-    return {
-        D33Doubt.TOO_LARGE: size > _MOST_D33,
-        D33Doubt.TOO_SMALL: size < _LEAST_D33,
-        D33Doubt.NEGATIVE: d33 < 0,
-    }
+    return {D33Doubt.TOO_LARGE: size > _MOST_D33, D33Doubt.TOO_SMALL: size < _LEAST_D33, D33Doubt.NEGATIVE: d33 < 0}

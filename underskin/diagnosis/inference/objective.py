@@ -8,12 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.diagnosis.inference.hypothesis import (
-    Hypothesis,
-    Point,
-    curvature_of_prior,
-    own_parameters,
-)
+from underskin.diagnosis.inference.hypothesis import Hypothesis, Point, curvature_of_prior, own_parameters
 from underskin.diagnosis.inference.likelihood import LogLikelihoods, Marginal, Moments
 from underskin.diagnosis.noise.noise_levels import NoiseLevels, SeveralLevels
 from underskin.mechanisms.models.composed import Prediction

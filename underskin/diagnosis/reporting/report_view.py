@@ -19,7 +19,7 @@ _VERDICTS = {
 }
 _NOTHING_NEXT = {
     "unexplained": "No recording can be planned for a law that is not known here. Repeat one where most of the misfit "
-    "lies, to see that it comes again; then change one thing of the rig at a time.",
+    "lies, to see that it comes again; then change one thing of the rig at a time."
 }
 _DECIDED = "Nothing more is needed for this answer: these recordings decide."
 _AFTER = {
@@ -168,10 +168,7 @@ def _what(report: Report) -> list[Block]:
         one = report["d33"]
         value = f"{number(one['value'])} ({interval(one)}) {one['unit']}"
         quotable = one.get("quotable", True)
-        blocks += [
-            Text(f"d33 under this explanation: {value}."),
-            Text(_D33 if quotable else _D33_NOT_TO_QUOTE, "note"),
-        ]
+        blocks += [Text(f"d33 under this explanation: {value}."), Text(_D33 if quotable else _D33_NOT_TO_QUOTE, "note")]
     elif report["fit"] is not None and "youngs_modulus" not in report["fit"]["after"]:
         blocks.append(Text(_NO_D33, "note"))
     if report["alternatives"]:

@@ -9,14 +9,7 @@ from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import EXPLAINED, SIMPLEST, in_words
 from underskin.diagnosis.localisation.effect_size import Effect
 from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT, AxisResult, Undecidable
-from underskin.diagnosis.localisation.residual_shape import (
-    ALONG_CURVES,
-    ORDER,
-    PRELOAD_BEFORE,
-    Form,
-    FormKind,
-    Shape,
-)
+from underskin.diagnosis.localisation.residual_shape import ALONG_CURVES, ORDER, PRELOAD_BEFORE, Form, FormKind, Shape
 from underskin.diagnosis.selection.search import Answer
 from underskin.diagnosis.validation.identifiability import Likeness
 from underskin.findings.english import lacking
