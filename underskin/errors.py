@@ -103,12 +103,10 @@ def not_unique(field: str, value: Any, allowed: str = "must be given once") -> I
     return InvalidInput(field, value, allowed, code=ErrorCode.NOT_UNIQUE)
 
 
-def unequal_lengths(
-    field: str, size: int, expected: int, like: str, noun: str = "entries", index: int | None = None
-) -> InvalidInput:
-    """A column, or a row, of another length than the one called `like`."""
-    allowed = Requirement(f"must have as many {noun} as ", Mention(like), f" ({expected})")
-    return InvalidInput(field, f"{size} {noun}", allowed, index, code=ErrorCode.UNEQUAL_LENGTHS)
+def unequal_lengths(field: str, size: int, expected: int, like: str, noun: str = "entries") -> InvalidInput:
+    """A column of another length than the one called `like`."""
+    allowed = Requirement(f"must have {expected} {noun}, as many as ", Mention(like))
+    return InvalidInput(field, f"{size} {noun}", allowed, code=ErrorCode.UNEQUAL_LENGTHS)
 
 
 def too_few(field: str, value: Any, allowed: str) -> InvalidInput:

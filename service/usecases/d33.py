@@ -10,7 +10,7 @@ from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS
 from service.store import Database
 from service.usecases.adopted_models import model_asked_for, press, require_paper
 from underskin.columns import rows
-from underskin.errors import conflicting, required, unequal_lengths
+from underskin.errors import ErrorCode, InvalidInput, conflicting, required
 from underskin.physics import charge_response
 from underskin.prediction import answers, plausibility
 from underskin.surrogate.sigma_table import SigmaTable
@@ -129,5 +129,6 @@ def _lines(request: D33Columns, name: str, count: int) -> Floats:
     """Rows × lines, after checking that each row has a value a frequency."""
     for row, line in enumerate(getattr(request, name)):
         if len(line) != count:
-            raise unequal_lengths(name, len(line), count, "frequency_hz", "lines", row)
+            allowed = f"must have as many lines as frequency_hz ({count})"
+            raise InvalidInput(name, f"{len(line)} lines", allowed, row, code=ErrorCode.UNEQUAL_LENGTHS)
     return finite(name, request.column(name))

@@ -91,7 +91,7 @@ def _from_csv(path: str, allowed: Sequence[str]) -> dict[str, Floats]:
     for name in columns:
         if name not in allowed:
             words = f"has the column {name!r}; allowed, once each: {', '.join(allowed)}"
-        raise InvalidInput("input", path, words, code=ErrorCode.UNKNOWN_FIELD)
+            raise InvalidInput("input", path, words, code=ErrorCode.UNKNOWN_FIELD)
     return {name: _numbers(name, cells) for name, cells in columns.items()}
 
 

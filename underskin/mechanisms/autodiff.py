@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]  # float64 or complex128
-Operand = "Differentiated | Array | float | complex"
 
 
 class Differentiated:

@@ -201,13 +201,8 @@ def series(field: str, value: Any, units_checked: bool) -> Floats:  # noqa: ARG0
 def increasing(field: str, value: Any, units_checked: bool) -> Floats:
     """A column of finite numbers, each greater than the one before."""
     column = series(field, value, units_checked)
-    _refuse_where(
-        field,
-        column,
-        np.diff(column, prepend=-math.inf) <= 0,
-        "must be greater than the entry before",
-        ErrorCode.NOT_INCREASING,
-    )
+    falls = np.diff(column, prepend=-math.inf) <= 0
+    _refuse_where(field, column, falls, "must be greater than the entry before", ErrorCode.NOT_INCREASING)
     return column
 
 
@@ -226,35 +221,28 @@ def rows(field: str, value: Any, units_checked: bool) -> Floats:
 def frequencies(field: str, value: Any, units_checked: bool) -> Floats:
     """An increasing column of frequencies above 0, from far below to far above what any instrument records."""
     column = increasing(field, value, units_checked)
-    _refuse_where(
-        field, column, column <= 0, "must be greater than 0 (leave out the line at 0 Hz)", ErrorCode.OUT_OF_RANGE
-    )
     low, high = _FREQUENCIES_HZ
-    _refuse_where(
-        field, column, (column < low) | (column > high), f"must be {low:g} to {high:g} Hz", ErrorCode.OUT_OF_RANGE
-    )
+    for bad, allowed in (
+        (column <= 0, "must be greater than 0 (leave out the line at 0 Hz)"),
+        ((column < low) | (column > high), f"must be {low:g} to {high:g} Hz"),
+    ):
+        _refuse_where(field, column, bad, allowed, ErrorCode.OUT_OF_RANGE)
     return column
 
 
 def not_falling(field: str, value: Any, units_checked: bool) -> Floats:
     """A column of times: none before the one above it."""
     column = series(field, value, units_checked)
-    _refuse_where(
-        field,
-        column,
-        np.diff(column, prepend=-math.inf) < 0,
-        "must not be before the entry above it",
-        ErrorCode.NOT_INCREASING,
-    )
+    falls = np.diff(column, prepend=-math.inf) < 0
+    _refuse_where(field, column, falls, "must not be before the entry above it", ErrorCode.NOT_INCREASING)
     return column
 
 
 def coherence(field: str, value: Any, units_checked: bool) -> Floats:
     """A column of coherences γ², 0 to 1."""
     column = series(field, value, units_checked)
-    _refuse_where(
-        field, column, (column < 0) | (column > 1 + _COHERENCE_ROUNDING), "must be 0 to 1", ErrorCode.OUT_OF_RANGE
-    )
+    bad = (column < 0) | (column > 1 + _COHERENCE_ROUNDING)
+    _refuse_where(field, column, bad, "must be 0 to 1", ErrorCode.OUT_OF_RANGE)
     return column
 
 

@@ -23,7 +23,6 @@ NEIGHBOUR_PITCHES = 1.2
 class FrfDesign:
     """Arrays over recordings, contacts, points, neighbours, lines and rows; SI."""
 
-    recording_ids: tuple[str, ...]
     sensor_ids: tuple[str, ...]
     sensor: Indices  # of each recording
     contact: Indices  # of each recording
@@ -75,7 +74,6 @@ class FrfDesign:
         distinct, frequency = np.unique(row_frequency, return_inverse=True)
         lines, line = np.unique(contact[recording] * len(distinct) + frequency, return_inverse=True)
         return cls(
-            recording_ids=tuple(entry.id for entry in recordings),
             sensor_ids=sensor_ids,
             sensor=sensor,
             contact=contact,
