@@ -18,7 +18,7 @@ from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import Limits
 from underskin.diagnosis.reporting.next_experiment import next_experiment
 from underskin.diagnosis.selection.search import Answer, Search, search
-from underskin.formatting import in_percent
+from underskin.findings.formatting import in_percent
 from underskin.mechanisms import compose
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable, load_table

@@ -22,7 +22,7 @@ from underskin.diagnosis.reporting.statements import answer_statement, location_
 from underskin.diagnosis.selection.occam_correction import fit_and_plausibility, without_occam
 from underskin.diagnosis.selection.search import Answer
 from underskin.diagnosis.validation.identifiability import Confounding, Likeness, left_open
-from underskin.formatting import in_percent
+from underskin.findings.formatting import in_percent
 from underskin.mechanisms.base import Kind
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Floats

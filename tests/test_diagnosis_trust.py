@@ -16,7 +16,7 @@ from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.laplace import levels_covariance
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.reporting.html_report import page
-from underskin.formatting import in_percent
+from underskin.findings.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings import read_file
 from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, from_dict

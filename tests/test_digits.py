@@ -2,7 +2,7 @@
 
 import pytest
 
-from underskin.formatting import significant
+from underskin.findings.formatting import significant
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import orjson
 import pytest
 
 from underskin import InvalidInput
-from underskin.requirement import UNITS_CHECKED, Mention, Requirement
+from underskin.errors import UNITS_CHECKED, Mention, Requirement
 from underskin.units import checked
 
 

@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from enum import StrEnum
 from typing import Any
 
-from underskin.requirement import Mention, Requirement
+from underskin.errors import Mention, Requirement
 
 
 class ErrorCode(StrEnum):

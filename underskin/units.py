@@ -10,12 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from underskin.errors import ErrorCode, InvalidInput
+from underskin.errors import UNITS_CHECKED, ErrorCode, InvalidInput, Requirement
 from underskin.findings import sentences
 from underskin.findings.arguments import UnitGuess
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.requirement import UNITS_CHECKED, Requirement
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -11,14 +11,13 @@ from service.ingest.uploads import Upload
 from service.middleware.unique_keys import require_unique_keys
 from service.problems import Refusal
 from service.store import skins
-from underskin.errors import ErrorCode, FileError, InvalidInput
+from underskin.errors import ErrorCode, FileError, InvalidInput, Mention, Requirement
 from underskin.recordings import join
 from underskin.recordings.campaign import Campaign, from_dict
 from underskin.recordings.channels import Contents
 from underskin.recordings.readers import formats
 from underskin.recordings.reading import Reading, read_contents, understood
 from underskin.recordings.rig_description import RigDescription
-from underskin.requirement import Mention, Requirement
 
 _BOM = b"\xef\xbb\xbf"
 _UNNAMED = "the upload"

@@ -8,8 +8,8 @@ from pydantic_core import from_json
 from service.middleware.unique_keys import require_unique_keys
 from service.problems import Refusal, from_validation
 from service.schemas.columns import ColumnsRequest
-from underskin.columns import CsvError, from_csv
 from underskin.errors import ErrorCode, InvalidInput, wrong_type
+from underskin.prediction.columns import CsvError, from_csv
 
 Kind = TypeVar("Kind", bound=ColumnsRequest)
 

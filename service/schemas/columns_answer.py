@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from service.schemas.columns import Status
-from underskin.columns import statuses, to_csv
 from underskin.findings.codes import FindingCode
+from underskin.prediction.columns import statuses, to_csv
 from underskin.units import Floats
 
 

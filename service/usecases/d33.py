@@ -9,10 +9,10 @@ from service.schemas.d33 import D33Columns
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS
 from service.store import Database
 from service.usecases.adopted_models import model_asked_for, press, require_paper
-from underskin.columns import rows
 from underskin.errors import ErrorCode, InvalidInput, conflicting, required
 from underskin.physics import charge_response
 from underskin.prediction import answers, plausibility
+from underskin.prediction.columns import rows
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats, finite, non_negative
 

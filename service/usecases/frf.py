@@ -7,9 +7,9 @@ from service.schemas.frf import FrfColumns
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS
 from service.store import Database
 from service.usecases.adopted_models import model_asked_for, press, require_paper
-from underskin.columns import rows
 from underskin.errors import out_of_range
 from underskin.prediction import answers
+from underskin.prediction.columns import rows
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, checked, non_negative, to_lab
 

@@ -2,8 +2,8 @@
 
 from service.schemas.columns_answer import Columns
 from service.schemas.sigma import SigmaColumns
-from underskin.columns import rows
 from underskin.prediction import answers
+from underskin.prediction.columns import rows
 from underskin.surrogate.sigma_table import SigmaTable
 
 

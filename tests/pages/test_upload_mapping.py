@@ -9,8 +9,8 @@ import yaml
 from service.pages.upload.file_summary import ChannelSummary
 from service.pages.upload.mapping import CHANNELS, KINDS, document_of, field_words, guessed, sensors_text, what_to_do
 from underskin import InvalidInput
+from underskin.errors import Mention, Requirement
 from underskin.recordings import rig_description
-from underskin.requirement import Mention, Requirement
 from underskin.units import checked
 
 RIGS = sorted((Path(__file__).parents[2] / "examples" / "formats" / "rigs").glob("*.yaml"))

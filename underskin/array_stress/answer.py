@@ -17,11 +17,10 @@ from underskin.array_stress.load_integration import (
 )
 from underskin.array_stress.request import LoadCase
 from underskin.array_stress.validation import findings, refuse_beside_skin, refuse_coarse, refuse_many, refuse_overlap
-from underskin.errors import out_of_range
+from underskin.errors import Mention, Requirement, out_of_range
 from underskin.findings.finding import Finding
 from underskin.physics.contact_pressure import MOST_A_OVER_H, SpherePressure, sphere_pressures
 from underskin.physics.elastic_layer import Layer, slip
-from underskin.requirement import Mention, Requirement
 from underskin.surrogate.influence_table import Influence, InfluenceTable
 from underskin.units import Floats, checked, to_lab, to_si
 

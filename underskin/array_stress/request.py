@@ -14,6 +14,8 @@ from underskin.array_stress import pressure_map
 from underskin.errors import (
     ErrorCode,
     InvalidInput,
+    Mention,
+    Requirement,
     conflicting,
     not_unique,
     out_of_range,
@@ -26,7 +28,6 @@ from underskin.recordings import validation as field
 from underskin.recordings.conditions import Sensors
 from underskin.recordings.readers import json_file
 from underskin.recordings.shown_values import shown
-from underskin.requirement import Mention, Requirement
 from underskin.units import Floats
 
 MOST_CONTACTS = 1000

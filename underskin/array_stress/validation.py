@@ -10,11 +10,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from underskin.array_stress.request import LabContact, LoadCase, PressureMap
-from underskin.errors import conflicting, out_of_range
+from underskin.errors import Mention, Requirement, conflicting, out_of_range
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.physics import hertz
-from underskin.requirement import Mention, Requirement
 from underskin.units import Floats, to_lab, to_si, unusual
 
 MOST_PAIRS = 50_000_000  # of a sensor and a point force: about ten seconds

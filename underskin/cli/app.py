@@ -160,7 +160,7 @@ def _answer(
 ) -> None:
     """Gather the columns, compute, and write inputs and results."""
     from underskin.cli import columns
-    from underskin.columns import rows
+    from underskin.prediction.columns import rows
     from underskin.surrogate.sigma_table import load_table
 
     gathered = columns.gather(options, defaults, input_file)

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from underskin.cli.columns import PIPED_WIDTH
 from underskin.errors import InvalidInput
-from underskin.formatting import significant
+from underskin.findings.formatting import significant
 from underskin.inversion.invert import Inversion
 from underskin.inversion.mixed_model import Estimate
 from underskin.recordings import plausibility

@@ -10,10 +10,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from underskin.columns import CsvError, from_csv, statuses, to_csv
 from underskin.errors import ErrorCode, InvalidInput, UnderskinError, not_unique, unreadable, wrong_type
 from underskin.findings.finding import Finding
-from underskin.formatting import significant
+from underskin.findings.formatting import significant
+from underskin.prediction.columns import CsvError, from_csv, statuses, to_csv
 from underskin.units import LAB, Floats
 
 STANDARD_INPUT = "-"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from underskin.errors import UnderskinError
-from underskin.formatting import significant
+from underskin.findings.formatting import significant
 
 if TYPE_CHECKING:
     from underskin.client.service_client import Client

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from underskin.findings.arguments import D33Doubt, DefectKind, UnitGuess
-from underskin.formatting import in_digits, significant
+from underskin.findings.formatting import in_digits, significant
 
 _MOST_SENSORS = 3  # named one by one
 

@@ -19,14 +19,23 @@ from typing import Annotated, Any
 
 import yaml
 
-from underskin.errors import ErrorCode, FileError, InvalidInput, conflicting, not_one_of, required, too_few
+from underskin.errors import (
+    ErrorCode,
+    FileError,
+    InvalidInput,
+    Mention,
+    Requirement,
+    conflicting,
+    not_one_of,
+    required,
+    too_few,
+)
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import COLUMNS, KINDS
 from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.readers import json_file, text
 from underskin.recordings.shown_values import named, shown
 from underskin.recordings.validation import mapping
-from underskin.requirement import Mention, Requirement
 
 SCHEMA = "rig/1"
 LARGEST_BYTES = 1_000_000

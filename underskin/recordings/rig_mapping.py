@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from underskin.errors import FileError
+from underskin.errors import FileError, Mention, Requirement
 from underskin.recordings.campaign import SCHEMA
 from underskin.recordings.channels import Block, Channel, Contents, Values
 from underskin.recordings.readers import text
 from underskin.recordings.readers.unit_labels import field_unit, labelled_unit, unit
 from underskin.recordings.rig_description import BLOCK_NAME, COMPLEX_FRF, ChannelMapping, Property, RigDescription
 from underskin.recordings.shown_values import LONGEST_NAME, shown
-from underskin.requirement import Mention, Requirement
 from underskin.units import LAB, Floats
 
 _TEXTS = ("id", "sensor", "recorded_at")

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from service.pages.shared.assets import LIBRARY, gzipped
 from service.pages.shared.formats import json_inside
-from underskin.columns import to_csv
+from underskin.prediction.columns import to_csv
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

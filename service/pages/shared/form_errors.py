@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from underskin import InvalidInput, UnderskinError
-from underskin.requirement import UNITS_CHECKED, Mention, Requirement
+from underskin.errors import UNITS_CHECKED, Mention, Requirement
 
 _LOAD_PATH = re.compile(r"contacts\[(\d+)\](?:\.(\w+))?(?:\[(\d)\])?")  # of `POST /v1/stress`
 _OF_LOAD = {"x_mm": "x", "y_mm": "y", "indenter_radius_mm": "R", "normal_force_n": "F"}

@@ -9,7 +9,7 @@ import orjson
 from markupsafe import Markup, escape
 
 from service.pages.shared.templates import macro
-from underskin.formatting import in_percent, significant
+from underskin.findings.formatting import in_percent, significant
 
 _VALUES = "values.html"
 _UNSAFE = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026", 0x2028: "\\u2028", 0x2029: "\\u2029"}

@@ -9,7 +9,7 @@ from sqlalchemy import Connection
 from service.store import diagnoses
 from service.store.tables import AnyRow
 from underskin.diagnosis.data.names import EXPLAINED, in_words
-from underskin.formatting import in_percent
+from underskin.findings.formatting import in_percent
 
 _WORTH_NAMING = 0.02  # probability of a rival, as in a report
 _MOST_RIVALS = 3

@@ -5,10 +5,9 @@ from copy import deepcopy
 from typing import Any
 
 from service.pages.upload.file_summary import ChannelSummary
-from underskin.errors import ErrorCode, InvalidInput, not_unique, wrong_type
+from underskin.errors import UNITS_CHECKED, ErrorCode, InvalidInput, Mention, Requirement, not_unique, wrong_type
 from underskin.recordings.readers.unit_labels import lab_field, unit
 from underskin.recordings.rig_description import SCHEMA, channel_fields
-from underskin.requirement import UNITS_CHECKED, Mention, Requirement
 
 KINDS = {
     "frf": "FRF: charge against a shaken force",

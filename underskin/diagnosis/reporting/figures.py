@@ -17,7 +17,7 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT
 from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned
 from underskin.diagnosis.reporting.report import Diagnosis
-from underskin.formatting import in_percent
+from underskin.findings.formatting import in_percent
 from underskin.units import Floats
 
 AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in WORDS.items()}

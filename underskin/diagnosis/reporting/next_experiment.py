@@ -6,7 +6,7 @@ from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import in_words
 from underskin.diagnosis.planning.optimal_design import Plan
 from underskin.diagnosis.reporting.statements import listed
-from underskin.formatting import in_percent
+from underskin.findings.formatting import in_percent
 
 
 def next_experiment(plan: Plan | None) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Any, Literal
 from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.statements import first_and_rest, lacking_part
 from underskin.diagnosis.reporting.wording import axis, error, group, interval, number, plain, readable, unit, words
-from underskin.formatting import in_percent
+from underskin.findings.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
 
 _VERDICTS = {

@@ -13,8 +13,8 @@ from underskin.diagnosis.localisation.residual_shape import ALONG_CURVES, ORDER,
 from underskin.diagnosis.selection.search import Answer
 from underskin.diagnosis.validation.identifiability import Likeness
 from underskin.findings.english import lacking
+from underskin.findings.formatting import in_digits, in_percent
 from underskin.findings.lacking import Lacking
-from underskin.formatting import in_digits, in_percent
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE
 

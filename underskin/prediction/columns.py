@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.errors import ErrorCode, InvalidInput
-from underskin.requirement import Mention, Requirement
+from underskin.errors import ErrorCode, InvalidInput, Mention, Requirement
 from underskin.units import Floats
 
 
