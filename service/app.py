@@ -96,8 +96,5 @@ def job_settings_of(settings: Settings, table: SigmaTable) -> JobSettings:
 
 def create_app(settings: Settings, table: SigmaTable, access: AccessControl, store: Database) -> ASGIApp:
     """What the server runs."""
-    hot = {
-        ("GET", "/v1/sigma"): sigma.hot_route(table),
-        ("POST", "/umbridge/Evaluate"): umbridge.hot_route(table),
-    }
+    hot = {("GET", "/v1/sigma"): sigma.hot_route(table), ("POST", "/umbridge/Evaluate"): umbridge.hot_route(table)}
     return AsgiMiddleware(create_api(settings, table, access, store), access, hot, problem_page)

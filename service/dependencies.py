@@ -10,7 +10,7 @@ from service.auth.keys import Key
 from service.jobs import Planner, Runner
 from service.problems import Refusal
 from service.store import Database
-from underskin import InvalidInput
+from underskin.errors import wrong_type
 from underskin.surrogate.sigma_table import SigmaTable
 
 
@@ -83,5 +83,5 @@ def number_of_cursor(cursor: str | None) -> int | None:
     if cursor is None:
         return None
     if not cursor.isascii() or not cursor.isdigit() or len(cursor) > 18:
-        raise InvalidInput("cursor", cursor, "must be the `next` of the page before")
+        raise wrong_type("cursor", cursor, "must be the `next` of the page before")
     return int(cursor)

@@ -10,8 +10,7 @@ from typing import Any
 import orjson
 from pydantic import BaseModel, Field, ValidationError
 
-from underskin import InvalidInput
-from underskin.errors import ErrorCode
+from underskin.errors import ErrorCode, InvalidInput
 
 _MOST_LOGGED = 3
 RETRY_LATER = {"Retry-After": "5"}  # seconds
@@ -108,10 +107,7 @@ def _is_umbridge(path: str) -> bool:
 
 def invalid_input(errors: Iterable[InvalidInput]) -> Refusal:
     """The problem of values that cannot be used: 422."""
-    shortened = [
-        InvalidInput(_brief(error.field), _brief(error.value), _writable(error.allowed), error.index, code=error.code)
-        for error in errors
-    ]
+    shortened = [_shortened(error) for error in errors]
     entries = [
         {
             "code": str(error.code),
@@ -123,6 +119,12 @@ def invalid_input(errors: Iterable[InvalidInput]) -> Refusal:
         for error in shortened
     ]
     return Refusal(422, "; ".join(str(error) for error in shortened), title="Invalid input", errors=entries)
+
+
+def _shortened(error: InvalidInput) -> InvalidInput:
+    return InvalidInput(
+        _brief(error.field), _brief(error.value), _writable(error.allowed), error.index, code=error.code
+    )
 
 
 def given_twice(field: str, place: str) -> Refusal:
@@ -142,6 +144,11 @@ def from_validation(errors: ValidationError | Sequence[Any]) -> Refusal:
     """The same problem from pydantic's list of errors."""
     details = errors.errors(include_url=False) if isinstance(errors, ValidationError) else errors
     return invalid_input(_as_invalid_input(detail) for detail in details)
+
+
+def first_refused(error: ValidationError) -> InvalidInput:
+    """The first of pydantic's errors."""
+    return _shortened(_as_invalid_input(error.errors(include_url=False)[0]))
 
 
 # pydantic's words where a lab's are clearer; the others are shown as they are.
@@ -212,7 +219,9 @@ def _in_json(value: Any) -> Any:
 def unknown_name(name: str, value: str, known: Collection[str], noun: str) -> InvalidInput:
     """The error of a name that is none of those `known`; `noun`: what such a name is, such as a query parameter."""
     if not known:
-        return InvalidInput(name, value, f"is not a {noun} of this request, which has none")
-    close = get_close_matches(name.lower(), known, n=1)
-    guess = f"; did you mean {close[0]}?" if close else "."
-    return InvalidInput(name, value, f"is not a {noun} of this request{guess} Known: {', '.join(known)}")
+        words = ", which has none"
+    else:
+        close = get_close_matches(name.lower(), known, n=1)
+        guess = f"; did you mean {close[0]}?" if close else "."
+        words = f"{guess} Known: {', '.join(known)}"
+    return InvalidInput(name, value, f"is not a {noun} of this request{words}", code=ErrorCode.UNKNOWN_FIELD)

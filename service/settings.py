@@ -20,8 +20,7 @@ class Settings(BaseSettings):
         "Made at start if missing; must be writable.",
     )
     tables: Path = Field(
-        default_factory=tables_folder,
-        description="Folder of the tables; by default those that ship with underskin.",
+        default_factory=tables_folder, description="Folder of the tables; by default those that ship with underskin."
     )
     max_body_mb: float = Field(
         default=64, gt=0, le=1e6, description="Largest request body in MB (10^6 bytes), counted as it streams in."

@@ -10,7 +10,7 @@ UnderskinError
 └── Unreachable       no answer from the server: nothing listens there, or time ran out (raised by the client)
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Self
@@ -70,7 +70,6 @@ class Requirement(str):
         return "".join(word(part) if isinstance(part, Mention) else part for part in self.parts)
 
 
-REQUIRED = Requirement("required")  # of a field that was left out
 UNITS_CHECKED = Mention("units_checked", " (or set units_checked to true)")  # which takes an unlikely magnitude
 
 
@@ -107,6 +106,64 @@ class InvalidInput(UnderskinError, ValueError):
         return InvalidInput(field, self.value, self.allowed, self.index, code=self.code)
 
 
+def required(field: str, allowed: str = "required") -> InvalidInput:
+    """A field that is missing."""
+    return InvalidInput(field, None, allowed, code=ErrorCode.REQUIRED)
+
+
+def wrong_type(field: str, value: Any, allowed: str = "must be a number", index: int | None = None) -> InvalidInput:
+    """A text where a number belongs, and the like."""
+    return InvalidInput(field, value, allowed, index, code=ErrorCode.WRONG_TYPE)
+
+
+def out_of_range(field: str, value: Any, allowed: str, index: int | None = None) -> InvalidInput:
+    """A number, or a size, outside what is possible."""
+    return InvalidInput(field, value, allowed, index, code=ErrorCode.OUT_OF_RANGE)
+
+
+def not_finite(field: str, value: Any, allowed: str = "must be finite", index: int | None = None) -> InvalidInput:
+    """NaN or infinity."""
+    return InvalidInput(field, value, allowed, index, code=ErrorCode.NOT_FINITE)
+
+
+def not_one_of(field: str, value: Any, known: Iterable[str]) -> InvalidInput:
+    """A name that is none of those `known`."""
+    names = tuple(known)
+    one_of = "one of " if len(names) != 1 else ""
+    return InvalidInput(field, value, f"must be {one_of}{', '.join(names)}", code=ErrorCode.NOT_ONE_OF)
+
+
+def not_unique(field: str, value: Any, allowed: str = "must be given once") -> InvalidInput:
+    """What is given twice, or a name that is in use."""
+    return InvalidInput(field, value, allowed, code=ErrorCode.NOT_UNIQUE)
+
+
+def unequal_lengths(field: str, size: int, expected: int, like: str, noun: str = "entries") -> InvalidInput:
+    """A column of another length than the one called `like`."""
+    allowed = Requirement(f"must have {expected} {noun}, as many as ", Mention(like))
+    return InvalidInput(field, f"{size} {noun}", allowed, code=ErrorCode.UNEQUAL_LENGTHS)
+
+
+def too_few(field: str, value: Any, allowed: str) -> InvalidInput:
+    """Too few entries, samples or recordings."""
+    return InvalidInput(field, value, allowed, code=ErrorCode.TOO_FEW)
+
+
+def conflicting(field: str, value: Any, allowed: str) -> InvalidInput:
+    """What contradicts another field."""
+    return InvalidInput(field, value, allowed, code=ErrorCode.CONFLICTING)
+
+
+def unusable(field: str, value: Any, allowed: str) -> InvalidInput:
+    """A time series or curve from which nothing can be computed."""
+    return InvalidInput(field, value, allowed, code=ErrorCode.UNUSABLE_SIGNAL)
+
+
+def unreadable(field: str, file: Any, allowed: str) -> InvalidInput:
+    """A file that cannot be read, as the value of a field."""
+    return InvalidInput(field, file, allowed, code=ErrorCode.UNREADABLE_FILE)
+
+
 class FileError(UnderskinError):
     """A file that cannot be read.
 
@@ -120,6 +177,11 @@ class FileError(UnderskinError):
         self.reason = reason
         self.code = code
         super().__init__(": ".join(part for part in (file, place, reason) if part))
+
+    def of_field(self, field: str, file: str | None) -> InvalidInput:
+        """The same error of a field whose value is the file, by the name that it was sent under."""
+        allowed = ": ".join(part for part in (self.place, self.reason) if part)
+        return InvalidInput(field, file, allowed, code=self.code)
 
 
 class TableError(UnderskinError):

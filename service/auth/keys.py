@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 from service.store import data_folder
-from underskin import InvalidInput
+from underskin.errors import not_one_of, not_unique
 
 # Looking at the file takes longer than checking a key.
 _FRESH_S = 0.5
@@ -102,7 +102,7 @@ class KeyStore:
         created = datetime.now(UTC).isoformat(timespec="seconds")
         with self._changing() as keys:
             if any(key.name == name for key in keys):
-                raise InvalidInput("name", name, "must not be the name of another key; revoke that one first")
+                raise not_unique("name", name, "must not be the name of another key; revoke that one first")
             keys.append(Key(name, scope, created, sha256(token.encode()).hexdigest()))
         return token
 
@@ -111,7 +111,7 @@ class KeyStore:
         with self._changing() as keys:
             remaining = [key for key in keys if key.name != name]
             if len(remaining) == len(keys):
-                raise InvalidInput("name", name, f"must be one of {[key.name for key in keys]}")
+                raise not_one_of("name", name, (key.name for key in keys))
             keys[:] = remaining
 
     def remove(self) -> None:

@@ -14,9 +14,7 @@ from service.store import restore as restoring
 from underskin import UnderskinError
 
 
-def backup(
-    file: Annotated[Path, typer.Argument(help="Where to write it; a file of that name is replaced.")],
-) -> None:
+def backup(file: Annotated[Path, typer.Argument(help="Where to write it; a file of that name is replaced.")]) -> None:
     """Write all that the store keeps into one file, read back to be sure, while servers run."""
     settings = read_settings()
     try:
@@ -26,9 +24,7 @@ def backup(
     typer.echo(f"{file}: {file.stat().st_size / 1e6:.1f} MB, read back and whole")
 
 
-def restore(
-    file: Annotated[Path, typer.Argument(help="A file that `underskin backup` wrote.")],
-) -> None:
+def restore(file: Annotated[Path, typer.Argument(help="A file that `underskin backup` wrote.")]) -> None:
     """Put a backup in place of the store, while servers run; what was there is backed up first."""
     settings = read_settings()
     try:

@@ -14,8 +14,7 @@ from service.ingest.uploads import Upload
 from service.problems import Refusal
 from service.store import answers, campaigns, skins
 from service.store.engine import Database
-from underskin import InvalidInput
-from underskin.errors import FileError
+from underskin.errors import FileError, InvalidInput, conflicting, required
 from underskin.recordings import plausibility, validation
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription, from_dict
@@ -42,7 +41,7 @@ class IngestOptions:
         """Raises InvalidInput."""
         if (self.corrects is None) != (self.reason is None):
             missing = "reason" if self.reason is None else "corrects"
-            raise InvalidInput(missing, None, "corrects and reason go together")
+            raise required(missing, "corrects and reason go together")
         if self.skin is not None:
             skins.require_usable("skin", self.skin)
         if self.together is not None:
@@ -92,7 +91,7 @@ def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> 
                 with upload.path.open("rb") as file:
                     return parse_rig(file.read(LARGEST_BYTES + 1), upload.label or RIG)
             except FileError as error:
-                raise InvalidInput(RIG, upload.label, f"{error.place}: {error.reason}".lstrip(": ")) from None
+                raise error.of_field(RIG, upload.label) from None
             except InvalidInput as error:
                 label = f"{upload.label}: " if upload.label else f"{RIG}."
                 raise error.at(f"{label}{error.field}") from None
@@ -122,7 +121,7 @@ def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, options: Ing
 def _require_keepable(arrived: Sequence[CheckedCampaign], options: IngestOptions) -> None:
     good = [entry for entry in arrived if entry.campaign is not None]
     if options.corrects is not None and len(arrived) > 1:
-        raise InvalidInput("corrects", options.corrects, f"needs one campaign in its place, not {len(arrived)}")
+        raise conflicting("corrects", options.corrects, f"needs one campaign in its place, not {len(arrived)}")
     spoilt = any(entry.campaign is None or entry.refused for entry in arrived)
     if good and not (options.all_or_nothing and spoilt):
         return

@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterator, Sequence
 
 from service.ingest.uploads import Upload
 from service.problems import invalid_input, unknown_name
-from underskin import InvalidInput
+from underskin.errors import InvalidInput, not_unique, wrong_type
 
 FILE = "file"  # a part of this name is a file, also where its sender gives no file name
 _LONGEST_TEXT = 4096  # bytes
@@ -23,7 +23,7 @@ def split(
     errors = [error for upload in form for error in _errors(upload, texts, single_files)]
     count = Counter(upload.field for upload in form)
     once = (*texts, *single_files)
-    errors += [InvalidInput(name, f"{count[name]} parts", "must be given once") for name in once if count[name] > 1]
+    errors += [not_unique(name, f"{count[name]} parts") for name in once if count[name] > 1]
     if errors:
         raise invalid_input(errors)
     values = {str(one.field): one.path.read_bytes().decode() for one in form if one.field in texts}
@@ -37,9 +37,9 @@ def _errors(upload: Upload, texts: Collection[str], single_files: Collection[str
     if upload.label is None and name not in known:
         yield unknown_name(name, _start(upload), known, "form field")
     elif name in texts and upload.label is not None:
-        yield InvalidInput(name, upload.label, "must be a text, not a file")
+        yield wrong_type(name, upload.label, "must be a text, not a file")
     elif name in texts and not _is_short_text(upload):
-        yield InvalidInput(name, _start(upload), f"must be text in UTF-8 of at most {_LONGEST_TEXT} bytes")
+        yield wrong_type(name, _start(upload), f"must be text in UTF-8 of at most {_LONGEST_TEXT} bytes")
 
 
 def _is_short_text(upload: Upload) -> bool:

@@ -11,8 +11,7 @@ from service.ingest.uploads import Upload
 from service.middleware.unique_keys import require_unique_keys
 from service.problems import Refusal
 from service.store import skins
-from underskin import InvalidInput
-from underskin.errors import ErrorCode, FileError, Mention, Requirement
+from underskin.errors import ErrorCode, FileError, InvalidInput, Mention, Requirement
 from underskin.recordings import join
 from underskin.recordings.campaign import Campaign, from_dict
 from underskin.recordings.channels import Contents

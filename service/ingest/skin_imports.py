@@ -12,8 +12,7 @@ from service.ingest.uploads import Upload
 from service.store import diagnosis_export, import_checks, importing
 from service.store.engine import Database
 from service.store.errors import Conflict
-from underskin import InvalidInput
-from underskin.errors import FileError
+from underskin.errors import FileError, InvalidInput, unreadable
 from underskin.recordings.skin_export import ExportedCampaign, Overview, read_campaigns, read_overview
 
 _AT_A_TIME = 8  # campaigns in memory
@@ -119,9 +118,9 @@ def _naming_the_part(upload: Upload, place: str) -> Iterator[None]:
     except InvalidInput as error:
         raise error.at(f"{place}{error.field}") from None
     except FileError as error:
-        raise InvalidInput("file", upload.label, f"{error.place}: {error.reason}".lstrip(": ")) from None
+        raise error.of_field("file", upload.label) from None
     except (ValidationError, KeyError, TypeError) as error:
-        raise InvalidInput("file", upload.label, f"{place}is not as underskin exports it: {_words(error)}") from None
+        raise unreadable("file", upload.label, f"{place}is not as underskin exports it: {_words(error)}") from None
 
 
 def _words(error: Exception) -> str:

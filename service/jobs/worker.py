@@ -81,7 +81,7 @@ def _work(job: Job, campaign: bytes, say: Callable[[dict[str, Any]], None]) -> N
     limits = RigLimits(**job.limits or {})
     diagnosis = diagnose(parse(orjson.loads(campaign)), table, lambda share: say({"progress": share}), limits)
     if job.limits is not None:
-        say({"plan": dict(diagnosis.next_experiment)})
+        say({"plan": diagnosis.next_experiment})
         return
     document = report(diagnosis)
     left_out = [

@@ -25,7 +25,7 @@ from service.store.times import stored
 from service.usecases import campaign_documents, d33_cache
 from service.usecases import campaigns as usecase
 from service.usecases.adopted_models import model_in_force
-from underskin import InvalidInput
+from underskin.errors import conflicting, wrong_type
 
 router = APIRouter(prefix="/v1", tags=["campaigns"], route_class=JsonRoute)
 
@@ -223,7 +223,7 @@ def d33(
 ) -> D33:
     """By sensor, indenter and preload, with uncertainty, and what it leaves out."""
     if (band_low_hz is None) != (band_high_hz is None):
-        raise InvalidInput("band_low_hz", band_low_hz, "band_low_hz and band_high_hz go together")
+        raise conflicting("band_low_hz", band_low_hz, "band_low_hz and band_high_hz go together")
     band = None if band_low_hz is None or band_high_hz is None else (band_low_hz, band_high_hz)
     with store.reading() as connection:
         row = campaigns.find(connection, campaign_id)
@@ -259,4 +259,4 @@ def _time(name: str, text: str | None) -> str | None:
     try:
         return None if text is None else stored(text)
     except ValueError:
-        raise InvalidInput(name, text, "must be a date and time like 2017-05-03T09:00:00Z") from None
+        raise wrong_type(name, text, "must be a date and time like 2017-05-03T09:00:00Z") from None

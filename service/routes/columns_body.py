@@ -8,7 +8,7 @@ from pydantic_core import from_json
 from service.middleware.unique_keys import require_unique_keys
 from service.problems import Refusal, from_validation
 from service.schemas.columns import ColumnsRequest
-from underskin import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput, wrong_type
 from underskin.prediction.columns import CsvError, from_csv
 
 RequestKind = TypeVar("RequestKind", bound=ColumnsRequest)
@@ -59,7 +59,7 @@ def _from_csv(kind: type[ColumnsRequest], body: bytes) -> dict[str, Any]:
 
 def _cells(kind: type[ColumnsRequest], name: str, cells: list[str]) -> Any:
     if name in kind.json_only:
-        raise InvalidInput(name, cells[0], "cannot be sent as CSV; send application/json")
+        raise wrong_type(name, cells[0], "cannot be sent as CSV; send application/json")
     if name in kind.constants:
         return _constant(name, cells)
     numbers = []
@@ -67,12 +67,14 @@ def _cells(kind: type[ColumnsRequest], name: str, cells: list[str]) -> Any:
         try:
             numbers.append(float(cell))
         except ValueError:
-            raise InvalidInput(name, cell, "must be a number", index=row) from None
+            raise wrong_type(name, cell, index=row) from None
     return numbers
 
 
 def _constant(name: str, cells: list[str]) -> str | bool:
     for row, cell in enumerate(cells):
         if cell != cells[0]:
-            raise InvalidInput(name, cell, f"must be the same in every row ({cells[0]!r})", index=row)
+            raise InvalidInput(
+                name, cell, f"must be the same in every row ({cells[0]!r})", row, code=ErrorCode.CONFLICTING
+            )
     return {"true": True, "false": False}.get(cells[0].lower(), cells[0])

@@ -6,7 +6,7 @@ from fastapi import Request
 
 from service.problems import invalid_input, unknown_name
 from service.routes.openapi import query_parameters
-from underskin import InvalidInput
+from underskin.errors import InvalidInput, not_unique
 
 
 async def known_query(request: Request) -> None:
@@ -25,5 +25,5 @@ def _errors(given: Iterable[tuple[str, str]], known: Collection[str]) -> Iterato
         if name not in known:
             yield unknown_name(name, value, known, "query parameter")
         elif name in seen:
-            yield InvalidInput(name, value, "must be given once")
+            yield not_unique(name, value)
         seen.add(name)

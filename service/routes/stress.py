@@ -37,10 +37,7 @@ _ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": StressAnswer, "conten
     summary="Charge on every sensor of an array",
     responses=_ANSWER,
     openapi_extra={
-        "requestBody": {
-            "required": True,
-            "content": {"application/json": {"schema": _SCHEMA, "example": EXAMPLE}},
-        }
+        "requestBody": {"required": True, "content": {"application/json": {"schema": _SCHEMA, "example": EXAMPLE}}}
     },
 )
 async def stress(request: Request, accept: Accept = "application/json") -> Response:

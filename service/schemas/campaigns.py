@@ -5,8 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from underskin import InvalidInput
-from underskin.errors import ErrorCode
+from underskin.errors import ErrorCode, conflicting
 
 State = Literal["current", "corrected", "withdrawn"]
 
@@ -39,7 +38,7 @@ class SendOptions(BaseModel):
         for name in options.model_fields_set & self.model_fields_set:
             if getattr(options, name) != getattr(self, name):
                 allowed = f"must be {getattr(self, name)!r}, as in the query, or be given once"
-                raise InvalidInput(name, fields[name], allowed)
+                raise conflicting(name, fields[name], allowed)
         return self.model_copy(update={name: getattr(options, name) for name in options.model_fields_set})
 
 

@@ -74,11 +74,7 @@ class Database:
         """
         sole_writer = self._locked_file() if self.is_sqlite else nullcontext()
         try:
-            with (
-                sole_writer,
-                self.engine.connect().execution_options(write=True) as connection,
-                connection.begin(),
-            ):
+            with sole_writer, self.engine.connect().execution_options(write=True) as connection, connection.begin():
                 if not self.is_sqlite:
                     connection.execute(text("SELECT pg_advisory_xact_lock_shared(:number)"), {"number": _PG_WRITING})
                 yield connection

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 from service.schemas.campaigns import RecordingResult
 from service.store import codec
 from service.store.skins import require_usable
-from underskin import InvalidInput
+from underskin.errors import conflicting, unreadable
 from underskin.recordings import rig_description
 from underskin.recordings.campaign import SCHEMA, Campaign, parse
 from underskin.recordings.skin_export import ExportedCampaign, Overview
@@ -103,7 +103,7 @@ def overview(exported: Overview) -> CheckedOverview:
         try:
             rig_description.from_dict(orjson.loads(rig.document))
         except orjson.JSONDecodeError as error:
-            raise InvalidInput("rigs", None, f"must be JSON: {error.msg}") from None
+            raise unreadable("rigs", None, f"must be JSON: {error.msg}") from None
     return CheckedOverview(rows, rigs)
 
 
@@ -161,4 +161,4 @@ def _require_together(row: BaseModel, *names: str) -> None:
 
 def _require(holds: bool, field: str, value: Any, allowed: str) -> None:
     if not holds:
-        raise InvalidInput(field, value, allowed)
+        raise conflicting(field, value, allowed)

@@ -10,7 +10,7 @@ from sqlalchemy.dialects import postgresql, sqlite
 from service.store.errors import Missing
 from service.store.tables import AnyRow, campaigns, rigs, skins
 from service.store.times import now
-from underskin import InvalidInput
+from underskin.errors import wrong_type
 
 _LONGEST_ID = 200
 
@@ -19,7 +19,7 @@ def require_usable(field: str, skin_id: str) -> None:
     """Refuses an id that cannot be part of an address (InvalidInput)."""
     plain = skin_id.isprintable() and "/" not in skin_id and skin_id not in (".", "..")
     if not plain or not skin_id.strip() or len(skin_id) > _LONGEST_ID:
-        raise InvalidInput(field, skin_id, f"must be a printable text of 1 to {_LONGEST_ID} characters without /")
+        raise wrong_type(field, skin_id, f"must be a printable text of 1 to {_LONGEST_ID} characters without /")
 
 
 def require(connection: Connection, skin_id: str | None) -> str:

@@ -14,7 +14,7 @@ from service.store import diagnoses, models, skins
 from service.store.engine import Database
 from service.store.errors import Conflict
 from service.store.tables import AnyRow
-from underskin import InvalidInput
+from underskin.errors import conflicting, out_of_range, required
 from underskin.physics.charge_response import gain
 from underskin.prediction.answers import pressed
 from underskin.recordings.conditions import frf_conditions
@@ -72,7 +72,7 @@ def of_row(connection: Connection, row: AnyRow) -> "AdoptedModel":
 def model_asked_for(store: Database, request: PressedSkinColumns) -> ModelInForce:
     """The model that a request asks for."""
     if request.skin_id is None:
-        raise InvalidInput("skin_id", None, "is required with model adopted")
+        raise required("skin_id", "is required with model adopted")
     return model_in_force(store, request.skin_id)
 
 
@@ -99,7 +99,7 @@ class RowsUnderModel:
         """Raises InvalidInput that names `field` where the model depends on frequency and it was not given."""
         if self.model_in_force.model.of_lines and getattr(self._request, field) is None:
             names = " and ".join(self.model_in_force.model.of_lines)
-            raise InvalidInput(field, None, f"is required: the adopted model depends on frequency ({names})")
+            raise required(field, f"is required: the adopted model depends on frequency ({names})")
 
 
 def press(model_in_force: ModelInForce, table: SigmaTable, request: PressedSkinColumns, count: int) -> RowsUnderModel:
@@ -109,7 +109,7 @@ def press(model_in_force: ModelInForce, table: SigmaTable, request: PressedSkinC
     model_in_force.model.require_skin(given)
     for name, mechanism in model_in_force.model.needs.items():
         if getattr(request, name) is None:
-            raise InvalidInput(name, None, f"is required: the adopted model has {mechanism}")
+            raise required(name, f"is required: the adopted model has {mechanism}")
     rows = _distinct_columns(request, given)
     stacked = np.column_stack([np.broadcast_to(column, (count,)) for column in rows.values()])
     distinct, which = np.unique(stacked, axis=0, return_inverse=True)
@@ -153,7 +153,7 @@ def _response(
     count = len(rows["preload_n"])
     if count * len(lines) > _LARGEST_LINES:
         allowed = f"different rows times frequencies must be at most {_LARGEST_LINES} with an adopted model"
-        raise InvalidInput("frequency_hz", f"{count} rows, {len(lines)} frequencies", allowed)
+        raise out_of_range("frequency_hz", f"{count} rows, {len(lines)} frequencies", allowed)
     conditions = frf_conditions(model.skin, sensor=request.sensor, frequency_hz=lines, **rows)
     response = model.response(conditions, table, level=frequency_hz is None)
     return response.value.reshape(count, -1), np.logical_and.reduce(response.inside.reshape(count, -1), axis=1)
@@ -163,4 +163,4 @@ def require_paper(request: PressedSkinColumns) -> None:
     """Raises InvalidInput for a field that only an adopted model uses."""
     for name in ("skin_id", "sensor", *ADOPTED_COLUMNS):
         if getattr(request, name) is not None:
-            raise InvalidInput(name, getattr(request, name), "is used only with model adopted")
+            raise conflicting(name, getattr(request, name), "is used only with model adopted")

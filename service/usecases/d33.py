@@ -9,7 +9,7 @@ from service.schemas.d33 import D33Columns
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS
 from service.store import Database
 from service.usecases.adopted_models import model_asked_for, press, require_paper
-from underskin import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput, conflicting, required
 from underskin.physics import charge_response
 from underskin.prediction import answers, plausibility
 from underskin.prediction.columns import rows
@@ -77,7 +77,7 @@ def _given(request: D33Columns) -> dict[str, Floats]:
     """Plateau values as they were sent."""
     for name in sorted(request.json_only):
         if getattr(request, name) is not None:
-            raise InvalidInput(name, "given", "goes with lines; leave it out, or leave out frf_pc_per_n")
+            raise conflicting(name, "given", "goes with lines; leave it out, or leave out frf_pc_per_n")
     sent = ("frf_pc_per_n", "frf_uncertainty_pc_per_n")
     return {name: request.column(name) for name in sent if getattr(request, name) is not None}
 
@@ -92,7 +92,7 @@ def _checked(measured: Mapping[str, Floats]) -> dict[str, Floats]:
 def _require_lines(request: D33Columns) -> None:
     for name in ("frequency_hz", "frf_re_pc_per_n", "band_hz"):
         if getattr(request, name) is None:
-            raise InvalidInput(name, None, "is required where frf_pc_per_n is not given")
+            raise required(name, "is required where frf_pc_per_n is not given")
 
 
 def _plateau(request: D33Columns, factor: Callable[[Floats], Complexes] | None = None) -> dict[str, Floats]:
@@ -117,9 +117,7 @@ def _plateau(request: D33Columns, factor: Callable[[Floats], Complexes] | None =
         sent = "frf_uncertainty_pc_per_n"
         measured[sent] = non_negative(sent, request.column(sent))
     elif inside.sum() < 2:
-        raise InvalidInput(
-            "frf_uncertainty_pc_per_n", None, "is required where band_hz holds one line, which has no scatter"
-        )
+        raise required("frf_uncertainty_pc_per_n", "is required where band_hz holds one line, which has no scatter")
     else:
         measured["frf_uncertainty_pc_per_n"] = error
     if imaginary is not None:
@@ -132,5 +130,5 @@ def _lines(request: D33Columns, name: str, count: int) -> Floats:
     for row, line in enumerate(getattr(request, name)):
         if len(line) != count:
             allowed = f"must have as many lines as frequency_hz ({count})"
-            raise InvalidInput(name, f"{len(line)} lines", allowed, index=row)
+            raise InvalidInput(name, f"{len(line)} lines", allowed, row, code=ErrorCode.UNEQUAL_LENGTHS)
     return finite(name, request.column(name))

@@ -7,7 +7,8 @@ from pydantic import ValidationError
 
 from service.problems import from_validation
 from service.schemas.design import DesignAnswer, DesignRequest, ResponseAnswer, SweepAnswer
-from underskin import Indenter, InvalidInput, Skin
+from underskin import Indenter, Skin
+from underskin.errors import out_of_range
 from underskin.prediction.skin_design import Design, design
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import checked, to_lab
@@ -30,7 +31,7 @@ def design_of(table: SigmaTable, asked: DesignRequest) -> Design:
     pitch = asked.pitch_mm * 1e-3
     if pitch < 2 * float(skin.sensor_radius):
         allowed = f"must be at least {2 * asked.sensor_radius_mm:g} mm, the diameter of a sensor: they cannot overlap"
-        raise InvalidInput("pitch_mm", asked.pitch_mm, allowed)
+        raise out_of_range("pitch_mm", asked.pitch_mm, allowed)
     return design(table, skin, indenter, preload, pitch, asked.dip_percent / 100)
 
 

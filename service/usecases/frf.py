@@ -7,7 +7,7 @@ from service.schemas.frf import FrfColumns
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS
 from service.store import Database
 from service.usecases.adopted_models import model_asked_for, press, require_paper
-from underskin import InvalidInput
+from underskin.errors import out_of_range
 from underskin.prediction import answers
 from underskin.prediction.columns import rows
 from underskin.surrogate.sigma_table import SigmaTable
@@ -75,7 +75,7 @@ def _spectra(request: FrfColumns, frf: Floats, count: int) -> tuple[dict[str, Fl
     frequency = non_negative("frequency_hz", request.column("frequency_hz"))
     if count * len(frequency) > _LARGEST_SPECTRA:
         allowed = f"rows times frequencies must be at most {_LARGEST_SPECTRA}"
-        raise InvalidInput("frequency_hz", f"{count} rows, {len(frequency)} frequencies", allowed)
+        raise out_of_range("frequency_hz", f"{count} rows, {len(frequency)} frequencies", allowed)
     shape = (count, len(frequency))
     real = np.broadcast_to(np.broadcast_to(frf, (count,))[:, None], shape)
     imaginary = np.where(np.isnan(real), np.nan, 0.0)

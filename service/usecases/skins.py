@@ -9,13 +9,13 @@ from service.store import skins
 from service.store.engine import Database
 from service.store.errors import Missing
 from service.usecases import histories
-from underskin import InvalidInput
+from underskin.errors import conflicting
 
 
 def join(store: Database, skin_id: str, other: str, reason: str) -> None:
     """Count `other` as `skin_id` from now on; raises InvalidInput, Missing, or Refusal where one was joined before."""
     if skin_id == other:
-        raise InvalidInput("skin_id", other, "must be another skin")
+        raise conflicting("skin_id", other, "must be another skin")
     with store.writing() as connection:
         rows = skins.lock(connection, [skin_id, other])
         for name in (skin_id, other):

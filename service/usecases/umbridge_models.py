@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin import Indenter, InvalidInput, Skin
+from underskin.errors import out_of_range
 from underskin.prediction.pressed_skin import frf_gradient, transmission
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import LAB, Floats, checked, to_lab
@@ -81,4 +82,4 @@ MODELS = {
 
 def _outside(table: SigmaTable) -> InvalidInput:
     domain = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in table.domain.items())
-    return InvalidInput("input", "outside the domain", f"must lie inside {domain}")
+    return out_of_range("input", "outside the domain", f"must lie inside {domain}")

@@ -16,6 +16,7 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import RigLimits
+from underskin.diagnosis.reporting.next_experiment import next_experiment
 from underskin.diagnosis.selection.search import Answer, Search, search
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms import compose
@@ -40,7 +41,7 @@ class Left:
         self.search = search(self.problem)
 
     def plan(self, **limits: Any) -> dict[str, Any]:
-        return plan(self.problem, self.search, RigLimits(**limits))
+        return next_experiment(plan(self.problem, self.search, RigLimits(**limits)))
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +104,7 @@ def test_rivals_without_a_law_and_curves_have_a_document_too(narrow: Left, table
             return [Answer(leader, 0.6), Answer(None, 0.4)]
 
     torn = Torn(narrow.search.explanations, (process,), narrow.search.unsupported)
-    planned = plan(narrow.problem, torn, RigLimits())
+    planned = next_experiment(plan(narrow.problem, torn, RigLimits()))
     assert planned["recordings"] == []
     assert "something without a name" in planned["statement"]
     assert diagnose(indentation_campaign(), table).next_experiment is not None

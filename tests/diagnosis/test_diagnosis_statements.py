@@ -21,7 +21,7 @@ from underskin.diagnosis.reporting.report import report
 from underskin.diagnosis.reporting.statements import answer_statement, location_statement, why_not
 from underskin.diagnosis.selection.occam_correction import fit_and_plausibility, without_occam
 from underskin.diagnosis.selection.search import Answer
-from underskin.diagnosis.validation.identifiability import Confounding, left_open
+from underskin.diagnosis.validation.identifiability import Confounding, Likeness, left_open
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.base import Kind
 from underskin.surrogate.sigma_table import SigmaTable, load_table
@@ -168,10 +168,10 @@ def answers_of(table: SigmaTable, weights: dict[tuple[str, ...], float]) -> list
 def test_what_was_found_is_not_called_unidentifiable(table: SigmaTable) -> None:
     answers = answers_of(table, {("ageing",): 0.6, ("misalignment",): 0.38, ("modulus_error",): 0.02})
     design = [
-        Confounding("ageing", "d33", ""),
-        Confounding("ageing", "modulus_error", ""),
-        Confounding("adhesion", "noise", ""),
-        Confounding("modulus_error", "thickness_error", ""),
+        Confounding("ageing", "d33", Likeness.TAKEN_UP),
+        Confounding("ageing", "modulus_error", Likeness.TAKEN_UP),
+        Confounding("adhesion", "noise", Likeness.TAKEN_UP),
+        Confounding("modulus_error", "thickness_error", Likeness.TAKEN_UP),
     ]
     left = {(entry.mechanism, entry.confounded_with) for entry in left_open(design, answers)}
     assert left == {("adhesion", "noise"), ("modulus_error", "thickness_error"), ("ageing", "misalignment")}

@@ -13,7 +13,7 @@ from tests.support.oracle import NEEDS_ORACLE
 from underskin import TableError
 from underskin.array_stress.load_integration import Load, array_stress, contact_load, pressure_map_loads
 from underskin.physics import elastic_layer
-from underskin.physics.contact_pressure import HERTZ_SHAPE, SpherePressure
+from underskin.physics.contact_pressure import SpherePressure
 from underskin.physics.elastic_layer import Layer
 from underskin.surrogate.hdf5_format import read_table
 from underskin.surrogate.influence_table import InfluenceTable, load_influence
@@ -22,6 +22,7 @@ from underskin.units import Floats
 
 TABLE = load_influence()
 GENERATOR = np.random.default_rng(2018)
+HERTZ_SHAPE = np.array([1.0, 1 / np.sqrt(5)])
 
 
 def assert_accurate(found: Floats, exact: Floats) -> None:

@@ -17,7 +17,7 @@ from underskin.array_stress.load_integration import (
 )
 from underskin.array_stress.request import LoadCase
 from underskin.array_stress.validation import findings, refuse_beside_skin, refuse_coarse, refuse_many, refuse_overlap
-from underskin.errors import InvalidInput, Mention, Requirement
+from underskin.errors import Mention, Requirement, out_of_range
 from underskin.findings.finding import Finding
 from underskin.physics.contact_pressure import MOST_A_OVER_H, SpherePressure, sphere_pressures
 from underskin.physics.elastic_layer import Layer, slip
@@ -88,14 +88,14 @@ def _influence(table: InfluenceTable, request: LoadCase, rt_over_h: float) -> In
     low, high = table.domain["poisson_ratio"]
     if not low <= request.poisson_ratio <= high:
         allowed = f"must be {low:g} to {high:g}: the table of influences holds no other"
-        raise InvalidInput("poisson_ratio", request.poisson_ratio, allowed)
+        raise out_of_range("poisson_ratio", request.poisson_ratio, allowed)
     low, high = table.domain["rt_over_h"]
     glue = np.inf if request.glue_stiffness is None else request.glue_stiffness
     influence = table.at(rt_over_h, request.poisson_ratio, slip(glue))
     if influence is None:
         thickness = f" ({request.thickness_mm:g}): the table's range"
         allowed = Requirement(f"must be {low:g} to {high:g} times ", Mention("thickness_mm"), thickness)
-        raise InvalidInput("sensor_radius_mm", request.sensor_radius_mm, allowed)
+        raise out_of_range("sensor_radius_mm", request.sensor_radius_mm, allowed)
     return influence
 
 
@@ -115,7 +115,7 @@ def _pressures(request: LoadCase, thickness: float) -> list[SpherePressure]:
                 f"must press less: the contact must be smaller than its sphere and {MOST_A_OVER_H:g} thicknesses; "
                 "is the modulus in MPa?"
             )
-            raise InvalidInput(f"contacts[{index}].normal_force_n", request.contacts[index].normal_force_n, allowed)
+            raise out_of_range(f"contacts[{index}].normal_force_n", request.contacts[index].normal_force_n, allowed)
         pressures.append(pressure)
     return pressures
 

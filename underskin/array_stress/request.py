@@ -11,7 +11,19 @@ from typing import Annotated, Any
 import numpy as np
 
 from underskin.array_stress import pressure_map
-from underskin.errors import InvalidInput, Mention, Requirement
+from underskin.errors import (
+    ErrorCode,
+    InvalidInput,
+    Mention,
+    Requirement,
+    conflicting,
+    not_unique,
+    out_of_range,
+    required,
+    too_few,
+    unreadable,
+    wrong_type,
+)
 from underskin.recordings import validation as field
 from underskin.recordings.conditions import Sensors
 from underskin.recordings.readers import json_file
@@ -46,7 +58,7 @@ class PressureMap:
 def _contacts(name: str, value: Any, units_checked: bool) -> tuple[LabContact, ...]:
     if not isinstance(value, list | tuple) or not 0 < len(value) <= MOST_CONTACTS:
         allowed = Requirement(f"must be a list of 1 to {MOST_CONTACTS} ", Mention("contacts"))
-        raise InvalidInput(name, shown(value), allowed)
+        raise wrong_type(name, shown(value), allowed)
     return tuple(field.build(LabContact, f"{name}[{i}]", entry, units_checked) for i, entry in enumerate(value))
 
 
@@ -60,7 +72,8 @@ def _pressure_map(name: str, value: Any, units_checked: bool) -> PressureMap:
     if result.pressure_mpa.shape != shape:
         rows, columns = result.pressure_mpa.shape
         allowed = f"must have a row for each y_mm ({shape[0]}) and a column for each x_mm ({shape[1]})"
-        raise InvalidInput(f"{name}.pressure_mpa", f"{rows} rows, {columns} columns", allowed)
+        sizes = f"{rows} rows, {columns} columns"
+        raise InvalidInput(f"{name}.pressure_mpa", sizes, allowed, code=ErrorCode.UNEQUAL_LENGTHS)
     _refuse_pull(f"{name}.pressure_mpa", result.pressure_mpa)
     return result
 
@@ -73,7 +86,7 @@ def _refuse_pull(name: str, pressure: Floats) -> None:
         more = f" and {len(cells) - _MOST_NAMED} more" if len(cells) > _MOST_NAMED else ""
         also = f"; so are {', '.join(others)}{more}" if others else ""
         allowed = f"must be at least 0: a pressure does not pull{also}"
-        raise InvalidInput(name + first, float(pressure[tuple(cells[0])]), allowed)
+        raise out_of_range(name + first, float(pressure[tuple(cells[0])]), allowed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +117,11 @@ def read_file(path: str, map_path: str | None = None) -> LoadCase:
     try:
         content = sys.stdin.buffer.read() if path == "-" else Path(path).read_bytes()
     except OSError as error:
-        raise InvalidInput("file", path, f"must be a readable JSON file ({error.strerror})") from error
+        raise unreadable("file", path, f"must be a readable JSON file ({error.strerror})") from error
     document = json_file.document(content, path)
     if map_path is not None:
         if field.mapping("body", document).get("pressure_map") is not None:
-            raise InvalidInput("pressure_map", map_path, f"is in {path} already; give it once")
+            raise not_unique("pressure_map", map_path, f"is in {path} already; give it once")
         document = {**document, "pressure_map": _map_in_file(map_path)}
     return read_request(document)
 
@@ -117,7 +130,7 @@ def _map_in_file(path: str) -> dict[str, Any]:
     try:
         content = Path(path).read_bytes()
     except OSError as error:
-        raise InvalidInput("pressure_map", path, f"must be a readable CSV file ({error.strerror})") from error
+        raise unreadable("pressure_map", path, f"must be a readable CSV file ({error.strerror})") from error
     return pressure_map.parse(content, path)
 
 
@@ -130,11 +143,13 @@ def read_request(document: Any) -> LoadCase:
         raise refused[0]
     request = LoadCase(**values)
     if not request.sensors:
-        raise InvalidInput("sensors", shown(request.sensors), "must hold at least one sensor")
+        raise too_few("sensors", shown(request.sensors), "must hold at least one sensor")
     if bool(request.contacts) == (request.pressure_map is not None):
         allowed = Requirement("must be given, or ", Mention("pressure_map"), ", but not both")
-        raise InvalidInput("contacts", shown(request.contacts) if request.contacts else None, allowed)
+        if not request.contacts:
+            raise required("contacts", allowed)
+        raise conflicting("contacts", shown(request.contacts), allowed)
     if request.contacts and request.youngs_modulus_mpa is None:
         allowed = Requirement("is required with ", Mention("contacts"), ", whose radii depend on it")
-        raise InvalidInput("youngs_modulus_mpa", None, allowed)
+        raise required("youngs_modulus_mpa", allowed)
     return request

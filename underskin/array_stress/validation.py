@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from underskin.array_stress.request import LabContact, LoadCase, PressureMap
-from underskin.errors import InvalidInput, Mention, Requirement
+from underskin.errors import Mention, Requirement, conflicting, out_of_range
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.physics import hertz
@@ -27,7 +27,7 @@ def refuse_many(request: LoadCase, points: int) -> None:
     """Reject a load that would take minutes to integrate (InvalidInput)."""
     if len(request.sensors) * points > MOST_PAIRS:
         allowed = f"sensors times points of the load must be at most {MOST_PAIRS}: send fewer, or coarser, at a time"
-        raise InvalidInput("sensors", f"{len(request.sensors)} sensors, {points} points", allowed)
+        raise out_of_range("sensors", f"{len(request.sensors)} sensors, {points} points", allowed)
 
 
 def refuse_coarse(x: Floats, y: Floats, thickness: float) -> None:
@@ -39,7 +39,7 @@ def refuse_coarse(x: Floats, y: Floats, thickness: float) -> None:
             allowed = (
                 f"must be in steps of at most {to_lab('x_mm', widest):g} mm, {_WIDEST_CELL:g} thicknesses: is it in mm?"
             )
-            raise InvalidInput(f"pressure_map.{name}", f"steps of {to_lab('x_mm', step):g} mm", allowed)
+            raise out_of_range(f"pressure_map.{name}", f"steps of {to_lab('x_mm', step):g} mm", allowed)
 
 
 def refuse_beside_skin(request: LoadCase, positions: Floats, half: Floats, name: Callable[[int], str]) -> None:
@@ -55,7 +55,7 @@ def refuse_beside_skin(request: LoadCase, positions: Floats, half: Floats, name:
             continue
         span, middle = highest[axis] - lowest[axis], (highest[axis] + lowest[axis]) / 2
         if span > size:
-            raise InvalidInput(extent, size, f"must be at least {span:g}: so far apart are the sensors")
+            raise out_of_range(extent, size, f"must be at least {span:g}: so far apart are the sensors")
         over = to_lab("x_mm", outermost[:, axis]) > size / 2 * (1 + _ROUNDING)
         if over.any():
             first = int(np.argmax(over))
@@ -67,7 +67,7 @@ def refuse_beside_skin(request: LoadCase, positions: Floats, half: Floats, name:
                 f"({extent} {size:g}, about the middle of the sensors)"
             )
             value = f"{'xy'[axis]} from {place - reach:.4g} to {place + reach:.4g} mm"
-            raise InvalidInput(name(first), value, allowed)
+            raise out_of_range(name(first), value, allowed)
 
 
 def refuse_overlap(positions: Floats, radii: Floats) -> None:
@@ -81,7 +81,7 @@ def refuse_overlap(positions: Floats, radii: Floats) -> None:
         gaps = f": the centres are {gap:.4g} mm apart, the radii add to {least:.4g} mm"
         allowed = Requirement("must not overlap ", Mention(f"contacts[{i}]"), gaps)
         x, y = to_lab("x_mm", positions[j])
-        raise InvalidInput(f"contacts[{j}]", f"at x {x:g}, y {y:g} mm", allowed)
+        raise conflicting(f"contacts[{j}]", f"at x {x:g}, y {y:g} mm", allowed)
 
 
 def findings(request: LoadCase) -> list[Finding]:

@@ -48,6 +48,10 @@ def _column(meaning: str) -> object:
     return typer.Option(help=meaning, metavar="NUMBER,...", show_default=False)
 
 
+# Columns of a skin pressed by a sphere, in the order in which they are written.
+_PRESSED_SKIN = (
+    *("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio", "indenter_radius_mm", "preload_n"),
+)
 _Given = list[str] | None
 ThicknessMm = Annotated[_Given, _column("Thickness h of the layer over the sensors [mm].")]
 YoungsModulusMpa = Annotated[_Given, _column("Young's modulus E of the layer [MPa].")]
@@ -75,17 +79,11 @@ def sigma(
     csv: Csv = False,
 ) -> None:
     """The stress transmission σ, from dimensionless numbers."""
-
     options = {"a_over_h": a_over_h, "rt_over_h": rt_over_h, "load_parameter": load_parameter}
     from underskin.prediction import answers
 
-    _answer(
-        options,
-        {"load_parameter": 0.0},
-        input_file,
-        csv,
-        lambda table, columns: answers.sigma(table, columns, model.value),
-    )
+    defaults = {"load_parameter": 0.0}
+    _answer(options, defaults, input_file, csv, lambda table, columns: answers.sigma(table, columns, model.value))
 
 
 @app.command(no_args_is_help=True)
@@ -102,25 +100,12 @@ def frf(
     csv: Csv = False,
 ) -> None:
     """The FRF, charge over force, that a skin should show under a sphere."""
-
-    options = {
-        "thickness_mm": thickness_mm,
-        "youngs_modulus_mpa": youngs_modulus_mpa,
-        "sensor_radius_mm": sensor_radius_mm,
-        "poisson_ratio": poisson_ratio,
-        "indenter_radius_mm": indenter_radius_mm,
-        "preload_n": preload_n,
-        "d33_pc_per_n": d33_pc_per_n,
-    }
+    given = locals()
+    options = {name: given[name] for name in (*_PRESSED_SKIN, "d33_pc_per_n")}
     from underskin.prediction import answers
 
-    _answer(
-        options,
-        {"poisson_ratio": 0.5},
-        input_file,
-        csv,
-        lambda table, columns: answers.frf(table, columns, units_checked),
-    )
+    defaults = {"poisson_ratio": 0.5}
+    _answer(options, defaults, input_file, csv, lambda table, columns: answers.frf(table, columns, units_checked))
 
 
 @app.command(no_args_is_help=True)
@@ -148,16 +133,8 @@ def d33(
 
     Files also tell the elastomer's modulus, where it was recorded on the same bench (compression, indentation).
     """
-    options = {
-        "thickness_mm": thickness_mm,
-        "youngs_modulus_mpa": youngs_modulus_mpa,
-        "sensor_radius_mm": sensor_radius_mm,
-        "poisson_ratio": poisson_ratio,
-        "indenter_radius_mm": indenter_radius_mm,
-        "preload_n": preload_n,
-        "frf_pc_per_n": frf_pc_per_n,
-        "frf_uncertainty_pc_per_n": frf_uncertainty_pc_per_n,
-    }
+    given = locals()
+    options = {name: given[name] for name in (*_PRESSED_SKIN, "frf_pc_per_n", "frf_uncertainty_pc_per_n")}
     if files:
         for_columns = [f"--{name.replace('_', '-')}" for name, values in options.items() if values]
         for_columns += [name for name, used in (("--input", input_file), ("--units-checked", units_checked)) if used]

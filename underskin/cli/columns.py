@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from underskin.errors import InvalidInput, UnderskinError
+from underskin.errors import ErrorCode, InvalidInput, UnderskinError, not_unique, unreadable, wrong_type
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import significant
 from underskin.prediction.columns import CsvError, from_csv, statuses, to_csv
@@ -59,7 +59,7 @@ def gather(
     columns = {}
     for name, values in options.items():
         if values and name in in_file:
-            raise InvalidInput(name, ",".join(values), f"is also a column of {path}; give it once")
+            raise not_unique(name, ",".join(values), f"is also a column of {path}; give it once")
         if values:
             columns[name] = _from_option(name, values)
         elif name in in_file:
@@ -85,12 +85,13 @@ def _from_csv(path: str, allowed: Sequence[str]) -> dict[str, Floats]:
             columns = from_csv(file.read())
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        raise InvalidInput("input", path, f"must be a readable CSV file ({reason})") from error
+        raise unreadable("input", path, f"must be a readable CSV file ({reason})") from error
     except CsvError as error:
-        raise InvalidInput("input", path, str(error)) from error
+        raise unreadable("input", path, str(error)) from error
     for name in columns:
         if name not in allowed:
-            raise InvalidInput("input", path, f"has the column {name!r}; allowed, once each: {', '.join(allowed)}")
+            words = f"has the column {name!r}; allowed, once each: {', '.join(allowed)}"
+            raise InvalidInput("input", path, words, code=ErrorCode.UNKNOWN_FIELD)
     return {name: _numbers(name, cells) for name, cells in columns.items()}
 
 
@@ -151,7 +152,7 @@ def _numbers(name: str, cells: Sequence[str]) -> Floats:
         try:
             numbers[row] = float(cell)
         except ValueError:
-            raise InvalidInput(name, cell, "must be a number", index=row if len(cells) > 1 else None) from None
+            raise wrong_type(name, cell, index=row if len(cells) > 1 else None) from None
     return numbers
 
 

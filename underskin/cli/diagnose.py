@@ -270,4 +270,4 @@ def plan(
         recordings=recordings,
     )
     diagnosis = work_out(campaign, load_table(), limits=limits)
-    typer.echo(json.dumps(dict(diagnosis.next_experiment), ensure_ascii=False, indent=1))
+    typer.echo(json.dumps(diagnosis.next_experiment, ensure_ascii=False, indent=1))

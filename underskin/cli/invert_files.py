@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from underskin.errors import InvalidInput, UnderskinError
+from underskin.errors import FileError, InvalidInput, UnderskinError, not_unique, wrong_type
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -54,7 +54,7 @@ class _FileErrors:
             yield
         except (UnderskinError, OSError) as error:
             self.count += 1
-            line = str(error) if name in str(error) else f"{name}: {error}"
+            line = str(error) if isinstance(error, FileError) else f"{name}: {error}"
             self._console.print(f"underskin: {line}", markup=False, highlight=False, soft_wrap=True)
 
 
@@ -148,7 +148,7 @@ def _band(text: str) -> _BandHz:
     except ValueError:
         low = high = 0.0
     if not 0 < low < high:
-        raise InvalidInput("band", text, "must be two frequencies in Hz, LOW,HIGH, the lower one first")
+        raise wrong_type("band", text, "must be two frequencies in Hz, LOW,HIGH, the lower one first")
     return low, high
 
 
@@ -158,7 +158,7 @@ def _pages(batches: Iterable[tuple[str, str]], folder: Path) -> dict[str, Path]:
     for name, short in batches:
         page = folder / f"{short}.html"
         if page in pages.values():
-            raise InvalidInput("figures", str(page), f"would hold two files' figures; {name} needs a run of its own")
+            raise not_unique("figures", str(page), f"would hold two files' figures; {name} needs a run of its own")
         pages[name] = page
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -104,14 +104,9 @@ class Adopted:
     dwell_s: ArrayLike | None = None
     load_cycles: ArrayLike | None = None
 
-    def columns(self) -> dict[str, ArrayLike | None]:
-        """The columns of the request that the adopted model uses."""
-        names = ("offset_x_mm", "offset_y_mm", "dynamic_force_n", "dwell_s", "load_cycles")
-        return {name: getattr(self, name) for name in names}
-
-    def shared(self) -> dict[str, str | None]:
-        """The fields of the request that hold for all rows."""
-        return {"model": "adopted", "skin_id": self.skin_id, "sensor": self.sensor}
+    def fields(self) -> dict[str, Any]:
+        """The fields of the request."""
+        return {"model": "adopted", **vars(self)}
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from uuid import uuid4
 import orjson
 
 from underskin.client.http_session import Session
-from underskin.errors import InvalidInput, Unreachable
+from underskin.errors import Unreachable, too_few
 from underskin.recordings.campaign import Campaign, parse, to_dict
 
 Document = dict[str, Any]
@@ -66,7 +66,7 @@ class Campaigns:
         joins the files, for instance one file for each press, into one campaign of that name.
         """
         if not files:
-            raise InvalidInput("files", [], "must name at least one file")
+            raise too_few("files", [], "must name at least one file")
         headers = {"Idempotency-Key": idempotency_key or uuid4().hex}
         query = query_of(skin=skin, all_or_nothing=all_or_nothing, together=together)
 

@@ -39,11 +39,7 @@ class Diagnoses:
         yield from pages(self._session, "/v1/diagnoses", "diagnoses", campaign=campaign, skin=skin, state=state)
 
     def wait(
-        self,
-        diagnosis_id: str,
-        *,
-        progress: Callable[[float], object] = lambda _: None,
-        timeout: float | None = None,
+        self, diagnosis_id: str, *, progress: Callable[[float], object] = lambda _: None, timeout: float | None = None
     ) -> Document:
         """The diagnosis once it is done, has failed or was cancelled; `progress` is called with its progress, 0 to 1.
 

@@ -70,8 +70,7 @@ class Client:
         model: Literal["layer", "half_space"] = "layer",
     ) -> SigmaAnswer:
         """σ(a/h, rT/h, L) of the layer on a rigid base, or of the half space."""
-        columns = {"a_over_h": a_over_h, "rt_over_h": rt_over_h, "load_parameter": load_parameter}
-        return self._columns("sigma", SigmaAnswer, columns, {"model": model})
+        return self._columns("sigma", SigmaAnswer, locals())
 
     def frf(
         self,
@@ -91,17 +90,7 @@ class Client:
 
         `units_checked` accepts unusual magnitudes; `adopted` uses the adopted model of the skin.
         """
-        columns = {
-            "thickness_mm": thickness_mm,
-            "youngs_modulus_mpa": youngs_modulus_mpa,
-            "sensor_radius_mm": sensor_radius_mm,
-            "poisson_ratio": poisson_ratio,
-            "indenter_radius_mm": indenter_radius_mm,
-            "preload_n": preload_n,
-            "d33_pc_per_n": d33_pc_per_n,
-        }
-        shared = {"frequency_hz": frequency_hz, "units_checked": units_checked}
-        return self._columns("frf", FrfAnswer, columns, shared, adopted)
+        return self._columns("frf", FrfAnswer, locals())
 
     def d33(
         self,
@@ -127,24 +116,7 @@ class Client:
         lines), and `band_hz`. `units_checked` accepts unusual magnitudes; `adopted` uses the adopted model of
         the skin.
         """
-        columns = {
-            "thickness_mm": thickness_mm,
-            "youngs_modulus_mpa": youngs_modulus_mpa,
-            "sensor_radius_mm": sensor_radius_mm,
-            "poisson_ratio": poisson_ratio,
-            "indenter_radius_mm": indenter_radius_mm,
-            "preload_n": preload_n,
-            "frf_pc_per_n": frf_pc_per_n,
-            "frf_uncertainty_pc_per_n": frf_uncertainty_pc_per_n,
-        }
-        lines = {
-            "frequency_hz": frequency_hz,
-            "frf_re_pc_per_n": frf_re_pc_per_n,
-            "frf_im_pc_per_n": frf_im_pc_per_n,
-            "band_hz": band_hz,
-            "units_checked": units_checked,
-        }
-        return self._columns("d33", D33Answer, columns, lines, adopted)
+        return self._columns("d33", D33Answer, locals())
 
     def stress(self, request: Mapping[str, Any]) -> StressAnswer:
         """Charge on every sensor of an array; `request` is the document that `POST /v1/stress` takes."""
@@ -172,22 +144,15 @@ class Client:
         """The hash of the table in use, once the service can do its work; needs no key."""
         return str(self._request("GET", "/ready")["table_sha256"])
 
-    def _columns(
-        self,
-        noun: str,
-        kind: type[_Answer],
-        columns: Mapping[str, ArrayLike | None],
-        shared: Mapping[str, Any],
-        adopted: Adopted | None = None,
-    ) -> _Answer:
-        if adopted is not None:
-            columns, shared = {**columns, **adopted.columns()}, {**shared, **adopted.shared()}
-        arrays = {name: _array(value) for name, value in columns.items() if value is not None}
-        others = {name: _shared(name, value) for name, value in shared.items() if value is not None}
+    def _columns(self, noun: str, kind: type[_Answer], arguments: Mapping[str, Any]) -> _Answer:
+        """The answer to what a method was given: its arguments, beside which it has `self` and perhaps `adopted`."""
+        adopted = arguments.get("adopted")
+        given = {**arguments, **(adopted.fields() if adopted is not None else {})}
+        given = {name: value for name, value in given.items() if value is not None and name not in ("self", "adopted")}
+        arrays = {name: _array(value) for name, value in given.items() if name not in _SHARED}
+        others = {name: _shared(name, value) for name, value in given.items() if name in _SHARED}
         document = self._request("POST", f"/v1/{noun}", {**arrays, **others})
-        single = all(array.ndim == 0 for array in arrays.values()) and not any(
-            np.ndim(value) > 1 for value in shared.values() if value is not None
-        )
+        single = all(array.ndim == 0 for array in arrays.values()) and all(np.ndim(given[name]) < 2 for name in others)
         return kind(**{field.name: _field(field.name, document, single) for field in fields(kind)})
 
     def _request(self, method: str, path: str, body: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -197,6 +162,8 @@ class Client:
 
 # Rows × lines; a single list is one row.
 _LINES = ("frf_re_pc_per_n", "frf_im_pc_per_n")
+# Fields of requests that are no columns.
+_SHARED = (*_LINES, "frequency_hz", "band_hz", "units_checked", "model", "skin_id", "sensor")
 
 
 def _array(value: Any) -> Floats:

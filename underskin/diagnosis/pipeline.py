@@ -15,12 +15,7 @@ from underskin.diagnosis.inference.residuals import residuals, whole_prediction
 from underskin.diagnosis.localisation.effect_size import effect
 from underskin.diagnosis.localisation.permutation_test import SEED, locate
 from underskin.diagnosis.localisation.region import in_region, region
-from underskin.diagnosis.localisation.residual_shape import (
-    above_noise,
-    contradicts,
-    describe,
-    largest_floor_percent,
-)
+from underskin.diagnosis.localisation.residual_shape import above_noise, contradicts, describe, largest_floor_percent
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
@@ -142,15 +137,12 @@ def _work_out(
         groups=groups,
         confounded=left_open(confounded, result.answers),
         shape=shape,
-        next_experiment=plan(problem, result, limits),
+        plan=plan(problem, result, limits),
     )
 
 
 def diagnosis_report(
-    campaign: Campaign,
-    table: SigmaTable,
-    progress: Progress = lambda _: None,
-    refused: Sequence[RecordingProblem] = (),
+    campaign: Campaign, table: SigmaTable, progress: Progress = lambda _: None, refused: Sequence[RecordingProblem] = ()
 ) -> dict[str, Any]:
     """The report of a campaign's diagnosis (`report/1`); `refused` recordings are named among the findings."""
     diagnosis = with_refused(diagnose(campaign, table, progress), refused)

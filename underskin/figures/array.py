@@ -11,7 +11,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
-from underskin.errors import InvalidInput
+from underskin.errors import unequal_lengths
 from underskin.figures.style import COLOURS, MARKERS, label, styled
 from underskin.units import Floats
 
@@ -187,7 +187,7 @@ def _columns(rows: Sequence[str], **columns: ArrayLike) -> list[Floats]:
     for name, column in columns.items():
         array = np.asarray(column, dtype=float)
         if array.shape != (len(rows),):
-            raise InvalidInput(name, f"shape {array.shape}", f"must have {len(rows)} entries")
+            raise unequal_lengths(name, array.size, len(rows), "rows")
         arrays.append(array)
     return arrays
 

@@ -1,9 +1,9 @@
 """The figures of one campaign, from its inversion, and a page that shows them without network or server."""
 
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from underskin.figures import array_map, frf_versus_preload, response_per_sensor
 from underskin.inversion.invert import Inversion
@@ -13,18 +13,6 @@ from underskin.units import Floats, to_lab
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
-
-_PAGE = """<!doctype html>
-<html lang="en">
-<head><meta charset="utf-8"><title>{title}</title></head>
-<body style="font-family: sans-serif; max-width: 70em; margin: 1em auto">
-<h1>{title}</h1>
-<p>Averaged over the band {band}. Lines show the model with the array's d33.</p>
-{notes}
-{figures}
-</body>
-</html>
-"""
 
 
 def figures(campaign: Campaign, inversion: Inversion) -> "tuple[go.Figure, go.Figure, go.Figure]":
@@ -60,20 +48,17 @@ def figures(campaign: Campaign, inversion: Inversion) -> "tuple[go.Figure, go.Fi
 
 def page(campaign: Campaign, inversion: Inversion) -> str:
     """An HTML page with the figures one below the other; it contains plotly's script once."""
+    environment = Environment(loader=PackageLoader("underskin.figures"), autoescape=True, undefined=StrictUndefined)
     parts = [
         figure.to_html(full_html=False, include_plotlyjs=number == 0, div_id=f"figure-{number}")
         for number, figure in enumerate(figures(campaign, inversion))
     ]
-    notes = "".join(f"<li>{escape(note.sentence)}</li>" for note in (*inversion.findings, *inversion.left_out))
-    return _PAGE.format(
-        title=escape(campaign.name),
-        band=escape(
-            f"{inversion.zone.low_hz:.4g} to {inversion.zone.high_hz:.4g} Hz"
-            if inversion.zone.chosen_by_user
-            else inversion.zone.reason
-        ),
-        notes=f"<p>Left out, or worth a look:</p><ul>{notes}</ul>" if notes else "",
-        figures="\n".join(parts),
+    zone = inversion.zone
+    return environment.get_template("campaign.html").render(
+        title=campaign.name,
+        band=f"{zone.low_hz:.4g} to {zone.high_hz:.4g} Hz" if zone.chosen_by_user else zone.reason,
+        notes=[*inversion.findings, *inversion.left_out],
+        figures=parts,
     )
 
 

@@ -124,10 +124,7 @@ def _look(spread: FrfSpread, spreads: Sequence[FrfSpread]) -> tuple[str, str]:
     preloads = sorted({entry.preload_n for entry in spreads})
     radii = sorted({entry.indenter_radius_mm for entry in spreads})
     place = _BRIGHTEST * preloads.index(spread.preload_n) / max(len(preloads) - 1, 1)
-    return (
-        sample_colorscale("Viridis", [place])[0],
-        DASHES[radii.index(spread.indenter_radius_mm) % len(DASHES)],
-    )
+    return (sample_colorscale("Viridis", [place])[0], DASHES[radii.index(spread.indenter_radius_mm) % len(DASHES)])
 
 
 def _faint(colour: str) -> str:

@@ -39,12 +39,7 @@ class Finding:
 
     def in_report(self) -> dict[str, str]:
         """The finding as a diagnosis report holds it, for JSON."""
-        return {
-            "code": str(self.code),
-            "recording": self.recording,
-            "field": self.field,
-            "statement": self.statement,
-        }
+        return {"code": str(self.code), "recording": self.recording, "field": self.field, "statement": self.statement}
 
     @property
     def sentence(self) -> str:

@@ -10,19 +10,9 @@ from typing import Any, TypeVar, get_args
 
 import numpy as np
 
-from underskin.errors import InvalidInput
+from underskin.errors import InvalidInput, not_finite, not_unique, required
 from underskin.extensions import described
-from underskin.mechanisms.base import (
-    AXES,
-    NEEDED_FIELDS,
-    UNITS,
-    Kind,
-    Mechanism,
-    Normal,
-    Parameter,
-    Stage,
-    Uniform,
-)
+from underskin.mechanisms.base import AXES, NEEDED_FIELDS, UNITS, Kind, Mechanism, Normal, Parameter, Stage, Uniform
 from underskin.mechanisms.models.compression import CompressionModel
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.models.indentation import IndentationModel
@@ -68,7 +58,7 @@ def check(mechanism: Mechanism, others: Sequence[Mechanism] = ()) -> None:
     """
     _check_traits(mechanism)
     if mechanism.name in {other.name for other in others}:
-        raise InvalidInput("name", mechanism.name, "is taken by another mechanism")
+        raise not_unique("name", mechanism.name, "is taken by another mechanism")
     taken = {entry.name: other.name for other in others for kind in other.kinds for entry in _parameters(other, kind)}
     taken |= dict.fromkeys(_NUISANCES, "the base model")
     spreads = [other.name for other in others for entry in _parameters(other, "frf") if entry.acts_on == "gain_spread"]
@@ -78,11 +68,11 @@ def check(mechanism: Mechanism, others: Sequence[Mechanism] = ()) -> None:
         for place, entry in enumerate(parameters):
             _check_parameter(mechanism, entry)
             if entry.name in {other.name for other in parameters[:place]}:
-                raise InvalidInput(_field(entry, "name"), entry.name, "must be that of one parameter")
+                raise not_unique(_field(entry, "name"), entry.name, "must be that of one parameter")
             if entry.name in taken:
-                raise InvalidInput(_field(entry, "name"), entry.name, f"is taken by {taken[entry.name]}")
+                raise not_unique(_field(entry, "name"), entry.name, f"is taken by {taken[entry.name]}")
             if entry.acts_on == "gain_spread" and spreads:
-                raise InvalidInput(_field(entry, "acts_on"), entry.acts_on, f"is taken by {spreads[0]}")
+                raise not_unique(_field(entry, "acts_on"), entry.acts_on, f"is taken by {spreads[0]}")
     for kind in mechanism.kinds:
         _check_numbers(mechanism, kind)
 
@@ -116,7 +106,7 @@ def _check_hooks(mechanism: Mechanism) -> None:
         good = mechanism.stage in HOOKS[name] or (name == "on_curve" and "frf" in mechanism.kinds)
         _require("stage", mechanism.stage.name, good, f"must be {stages}, since {name} is overridden")
     if not own and mechanism.moves_predictions:
-        raise InvalidInput("law", None, f"must be in one of the hooks {', '.join(HOOKS)}; none is overridden")
+        raise required("law", f"must be in one of the hooks {', '.join(HOOKS)}; none is overridden")
     curves = bool({"indentation", "compression"} & set(mechanism.kinds))
     allowed = "must hold indentation or compression where on_curve is overridden, and only there"
     _require("kinds", mechanism.kinds, curves == ("on_curve" in own), allowed)
@@ -163,7 +153,7 @@ def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
             answer = _called(f"{field} at {place}", partial(model.predict, fit))
         numbers = [answer.value, answer.slopes, *([] if answer.pickup is None else [answer.pickup])]
         if not all(np.isfinite(part).all() for part in numbers):
-            raise InvalidInput(f"{field} at {place}", None, "gives numbers that are not finite")
+            raise not_finite(f"{field} at {place}", None, "gives numbers that are not finite")
 
 
 def _model(mechanism: Mechanism, campaign: Campaign, kind: Kind) -> FrfModel | IndentationModel | CompressionModel:

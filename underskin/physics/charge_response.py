@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from underskin.errors import InvalidInput
+from underskin.errors import too_few
 from underskin.units import Floats
 
 
@@ -131,7 +131,7 @@ def plateau(lines: Floats, in_band: NDArray[np.bool_]) -> tuple[Floats, Floats]:
     """
     count = int(in_band.sum())
     if count == 0:
-        raise InvalidInput("band_hz", "no line inside", "must hold at least one entry of frequency_hz")
+        raise too_few("band_hz", "no line inside", "must hold at least one entry of frequency_hz")
     chosen = lines[:, in_band]
     if count == 1:
         return chosen[:, 0], np.full(len(chosen), np.nan)

@@ -19,7 +19,6 @@ from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
 MOST_A_OVER_H = LARGEST_A_OVER_H
-HERTZ_SHAPE: Floats = np.array([1.0, 1 / np.sqrt(5)])
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from underskin.autodiff import Differentiated
-from underskin.errors import InvalidInput
+from underskin.errors import out_of_range
 from underskin.physics.hankel_transform import hertz_transform, normal_stress, tangential_stress
 from underskin.units import Floats
 
@@ -47,7 +47,7 @@ def slip(glue_stiffness: float) -> float:
         If κ is negative or NaN.
     """
     if not glue_stiffness >= 0:
-        raise InvalidInput("glue_stiffness", glue_stiffness, "must be at least 0 (infinity: bonded)")
+        raise out_of_range("glue_stiffness", glue_stiffness, "must be at least 0 (infinity: bonded)")
     return 1 / (1 + glue_stiffness)
 
 
@@ -75,9 +75,9 @@ class Layer:
 
     def __post_init__(self) -> None:
         if not 0 <= self.poisson_ratio <= 0.5:
-            raise InvalidInput("poisson_ratio", self.poisson_ratio, "must be 0 to 0.5")
+            raise out_of_range("poisson_ratio", self.poisson_ratio, "must be 0 to 0.5")
         if not 0 <= self.slip <= 1:
-            raise InvalidInput("slip", self.slip, "must be 0 (bonded) to 1 (frictionless)")
+            raise out_of_range("slip", self.slip, "must be 0 (bonded) to 1 (frictionless)")
 
     def transmission(self, k: Floats) -> Differentiated:
         """Normal transmission M(k), 1 at k = 0, as `hankel_transform.normal_stress` takes it (γ_n, σ)."""

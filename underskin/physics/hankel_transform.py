@@ -78,12 +78,7 @@ def tangential_stress(transmission: Transform, rho: ArrayLike, offset: ArrayLike
 
 
 def _transform(
-    transmission: Transform,
-    pressure: Transform,
-    bessel: Transform,
-    a: ArrayLike,
-    rho: ArrayLike,
-    offset: ArrayLike,
+    transmission: Transform, pressure: Transform, bessel: Transform, a: ArrayLike, rho: ArrayLike, offset: ArrayLike
 ) -> Floats:
     a_all, rho_all, offset_all = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (a, rho, offset)))
     shape = a_all.shape

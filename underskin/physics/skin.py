@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from underskin.errors import InvalidInput
+from underskin.errors import out_of_range
 from underskin.units import Floats, checked
 
 INCOMPRESSIBLE = 0.5
@@ -82,10 +82,7 @@ def _checked_poisson_ratio(value: ArrayLike) -> Floats:
     bad = ~((values >= 0.0) & (values <= INCOMPRESSIBLE))
     if bad.any():
         first = int(np.argmax(bad))
-        raise InvalidInput(
-            "poisson_ratio",
-            float(values.flat[first]),
-            "must be 0 to 0.5",
-            index=first if values.ndim else None,
+        raise out_of_range(
+            "poisson_ratio", float(values.flat[first]), "must be 0 to 0.5", index=first if values.ndim else None
         )
     return values

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from underskin.errors import InvalidInput
+from underskin.errors import InvalidInput, conflicting
 from underskin.findings import sentences
 from underskin.mechanisms.base import Mechanism, Parameter, Stage
 from underskin.mechanisms.models.composed import forward_model
@@ -88,9 +88,7 @@ class AdoptedModel:
             there = np.atleast_1d(np.asarray(declared[name], dtype=float))
             if not np.allclose(there, here, rtol=_SAME, atol=0):
                 off = there[~np.isclose(there, here, rtol=_SAME, atol=0)][0]
-                raise InvalidInput(
-                    name, float(off), f"must be {here:g}, as the skin was declared when it was diagnosed"
-                )
+                raise conflicting(name, float(off), f"must be {here:g}, as the skin was declared when it was diagnosed")
 
     def response(self, conditions: Conditions, table: SigmaTable, *, level: bool = False) -> Response:
         """What each line of FRFs under these conditions shows; their `level` with one row a recording instead.

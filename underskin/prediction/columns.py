@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.errors import InvalidInput, Mention, Requirement
+from underskin.errors import ErrorCode, InvalidInput, Mention, Requirement
 from underskin.units import Floats
 
 
@@ -28,7 +28,7 @@ def rows(columns: Mapping[str, Floats]) -> int:
         if first is not None and count != long[first]:
             length = f" ({long[first]}), or be a single number"
             allowed = Requirement("must have as many rows as ", Mention(first), length)
-            raise InvalidInput(name, f"{count} rows", allowed)
+            raise InvalidInput(name, f"{count} rows", allowed, code=ErrorCode.UNEQUAL_LENGTHS)
     return 1 if first is None else long[first]
 
 

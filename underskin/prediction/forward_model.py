@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.errors import InvalidInput
+from underskin.errors import conflicting, not_one_of, out_of_range, required
 from underskin.mechanisms.base import Kind, Mechanism, Parameter
 from underskin.mechanisms.models.composed import Model, forward_model
 from underskin.mechanisms.models.composition import chosen, kind_of, parameters_together
@@ -85,7 +85,7 @@ def predict(
     acting = chosen(mechanisms, CATALOGUE)
     for mechanism in acting:
         if kind not in mechanism.kinds:
-            raise InvalidInput("mechanisms", mechanism.name, f"does not act on recordings of kind {kind}")
+            raise conflicting("mechanisms", mechanism.name, f"does not act on recordings of kind {kind}")
     if kind == "frf":
         require_fields(acting, conditions)
     model = forward_model(acting, conditions, table, kind)
@@ -120,7 +120,7 @@ def require_fields(mechanisms: Sequence[Mechanism], conditions: Conditions, mode
     for name, mechanism in needed_fields(mechanisms).items():
         for entry in conditions.recordings:
             if isinstance(entry, FrfConditions) and getattr(entry, name) is None:
-                raise InvalidInput(f"recordings[{entry.id}].{name}", None, f"is required: {model} has {mechanism}")
+                raise required(f"recordings[{entry.id}].{name}", f"is required: {model} has {mechanism}")
 
 
 def _fit_coordinates(model: Model, values: Mapping[str, float], own: int) -> NDArray[np.float64]:
@@ -131,16 +131,16 @@ def _fit_coordinates(model: Model, values: Mapping[str, float], own: int) -> NDA
     names = [entry.name for entry in model.parameters]
     for name in values:
         if name not in names:
-            raise InvalidInput("parameters", name, f"must be one of {', '.join(names)}")
-    required = {*names[:own], "d33"}
-    return np.array([_coordinate(entry, values.get(entry.name), entry.name in required) for entry in model.parameters])
+            raise not_one_of("parameters", name, names)
+    needed = {*names[:own], "d33"}
+    return np.array([_coordinate(entry, values.get(entry.name), entry.name in needed) for entry in model.parameters])
 
 
-def _coordinate(entry: Parameter, value: float | None, required: bool) -> float:
+def _coordinate(entry: Parameter, value: float | None, needed: bool) -> float:
     if value is None:
-        if required:
-            raise InvalidInput(f"parameters.{entry.name}", None, f"required, in {entry.unit}: {entry.reason}")
+        if needed:
+            raise required(f"parameters.{entry.name}", f"required, in {entry.unit}: {entry.reason}")
         return entry.start
     if not entry.low <= value <= entry.high:
-        raise InvalidInput(f"parameters.{entry.name}", value, f"must be {entry.low:g} to {entry.high:g} {entry.unit}")
+        raise out_of_range(f"parameters.{entry.name}", value, f"must be {entry.low:g} to {entry.high:g} {entry.unit}")
     return entry.to_fit(value)

@@ -10,7 +10,17 @@ from typing import Any, Self
 
 import numpy as np
 
-from underskin.errors import REQUIRED, ErrorCode, InvalidInput, Mention, Requirement
+from underskin.errors import (
+    ErrorCode,
+    InvalidInput,
+    conflicting,
+    not_one_of,
+    not_unique,
+    required,
+    too_few,
+    unequal_lengths,
+    wrong_type,
+)
 from underskin.recordings import validation as field
 from underskin.recordings.conditions import (
     CompressionConditions,
@@ -19,7 +29,7 @@ from underskin.recordings.conditions import (
     IndentationConditions,
     SkinDescription,
 )
-from underskin.recordings.shown_values import named, shown
+from underskin.recordings.shown_values import shown
 from underskin.units import Complexes, Floats
 
 SCHEMA = "campaign/1"
@@ -109,7 +119,7 @@ def frf_recordings(campaign: Campaign) -> list[FrfRecording]:
     """The campaign's FRF recordings, in order; raises InvalidInput where there is none."""
     recordings = [entry for entry in campaign.recordings if isinstance(entry, FrfRecording)]
     if not recordings:
-        raise InvalidInput("recordings", "none of kind frf", "must hold at least one")
+        raise too_few("recordings", "none of kind frf", "must hold at least one")
     return recordings
 
 
@@ -118,30 +128,20 @@ def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
 
     Raises InvalidInput where the campaign itself or its skin cannot be used.
     """
-    document = field.mapping("campaign", document)
-    for name in document:
-        if name not in ("schema", "name", "skin", "recordings", "units_checked"):
-            raise InvalidInput(
-                named(name), shown(document[name]), "unknown field of a campaign", code=ErrorCode.UNKNOWN_FIELD
-            )
-    if document.get("schema") != SCHEMA:
-        raise InvalidInput("schema", shown(document.get("schema")), f"must be {SCHEMA}", code=ErrorCode.NOT_ONE_OF)
+    fields_known = ("schema", "name", "skin", "recordings", "units_checked")
+    document = field.of_schema("campaign", document, SCHEMA, fields_known)
     units_checked = field.flag("units_checked", document.get("units_checked", False), False)
     name = field.name("name", document.get("name"), units_checked)
     skin = field.build(SkinDescription, "skin", document.get("skin"), units_checked)
     entries = document.get("recordings")
     if not isinstance(entries, list) or not entries:
-        raise InvalidInput(
-            "recordings", shown(entries), "must be a list of at least one recording", code=ErrorCode.WRONG_TYPE
-        )
+        raise wrong_type("recordings", shown(entries), "must be a list of at least one recording")
     good: dict[str, Recording] = {}
     problems: list[RecordingProblem] = []
     for index, entry in enumerate(entries):
         recording, refused = _recording(entry, skin, units_checked)
         if recording is not None and recording.id in good:
-            refused = [
-                InvalidInput("id", recording.id, "must differ from every other recording's", code=ErrorCode.NOT_UNIQUE)
-            ]
+            refused = [not_unique("id", recording.id, "must differ from every other recording's")]
         if recording is not None and not refused:
             good[recording.id] = recording
         label = recording.id if recording is not None else _label(entry, index)
@@ -198,9 +198,7 @@ def _recording(entry: Any, skin: SkinDescription, units_checked: bool) -> tuple[
         return None, [refusal]
     kind = document.get("kind") or "frf"
     if not isinstance(kind, str) or kind not in KINDS:
-        return None, [
-            InvalidInput("kind", shown(kind), f"must be one of {', '.join(KINDS)}", code=ErrorCode.NOT_ONE_OF)
-        ]
+        return None, [not_one_of("kind", shown(kind), KINDS)]
     values, refused = field.check_fields(KINDS[kind], document, units_checked=units_checked)
     if refused:
         return None, refused
@@ -218,7 +216,7 @@ def _unmet_needs(recording: Recording, skin: SkinDescription) -> list[InvalidInp
         )
     if isinstance(recording, FrfRecording):
         refused += [
-            InvalidInput(f"skin.{name}", None, "required by a recording of kind frf", code=ErrorCode.REQUIRED)
+            required(f"skin.{name}", "required by a recording of kind frf")
             for name in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm")
             if getattr(skin, name) is None
         ]
@@ -235,15 +233,9 @@ def _not_one_of_two_forms(recording: FrfRecording) -> list[InvalidInput]:
     series = [name for name in _TIME_SERIES if getattr(recording, name) is not None]
     lines = [name for name in (*_LINES, "coherence") if getattr(recording, name) is not None]
     if series and lines:
-        return [
-            InvalidInput(series[0], "given", "must be absent where the FRF itself is given", code=ErrorCode.CONFLICTING)
-        ]
+        return [conflicting(series[0], "given", "must be absent where the FRF itself is given")]
     needed = _TIME_SERIES if series else _LINES
-    return [
-        InvalidInput(name, None, REQUIRED, code=ErrorCode.REQUIRED)
-        for name in needed
-        if getattr(recording, name) is None
-    ]
+    return [required(name) for name in needed if getattr(recording, name) is None]
 
 
 def _unequal_lengths(recording: Recording) -> list[InvalidInput]:
@@ -255,16 +247,7 @@ def _unequal_lengths(recording: Recording) -> list[InvalidInput]:
     if len(set(columns.values())) < 2:
         return []
     first, length = next(iter(columns.items()))
-    return [
-        InvalidInput(
-            name,
-            f"{size} entries",
-            Requirement(f"must have {length} entries, as many as ", Mention(first)),
-            code=ErrorCode.UNEQUAL_LENGTHS,
-        )
-        for name, size in columns.items()
-        if size != length
-    ]
+    return [unequal_lengths(name, size, length, first) for name, size in columns.items() if size != length]
 
 
 def _label(entry: Any, index: int) -> str:

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from underskin.errors import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique, too_few, wrong_type
 from underskin.recordings import validation as field
 from underskin.recordings.shown_values import shown
 from underskin.units import Floats, to_si
@@ -29,12 +29,12 @@ class Sensor:
 
 def _sensors(name: str, value: Any, units_checked: bool) -> tuple[Sensor, ...]:
     if not isinstance(value, list | tuple):
-        raise InvalidInput(name, shown(value), "must be a list of sensors")
+        raise wrong_type(name, shown(value), "must be a list of sensors")
     sensors = [field.build(Sensor, f"{name}[{index}]", entry, units_checked) for index, entry in enumerate(value)]
     seen: set[str] = set()
     for index, sensor in enumerate(sensors):
         if sensor.id in seen:
-            raise InvalidInput(f"{name}[{index}].id", sensor.id, "must differ from every other sensor's")
+            raise not_unique(f"{name}[{index}].id", sensor.id, "must differ from every other sensor's")
         seen.add(sensor.id)
     return tuple(sensors)
 
@@ -170,11 +170,11 @@ def frf_conditions(
     """
     unknown = [name for name in further if name not in _FURTHER_COLUMNS]
     if unknown:
-        raise InvalidInput(unknown[0], "given", f"must be one of {', '.join(_FURTHER_COLUMNS)}")
+        raise not_one_of(unknown[0], "given", _FURTHER_COLUMNS)
     skin = skin if skin.sensors else replace(skin, sensors=(Sensor("sensor", 0.0, 0.0),))
     centres = {entry.id: entry for entry in skin.sensors}
     if sensor is not None and sensor not in centres:
-        raise InvalidInput("sensor", sensor, f"must be one of {', '.join(centres)}")
+        raise not_one_of("sensor", sensor, centres)
     centre = skin.sensors[0] if sensor is None else centres[sensor]
     columns = {name: values for name, values in further.items() if values is not None}
     columns = {"offset_x_mm": 0.0, "offset_y_mm": 0.0, "dynamic_force_n": 0.0} | columns
@@ -198,7 +198,9 @@ def _rows(columns: Mapping[str, ArrayLike]) -> list[dict[str, Any]]:
         whole = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values, dtype=float)) for values in columns.values()))
     except ValueError:
         lengths = ", ".join(f"{name} {np.size(values)}" for name, values in columns.items())
-        raise InvalidInput("columns", lengths, "must have one length, or be single numbers") from None
+        raise InvalidInput(
+            "columns", lengths, "must have one length, or be single numbers", code=ErrorCode.UNEQUAL_LENGTHS
+        ) from None
     return [dict(zip(columns, row, strict=True)) for row in zip(*(column.tolist() for column in whole), strict=True)]
 
 
@@ -206,7 +208,7 @@ def frf_of(conditions: Conditions) -> list[FrfConditions]:
     """Those of FRF recordings, in order; raises InvalidInput where there is none."""
     recordings = [entry for entry in conditions.recordings if isinstance(entry, FrfConditions)]
     if not recordings:
-        raise InvalidInput("recordings", "none of kind frf", "must hold at least one")
+        raise too_few("recordings", "none of kind frf", "must hold at least one")
     return recordings
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from underskin.errors import ErrorCode, InvalidInput, Mention, Requirement
+from underskin.errors import InvalidInput, too_few, unequal_lengths, unusable
 from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
 from underskin.units import Floats, to_lab, to_si
 
@@ -181,29 +181,19 @@ def _amplification(jacobian: Floats) -> float:
     normal = shape.T @ shape
     if np.linalg.matrix_rank(normal, hermitian=True) < len(normal):
         allowed = "must tell the modulus from the contact point: more samples in contact"
-        raise InvalidInput(
-            "displacement_mm",
-            f"{np.count_nonzero(jacobian[:, 0])} samples in contact",
-            allowed,
-            code=ErrorCode.UNUSABLE_SIGNAL,
-        )
+        raise unusable("displacement_mm", f"{np.count_nonzero(jacobian[:, 0])} samples in contact", allowed)
     return float(np.sqrt(np.linalg.inv(normal)[0, 0]) / size[0])
 
 
 def _loading(along: Floats, load: Floats) -> tuple[Floats, Floats]:
     """The branch up to the largest load."""
     if len(along) != len(load):
-        allowed = Requirement(f"must have {len(along)}, as many as ", Mention("displacement_mm"))
-        raise InvalidInput("force_n", f"{len(load)} entries", allowed, code=ErrorCode.UNEQUAL_LENGTHS)
+        raise unequal_lengths("force_n", len(load), len(along), "displacement_mm")
     top = int(np.argmax(np.abs(load - load[0])))
     if top + 1 < _FEWEST:
-        raise InvalidInput(
-            "force_n", f"largest at entry {top}", f"must load over at least {_FEWEST} entries", code=ErrorCode.TOO_FEW
-        )
+        raise too_few("force_n", f"largest at entry {top}", f"must load over at least {_FEWEST} entries")
     if along[top] == along[0]:
-        raise InvalidInput(
-            "displacement_mm", float(along[top]), "must change while the force rises", code=ErrorCode.UNUSABLE_SIGNAL
-        )
+        raise unusable("displacement_mm", float(along[top]), "must change while the force rises")
     return along[: top + 1], load[: top + 1]
 
 

@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 from pathlib import PurePath
 from typing import Any
 
-from underskin.errors import ErrorCode, InvalidInput
+from underskin.errors import conflicting, too_few
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import Campaign, Recording
 from underskin.recordings.conditions import SkinDescription
@@ -33,7 +33,7 @@ def join(name: str, files: Files, skin_id: str | None = None) -> Reading:
     """
     name = field.name("name", name, False)
     if not files:
-        raise InvalidInput("files", "none", "must be at least one", code=ErrorCode.TOO_FEW)
+        raise too_few("files", "none", "must be at least one")
     skin = _skin(files, skin_id)
     names = _names(files)
     recordings, repeats = _once(
@@ -63,7 +63,7 @@ def _skin(files: Files, skin_id: str | None) -> SkinDescription:
             first, other = said.setdefault(name, (value, file))
             if not _same(value, first):
                 allowed = f"in {file}; must be {first!r}, as in {other}: files are joined where they are of one skin"
-                raise InvalidInput(f"skin.{name}", value, allowed, code=ErrorCode.CONFLICTING)
+                raise conflicting(f"skin.{name}", value, allowed)
         sensors.update({sensor.id: sensor for sensor in skin.sensors if sensor.id not in sensors})
     known = {entry.name: said[entry.name][0] for entry in fields(SkinDescription) if entry.name in said}
     return SkinDescription(**known, sensors=tuple(sensors.values()))

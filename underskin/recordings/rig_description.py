@@ -19,7 +19,17 @@ from typing import Annotated, Any
 
 import yaml
 
-from underskin.errors import ErrorCode, FileError, InvalidInput, Mention, Requirement
+from underskin.errors import (
+    ErrorCode,
+    FileError,
+    InvalidInput,
+    Mention,
+    Requirement,
+    conflicting,
+    not_one_of,
+    required,
+    too_few,
+)
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import COLUMNS, KINDS
 from underskin.recordings.conditions import SkinDescription
@@ -99,17 +109,11 @@ def parse(data: bytes, file: str) -> RigDescription:
 
 def from_dict(document: Any) -> RigDescription:
     """The rig description of a document; raises InvalidInput that names the field."""
-    document = mapping("rig", document)
-    for name in document:
-        if name not in ("schema", "name", "kind", "skin", "recording", "channels", "units_checked"):
-            raise InvalidInput(
-                named(name), shown(document[name]), "unknown field of a rig description", code=ErrorCode.UNKNOWN_FIELD
-            )
-    if document.get("schema") != SCHEMA:
-        raise InvalidInput("schema", shown(document.get("schema")), f"must be {SCHEMA}", code=ErrorCode.NOT_ONE_OF)
+    fields_known = ("schema", "name", "kind", "skin", "recording", "channels", "units_checked")
+    document = field.of_schema("rig description", document, SCHEMA, fields_known)
     kind = document.get("kind", "frf")
     if not isinstance(kind, str) or kind not in KINDS:
-        raise InvalidInput("kind", shown(kind), f"must be one of {', '.join(KINDS)}", code=ErrorCode.NOT_ONE_OF)
+        raise not_one_of("kind", shown(kind), KINDS)
     field.name("name", document.get("name", SCHEMA), False)
     known = {entry.name for entry in fields(KINDS[kind])} - {"kind"}
     recording = mapping("recording", document.get("recording", {}))
@@ -137,40 +141,21 @@ def _channels(kind: str, document: Any) -> dict[str, ChannelMapping]:
     channels = {name: field.build(ChannelMapping, f"channels.{name}", value, False) for name, value in given.items()}
     for name, entry in channels.items():
         if (entry.sensitivity is None) != (entry.sensitivity_unit is None):
-            raise InvalidInput(
-                f"channels.{name}.sensitivity",
-                entry.sensitivity,
-                "needs a sensitivity_unit, and it one",
-                code=ErrorCode.CONFLICTING,
-            )
+            raise conflicting(f"channels.{name}.sensitivity", entry.sensitivity, "needs a sensitivity_unit, and it one")
         if entry.labelled is not None and entry.unit is None:
-            raise InvalidInput(
-                f"channels.{name}.unit",
-                None,
-                "required where labelled says that the label is wrong",
-                code=ErrorCode.REQUIRED,
-            )
+            raise required(f"channels.{name}.unit", "required where labelled says that the label is wrong")
         if entry.stiffness_n_per_mm is not None and (name != "displacement_mm" or "force_n" not in channels):
-            raise InvalidInput(
-                f"channels.{name}.stiffness_n_per_mm",
-                entry.stiffness_n_per_mm,
-                Requirement("is for ", Mention("displacement_mm")),
-                code=ErrorCode.CONFLICTING,
-            )
+            allowed = Requirement("is for ", Mention("displacement_mm"))
+            raise conflicting(f"channels.{name}.stiffness_n_per_mm", entry.stiffness_n_per_mm, allowed)
     if not channels:
-        raise InvalidInput("channels", "none", "must name at least one channel", code=ErrorCode.TOO_FEW)
+        raise too_few("channels", "none", "must name at least one channel")
     return channels
 
 
 def _known(prefix: str, document: Mapping[str, Any], known: set[str]) -> Mapping[str, Any]:
     for name in document:
         if name not in known:
-            raise InvalidInput(
-                f"{prefix}.{named(name)}",
-                shown(document[name]),
-                f"must be one of {sorted(known)}",
-                code=ErrorCode.NOT_ONE_OF,
-            )
+            raise not_one_of(f"{prefix}.{named(name)}", shown(document[name]), sorted(known))
     return document
 
 

@@ -5,7 +5,7 @@ field in its annotation, by one of the types at the end.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, fields
 from datetime import datetime
 from functools import cache
@@ -14,7 +14,16 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from underskin.errors import REQUIRED, ErrorCode, InvalidInput
+from underskin.errors import (
+    ErrorCode,
+    InvalidInput,
+    not_finite,
+    not_one_of,
+    out_of_range,
+    required,
+    too_few,
+    wrong_type,
+)
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings.shown_values import LONGEST_NAME, named, shown
 from underskin.units import Floats, checked
@@ -36,26 +45,33 @@ def check_fields(
     `model` is a dataclass; a field that has a default may be left out or null.
     """
     known = _checks(model)
-    unknown = (name for name in document if name not in known)
-    refused = [
-        InvalidInput(
-            named(name),
-            shown(document[name]),
-            f"unknown field; known: {', '.join(known)}",
-            code=ErrorCode.UNKNOWN_FIELD,
-        )
-        for name in islice(unknown, _MOST_UNKNOWN)
-    ]
+    refused = _unknown_fields(document, known, f"unknown field; known: {', '.join(known)}")
     values: dict[str, Any] = {}
     for name, (field_check, default) in known.items():
         value = document.get(name)
         try:
             if value is None and default is MISSING:
-                raise InvalidInput(name, None, REQUIRED, code=ErrorCode.REQUIRED)
+                raise required(name)
             values[name] = default if value is None else field_check(name, value, units_checked)
         except InvalidInput as refusal:
             refused.append(refusal)
     return values, refused
+
+
+def _unknown_fields(document: Mapping[str, Any], known: Collection[str], allowed: str) -> list[InvalidInput]:
+    unknown = islice((name for name in document if name not in known), _MOST_UNKNOWN)
+    code = ErrorCode.UNKNOWN_FIELD
+    return [InvalidInput(named(name), shown(document[name]), allowed, code=code) for name in unknown]
+
+
+def of_schema(noun: str, value: Any, schema: str, known: Collection[str]) -> Mapping[str, Any]:
+    """A JSON object that has its `schema` and no unknown field; `noun`: what it is called."""
+    document = mapping(noun, value)
+    if unknown := _unknown_fields(document, known, f"unknown field of a {noun}"):
+        raise unknown[0]
+    if document.get("schema") != schema:
+        raise not_one_of("schema", shown(document.get("schema")), (schema,))
+    return document
 
 
 def mapping(field: str, value: Any) -> Mapping[str, Any]:
@@ -108,7 +124,7 @@ def number(field: str, value: Any, units_checked: bool = False) -> float:  # noq
     except OverflowError:
         result = math.inf
     if not math.isfinite(result):
-        raise InvalidInput(field, shown(result), "must be finite", code=ErrorCode.NOT_FINITE)
+        raise not_finite(field, shown(result))
     return result
 
 
@@ -116,7 +132,7 @@ def positive(field: str, value: Any, units_checked: bool) -> float:  # noqa: ARG
     """A measured or chosen quantity greater than 0, of any magnitude."""
     result = number(field, value)
     if result <= 0:
-        raise InvalidInput(field, result, "must be greater than 0", code=ErrorCode.OUT_OF_RANGE)
+        raise out_of_range(field, result, "must be greater than 0")
     return result
 
 
@@ -124,7 +140,7 @@ def not_negative(field: str, value: Any, units_checked: bool) -> float:  # noqa:
     """A number that is 0 or greater."""
     result = number(field, value)
     if result < 0:
-        raise InvalidInput(field, result, "must be 0 or greater", code=ErrorCode.OUT_OF_RANGE)
+        raise out_of_range(field, result, "must be 0 or greater")
     return result
 
 
@@ -139,7 +155,7 @@ def poisson_ratio(field: str, value: Any, units_checked: bool) -> float:  # noqa
     """0 to 0.5."""
     result = number(field, value)
     if not 0 <= result <= INCOMPRESSIBLE:
-        raise InvalidInput(field, result, f"must be 0 to {INCOMPRESSIBLE}", code=ErrorCode.OUT_OF_RANGE)
+        raise out_of_range(field, result, f"must be 0 to {INCOMPRESSIBLE}")
     return result
 
 
@@ -157,9 +173,7 @@ def time_of_day(field: str, value: Any, units_checked: bool) -> str:
     try:
         datetime.fromisoformat(text)
     except ValueError:
-        raise InvalidInput(
-            field, text, "must be a date and time like 2017-05-03T09:00:00Z", code=ErrorCode.WRONG_TYPE
-        ) from None
+        raise wrong_type(field, text, "must be a date and time like 2017-05-03T09:00:00Z") from None
     return text
 
 
@@ -179,7 +193,7 @@ def series(field: str, value: Any, units_checked: bool) -> Floats:  # noqa: ARG0
     """A column of at least one finite number."""
     column = _column(field, value)
     if column.size == 0:
-        raise InvalidInput(field, shown(value), "must hold at least one number", code=ErrorCode.TOO_FEW)
+        raise too_few(field, shown(value), "must hold at least one number")
     _refuse_where(field, column, ~np.isfinite(column), "must be finite", ErrorCode.NOT_FINITE)
     return column
 
@@ -187,13 +201,8 @@ def series(field: str, value: Any, units_checked: bool) -> Floats:  # noqa: ARG0
 def increasing(field: str, value: Any, units_checked: bool) -> Floats:
     """A column of finite numbers, each greater than the one before."""
     column = series(field, value, units_checked)
-    _refuse_where(
-        field,
-        column,
-        np.diff(column, prepend=-math.inf) <= 0,
-        "must be greater than the entry before",
-        ErrorCode.NOT_INCREASING,
-    )
+    falls = np.diff(column, prepend=-math.inf) <= 0
+    _refuse_where(field, column, falls, "must be greater than the entry before", ErrorCode.NOT_INCREASING)
     return column
 
 
@@ -204,48 +213,36 @@ def rows(field: str, value: Any, units_checked: bool) -> Floats:
     columns = [series(f"{field}[{index}]", row, units_checked) for index, row in enumerate(value)]
     for index, row in enumerate(columns):
         if row.size != columns[0].size:
-            raise InvalidInput(
-                field,
-                f"{row.size} columns",
-                f"must have as many as row 0 ({columns[0].size})",
-                index,
-                code=ErrorCode.UNEQUAL_LENGTHS,
-            )
+            allowed = f"must have as many as row 0 ({columns[0].size})"
+            raise InvalidInput(field, f"{row.size} columns", allowed, index, code=ErrorCode.UNEQUAL_LENGTHS)
     return np.stack(columns)
 
 
 def frequencies(field: str, value: Any, units_checked: bool) -> Floats:
     """An increasing column of frequencies above 0, from far below to far above what any instrument records."""
     column = increasing(field, value, units_checked)
-    _refuse_where(
-        field, column, column <= 0, "must be greater than 0 (leave out the line at 0 Hz)", ErrorCode.OUT_OF_RANGE
-    )
     low, high = _FREQUENCIES_HZ
-    _refuse_where(
-        field, column, (column < low) | (column > high), f"must be {low:g} to {high:g} Hz", ErrorCode.OUT_OF_RANGE
-    )
+    for bad, allowed in (
+        (column <= 0, "must be greater than 0 (leave out the line at 0 Hz)"),
+        ((column < low) | (column > high), f"must be {low:g} to {high:g} Hz"),
+    ):
+        _refuse_where(field, column, bad, allowed, ErrorCode.OUT_OF_RANGE)
     return column
 
 
 def not_falling(field: str, value: Any, units_checked: bool) -> Floats:
     """A column of times: none before the one above it."""
     column = series(field, value, units_checked)
-    _refuse_where(
-        field,
-        column,
-        np.diff(column, prepend=-math.inf) < 0,
-        "must not be before the entry above it",
-        ErrorCode.NOT_INCREASING,
-    )
+    falls = np.diff(column, prepend=-math.inf) < 0
+    _refuse_where(field, column, falls, "must not be before the entry above it", ErrorCode.NOT_INCREASING)
     return column
 
 
 def coherence(field: str, value: Any, units_checked: bool) -> Floats:
     """A column of coherences γ², 0 to 1."""
     column = series(field, value, units_checked)
-    _refuse_where(
-        field, column, (column < 0) | (column > 1 + _COHERENCE_ROUNDING), "must be 0 to 1", ErrorCode.OUT_OF_RANGE
-    )
+    bad = (column < 0) | (column > 1 + _COHERENCE_ROUNDING)
+    _refuse_where(field, column, bad, "must be 0 to 1", ErrorCode.OUT_OF_RANGE)
     return column
 
 
@@ -262,9 +259,7 @@ def _column(field: str, value: Any) -> Floats:
     try:
         return np.array(value, dtype=np.float64)
     except OverflowError:
-        raise InvalidInput(
-            field, shown(value), "holds a number too large to keep", code=ErrorCode.OUT_OF_RANGE
-        ) from None
+        raise out_of_range(field, shown(value), "holds a number too large to keep") from None
 
 
 def _refuse_where(field: str, column: Floats, bad: Any, allowed: str, code: ErrorCode) -> None:
@@ -274,7 +269,7 @@ def _refuse_where(field: str, column: Floats, bad: Any, allowed: str, code: Erro
 
 
 def _wrong_type(field: str, value: Any, allowed: str, index: int | None = None) -> InvalidInput:
-    return InvalidInput(field, shown(value), allowed, index, code=ErrorCode.WRONG_TYPE)
+    return wrong_type(field, shown(value), allowed, index=index)
 
 
 Name = Annotated[str, name]

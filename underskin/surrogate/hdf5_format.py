@@ -85,11 +85,7 @@ def _write_group(group: h5py.Group, datasets: Group, signal: str) -> None:
     group.attrs["axes"] = list(datasets[signal].axes)
     for name, dataset in datasets.items():
         stored = group.create_dataset(
-            name,
-            data=np.asarray(dataset.values, dtype="<f8"),
-            compression="gzip",
-            shuffle=True,
-            track_times=False,
+            name, data=np.asarray(dataset.values, dtype="<f8"), compression="gzip", shuffle=True, track_times=False
         )
         stored.attrs["units"] = ""
         stored.attrs["long_name"] = dataset.meaning

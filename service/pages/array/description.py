@@ -14,9 +14,9 @@ from service.pages.shared.typed_numbers import number
 from service.store import campaigns, skins
 from service.store.engine import Database
 from service.usecases.table_loader import influence_table
-from underskin import InvalidInput, UnderskinError
 from underskin.array_stress.answer import ArrayStress, answer
 from underskin.array_stress.request import read_request
+from underskin.errors import InvalidInput, UnderskinError, out_of_range, wrong_type
 from underskin.surrogate.sigma_table import SigmaTable
 
 _MOST_SENSORS = 10_000
@@ -92,9 +92,9 @@ def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:
     columns, rows, pitch = values["columns"], values["rows"], values["pitch_mm"]
     for name in ("columns", "rows"):
         if not values[name].is_integer():
-            raise InvalidInput(name, f"{values[name]:g}", "must be a whole number")
+            raise wrong_type(name, f"{values[name]:g}", "must be a whole number")
     if not (1 <= columns <= 1000 and 1 <= rows <= 1000 and columns * rows <= _MOST_SENSORS):
-        raise InvalidInput("columns", f"{columns:g} × {rows:g}", f"must be 1 to {_MOST_SENSORS} sensors in all")
+        raise out_of_range("columns", f"{columns:g} × {rows:g}", f"must be 1 to {_MOST_SENSORS} sensors in all")
     return [
         {"id": f"s{1 + row * int(columns) + column:02d}", "x_mm": pitch * column, "y_mm": pitch * row}
         for row in range(int(rows))

@@ -11,8 +11,8 @@ from service.pages.shared import same_request
 from service.pages.shared.figures import csv_answer, drawn
 from service.pages.shared.html import page
 from service.pages.shared.typed_numbers import numbers
-from underskin import InvalidInput, UnderskinError
 from underskin.array_stress.answer import ArrayStress
+from underskin.errors import UnderskinError, wrong_type
 
 router = APIRouter(prefix="/loads")
 
@@ -81,6 +81,6 @@ def _load(place: int, line: str) -> dict[str, Any]:
     """A line of numbers: x, y, radius and force, and perhaps the tangential force along x and y."""
     parts = numbers(f"load in line {place}", line)
     if len(parts) not in (4, 6):
-        raise InvalidInput(f"load in line {place}", line[:80], "must be x y R F, or x y R F Fx Fy (mm, N)")
+        raise wrong_type(f"load in line {place}", line[:80], "must be x y R F, or x y R F Fx Fy (mm, N)")
     load: dict[str, Any] = dict(zip(_ORDER, parts, strict=False))
     return {**load, "tangential_force_n": parts[4:]} if parts[4:] else load

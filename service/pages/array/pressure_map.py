@@ -21,9 +21,9 @@ from service.pages.shared.figures import Drawn, csv_text, drawn
 from service.pages.shared.forms import TOKEN, require_own
 from service.pages.shared.html import page
 from service.store.engine import Database
-from underskin import InvalidInput, UnderskinError
 from underskin.array_stress import pressure_map
 from underskin.array_stress.answer import ArrayStress
+from underskin.errors import UnderskinError, out_of_range
 from underskin.recordings.readers import text
 
 router = APIRouter(prefix="/loads/map")
@@ -65,7 +65,7 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
     answer: ArrayStress | None = None
     try:
         if len(content) > _LARGEST_BYTES:
-            raise InvalidInput("pressure_map", name, f"must have at most {_LARGEST_BYTES / 1e6:g} MB: make it coarser")
+            raise out_of_range("pressure_map", name, f"must have at most {_LARGEST_BYTES / 1e6:g} MB: make it coarser")
         pressure = pressure_map.parse(content, name)
         document = {**described.document(), "pressure_map": pressure}
         answer = description.answered(request, document)

@@ -17,7 +17,7 @@ from service.store.tables import AnyRow
 from service.usecases import d33_cache
 from service.usecases.campaigns import exclude as exclude_recording
 from service.usecases.figure_data import frf_columns
-from underskin import InvalidInput
+from underskin.errors import wrong_type
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
 
 router = APIRouter(prefix="/campaigns/{campaign_id}")
@@ -35,7 +35,7 @@ def _band(
     try:
         low, high = float(band_low_hz), float(band_high_hz)
     except ValueError:
-        raise InvalidInput("band_low_hz", band_low_hz, "band_low_hz and band_high_hz must both be numbers") from None
+        raise wrong_type("band_low_hz", band_low_hz, "band_low_hz and band_high_hz must both be numbers") from None
     return low, high
 
 

@@ -17,10 +17,10 @@ from service.pages.shared.form_errors import in_form_words
 from service.pages.shared.formats import short_and_exact
 from service.pages.shared.html import compress, page
 from service.pages.shared.skin_values import PROTOTYPE, start
-from service.problems import from_validation
+from service.problems import first_refused
 from service.schemas.design import DesignAnswer, DesignRequest
 from service.usecases.design import design_answer, design_of
-from underskin import InvalidInput, UnderskinError
+from underskin.errors import UnderskinError, wrong_type
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/design")
@@ -168,19 +168,14 @@ def _given(request: Request) -> dict[str, float]:
     try:
         return {name: float(value) for name, value in request.query_params.items() if name in names}
     except ValueError:
-        raise InvalidInput("address", request.url.query[:80], "must have numbers") from None
+        raise wrong_type("address", request.url.query[:80], "must have numbers") from None
 
 
 def _asked(values: Mapping[str, float]) -> DesignRequest:
     try:
         return DesignRequest.model_validate(dict(values))
     except ValidationError as error:
-        raise InvalidInput(*_first(error)) from None
-
-
-def _first(error: ValidationError) -> tuple[str, Any, str]:
-    results = from_validation(error).errors[0]
-    return results["field"], results["value"], results["allowed"]
+        raise first_refused(error) from None
 
 
 def _computed(request: Request, table: SigmaTable) -> DesignAnswer:

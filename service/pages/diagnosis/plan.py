@@ -17,7 +17,7 @@ from service.problems import Refusal
 from service.store import campaigns, diagnoses
 from service.store.engine import Database
 from service.store.tables import AnyRow
-from underskin import InvalidInput, UnderskinError
+from underskin.errors import UnderskinError, out_of_range, required
 
 if TYPE_CHECKING:
     from underskin.diagnosis.planning.rig_limits import RigLimits
@@ -107,17 +107,17 @@ def _limits(given: Mapping[str, str]) -> dict[str, Any]:
     if all(ends):
         limits["preload_n"] = tuple(number(name, text) for name, text in zip((_LOWEST, _HIGHEST), ends, strict=True))
     elif any(ends):
-        raise InvalidInput("preload_n", None, "give both, or leave both empty")
+        raise required("preload_n", "give both, or leave both empty")
     for name in _SEVERAL:
         parts = given.get(name, "").replace(",", " ").split()
         if len(parts) > _MOST_VALUES:
-            raise InvalidInput(name, len(parts), f"must be at most {_MOST_VALUES} numbers")
+            raise out_of_range(name, len(parts), f"must be at most {_MOST_VALUES} numbers")
         if parts:
             limits[name] = [number(name, part) for part in parts]
     count = given.get(_RECORDINGS, "").strip()
     if count:
         if not (count.isascii() and count.isdigit() and 1 <= int(count[:4]) <= _MOST_RECORDINGS):
-            raise InvalidInput(_RECORDINGS, count[:80], f"must be a whole number from 1 to {_MOST_RECORDINGS}")
+            raise out_of_range(_RECORDINGS, count[:80], f"must be a whole number from 1 to {_MOST_RECORDINGS}")
         limits[_RECORDINGS] = int(count)
     return limits
 

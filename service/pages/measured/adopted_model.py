@@ -14,7 +14,7 @@ from service.store.engine import Database
 from service.store.errors import Conflict
 from service.usecases.adopted_models import model_in_force
 from service.usecases.d33 import d33
-from underskin import InvalidInput, UnderskinError
+from underskin.errors import UnderskinError, required
 from underskin.surrogate.sigma_table import SigmaTable
 
 if TYPE_CHECKING:
@@ -75,5 +75,5 @@ def by_model(
 def _needed(model: "AdoptedModel", fields: Sequence[tuple[str, str, str, str]]) -> dict[str, Any]:
     if model.of_lines:
         names = " and ".join(name.replace("_", " ") for name in model.of_lines)
-        raise InvalidInput("FRF", None, f"one value is not enough: {names} depends on frequency, so upload recordings")
+        raise required("FRF", f"one value is not enough: {names} depends on frequency, so upload recordings")
     return {name: value if name == "sensor" else number(name, value) for name, _, _, value in fields if value}

@@ -18,12 +18,12 @@ from service.pages.shared.skin_fields import FIELDS as SKIN_FIELDS
 from service.pages.shared.skin_fields import UNITS
 from service.pages.shared.skin_values import start
 from service.pages.shared.typed_numbers import number, numbers
-from service.problems import from_validation
+from service.problems import first_refused
 from service.schemas.columns_answer import Columns
 from service.schemas.d33 import D33Columns
 from service.store.engine import Database
 from service.usecases.d33 import d33
-from underskin import InvalidInput, UnderskinError
+from underskin.errors import InvalidInput, UnderskinError, too_few, wrong_type
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/d33")
@@ -52,8 +52,7 @@ def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, r
         answer = _answered(table, store, document)
         adopted = by_model(store, table, skin, request.query_params, document)
     except ValidationError as problem:
-        entry = from_validation(problem).errors[0]
-        error = _said(InvalidInput(entry["field"], entry["value"], entry["allowed"], entry["index"]))
+        error = _said(first_refused(problem))
     except UnderskinError as problem:
         error = _said(problem)
     shown = document if adopted is None or adopted.document is None else adopted.document
@@ -117,7 +116,7 @@ def _document(values: Mapping[str, str], given: Mapping[str, str], rows: str) ->
     """The request of `POST /v1/d33`; raises InvalidInput."""
     parts = [_row(place, line) for place, line in enumerate(rows.splitlines(), 1) if line.strip()]
     if len({len(part) for part in parts}) != 1:
-        raise InvalidInput("measurements", len(parts), "must be one or more, all with an uncertainty or none")
+        raise too_few("measurements", len(parts), "must be one or more, all with an uncertainty or none")
     document: dict[str, Any] = {name: number(name, values[name]) for name, *_ in FIELDS}
     document |= dict(zip(_ORDER, (list(column) for column in zip(*parts, strict=True)), strict=False))
     return {**document, UNITS: True} if UNITS in given else document
@@ -126,5 +125,5 @@ def _document(values: Mapping[str, str], given: Mapping[str, str], rows: str) ->
 def _row(place: int, line: str) -> list[float]:
     parts = numbers(f"row {place}", line)
     if len(parts) not in (3, 4):
-        raise InvalidInput(f"row {place}", line[:80], "must be R F FRF, or R F FRF and its uncertainty (mm, N, pC/N)")
+        raise wrong_type(f"row {place}", line[:80], "must be R F FRF, or R F FRF and its uncertainty (mm, N, pC/N)")
     return parts

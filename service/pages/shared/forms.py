@@ -8,7 +8,7 @@ from fastapi.responses import RedirectResponse
 
 from service.auth import session
 from service.problems import Refusal
-from underskin import InvalidInput
+from underskin.errors import out_of_range
 
 TOKEN = "form_token"  # noqa: S105 -- the name of the field
 _LARGEST_BYTES = 100_000
@@ -45,7 +45,7 @@ def reason(sent: dict[str, str]) -> str:
     """Why, as somebody wrote it; raises InvalidInput."""
     why = sent.get("reason", "").strip()
     if not 0 < len(why) <= 1000:
-        raise InvalidInput("reason", why[:80], "must say why in 1 to 1000 characters")
+        raise out_of_range("reason", why[:80], "must say why in 1 to 1000 characters")
     return why
 
 

@@ -2,7 +2,7 @@
 
 import re
 
-from underskin import InvalidInput
+from underskin.errors import wrong_type
 from underskin.recordings.readers import text
 
 _BETWEEN = re.compile(r"[;\s]+|,(?:\s+|$)")  # numbers in a line: a comma without a space may be a decimal one
@@ -13,7 +13,7 @@ def number(name: str, typed: str) -> float:
     try:
         return float(typed)
     except ValueError:
-        raise InvalidInput(name, typed[:80], "must be a number") from None
+        raise wrong_type(name, typed[:80]) from None
 
 
 def numbers(name: str, line: str) -> list[float]:
@@ -26,5 +26,5 @@ def numbers(name: str, line: str) -> list[float]:
     values = [text.number(cell, decimal) for cell in typed]
     if decimal == "," and None in values:
         allowed = "must be numbers with spaces between them, with decimal points or with decimal commas, not both"
-        raise InvalidInput(name, line[:80], allowed)
+        raise wrong_type(name, line[:80], allowed)
     return [number(name, cell) if value is None else value for cell, value in zip(typed, values, strict=True)]

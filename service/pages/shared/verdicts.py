@@ -8,7 +8,7 @@ from sqlalchemy import Connection
 
 from service.store import diagnoses
 from service.store.tables import AnyRow
-from underskin.diagnosis.data.names import EXPLAINED
+from underskin.diagnosis.data.names import EXPLAINED, in_words
 from underskin.findings.formatting import in_percent
 
 _WORTH_NAMING = 0.02  # probability of a rival, as in a report
@@ -20,7 +20,6 @@ _SAYS = {
     "no_mismatch": "no mismatch found",
     "insufficient_data": "too little data",
 }
-_SPECIAL = {"nothing_missing": "nothing missing", "none_of_these": "something without a name"}
 
 
 @dataclass(frozen=True)
@@ -38,11 +37,6 @@ def of_rows(connection: Connection, rows: Sequence[AnyRow], adopted: Sequence[st
     """By the diagnosis' id; `adopted`: ids of those whose model is in force."""
     reports = diagnoses.reports_of(connection, [row.number for row in rows if row.state == "done"])
     return {row.id: _verdict(row, reports.get(row.number, {}), row.id in adopted) for row in rows}
-
-
-def in_words(names: Sequence[str]) -> str:
-    """A set of mechanisms as a sentence has it."""
-    return " and ".join(_SPECIAL.get(name, name.replace("_", " ")) for name in names)
 
 
 def mechanisms_of(report: Mapping[str, Any]) -> list[str]:

@@ -14,8 +14,7 @@ from service.pages.upload.pending_uploads import PendingUpload
 from service.problems import Refusal
 from service.store.engine import Database
 from service.store.errors import Conflict, Missing
-from underskin import InvalidInput
-from underskin.errors import ErrorCode, FileError
+from underskin.errors import ErrorCode, FileError, InvalidInput
 
 SKIN_FIELD, CORRECTS = "skin", "corrects"
 

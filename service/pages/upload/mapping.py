@@ -5,8 +5,7 @@ from copy import deepcopy
 from typing import Any
 
 from service.pages.upload.file_summary import ChannelSummary
-from underskin import InvalidInput
-from underskin.errors import UNITS_CHECKED, ErrorCode, Mention, Requirement
+from underskin.errors import UNITS_CHECKED, ErrorCode, InvalidInput, Mention, Requirement, not_unique, wrong_type
 from underskin.recordings.readers.unit_labels import lab_field, unit
 from underskin.recordings.rig_description import SCHEMA, channel_fields
 
@@ -219,7 +218,7 @@ def _sensors(layout: str) -> tuple[list[dict[str, Any]] | None, list[InvalidInpu
         parts = next((parts for by in _SEPARATORS if len(parts := text.split(by)) == _PARTS), None)
         if parts is None:
             must = f"line {number} must be: name, x [mm], y [mm]; such as s{number}, 8, 0"
-            strange.append(InvalidInput("skin.sensors", text[:80], must))
+            strange.append(wrong_type("skin.sensors", text[:80], must))
             sensors.append({"id": text})
         else:
             name, x, y = parts
@@ -237,7 +236,7 @@ def _channels(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[st
         if field in by_field:
             first = by_field[field]["channel"]
             allowed = f"{first[:80]} is {CHANNELS.get(field, field)} already: set one of the two to “not used”"
-            twice.append(InvalidInput(f"channels.{field}", form[f"channel-{number}"], allowed))
+            twice.append(not_unique(f"channels.{field}", form[f"channel-{number}"], allowed))
         elif field:
             by_field[field] = _channel(form, number, base.get(field, {}))
         number += 1

@@ -145,10 +145,7 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
         skin_fields=SKIN,
         recording_fields=RECORDING,
         same=same_request.files(
-            request,
-            [one.label for one in pending.seen[:_MOST_NAMED]],
-            pending.rig_label,
-            pending.skin or "",
+            request, [one.label for one in pending.seen[:_MOST_NAMED]], pending.rig_label, pending.skin or ""
         ),
     )
 

@@ -9,8 +9,7 @@ from service.ingest.uploads import Upload
 from service.pages.upload.keep import field_errors
 from service.store import campaigns, skins
 from service.store.engine import Database
-from underskin import InvalidInput
-from underskin.errors import FileError
+from underskin.errors import FileError, InvalidInput
 from underskin.recordings import rig_description
 from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription
 

@@ -10,18 +10,15 @@ posterior updated: the chance that the true explanation then could be stated wit
 """
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.data.axes import WORDS
-from underskin.diagnosis.data.names import EXPLAINED, in_words
+from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.planning.rig_limits import RigLimits, candidates, inferred, wider
 from underskin.diagnosis.selection.search import Answer, Search
-from underskin.findings.formatting import in_percent
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.registry import CATALOGUE
@@ -36,67 +33,60 @@ _SURVIVES = 0.02
 _RIVALS = 4
 
 
-def plan(problem: FittingProblem, search: Search, limits: RigLimits) -> dict[str, Any]:
-    """The recordings to make, in lab units, what they cost, and the chance that they decide; empty if all is decided.
+@dataclass(frozen=True)
+class Plan:
+    """The recordings to make next and what they promise; no recordings where none tells the rivals apart."""
 
-    Where several answers remain and no recording can be planned, the document says why, with no recordings in it.
-    """
+    rivals: Sequence[Sequence[str]]  # the mechanisms of each
+    recordings: Sequence[FrfConditions] = ()  # one object for those that are repeats, which are neighbours
+    first: FrfConditions | None = None  # the recording that tells most
+    probability: float = 0.0  # of deciding
+    without: float = 0.0  # the same without further recordings
+    minutes: float = 0.0
+    beyond: bool = False  # the recordings go beyond what the campaign did
+    differ_on: Collection[str] = ()  # axes on which the rivals differ, where there are no recordings
+
+
+def plan(problem: FittingProblem, search: Search, limits: RigLimits) -> Plan | None:
+    """The recordings to make, what they cost, and the chance that they decide; None if all is decided."""
     surviving = [answer for answer in search.answers if answer.probability > _SURVIVES][:_RIVALS]
     if len(surviving) < 2:
-        return {}
+        return None
     if not problem.lines.curves:
         within = inferred(problem.lines.campaign, limits)
         for beyond, rig in enumerate([within] if limits.given else [within, wider(problem.lines.campaign, within)]):
             planned = _planned(problem, surviving, rig, bool(beyond))
             if planned:
                 return planned
-    return {} if surviving[0].probability >= EXPLAINED else _nothing_to_plan(surviving)
+    return None if surviving[0].probability >= EXPLAINED else _nothing_to_plan(surviving)
 
 
-def _planned(problem: FittingProblem, surviving: Sequence[Answer], limits: RigLimits, beyond: bool) -> dict[str, Any]:
-    """The best recordings within these limits; empty where none brings anything."""
+def _planned(problem: FittingProblem, surviving: Sequence[Answer], limits: RigLimits, beyond: bool) -> Plan | None:
+    """The best recordings within these limits; None where none brings anything."""
     allowed = candidates(problem.lines.campaign, limits)
     rivals, outlook, allowed = _outlook(problem, surviving, allowed)
     if len(rivals) < 2 or not allowed:
-        return {}
+        return None
     chosen, chance = _choose(outlook, allowed, limits)
     if not chosen:
-        return {}
+        return None
     spheres = {allowed[index].indenter_radius_mm for index in chosen}
-    names = [list(answer.names) for answer in rivals]
-    return {
-        "recordings": _described(allowed, chosen),
-        "separates": names,
-        "probability_of_deciding": round(chance, 3),
-        "without_it": round(outlook.deciding([]), 3),
-        "minutes": round(len(chosen) * limits.minutes_per_recording + len(spheres) * limits.minutes_per_indenter, 1),
-        "statement": _statement(allowed, chosen, chance, names, beyond),
-    }
+    return Plan(
+        rivals=[answer.names for answer in rivals],
+        recordings=[allowed[index] for index in sorted(chosen)],
+        first=allowed[chosen[0]],
+        probability=chance,
+        without=outlook.deciding([]),
+        minutes=len(chosen) * limits.minutes_per_recording + len(spheres) * limits.minutes_per_indenter,
+        beyond=beyond,
+    )
 
 
-def _nothing_to_plan(surviving: Sequence[Answer]) -> dict[str, Any]:
-    """Why no recording is planned, and on which axes the rivals would differ."""
-    names = [list(answer.names) for answer in surviving]
-    statement = f"No recording within these limits tells {_together([in_words(entry) for entry in names])} apart."
-    axes = [
-        {axis for name in entry for axis in CATALOGUE[name].axes} for entry in names if set(entry) <= set(CATALOGUE)
-    ]
-    apart = {axis for own in axes for axis in own if any(axis not in other for other in axes)}
-    if apart:
-        words = sorted(WORDS[axis][0] if axis in WORDS else axis for axis in apart)
-        statement += f" They differ in what they depend on: vary the {_together(words)} more widely than here."
-    return {
-        "recordings": [],
-        "separates": names,
-        "probability_of_deciding": 0.0,
-        "without_it": 0.0,
-        "minutes": 0.0,
-        "statement": statement,
-    }
-
-
-def _together(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+def _nothing_to_plan(surviving: Sequence[Answer]) -> Plan:
+    """No recordings, and on which axes the rivals would differ."""
+    names = [answer.names for answer in surviving]
+    axes = [{axis for name in own for axis in CATALOGUE[name].axes} for own in names if set(own) <= set(CATALOGUE)]
+    return Plan(names, differ_on=set().union(*axes) - set.intersection(*axes) if axes else set())
 
 
 def _outlook(
@@ -198,37 +188,3 @@ def _choose(outlook: _Outlook, candidates: Sequence[FrfConditions], limits: RigL
         best = chance
         steps = [(index,) for index in promising]
     return chosen, best
-
-
-def _described(candidates: Sequence[FrfConditions], chosen: Sequence[int]) -> list[dict[str, Any]]:
-    documents = []
-    for index in sorted(set(chosen)):
-        entry = candidates[index]
-        described: Mapping[str, Any] = {
-            "sensor": entry.sensor,
-            "indenter_radius_mm": entry.indenter_radius_mm,
-            "preload_n": entry.preload_n,
-            "dynamic_force_n": entry.dynamic_force_n,
-            "position_mm": list(entry.position_mm or ()),
-            "dwell_s": entry.dwell_s,
-            "repeats": list(chosen).count(index),
-        }
-        documents.append({name: value for name, value in described.items() if value is not None})
-    return documents
-
-
-def _statement(
-    candidates: Sequence[FrfConditions],
-    chosen: Sequence[int],
-    chance: float,
-    names: Sequence[Sequence[str]],
-    beyond: bool,
-) -> str:
-    entry = candidates[chosen[0]]
-    count = f"{len(chosen)} recordings, first" if len(chosen) > 1 else "One recording"
-    wider_than = " It goes beyond what this campaign did: check that the rig can." if beyond else ""
-    rivals = _together([in_words(rival) for rival in names])
-    return (
-        f"{count} with the {entry.indenter_radius_mm:g} mm sphere at {entry.preload_n:g} N, should tell which of "
-        f"{rivals} it is, with a probability of {in_percent(chance)}.{wider_than}"
-    )

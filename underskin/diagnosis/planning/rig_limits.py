@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from underskin.diagnosis.data.dataset import COLLAPSED_HZ
-from underskin.errors import InvalidInput
+from underskin.errors import out_of_range
 from underskin.recordings.conditions import Conditions, FrfConditions, frf_of, offsets
 
 MOST_RECORDINGS = 8
@@ -38,15 +38,15 @@ class RigLimits:
 
     def __post_init__(self) -> None:
         if self.preload_n is not None and not 0 < self.preload_n[0] <= self.preload_n[1] < math.inf:
-            raise InvalidInput("preload_n", list(self.preload_n), "must be above 0, the lowest first")
+            raise out_of_range("preload_n", list(self.preload_n), "must be above 0, the lowest first")
         for name in ("indenter_radius_mm", "dynamic_force_n"):
             if any(not 0 < value < math.inf for value in getattr(self, name) or ()):
-                raise InvalidInput(name, list(getattr(self, name)), "must be above 0, each")
+                raise out_of_range(name, list(getattr(self, name)), "must be above 0, each")
         for name in ("dwell_s", "offset_mm"):
             if any(not 0 <= value < math.inf for value in getattr(self, name) or ()):
-                raise InvalidInput(name, list(getattr(self, name)), "must be 0 or more, each")
+                raise out_of_range(name, list(getattr(self, name)), "must be 0 or more, each")
         if self.recordings < 1:
-            raise InvalidInput("recordings", self.recordings, "must be 1 or more")
+            raise out_of_range("recordings", self.recordings, "must be 1 or more")
 
     @property
     def given(self) -> bool:

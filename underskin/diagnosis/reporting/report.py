@@ -14,11 +14,14 @@ from underskin.diagnosis.localisation.effect_size import EffectSize
 from underskin.diagnosis.localisation.permutation_test import AxisResult
 from underskin.diagnosis.localisation.region import reaches_all_along
 from underskin.diagnosis.localisation.residual_shape import REACHES_NOISE, Shape
+from underskin.diagnosis.planning.optimal_design import Plan
+from underskin.diagnosis.reporting import next_experiment
 from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
 from underskin.diagnosis.reporting.numbers import parameter, place_of, probability, rounded
 from underskin.diagnosis.reporting.statements import (
+    CONFOUNDED,
     UNDECIDABLE,
     answer_statement,
     insufficient_statement,
@@ -54,11 +57,16 @@ class DiagnosisResult:
     groups: Sequence[cross_validation.HeldOut] = ()
     confounded: Sequence[Confounding] = ()
     shape: Shape | None = None  # of what remains, where no mechanism describes it
-    next_experiment: Mapping[str, Any] = field(default_factory=dict)
+    plan: Plan | None = None
+
+    @property
+    def next_experiment(self) -> dict[str, Any]:
+        """The recordings to make next, as in the report; empty where all is decided."""
+        return next_experiment.next_experiment(self.plan)
 
 
 def verdict(diagnosis: DiagnosisResult) -> str:
-    """The verdict that the probabilities give, as DESIGN.md defines it."""
+    """The verdict that the probabilities give, as docs/diagnosis.md explains it."""
     if diagnosis.search is None:
         return "insufficient_data"
     leader = diagnosis.search.answers[0]
@@ -107,13 +115,17 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         "mechanisms": [] if named is None else _mechanisms(search, problem, named),
         "alternatives": _alternatives(search.answers),
         "not_identifiable": [
-            {"mechanism": entry.mechanism, "confounded_with": entry.confounded_with, "reason": entry.reason}
+            {
+                "mechanism": entry.mechanism,
+                "confounded_with": entry.confounded_with,
+                "reason": CONFOUNDED[entry.why].format(mechanism=entry.mechanism, other=entry.confounded_with),
+            }
             for entry in diagnosis.confounded
         ],
         "findings": findings,
         "fit": fit,
         "d33": d33,
-        "next_experiment": dict(diagnosis.next_experiment) or None,
+        "next_experiment": diagnosis.next_experiment or None,
         "provenance": dict(diagnosis.provenance),
     }
 

@@ -19,7 +19,7 @@ _VERDICTS = {
 }
 _NOTHING_NEXT = {
     "unexplained": "No recording can be planned for a law that is not known here. Repeat one where most of the misfit "
-    "lies, to see that it comes again; then change one thing of the rig at a time.",
+    "lies, to see that it comes again; then change one thing of the rig at a time."
 }
 _DECIDED = "Nothing more is needed for this answer: these recordings decide."
 _AFTER = {

@@ -18,6 +18,7 @@ from underskin.diagnosis.localisation.residual_shape import (
     ShapeForm,
 )
 from underskin.diagnosis.selection.search import Answer
+from underskin.diagnosis.validation.identifiability import Likeness
 from underskin.findings.english import lacking
 from underskin.findings.formatting import in_digits, in_percent
 from underskin.findings.lacking import Lacking
@@ -54,6 +55,7 @@ def insufficient_statement(what: Lacking | None) -> str:
     return f"{_INSUFFICIENT}{lacking(what)}."
 
 
+# The page of a stored report lays its statement out by these two; nothing is decided by what they return.
 def lacking_part(statement: str) -> str:
     """What is lacking, with its full stop, out of the statement that `insufficient_statement` made."""
     return statement.removeprefix(_INSUFFICIENT)
@@ -155,6 +157,15 @@ UNDECIDABLE: Mapping[Undecidable, str] = {
 }
 
 
+CONFOUNDED: Mapping[Likeness, str] = {
+    Likeness.NOISE: "at a typical strength it stays within the noise here",
+    Likeness.TAKEN_UP: "at a typical strength, d33, E and h within their tolerances take up what it does here",
+    Likeness.IMITATED: "what {mechanism} typically does to these recordings, {other} can do as well",
+    Likeness.IMITATES: "what {other} typically does to these recordings, {mechanism} can do as well",
+    Likeness.FITS_AS_WELL: "{other} explains these recordings about as well as {mechanism}",
+}
+
+
 def location_statement(
     axes: Sequence[AxisResult],
     region: Mapping[str, Sequence[float | str]],
@@ -167,16 +178,16 @@ def location_statement(
     that recordings and model agree within the noise."""
     telling = [entry for entry in axes if entry.p_value is not None and entry.p_value < SIGNIFICANT]
     undecidable = [WORDS[entry.axis][0] for entry in axes if entry.p_value is None]
-    tail = f"; whether it depends on {_listed(undecidable)}, this design cannot tell" if undecidable else ""
+    tail = f"; whether it depends on {listed(undecidable)}, this design cannot tell" if undecidable else ""
     if not telling:
         return f"The misfit depends on none of the axes beyond chance{tail}."
-    names = _listed([WORDS[entry.axis][0] for entry in sorted(telling, key=lambda entry: entry.p_value or 0.0)])
+    names = listed([WORDS[entry.axis][0] for entry in sorted(telling, key=lambda entry: entry.p_value or 0.0)])
     if agrees:
         return (
             f"What is left is within the noise, though more of it goes along with {names} than chance would give{tail}."
         )
     parts = [_range(name, ends) for name, ends in region.items() if not whole[name]]
-    where = f"most of it lies at {_listed(parts)}, where" if parts else "it is spread over all of the recordings, where"
+    where = f"most of it lies at {listed(parts)}, where" if parts else "it is spread over all of the recordings, where"
     return f"The misfit depends on {names}; {where} {_size(effect)}{tail}."
 
 
@@ -214,5 +225,6 @@ def _range(axis: str, ends: Sequence[float | str]) -> str:
     return f"{words} {text} {unit}".rstrip()
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
+    """Names with commas and a last "and"."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

@@ -6,7 +6,7 @@ import numpy as np
 
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.screening.curve_unit_errors import is_reversed
-from underskin.errors import ErrorCode, InvalidInput
+from underskin.errors import InvalidInput, too_few, unusable
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.base import Kind
@@ -31,18 +31,16 @@ def without_unusable(campaign: Campaign, kind: Kind) -> tuple[Campaign, list[Fin
 
 def _lacking(entry: object, poisson_ratio: float) -> InvalidInput | None:
     if isinstance(entry, IndentationRecording | CompressionRecording) and not np.ptp(entry.displacement_mm):
-        return InvalidInput(
-            "displacement_mm", float(entry.displacement_mm[0]), "must change", code=ErrorCode.UNUSABLE_SIGNAL
-        )
+        return unusable("displacement_mm", float(entry.displacement_mm[0]), "must change")
     try:
         if isinstance(entry, IndentationRecording):
             modulus = elastomer.of_indentation(entry, poisson_ratio).modulus
         elif isinstance(entry, CompressionRecording):
             modulus = elastomer.of_compression(entry).modulus
         else:
-            return InvalidInput("force_n", "too few finite samples", "must have at least 5", code=ErrorCode.TOO_FEW)
+            return too_few("force_n", "too few finite samples", "must have at least 5")
     except InvalidInput as refusal:
         return refusal
     if modulus > 0 or is_reversed(entry):
         return None
-    return InvalidInput("force_n", "does not rise as it is pressed", "must rise", code=ErrorCode.UNUSABLE_SIGNAL)
+    return unusable("force_n", "does not rise as it is pressed", "must rise")

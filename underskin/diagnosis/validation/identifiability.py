@@ -11,6 +11,7 @@ another, each further parameter at its middle and at either end of its usual ran
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import Enum, auto
 
 import numpy as np
 
@@ -32,13 +33,23 @@ _ENDS = (0.1, 0.9)  # of a shape's usual range
 _OPEN = 0.1  # of the leader's probability: a rival beyond that is not told from it
 
 
+class Likeness(Enum):
+    """Why a mechanism is confounded."""
+
+    NOISE = auto()
+    TAKEN_UP = auto()  # by d33, E and h
+    IMITATED = auto()  # what it typically does, the other can do
+    IMITATES = auto()  # what the other typically does, it can do
+    FITS_AS_WELL = auto()  # the other explains these recordings as well
+
+
 @dataclass(frozen=True)
 class Confounding:
     """`confounded_with` is another mechanism, "d33", or "noise" where too little of it shows."""
 
     mechanism: str
     confounded_with: str
-    reason: str
+    why: Likeness
 
 
 def confounding(problem: FittingProblem) -> list[Confounding]:
@@ -95,20 +106,18 @@ def _confounding(owners: Sequence[str], information: Floats, nuisances: Sequence
     confounded = []
     for name, index in first.items():
         if own[index, index] < _LEAST_CHI2:
-            confounded.append(Confounding(name, "noise", "at a typical strength it stays within the noise here"))
+            confounded.append(Confounding(name, "noise", Likeness.NOISE))
         elif chi2[index] < _LEAST_CHI2:
-            reason = "at a typical strength, d33, E and h within their tolerances take up what it does here"
-            confounded.append(Confounding(name, "d33", reason))
+            confounded.append(Confounding(name, "d33", Likeness.TAKEN_UP))
     visible = [name for name in first if chi2[first[name]] >= _LEAST_CHI2]
     for one, other in itertools.combinations(visible, 2):
-        for typical_one, shaped in ((one, other), (other, one)):
-            place = first[typical_one]
+        for typical, shaped, why in ((one, other, Likeness.IMITATED), (other, one, Likeness.IMITATES)):
+            place = first[typical]
             rivals = [index for index, name in enumerate(owners) if name == shaped and chi2[index] >= _LEAST_CHI2]
             cosine = left[place, rivals] / np.sqrt(chi2[place] * chi2[rivals])
             apart = (1 - cosine**2) * np.minimum(chi2[place], chi2[rivals])
             if (np.abs(cosine) > _TWINS).any() or (apart < _LEAST_CHI2).any():
-                reason = f"what {typical_one} typically does to these recordings, {shaped} can do as well"
-                confounded.append(Confounding(one, other, reason))
+                confounded.append(Confounding(one, other, why))
                 break
     return confounded
 
@@ -134,7 +143,7 @@ def left_open(confounded: Sequence[Confounding], answers: Sequence[Answer]) -> l
             open_ones.append(entry)
             swapped.pop(frozenset(both), None)
     for one, other in sorted(swapped.values()):
-        open_ones.append(Confounding(one, other, f"{other} explains these recordings about as well as {one}"))
+        open_ones.append(Confounding(one, other, Likeness.FITS_AS_WELL))
     return open_ones
 
 

@@ -32,17 +32,10 @@ class Adhesion(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The work of adhesion."""
+        reason = "0.04 J/m² is thermodynamic for silicone; rate effects and soft gels raise it to some J/m²"
         return (
             Parameter(
-                name="work_of_adhesion",
-                unit="J/m²",
-                low=1e-3,
-                high=20.0,
-                prior=Normal(-1.6, 1.3),
-                scale="log",
-                limit=0.0,
-                shown=0.5,
-                reason="0.04 J/m² is thermodynamic for silicone; rate effects and soft gels raise it to some J/m²",
+                "work_of_adhesion", "J/m²", 1e-3, 20.0, Normal(-1.6, 1.3), "log", limit=0.0, shown=0.5, reason=reason
             ),
         )
 

@@ -38,39 +38,16 @@ class Ageing(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The loss, by the decade or in the end, the cycles at which it sets in, and the shape."""
+        loss_reason = "poled polymers lose some to tens of percent, a decade or in the end"
+        onset_reason = "run-in takes tens to ten thousands of cycles; 1000 within a factor of 7"
+        saturation_reason = "from a loss that goes on by the decade to one that ends: nothing is known beforehand"
         return (
+            Parameter("loss", "-", 0.0, 0.95, Normal(0.0, 0.3), "linear", limit=0.0, shown=0.15, reason=loss_reason),
             Parameter(
-                name="loss",
-                unit="-",
-                low=0.0,
-                high=0.95,
-                prior=Normal(0.0, 0.3),
-                scale="linear",
-                limit=0.0,
-                shown=0.15,
-                reason="poled polymers lose some to tens of percent, a decade or in the end",
+                "onset", "cycles", 1.0, 1e6, Normal(6.9, 2.0), "log", limit=None, shown=1000.0, reason=onset_reason
             ),
             Parameter(
-                name="onset",
-                unit="cycles",
-                low=1.0,
-                high=1e6,
-                prior=Normal(6.9, 2.0),
-                scale="log",
-                limit=None,
-                shown=1000.0,
-                reason="run-in takes tens to ten thousands of cycles; 1000 within a factor of 7",
-            ),
-            Parameter(
-                name="saturation",
-                unit="-",
-                low=0.0,
-                high=0.95,
-                prior=Uniform(),
-                scale="linear",
-                limit=None,
-                shown=0.0,
-                reason="from a loss that goes on by the decade to one that ends: nothing is known beforehand",
+                "saturation", "-", 0.0, 0.95, Uniform(), "linear", limit=None, shown=0.0, reason=saturation_reason
             ),
         )
 

@@ -27,19 +27,8 @@ class AmplifierHighPass(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The corner frequency."""
-        return (
-            Parameter(
-                name="corner",
-                unit="Hz",
-                low=1e-3,
-                high=100.0,
-                prior=Normal(-0.7, 1.5),
-                scale="log",
-                limit=0.0,
-                shown=1.0,
-                reason="charge amplifiers have corners of 0.01 to some Hz; 0.5 Hz within a factor of 4.5",
-            ),
-        )
+        reason = "charge amplifiers have corners of 0.01 to some Hz; 0.5 Hz within a factor of 4.5"
+        return (Parameter("corner", "Hz", 1e-3, 100.0, Normal(-0.7, 1.5), "log", limit=0.0, shown=1.0, reason=reason),)
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         """1/(1 − i corner/f)."""

@@ -40,19 +40,8 @@ class AmplitudeNonlinearity(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The edge's mobility."""
-        return (
-            Parameter(
-                name="edge_mobility",
-                unit="-",
-                low=0.0,
-                high=1.0,
-                prior=Uniform(),
-                scale="linear",
-                limit=0.0,
-                shown=1.0,
-                reason="from an edge pinned by adhesion to one that moves freely: nothing is known beforehand",
-            ),
-        )
+        reason = "from an edge pinned by adhesion to one that moves freely: nothing is known beforehand"
+        return (Parameter("edge_mobility", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=1.0, reason=reason),)
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """The contact must not open."""

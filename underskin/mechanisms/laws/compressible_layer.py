@@ -33,19 +33,8 @@ class CompressibleLayer(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The Poisson ratio."""
-        return (
-            Parameter(
-                name="poisson_ratio",
-                unit="-",
-                low=0.30,
-                high=0.5,
-                prior=Uniform(),
-                scale="linear",
-                limit=0.5,
-                shown=0.4,
-                reason="solid elastomers 0.48 to 0.5, filled and slightly porous ones 0.4, foams 0.3",
-            ),
-        )
+        reason = "solid elastomers 0.48 to 0.5, filled and slightly porous ones 0.4, foams 0.3"
+        return (Parameter("poisson_ratio", "-", 0.30, 0.5, Uniform(), "linear", limit=0.5, shown=0.4, reason=reason),)
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """A skin that is declared compressible has its ν in the base model."""

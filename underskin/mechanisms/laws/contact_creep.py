@@ -53,28 +53,14 @@ class ContactCreep(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """One Prony pair."""
+        fraction_reason = "from a few percent in a well cured silicone to most of the modulus in a gel"
+        time_reason = "what a bench can see lies between seconds and an hour; 40 s within a factor of 4.5"
         return (
             Parameter(
-                name="relaxed_fraction",
-                unit="-",
-                low=0.0,
-                high=0.9,
-                prior=Uniform(),
-                scale="linear",
-                limit=0.0,
-                shown=0.4,
-                reason="from a few percent in a well cured silicone to most of the modulus in a gel",
+                "relaxed_fraction", "-", 0.0, 0.9, Uniform(), "linear", limit=0.0, shown=0.4, reason=fraction_reason
             ),
             Parameter(
-                name="relaxation_time",
-                unit="s",
-                low=0.05,
-                high=5e4,
-                prior=Normal(3.7, 1.5),
-                scale="log",
-                limit=None,
-                shown=40.0,
-                reason="what a bench can see lies between seconds and an hour; 40 s within a factor of 4.5",
+                "relaxation_time", "s", 0.05, 5e4, Normal(3.7, 1.5), "log", limit=None, shown=40.0, reason=time_reason
             ),
         )
 

@@ -38,28 +38,12 @@ class ContactResonance(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """Tip mass and damping ratio."""
+        mass_reason = "what sits in front of a force cell, from a bead to a shaker's table: 2 g within a factor of 6"
+        ratio_reason = "silicones lose little, tan δ 0.02 to 0.3, ζ half of it: 0.05 within a factor of 2.7"
         return (
+            Parameter("tip_mass", "g", 0.01, 2000.0, Normal(0.7, 1.8), "log", limit=0.0, shown=2.0, reason=mass_reason),
             Parameter(
-                name="tip_mass",
-                unit="g",
-                low=0.01,
-                high=2000.0,
-                prior=Normal(0.7, 1.8),
-                scale="log",
-                limit=0.0,
-                shown=2.0,
-                reason="what sits in front of a force cell, from a bead to a shaker's table: 2 g within a factor of 6",
-            ),
-            Parameter(
-                name="damping_ratio",
-                unit="-",
-                low=1e-3,
-                high=1.0,
-                prior=Normal(-3.0, 1.0),
-                scale="log",
-                limit=None,
-                shown=0.05,
-                reason="silicones lose little, tan δ 0.02 to 0.3, ζ half of it: 0.05 within a factor of 2.7",
+                "damping_ratio", "-", 1e-3, 1.0, Normal(-3.0, 1.0), "log", limit=None, shown=0.05, reason=ratio_reason
             ),
         )
 

@@ -38,19 +38,8 @@ class Crosstalk(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The fraction."""
-        return (
-            Parameter(
-                name="fraction",
-                unit="-",
-                low=0.0,
-                high=0.6,
-                prior=Normal(0.0, 0.15),
-                scale="linear",
-                limit=0.0,
-                shown=0.1,
-                reason="coupling of unshielded leads is some to 20 percent",
-            ),
-        )
+        reason = "coupling of unshielded leads is some to 20 percent"
+        return (Parameter("fraction", "-", 0.0, 0.6, Normal(0.0, 0.15), "linear", limit=0.0, shown=0.1, reason=reason),)
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """A neighbour under stress is needed."""

@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from underskin.autodiff import Differentiated
-from underskin.errors import InvalidInput
+from underskin.errors import conflicting
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.recordings.conditions import Conditions, frf_of, offsets
 
@@ -68,10 +68,9 @@ class Misalignment(Mechanism):
         beside = offsets(conditions).any(axis=1)
         if beside.any():
             entry = frf_of(conditions)[int(np.argmax(beside))]
-            allowed = (
-                "must be the sensor's centre: the adopted model knows how far presses miss it, not in which direction"
-            )
-            raise InvalidInput(f"recordings[{entry.id}].position_mm", entry.position_mm, allowed)
+            known = "the adopted model knows how far presses miss it, not in which direction"
+            allowed = f"must be the sensor's centre: {known}"
+            raise conflicting(f"recordings[{entry.id}].position_mm", entry.position_mm, allowed)
         return values
 
     def offset(self, values: Values) -> tuple[Differentiated, Differentiated]:

@@ -30,18 +30,9 @@ class ModulusError(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """True over declared modulus."""
+        reason = "E from a durometer, a data sheet or another cure is off by tens of percent"
         return (
-            Parameter(
-                name="modulus_factor",
-                unit="-",
-                low=0.25,
-                high=4.0,
-                prior=Normal(0.0, 0.35),
-                scale="log",
-                limit=1.0,
-                shown=0.7,
-                reason="E from a durometer, a data sheet or another cure is off by tens of percent",
-            ),
+            Parameter("modulus_factor", "-", 0.25, 4.0, Normal(0.0, 0.35), "log", limit=1.0, shown=0.7, reason=reason),
         )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:

@@ -34,19 +34,8 @@ class MovingContactEdge(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The mobile fraction."""
-        return (
-            Parameter(
-                name="mobile_fraction",
-                unit="-",
-                low=0.0,
-                high=1.0,
-                prior=Uniform(),
-                scale="linear",
-                limit=0.0,
-                shown=1.0,
-                reason="from an edge pinned by adhesion to one that moves freely: nothing is known beforehand",
-            ),
-        )
+        reason = "from an edge pinned by adhesion to one that moves freely: nothing is known beforehand"
+        return (Parameter("mobile_fraction", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=1.0, reason=reason),)
 
     def force_nodes(self, force: Floats, dynamic_force: Floats) -> tuple[Array, Array]:
         """d(Fσ)/dF by a central difference."""

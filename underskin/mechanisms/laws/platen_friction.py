@@ -27,19 +27,8 @@ class PlatenFriction(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """How far the platens hold the sample."""
-        return (
-            Parameter(
-                name="friction",
-                unit="-",
-                low=0.0,
-                high=1.0,
-                prior=Uniform(),
-                scale="linear",
-                limit=0.0,
-                shown=0.5,
-                reason="from well oiled to bonded: nothing is known beforehand",
-            ),
-        )
+        reason = "from well oiled to bonded: nothing is known beforehand"
+        return (Parameter("friction", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=0.5, reason=reason),)
 
     def on_curve(self, curve: Curve, values: Values) -> None:
         """Let the platens hold."""

@@ -30,39 +30,24 @@ class SensorRelaxation(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The power law's exponent, the step and its frequency."""
+        exponent_reason = "tan δ of PVDF and its copolymers is 0.02 to 0.2, and n is 2/π of it"
+        step_reason = "a relaxation inside the band changes d33 by some tens of percent"
+        reason = "it must lie in or near the band of measurement to be seen; 20 Hz within a factor of 4.5"
         return (
             Parameter(
-                name="exponent",
-                unit="-",
-                low=0.0,
-                high=0.4,
-                prior=Normal(0.0, 0.08),
-                scale="linear",
-                limit=0.0,
-                shown=0.03,
-                reason="tan δ of PVDF and its copolymers is 0.02 to 0.2, and n is 2/π of it",
+                "exponent", "-", 0.0, 0.4, Normal(0.0, 0.08), "linear", limit=0.0, shown=0.03, reason=exponent_reason
             ),
+            Parameter("step", "-", 0.0, 3.0, Normal(0.0, 0.4), "linear", limit=0.0, shown=0.1, reason=step_reason),
             Parameter(
-                name="step",
-                unit="-",
-                low=0.0,
-                high=3.0,
-                prior=Normal(0.0, 0.4),
-                scale="linear",
-                limit=0.0,
-                shown=0.1,
-                reason="a relaxation inside the band changes d33 by some tens of percent",
-            ),
-            Parameter(
-                name="step_frequency",
-                unit="Hz",
-                low=0.05,
-                high=3000.0,
-                prior=Normal(3.0, 1.5),
-                scale="log",
+                "step_frequency",
+                "Hz",
+                0.05,
+                3000.0,
+                Normal(3.0, 1.5),
+                "log",
                 limit=None,
                 shown=20.0,
-                reason="it must lie in or near the band of measurement to be seen; 20 Hz within a factor of 4.5",
+                reason=reason,
             ),
         )
 

@@ -23,17 +23,10 @@ class ThicknessError(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """True over declared thickness."""
+        reason = "a cast layer differs from its mould by shrinkage, meniscus and tilt: some to 20 percent"
         return (
             Parameter(
-                name="thickness_factor",
-                unit="-",
-                low=0.65,
-                high=1.55,
-                prior=Normal(0.0, 0.12),
-                scale="log",
-                limit=1.0,
-                shown=0.9,
-                reason="a cast layer differs from its mould by shrinkage, meniscus and tilt: some to 20 percent",
+                "thickness_factor", "-", 0.65, 1.55, Normal(0.0, 0.12), "log", limit=1.0, shown=0.9, reason=reason
             ),
         )
 

@@ -29,17 +29,10 @@ class TimingDelay(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The delay."""
+        reason = "multiplexed converters and their filters delay by a few samples at 1 to 50 kS/s"
         return (
             Parameter(
-                name="delay",
-                unit="µs",
-                low=-5000.0,
-                high=5000.0,
-                prior=Normal(0.0, 300.0),
-                scale="linear",
-                limit=0.0,
-                shown=300.0,
-                reason="multiplexed converters and their filters delay by a few samples at 1 to 50 kS/s",
+                "delay", "µs", -5000.0, 5000.0, Normal(0.0, 300.0), "linear", limit=0.0, shown=300.0, reason=reason
             ),
         )
 

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.errors import InvalidInput
+from underskin.errors import ErrorCode, InvalidInput
 from underskin.mechanisms.base import Kind, Mechanism, Parameter
 from underskin.mechanisms.models.composition import Prediction, check_supported, chosen, kind_of
 from underskin.mechanisms.models.compression import CompressionModel
@@ -90,4 +90,6 @@ def forward_model(mechanisms: Sequence[Mechanism], conditions: Conditions, table
 
 def _require_kind(conditions: Conditions, kind: Kind) -> None:
     if all(recording.kind != kind for recording in conditions.recordings):
-        raise InvalidInput("kind", kind, "must be that of at least one of the campaign's recordings")
+        raise InvalidInput(
+            "kind", kind, "must be that of at least one of the campaign's recordings", code=ErrorCode.NOT_ONE_OF
+        )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.autodiff import Differentiated, variables
-from underskin.errors import InvalidInput
+from underskin.errors import InvalidInput, not_one_of, not_unique, unequal_lengths
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Unsupported, Values
 from underskin.recordings.conditions import Conditions
 from underskin.units import Array, Floats
@@ -66,7 +66,7 @@ class Composition:
         Raises InvalidInput where `fit` has another length than the parameters.
         """
         if np.shape(fit) != (len(self.parameters),):
-            raise InvalidInput("fit", np.shape(fit), f"must hold {len(self.parameters)} coordinates")
+            raise unequal_lengths("fit", np.size(fit), len(self.parameters), "the parameters", "coordinates")
         value = np.where(self._log, np.exp(np.where(self._log, fit, 0.0)), fit)
         slope = np.where(self._log, value, 1.0)
         seeds = variables([*value, *np.zeros(further)], [*slope, *np.ones(further)])
@@ -116,7 +116,7 @@ def chosen(names: Sequence[str], catalogue: Mapping[str, Mechanism]) -> list[Mec
     """The mechanisms of these names in order of composition; raises InvalidInput for one unknown or twice."""
     for name in names:
         if name not in catalogue:
-            raise InvalidInput("mechanism", name, f"must be one of {', '.join(catalogue)}")
+            raise not_one_of("mechanism", name, catalogue)
         if list(names).count(name) > 1:
-            raise InvalidInput("mechanism", name, "must be named once")
+            raise not_unique("mechanism", name, "must be named once")
     return [mechanism for name, mechanism in catalogue.items() if name in names]

@@ -102,8 +102,7 @@ def _nuisances(recordings: Sequence[CompressionConditions], skin: SkinDescriptio
             try:
                 estimates.append(elastomer.of_compression(entry).modulus)
             except InvalidInput as refusal:
-                field = f"recordings[{entry.id}].{refusal.field}"
-                raise InvalidInput(field, refusal.value, refusal.allowed) from refusal
+                raise refusal.at(f"recordings[{entry.id}].{refusal.field}") from refusal
             unloaded = int(np.abs(entry.force_n).argmin())
             begins = float(to_si("displacement_mm", entry.displacement_mm[unloaded]))
         else:

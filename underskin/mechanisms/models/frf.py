@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.autodiff import Differentiated, chain, constant, sum_rows
-from underskin.errors import InvalidInput
+from underskin.errors import required
 from underskin.mechanisms.base import Mechanism, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
 from underskin.mechanisms.models.contact_stage import layer_curves, press, stiffness
@@ -253,5 +253,5 @@ def _by_name(own: dict[str, Values]) -> dict[str, Floats]:
 
 def _required(name: str, value: float | None) -> float:
     if value is None:
-        raise InvalidInput(f"skin.{name}", None, "required by a recording of kind frf")
+        raise required(f"skin.{name}", "required by a recording of kind frf")
     return float(to_si(name, value))

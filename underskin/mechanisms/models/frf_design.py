@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from underskin.errors import InvalidInput
+from underskin.errors import required
 from underskin.recordings.conditions import Conditions, FrfConditions, frf_of
 from underskin.units import Floats, to_si
 
@@ -23,7 +23,6 @@ NEIGHBOUR_PITCHES = 1.2
 class FrfDesign:
     """Arrays over recordings, contacts, points, neighbours, lines and rows; SI."""
 
-    recording_ids: tuple[str, ...]
     sensor_ids: tuple[str, ...]
     sensor: Indices  # of each recording
     contact: Indices  # of each recording
@@ -75,7 +74,6 @@ class FrfDesign:
         distinct, frequency = np.unique(row_frequency, return_inverse=True)
         lines, line = np.unique(contact[recording] * len(distinct) + frequency, return_inverse=True)
         return cls(
-            recording_ids=tuple(entry.id for entry in recordings),
             sensor_ids=sensor_ids,
             sensor=sensor,
             contact=contact,
@@ -102,7 +100,7 @@ class FrfDesign:
 def frequencies(entry: FrfConditions) -> Floats:
     """The lines of one FRF [Hz]; raises InvalidInput where they are yet to be estimated from a time series."""
     if entry.frequency_hz is None:
-        raise InvalidInput(f"recordings[{entry.id}].frequency_hz", None, "required for a prediction")
+        raise required(f"recordings[{entry.id}].frequency_hz", "required for a prediction")
     return entry.frequency_hz
 
 

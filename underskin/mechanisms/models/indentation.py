@@ -174,7 +174,7 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
                 modulus, begins = _hertz(*columns, entry.indenter_radius_mm, skin.poisson_ratio)
                 estimates.append(modulus)
             except InvalidInput as refusal:
-                refused = InvalidInput(f"recordings[{entry.id}].{refusal.field}", refusal.value, refusal.allowed)
+                refused = refusal.at(f"recordings[{entry.id}].{refusal.field}")
                 # A curve that does not load begins where it shows least force.
                 begins = float(to_si("displacement_mm", entry.displacement_mm[int(np.abs(entry.force_n).argmin())]))
             if refused is not None and span == 0:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from underskin.errors import InvalidInput
+from underskin.errors import required
 from underskin.mechanisms.base import Normal, Parameter
 from underskin.recordings.conditions import SkinDescription
 from underskin.units import to_lab
@@ -68,7 +68,7 @@ def modulus_parameter(skin: SkinDescription, estimates: Sequence[float]) -> Para
 def required_modulus(skin: SkinDescription) -> float:
     """The declared modulus [MPa]; raises InvalidInput where there is none and no measured curve tells it either."""
     if skin.youngs_modulus_mpa is None:
-        raise InvalidInput("skin.youngs_modulus_mpa", None, "required to predict curves that were not measured")
+        raise required("skin.youngs_modulus_mpa", "required to predict curves that were not measured")
     return skin.youngs_modulus_mpa
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import get_window
 
-from underskin.errors import ErrorCode, InvalidInput
+from underskin.errors import not_finite, out_of_range, too_few, unequal_lengths, unusable
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.periodic import period_of, without_drift
 from underskin.recordings.frf.signal_checks import Defect, damaged, defects_of_pair
@@ -155,11 +155,9 @@ def broadband(
     _check(force, charge, sample_rate)
     size = block_samples or max(8, 2 * len(force) // (_BLOCKS + 1))
     if not 8 <= size <= len(force):
-        raise InvalidInput(
-            "block_samples", size, f"must be 8 to {len(force)}, the length of the signals", code=ErrorCode.OUT_OF_RANGE
-        )
+        raise out_of_range("block_samples", size, f"must be 8 to {len(force)}, the length of the signals")
     if not 0 <= overlap < 1:
-        raise InvalidInput("overlap", overlap, "must be 0 or greater and less than 1", code=ErrorCode.OUT_OF_RANGE)
+        raise out_of_range("overlap", overlap, "must be 0 or greater and less than 1")
     step = max(1, round(size * (1 - overlap)))
     taper = np.asarray(get_window(window, size), dtype=np.float64)
     average = averaged(force, charge, Blocks(taper, step, slice(1, (size + 1) // 2), without_line), estimator)
@@ -197,9 +195,7 @@ def periodic(force: Floats, charge: Floats, sample_rate: float, *, estimator: Es
     _check(force, charge, sample_rate)
     period = period_of(force)
     if not period:
-        raise InvalidInput(
-            "force_n", f"{len(force)} samples", "must repeat itself at least four times", code=ErrorCode.UNUSABLE_SIGNAL
-        )
+        raise unusable("force_n", f"{len(force)} samples", "must repeat itself at least four times")
     taper = np.asarray(get_window("hann", 2 * period), dtype=np.float64)
     average = averaged(force, charge, Blocks(taper, period, slice(2, period, 2), without_drift), estimator)
     return _frf(average, sample_rate, independent=True)
@@ -243,12 +239,7 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
         if len(pair[0]):
             lines.setdefault(_same_line(step.frequency, lines), []).append(pair)
     if not lines:
-        raise InvalidInput(
-            "force_n",
-            f"{len(defects)} defects",
-            "must dwell on a tone for some undamaged cycles",
-            code=ErrorCode.UNUSABLE_SIGNAL,
-        )
+        raise unusable("force_n", f"{len(defects)} defects", "must dwell on a tone for some undamaged cycles")
     frequency = np.array(sorted(lines))
     values, coherence, averages = np.empty(len(lines), complex), np.empty(len(lines)), np.empty(len(lines))
     for index, line in enumerate(frequency):
@@ -280,21 +271,12 @@ def _same_line(frequency: float, lines: dict[float, list[tuple[Complexes, Comple
 
 def _check(force: Floats, charge: Floats, sample_rate: float) -> None:
     if len(force) != len(charge):
-        raise InvalidInput(
-            "charge_pc",
-            f"{len(charge)} samples",
-            f"must have {len(force)}, as many as force_n",
-            code=ErrorCode.UNEQUAL_LENGTHS,
-        )
+        raise unequal_lengths("charge_pc", len(charge), len(force), "force_n", "samples")
     if len(force) < 8:
-        raise InvalidInput("force_n", f"{len(force)} samples", "must have at least 8", code=ErrorCode.TOO_FEW)
+        raise too_few("force_n", f"{len(force)} samples", "must have at least 8")
     if not (np.isfinite(sample_rate) and sample_rate > 0):
-        raise InvalidInput(
-            "sample_rate_hz", sample_rate, "must be finite and greater than 0", code=ErrorCode.NOT_FINITE
-        )
+        raise not_finite("sample_rate_hz", sample_rate, "must be finite and greater than 0")
     for name, signal in (("force_n", force), ("charge_pc", charge)):
         bad: NDArray[np.bool_] = ~np.isfinite(signal)
         if bad.any():
-            raise InvalidInput(
-                name, "not finite", "must be finite", index=int(np.argmax(bad)), code=ErrorCode.NOT_FINITE
-            )
+            raise not_finite(name, "not finite", index=int(np.argmax(bad)))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from underskin.errors import ErrorCode, InvalidInput
+from underskin.errors import too_few
 from underskin.recordings.frf.estimation import Frf
 from underskin.recordings.frf.flat_zone_reason import levels_of, reason_of
 from underskin.recordings.frf.mains import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ
@@ -111,11 +111,10 @@ def flat_zone(
     if band_hz is not None:
         inside = (frequencies >= band_hz[0]) & (frequencies <= band_hz[1])
         if not inside.any():
-            raise InvalidInput(
+            raise too_few(
                 "band_hz",
                 list(band_hz),
                 f"must hold at least one line; they lie at {frequencies[0]:g} to {frequencies[-1]:g} Hz",
-                code=ErrorCode.TOO_FEW,
             )
         return FlatZone(*band_hz, "the band given by the user", mains, chosen_by_user=True)
     edges = _edges(frequencies)

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.errors import ErrorCode, InvalidInput
+from underskin.errors import ErrorCode, InvalidInput, unusable
 from underskin.findings import sentences
 from underskin.recordings.frf.signal_checks import Defect, damaged, defects_of_pair
 from underskin.units import Complexes, Floats
@@ -57,9 +57,7 @@ def averaged(force: Floats, charge: Floats, blocks: Blocks, estimator: Estimator
     if not count:
         first = defects[0]
         words = sentences.defect(first.kind, first.channel, first.samples, first.first_sample)
-        raise InvalidInput(
-            first.channel, f"{len(defects)} defects", f"no undamaged block: {words}", code=ErrorCode.UNUSABLE_SIGNAL
-        )
+        raise unusable(first.channel, f"{len(defects)} defects", f"no undamaged block: {words}")
     force_spectra, charge_spectra = (blocks.spectra(signal)[whole] for signal in (force, charge))
     frequency: Floats = np.fft.rfftfreq(len(blocks.taper))[blocks.lines].astype(np.float64)
     averages = _independent_blocks(count, blocks.taper, blocks.step)

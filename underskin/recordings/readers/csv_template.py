@@ -82,33 +82,32 @@ class _Template:
         table = next((index for index, row in enumerate(self.rows) if row[0].lower() == "id"), None)
         if table is None:
             raise self._error(len(self.rows) - 1, "the table is missing: no line begins with id")
-        document: dict[str, Any] = {"schema": SCHEMA, "skin": {}, "recordings": []}
-        for index, row in enumerate(self.rows[:table]):
-            if any(row):
-                self._about(document, row, index)
-        document["recordings"] = self._recordings(table)
-        return document
+        above = [self._above(row, index) for index, row in enumerate(self.rows[:table]) if any(row)]
+        parts = {part: {field: value for of, field, value in above if of == part} for part in ("campaign", "skin")}
+        sensors = [value for part, _, value in above if part == "sensor"]
+        skin = {**parts["skin"], **({"sensors": sensors} if sensors else {})}
+        return {"schema": SCHEMA, **parts["campaign"], "skin": skin, "recordings": self._recordings(table)}
 
-    def _about(self, document: dict[str, Any], row: list[str], index: int) -> None:
-        """A line above the table: of the campaign, of the skin, or a sensor."""
+    def _above(self, row: list[str], index: int) -> tuple[str, str, Any]:
+        """A line above the table: what it is about (campaign, skin or sensor), its field and its value."""
         name = row[0]
         self._require_few(row, index, 4 if name == "sensor" else 2)
         cell = row[1] if len(row) > 1 else ""
         if name == "sensor":
             values = [*row[1:], "", "", ""]
             sensor = {key: self._value(key, values[place], (index, place + 1)) for place, key in enumerate(_SENSOR)}
-            document["skin"].setdefault("sensors", []).append(sensor)
-        elif name in ("schema", "name", "units_checked"):
+            return "sensor", name, sensor
+        if name in ("schema", "name", "units_checked"):
             self._require_first(name, index)
-            document[name] = _FLAGS.get(cell.lower(), cell) if name == "units_checked" else cell
-        else:
-            field, factor = self._field(name.removeprefix("skin."), index)
-            if f"skin.{field}" not in _SKIN_FIELDS or not name.startswith("skin."):
-                raise self._error(index, f"{name!r} is neither of the campaign nor of its skin")
-            self._require_first(f"skin.{field}", index)
-            document["skin"][field] = self._value(f"skin.{field}", cell, (index, 1), factor)
-            if factor != 1.0 and not self._units_checked():
-                self._require_meant(name, field, cell, document["skin"][field], index)
+            return "campaign", name, _FLAGS.get(cell.lower(), cell) if name == "units_checked" else cell
+        field, factor = self._field(name.removeprefix("skin."), index)
+        if f"skin.{field}" not in _SKIN_FIELDS or not name.startswith("skin."):
+            raise self._error(index, f"{name!r} is neither of the campaign nor of its skin")
+        self._require_first(f"skin.{field}", index)
+        value = self._value(f"skin.{field}", cell, (index, 1), factor)
+        if factor != 1.0 and not self._units_checked():
+            self._require_meant(name, field, cell, value, index)
+        return "skin", field, value
 
     def _require_few(self, row: list[str], index: int, most: int) -> None:
         """Refuses cells behind those that a line above the table has, such as what follows a decimal comma."""
@@ -136,7 +135,7 @@ class _Template:
 
     def _recordings(self, table: int) -> list[dict[str, Any]]:
         headings = self._headings(table)
-        recordings: dict[str, dict[str, Any]] = {}
+        recordings: list[_Recording] = []
         begun: dict[str, int] = {}
         current, continued = "", False  # the id of the recording, and whether rows without it have followed
         for index, row in enumerate(self.rows[table + 1 :], start=table + 1):
@@ -146,14 +145,16 @@ class _Template:
                 if row[0] in begun:
                     raise self._error(index, f"recording {row[0]!r} began on line {begun[row[0]] + 1} already", 0)
                 current, begun[row[0]] = row[0], index
+                recordings.append(_Recording())
             continued = not row[0]
             if not current:
                 raise self._error(index, "the first row of the table needs an id")
             if len(row) > len(headings):
                 reason = f"has {len(row)} cells under {len(headings)} headings"
                 raise self._error(index, reason, len(headings))
-            self._add_row(recordings.setdefault(current, {}), self._line(headings, row, index), index)
-        return [_as_documented(recording) for recording in recordings.values()]
+            if contradiction := recordings[-1].add(self._line(headings, row, index)):
+                raise self._error(index, contradiction)
+        return [recording.document() for recording in recordings]
 
     def _line(self, headings: list[tuple[str, float]], row: list[str], index: int) -> dict[str, Any]:
         """The values of a row by field."""
@@ -162,12 +163,6 @@ class _Template:
             field: self._value(field, cell, (index, column), factor)
             for column, ((field, factor), cell) in enumerate(zip(headings, cells, strict=True))
         }
-
-    def _add_row(self, recording: dict[str, Any], line: dict[str, Any], index: int) -> None:
-        self._add_entries(recording, {field: line.pop(field) for field in COLUMNS if field in line})
-        for field, value in line.items():
-            if value is not None:
-                self._add(recording, field, value, index)
 
     def _headings(self, table: int) -> list[tuple[str, float]]:
         """The field of each column and the factor to its unit, each field once."""
@@ -178,17 +173,6 @@ class _Template:
                 raise self._error(table, f"{cell!r} is a second column of {field}")
             headings[field] = factor
         return list(headings.items())
-
-    def _add_entries(self, recording: dict[str, Any], line: dict[str, Any]) -> None:
-        """A row's entries of the columns, if it has any; one that is missing beside others is for the checks."""
-        if any(value is not None for value in line.values()):
-            for field, value in line.items():
-                recording.setdefault(field, []).append(value)
-
-    def _add(self, recording: dict[str, Any], field: str, value: Any, index: int) -> None:
-        before = recording.setdefault(field, value)
-        if before != value:
-            raise self._error(index, f"{field} = {value!r}, but {before!r} above it")
 
     def _field(self, heading: str, index: int) -> tuple[str, float]:
         """The field of a heading and the factor to its unit."""
@@ -224,14 +208,26 @@ def _likely(known: LabField, value: float) -> bool:
     return known.likely[0] <= value <= known.likely[1]
 
 
-def _as_documented(recording: dict[str, Any]) -> dict[str, Any]:
-    """The recording as in a campaign: one position, and no columns that it leaves empty, which are another kind's."""
-    documented = {
-        name: value
-        for name, value in recording.items()
-        if name not in _POSITION and (name not in COLUMNS or any(entry is not None for entry in value))
-    }
-    position = [recording.get(name) for name in _POSITION]
-    if position != [None, None]:
-        documented.setdefault("position_mm", position)
-    return documented
+class _Recording:
+    """A recording, row by row."""
+
+    def __init__(self) -> None:
+        self.once: dict[str, Any] = {}
+        self.columns: dict[str, list[Any]] = {}
+
+    def add(self, line: dict[str, Any]) -> str:
+        """Take the values of a row; what contradicts those above it, in words."""
+        entries = {field: line[field] for field in COLUMNS if field in line}
+        if any(value is not None for value in entries.values()):  # one missing beside others is for the checks
+            for field, value in entries.items():
+                self.columns.setdefault(field, []).append(value)
+        for field, value in line.items():
+            if field not in COLUMNS and value is not None and self.once.setdefault(field, value) != value:
+                return f"{field} = {value!r}, but {self.once[field]!r} above it"
+        return ""
+
+    def document(self) -> dict[str, Any]:
+        """As in a campaign: one position, and no columns that it leaves empty, which are another kind's."""
+        columns = {name: column for name, column in self.columns.items() if any(entry is not None for entry in column)}
+        position = [self.once.pop(name, None) for name in _POSITION]
+        return {**({} if position == [None, None] else {"position_mm": position}), **self.once, **columns}

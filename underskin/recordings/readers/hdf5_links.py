@@ -2,6 +2,7 @@
 data that were never written.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import h5py
@@ -10,6 +11,7 @@ from underskin.errors import FileError
 
 _DEEPEST = 8
 _MOST_OBJECTS = 200_000
+_TOO_MUCH = "is nested too deep, or holds too many objects"
 _SMALL = 100_000  # bytes, which a dataset may declare without any stored
 _LARGEST_COMPRESSION = 1100  # deflate's is 1032
 
@@ -18,25 +20,28 @@ def refuse_outside(source: Any, file: str) -> None:
     """Raises FileError at a soft or external link, external storage, a virtual dataset, a group met again, or a dataset
     that declares more than the file can have stored."""
     seen: set[Any] = set()
-    _walk(source, "", 0, seen, file)
-
-
-def _walk(group: Any, path: str, depth: int, seen: set[Any], file: str) -> None:
-    if depth > _DEEPEST or len(seen) > _MOST_OBJECTS:
-        raise FileError(file, path or "/", "is nested too deep, or holds too many objects")
-    for name in group:
-        here = f"{path}/{name}"
-        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            raise FileError(file, here, "is a link to somewhere else: only data in the file itself is read")
-        item = group[name]
+    for item, here in _objects(source, "", 0, file):
         address = h5py.h5o.get_info(item.id).addr
         if address in seen:
             raise FileError(file, here, "is the same object as another one in the file")
         seen.add(address)
-        if isinstance(item, h5py.Group):
-            _walk(item, here, depth + 1, seen, file)
-        elif isinstance(item, h5py.Dataset):
+        if isinstance(item, h5py.Dataset):
             _refuse_dataset(item, here, file)
+        elif isinstance(item, h5py.Group) and len(seen) > _MOST_OBJECTS:
+            raise FileError(file, here, _TOO_MUCH)
+
+
+def _objects(group: Any, path: str, depth: int, file: str) -> Iterator[tuple[Any, str]]:
+    """Each object below a group, with its path, before what it holds itself."""
+    if depth > _DEEPEST:
+        raise FileError(file, path, _TOO_MUCH)
+    for name in group:
+        here = f"{path}/{name}"
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            raise FileError(file, here, "is a link to somewhere else: only data in the file itself is read")
+        yield (item := group[name]), here
+        if isinstance(item, h5py.Group):
+            yield from _objects(item, here, depth + 1, file)
 
 
 def _refuse_dataset(item: Any, here: str, file: str) -> None:

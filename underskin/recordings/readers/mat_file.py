@@ -15,7 +15,6 @@ from underskin.errors import FileError
 from underskin.recordings.channels import Block, Channel, Contents, as_values
 from underskin.recordings.readers import hdf5_links
 
-MAGIC_5 = b"MATLAB 5.0 MAT-file"
 MAGIC_73 = b"MATLAB 7.3 MAT-file"
 _MOST_COLUMNS = 1000
 

@@ -56,7 +56,10 @@ def _number_of_repeated(document: bytes) -> int | None:
     number = behind = 0
     while (start := document.find(b'"', behind)) >= 0:
         if start - behind > 1 or not number:  # a single character is a colon or a comma
-            _follow(document, behind, start, objects)
+            closed, opens = _braces(document, behind, start)
+            del objects[len(objects) - closed :]
+            if opens:
+                objects.append(set())
         end = document.find(b'"', start + 1)
         behind = end + 1
         follows = document[behind : behind + 1]
@@ -71,20 +74,18 @@ def _number_of_repeated(document: bytes) -> int | None:
     return None
 
 
-def _follow(document: bytes, start: int, end: int, objects: list[set[bytes]]) -> None:
-    """Open and close `objects` as the braces between two strings do.
+def _braces(document: bytes, start: int, end: int) -> tuple[int, bool]:
+    """How many open objects the braces between two strings close, and whether they open one that stays open.
 
     No object has a key between two strings, so that the last brace alone can open one that stays open.
     """
     opening, closing = document.find(b"{", start, end), document.find(b"}", start, end)
     if opening < 0 and closing < 0:
-        return
+        return 0, False
     opened = document.count(b"{", opening, end) if opening >= 0 else 0
     closed = document.count(b"}", closing, end) if closing >= 0 else 0
     stays_open = document.rfind(b"{", start, end) > document.rfind(b"}", start, end)
-    del objects[len(objects) - (closed - opened + stays_open) :]
-    if stays_open:
-        objects.append(set())
+    return closed - opened + stays_open, stays_open
 
 
 def _unescaped(string: bytes) -> str:

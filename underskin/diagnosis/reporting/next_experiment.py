@@ -1,0 +1,62 @@
+"""The planned recordings as the report's `next_experiment`, with a statement in words."""
+
+from typing import Any
+
+from underskin.diagnosis.data.axes import WORDS
+from underskin.diagnosis.data.names import in_words
+from underskin.diagnosis.planning.optimal_design import Plan
+from underskin.diagnosis.reporting.statements import listed
+from underskin.findings.formatting import in_percent
+
+
+def next_experiment(plan: Plan | None) -> dict[str, Any]:
+    """The document, in lab units; empty where nothing needs to be planned."""
+    if plan is None:
+        return {}
+    return {
+        "recordings": _recordings(plan),
+        "separates": [list(names) for names in plan.rivals],
+        "probability_of_deciding": round(plan.probability, 3),
+        "without_it": round(plan.without, 3),
+        "minutes": round(plan.minutes, 1),
+        "statement": _statement(plan) if plan.recordings else _why_none(plan),
+    }
+
+
+def _recordings(plan: Plan) -> list[dict[str, Any]]:
+    documents = []
+    for entry in dict.fromkeys(plan.recordings):
+        described = {
+            "sensor": entry.sensor,
+            "indenter_radius_mm": entry.indenter_radius_mm,
+            "preload_n": entry.preload_n,
+            "dynamic_force_n": entry.dynamic_force_n,
+            "position_mm": list(entry.position_mm or ()),
+            "dwell_s": entry.dwell_s,
+            "repeats": plan.recordings.count(entry),
+        }
+        documents.append({name: value for name, value in described.items() if value is not None})
+    return documents
+
+
+def _statement(plan: Plan) -> str:
+    first = plan.first
+    assert first is not None
+    count = f"{len(plan.recordings)} recordings, first" if len(plan.recordings) > 1 else "One recording"
+    beyond = " It goes beyond what this campaign did: check that the rig can." if plan.beyond else ""
+    return (
+        f"{count} with the {first.indenter_radius_mm:g} mm sphere at {first.preload_n:g} N, should tell which of "
+        f"{_rivals(plan)} it is, with a probability of {in_percent(plan.probability)}.{beyond}"
+    )
+
+
+def _why_none(plan: Plan) -> str:
+    statement = f"No recording within these limits tells {_rivals(plan)} apart."
+    if plan.differ_on:
+        words = sorted(WORDS[axis][0] if axis in WORDS else axis for axis in plan.differ_on)
+        statement += f" They differ in what they depend on: vary the {listed(words)} more widely than here."
+    return statement
+
+
+def _rivals(plan: Plan) -> str:
+    return listed([in_words(names) for names in plan.rivals])
