@@ -10,7 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.service.pages.test_pages_security import BROWSING, token_of
+from tests.service.pages.forms import BROWSING, token_of
 from tests.support.server import UNDERSKIN, Server, running
 from tests.support.store_server import campaign
 from underskin.recordings.campaign import parse

@@ -2,33 +2,16 @@
 
 import csv
 import io
-import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import underskin
+from tests.cli.commands import COMMAND, FRF, PRESSED, SKIN, refused, run
 from underskin import Client
-
-COMMAND = Path(sys.executable).with_name("underskin")
-PRESSED: dict[str, Any] = {
-    "thickness_mm": 2.5,
-    "youngs_modulus_mpa": 16.0,
-    "sensor_radius_mm": 1.5,
-    "indenter_radius_mm": 4.0,
-}
-SKIN = [part for name, value in PRESSED.items() for part in ("--" + name.replace("_", "-"), str(value))]
-FRF = ["frf", *SKIN, "--d33-pc-per-n", "14"]
-
-
-def run(*arguments: str, given: str | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
-    """The command's result; `given` is its standard input."""
-    plain = {**os.environ, "COLUMNS": "120", **environment}
-    return subprocess.run([COMMAND, *arguments], input=given, env=plain, capture_output=True, text=True)
 
 
 def columns(*arguments: str, given: str | None = None) -> dict[str, list[str]]:
@@ -41,14 +24,6 @@ def columns(*arguments: str, given: str | None = None) -> dict[str, list[str]]:
 
 def numbers(cells: list[str]) -> list[float]:
     return [float(cell) for cell in cells]
-
-
-def refused(*arguments: str, given: str | None = None, **environment: str) -> str:
-    """The one line on stderr of a command that ends with status 2."""
-    answer = run(*arguments, given=given, **environment)
-    assert (answer.returncode, answer.stdout) == (2, "")
-    (line,) = answer.stderr.splitlines()
-    return line
 
 
 def test_frf_agrees_with_the_service(server_url: str) -> None:

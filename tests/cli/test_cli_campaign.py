@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.cli.test_cli import FRF, SKIN, refused, run
+from tests.cli.commands import FRF, SKIN, refused, run
 from tests.support.instrument_files import EXAMPLES
 from tests.support.simulated_campaign import Rig, simulate
 from underskin import load_table

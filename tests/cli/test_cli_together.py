@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.cli.test_cli import refused, run
+from tests.cli.commands import refused, run
 from tests.support.simulated_campaign import Rig, simulate
 from underskin import load_table
 from underskin.recordings.campaign import Campaign, FrfRecording

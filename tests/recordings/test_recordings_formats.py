@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.recordings.test_recordings_campaign import EVERYTHING, FRF, document
+from tests.recordings.contents_of_files import contents, the_time_series
+from tests.support.campaign_documents import EVERYTHING, FRF, document
 from tests.support.instrument_files import (
     CHARGE,
     COMMON,
@@ -25,29 +26,10 @@ from tests.support.instrument_files import (
 from underskin.errors import FileError, InvalidInput
 from underskin.recordings import read_contents, read_file
 from underskin.recordings.campaign import parse, to_dict
-from underskin.recordings.channels import Contents
 from underskin.recordings.readers import json_file
-from underskin.recordings.rig_description import RigDescription
 
 MAY, JUNE = np.datetime64("2024-05-03T10:00:00"), np.datetime64("2024-06-03T10:00:00.500000")
 UNSET = np.datetime64("1904-01-01T00:00:00")
-
-
-def the_time_series(data: bytes, name: str, rig: RigDescription, rate: float = 1000.0) -> list[str]:
-    """Asserts that a file holds FORCE and CHARGE as that rig wrote them; returns the warnings."""
-    reading = read_file(data, name, rig)
-    assert not reading.problems
-    for recording in to_dict(reading.campaign)["recordings"]:
-        assert recording["sample_rate_hz"] == pytest.approx(rate)
-        assert recording["force_n"] == pytest.approx(FORCE)
-        assert recording["charge_pc"] == pytest.approx(CHARGE)
-    return reading.warnings
-
-
-def contents(data: bytes, name: str) -> Contents:
-    found = read_contents(data, name)
-    assert isinstance(found, Contents)
-    return found
 
 
 def test_json_to_hdf5_and_back_loses_nothing() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.recordings.test_recordings_real import read, real
+from tests.recordings.real_files import read, real
 from tests.support.instrument_files import rig, tdms
 from underskin.errors import InvalidInput
 from underskin.recordings import Reading, join, read_file

@@ -1,37 +1,14 @@
 """Real instruments' files, through the example rig descriptions. Found through UNDERSKIN_RECORDINGS."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from tests.support.instrument_files import EXAMPLES, rig
+from tests.recordings.real_files import example_rig, read, real
+from tests.support.instrument_files import rig
 from underskin.errors import FileError
-from underskin.recordings import Reading, read_contents, read_file, rig_description
+from underskin.recordings import read_contents, read_file, rig_description
 from underskin.recordings.campaign import CompressionRecording, FrfRecording, IndentationRecording
 from underskin.recordings.channels import Contents
-from underskin.recordings.rig_description import RigDescription
-
-
-def real(pattern: str) -> list[Path]:
-    folder = os.environ.get("UNDERSKIN_RECORDINGS")
-    if folder is None:
-        pytest.skip("UNDERSKIN_RECORDINGS names no folder of recordings")
-    files = sorted(Path(folder).glob(pattern))
-    assert files
-    return files
-
-
-def example_rig(name: str) -> RigDescription:
-    file = EXAMPLES / "rigs" / f"{name}.yaml"
-    return rig_description.parse(file.read_bytes(), file.name)
-
-
-def read(file: Path, rig_name: str) -> Reading:
-    reading = read_file(file, file.name, example_rig(rig_name))
-    assert not reading.problems
-    return reading
 
 
 def test_sphere_in_well_comes_out_positive_in_compression() -> None:

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.recordings.test_recordings_campaign import EVERYTHING, INDENTATION, document
+from tests.support.campaign_documents import EVERYTHING, INDENTATION, document
 from tests.support.instrument_files import hdf5, tdms
 from underskin.errors import FileError
 from underskin.recordings import read_contents, read_file

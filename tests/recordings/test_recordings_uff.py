@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.recordings.test_recordings_formats import contents, the_time_series
+from tests.recordings.contents_of_files import contents, the_time_series
 from tests.support.instrument_files import COMMON, SKIN, frf_datasets, rig, time_datasets, uff
 from underskin.errors import FileError
 from underskin.recordings import read_contents, read_file

@@ -13,7 +13,7 @@ import pyuff
 import scipy.io
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
-from tests.recordings.test_recordings_campaign import FRF, document
+from tests.support.campaign_documents import FRF, document
 from tests.support.repository import ROOT
 from underskin.recordings import rig_description
 from underskin.recordings.campaign import parse

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.sparse import bmat, coo_matrix
+from scipy.sparse import csc_matrix, hstack, vstack
 from scipy.sparse.linalg import splu
 
 import tablegen.mesh
@@ -105,12 +105,12 @@ def after_newton_step(layer: NonlinearLayer, state: State, load: Floats) -> Stat
     strain = (d.gradient @ state.displacement[d.numbers][:, None, :, None])[..., 0]
     volume = (d.weight * (volume_ratio(IDENTITY + strain) - 1)) @ d.pressure
     stiffness, c = layer.element_matrices(state)
-    rows = np.arange(volume.size).reshape(volume.shape)[:, :, None]
-    columns = d.numbers[:, None, :]
-    places = np.broadcast_arrays(rows, columns)
-    constraint = coo_matrix((c.ravel(), [place.ravel() for place in places]), shape=(volume.size, d.size))
-    constraint = constraint.tocsc()[:, d.free]
-    system = bmat([[d.assemble_matrix(stiffness), -constraint.T], [constraint, None]], format="csc")
+    rows = np.broadcast_to(np.arange(volume.size).reshape(volume.shape)[:, :, None], c.shape)
+    columns = np.broadcast_to(d.numbers[:, None, :], c.shape)
+    everywhere = csc_matrix((c.ravel(), (rows.ravel(), columns.ravel())), shape=(volume.size, d.size))
+    constraint = everywhere[:, d.free]
+    above = hstack([d.assemble_matrix(stiffness), -constraint.T])
+    system = vstack([above, hstack([constraint, csc_matrix((volume.size, volume.size))])], format="csc")
     step = splu(system).solve(np.concatenate([(load - layer.internal_force(state))[d.free], -volume.ravel()]))
     displacement = state.displacement.copy()
     displacement[d.free] += step[: d.free.size]

@@ -16,8 +16,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.recordings.test_recordings_campaign import EVERYTHING
 from tests.support import instrument_files as examples
+from tests.support.campaign_documents import EVERYTHING
 from tests.support.repository import ROOT
 from underskin.recordings.campaign import parse
 from underskin.recordings.readers import json_file

@@ -15,8 +15,8 @@ import pytest
 
 from service.auth.keys import KeyStore
 from service.auth.session import COOKIE, logged_in
-from tests.service.middleware.test_service_errors import SIGMA, all_routes, problem_of
-from tests.service.middleware.test_service_limits import BODIES
+from tests.service.connections import BODIES
+from tests.service.requests import SIGMA, all_routes, problem_of
 from tests.support.server import UNDERSKIN, Server, running
 from underskin import InvalidInput
 

@@ -13,8 +13,8 @@ import httpx
 import pytest
 
 from service.settings import Settings
-from tests.service.middleware.test_service_errors import SIGMA, problem_of
-from tests.service.middleware.test_service_limits import HEAD, connect, read_answer
+from tests.service.connections import HEAD, connect, read_answer
+from tests.service.requests import SIGMA, problem_of
 from tests.support.server import UNDERSKIN, running
 from underskin.surrogate.sigma_table import SIGMA_TABLE, tables_folder
 

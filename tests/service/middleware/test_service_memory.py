@@ -13,7 +13,7 @@ import httpx
 import pytest
 
 from service.auth.keys import KeyStore
-from tests.service.middleware.test_service_limits import assert_too_large, connect, read_answer
+from tests.service.connections import assert_too_large, connect, read_answer
 from tests.support.server import Server, running
 
 UNFINISHED = 20

@@ -6,8 +6,8 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.service.middleware.test_service_errors import FRF, SIGMA, problem_of
-from tests.service.middleware.test_service_limits import HEAD, connect, read_answer
+from tests.service.connections import HEAD, connect, read_answer
+from tests.service.requests import FRF, SIGMA, problem_of
 from tests.support.server import Server
 
 ONE_SIGMA = "/v1/sigma?a_over_h=0.3&rt_over_h=0.6"

@@ -12,7 +12,7 @@ import pytest
 
 from service.store import database, diagnoses
 from tests.service.pages.conftest import Visit
-from tests.service.pages.test_pages_security import BROWSING, HOSTILE, token_of
+from tests.service.pages.forms import BROWSING, HOSTILE, token_of
 from tests.support.diagnosed import asked, resonant, sent, table
 from tests.support.store_server import Server
 from underskin import __version__

@@ -7,8 +7,8 @@ import httpx
 import pytest
 
 from tests.service.pages.conftest import Visit
+from tests.service.pages.forms import BROWSING
 from tests.service.pages.test_pages_adopted import mistuned
-from tests.service.pages.test_pages_security import BROWSING
 from tests.support.diagnosed import diagnosed, resonant
 from tests.support.store_server import Place, Server, running
 

@@ -10,7 +10,7 @@ import httpx
 import numpy as np
 import pytest
 
-from tests.service.pages.test_pages_security import token_of
+from tests.service.pages.forms import token_of
 from tests.support.repository import ROOT
 from tests.support.store_server import Place, Server, campaign, running
 

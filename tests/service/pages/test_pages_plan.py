@@ -7,7 +7,7 @@ import pytest
 
 from tests.diagnosis.test_diagnosis_plan import NARROW
 from tests.service.pages.conftest import Visit
-from tests.service.pages.test_pages_security import BROWSING
+from tests.service.pages.forms import BROWSING
 from tests.support.diagnosed import asked, awaited, sent, table
 from tests.support.diagnosis_campaigns import campaign
 from tests.support.store_server import Server

@@ -7,8 +7,8 @@ import httpx
 import pytest
 
 from tests.service.pages.conftest import Visit
-from tests.service.pages.test_pages_security import BROWSING, token_of
-from tests.service.pages.test_pages_upload import file
+from tests.service.pages.forms import BROWSING, token_of
+from tests.service.pages.uploads import file
 from tests.support.repository import ROOT
 from tests.support.store_server import Server, campaign
 

@@ -1,6 +1,5 @@
 """Other sites, other people and hostile names get nowhere."""
 
-import re
 import time
 from collections.abc import Iterator
 
@@ -11,16 +10,8 @@ from playwright.sync_api import Browser
 from service.auth import session
 from service.auth.keys import KeyStore
 from tests.service.pages.conftest import Visit, visit
+from tests.service.pages.forms import BROWSING, HOSTILE, token_of
 from tests.support.store_server import Server, campaign
-
-HOSTILE = "<script>alert(1)</script>\"'><img src=x onerror=alert(2)>{{7*7}}=1+1"
-BROWSING = {"Accept": "text/html"}
-
-
-def token_of(page: str) -> str:
-    found = re.search(r'name="form_token" value="([^"]+)"', page)
-    assert found is not None
-    return found[1]
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ import httpx
 import pytest
 
 from tests.service.pages.conftest import Visit
-from tests.service.pages.test_pages_security import BROWSING, token_of
-from tests.service.pages.test_pages_upload import as_json, file, look_at
+from tests.service.pages.forms import BROWSING, token_of
+from tests.service.pages.uploads import as_json, file, look_at
 from tests.support.diagnosed import diagnosed, report, resonant
 from tests.support.store_server import Place, Server, campaign, running
 

@@ -1,42 +1,17 @@
 """Uploads in the browser: understood, corrected, joined, and kept or not at all."""
 
-import httpx
 import pytest
-from playwright.sync_api import FilePayload
 
 from tests.service.pages.conftest import Visit
+from tests.service.pages.forms import HOSTILE
 from tests.service.pages.lab_files import SHAKER_RIG, shaker_tdms
-from tests.service.pages.test_pages_security import HOSTILE
+from tests.service.pages.uploads import as_json, campaigns_of, file, look_at
 from tests.support.repository import ROOT
 from tests.support.store_server import Server, campaign
 from underskin.recordings import rig_description
 
 GAIN = 7.4
 TEMPLATE = ROOT / "examples" / "formats" / "template.csv"
-
-
-def file(name: str, content: bytes | str) -> FilePayload:
-    return {"name": name, "mimeType": "", "buffer": content.encode() if isinstance(content, str) else content}
-
-
-def look_at(visitor: Visit, files: list[FilePayload], *, rig: str = "", skin: str = "") -> None:
-    page = visitor.page
-    visitor.go("/upload")
-    page.get_by_label("Files").set_input_files(files)
-    page.get_by_label("Skin").fill(skin)
-    if rig:
-        page.get_by_label("Rig description").set_input_files(file("rig.yaml", rig))
-    page.get_by_role("button", name="Look at them").click()
-    page.wait_for_url("**/upload/*")
-
-
-def as_json(document: dict[str, object]) -> str:
-    return httpx.Request("POST", "http://x", json=document).content.decode()
-
-
-def campaigns_of(server: Server, skin: str) -> list[str]:
-    answer = server.http.get("/v1/campaigns", params={"skin": skin}).json()
-    return [entry["id"] for entry in answer["campaigns"]]
 
 
 def test_a_bad_recording_is_explained_field_by_field(visitor: Visit, server: Server) -> None:

@@ -5,8 +5,8 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.service.pages.test_pages_security import BROWSING, token_of
-from tests.service.pages.test_pages_upload import as_json
+from tests.service.pages.forms import BROWSING, token_of
+from tests.service.pages.uploads import as_json
 from tests.support.store_server import Server, campaign
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.service.pages.conftest import Visit
-from tests.service.pages.test_pages_upload import as_json, file, look_at
+from tests.service.pages.uploads import as_json, file, look_at
 from tests.support.instrument_files import frf_datasets, uff
 from tests.support.store_server import campaign
 

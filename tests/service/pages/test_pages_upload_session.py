@@ -10,8 +10,8 @@ import pytest
 from service.ingest.uploads import Upload
 from service.pages.upload.pending_uploads import PendingUploads
 from service.store.errors import Missing
-from tests.service.pages.test_pages_security import BROWSING, token_of
-from tests.service.pages.test_pages_upload import as_json, campaigns_of
+from tests.service.pages.forms import BROWSING, token_of
+from tests.service.pages.uploads import as_json, campaigns_of
 from tests.support.store_server import Place, Server, campaign, running
 
 
