@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from tests.support.repository import ROOT
-from underskin.errors import ErrorCode, FileError, InvalidInput
+from underskin.array_stress.request import read_request
+from underskin.errors import ErrorCode, FileError, InvalidInput, not_one_of, required, unequal_lengths, wrong_type
 from underskin.findings import english, sentences
 from underskin.findings.arguments import DefectKind, ImplausibleD33, UnitGuess
 from underskin.findings.codes import FindingCode, Reason
@@ -144,6 +145,38 @@ def test_errors_carry_codes_that_survive_a_new_name() -> None:
         unlikely.value.allowed,
     )
     assert FileError("a.tdms", "", "is empty").code == ErrorCode.UNREADABLE_FILE
+
+
+def test_errors_of_one_kind_have_one_sentence_and_one_code() -> None:
+    for error, code, text in (
+        (required("preload_n"), ErrorCode.REQUIRED, "preload_n = None: required"),
+        (wrong_type("x_mm", "a", index=2), ErrorCode.WRONG_TYPE, "x_mm[2] = 'a': must be a number"),
+        (not_one_of("kind", "b", ("frf", "c")), ErrorCode.NOT_ONE_OF, "kind = 'b': must be one of frf, c"),
+        (not_one_of("schema", "b", ("rig/1",)), ErrorCode.NOT_ONE_OF, "schema = 'b': must be rig/1"),
+        (
+            unequal_lengths("b", 2, 3, "a", "rows"),
+            ErrorCode.UNEQUAL_LENGTHS,
+            "b = '2 rows': must have 3 rows, as many as a",
+        ),
+        (FileError("a.json", "line 1", "no").of_field("rig", "r"), ErrorCode.UNREADABLE_FILE, "rig = 'r': line 1: no"),
+    ):
+        assert (error.code, str(error)) == (code, text)
+
+
+def test_what_is_wrong_with_a_load_has_a_code() -> None:
+    sensors = [{"id": "s0", "x_mm": 0.0, "y_mm": 0.0}]
+    document = {"thickness_mm": 2.5, "sensor_radius_mm": 1.5, "d33_pc_per_n": 14.0, "sensors": sensors}
+    contact = {"x_mm": 0.0, "y_mm": 0.0, "indenter_radius_mm": 4.0, "normal_force_n": 1.0}
+    pressure = {"x_mm": [0.0, 1.0], "y_mm": [0.0, 1.0], "pressure_mpa": [[0.0, -1.0], [0.0, 0.0]]}
+    for change, code in (
+        ({"sensors": []}, ErrorCode.TOO_FEW),
+        ({}, ErrorCode.REQUIRED),
+        ({"contacts": [contact]}, ErrorCode.REQUIRED),
+        ({"pressure_map": pressure}, ErrorCode.OUT_OF_RANGE),
+    ):
+        with pytest.raises(InvalidInput) as refusal:
+            read_request({**document, **change})
+        assert refusal.value.code == code, refusal.value
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from service.pages.shared.verdicts import in_words, mechanisms_of
+from service.pages.shared.verdicts import mechanisms_of
 from service.problems import Refusal
 from service.store import diagnoses
 from service.store.engine import Database
@@ -14,6 +14,7 @@ from service.store.errors import Conflict
 from service.store.tables import AnyRow
 from service.usecases import adopted_models, d33_cache
 from underskin import InvalidInput
+from underskin.diagnosis.data.names import in_words
 from underskin.surrogate.sigma_table import SigmaTable
 
 

@@ -86,7 +86,7 @@ def _nothing_to_plan(surviving: Sequence[Answer]) -> Plan:
     """No recordings, and on which axes the rivals would differ."""
     names = [answer.names for answer in surviving]
     axes = [{axis for name in own for axis in CATALOGUE[name].axes} for own in names if set(own) <= set(CATALOGUE)]
-    return Plan(names, differ_on=set().union(*axes) - set.intersection(*axes) if axes else set())
+    return Plan(names, differ_on={axis for own in axes for axis in own if any(axis not in other for other in axes)})
 
 
 def _outlook(

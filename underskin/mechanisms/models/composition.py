@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.autodiff import Differentiated, variables
-from underskin.errors import InvalidInput, not_one_of, not_unique, unequal_lengths
+from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Unsupported, Values
 from underskin.recordings.conditions import Conditions
 from underskin.units import Array, Floats
@@ -66,7 +66,8 @@ class Composition:
         Raises InvalidInput where `fit` has another length than the parameters.
         """
         if np.shape(fit) != (len(self.parameters),):
-            raise unequal_lengths("fit", np.size(fit), len(self.parameters), "the parameters", "coordinates")
+            allowed = f"must hold {len(self.parameters)} coordinates"
+            raise InvalidInput("fit", np.shape(fit), allowed, code=ErrorCode.UNEQUAL_LENGTHS)
         value = np.where(self._log, np.exp(np.where(self._log, fit, 0.0)), fit)
         slope = np.where(self._log, value, 1.0)
         seeds = variables([*value, *np.zeros(further)], [*slope, *np.ones(further)])
