@@ -1,4 +1,5 @@
 """Where recordings and model differ, and what physics was left out.
 
-Data flow one way, one file a step: lines (with line_noise) → likelihood → fit → search → report → plan.
+Data flow one way, one folder a step: data and noise → screening → inference → selection → validation and planning →
+localisation → reporting; `pipeline` calls them. docs/diagnosis.md lists the files of each step.
 """

@@ -1,4 +1,4 @@
-"""A campaign's diagnosis: findings → lines → search → residuals and location → held-out groups → plan → report."""
+"""A campaign's diagnosis: screening → rows with noise → search → location → held-out groups → plan → report."""
 
 import importlib.metadata
 from collections.abc import Callable, Sequence

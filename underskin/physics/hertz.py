@@ -1,6 +1,7 @@
 """Hertz: a rigid sphere on an elastic half space (Seminara 2018, equations 7–10 and 16).
 
-All functions take SI scalars or arrays and broadcast.
+All functions take SI scalars or arrays and broadcast. The forward model has the same radius with derivatives by its
+parameters: `Contacts.hertz_radius` in `underskin/mechanisms/models/contact_state.py`.
 """
 
 import numpy as np

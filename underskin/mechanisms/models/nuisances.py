@@ -1,5 +1,5 @@
-"""The nuisances: factors on the declared modulus and thickness; of a curve, where its contact begins and what the cell
-shows without one.
+"""Parameters that every model has, whatever its mechanisms: of FRFs d33 and factors on the declared modulus and
+thickness; of a curve its modulus, where its contact begins, and what the load cell shows without contact.
 """
 
 from collections.abc import Sequence
