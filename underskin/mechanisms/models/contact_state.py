@@ -29,7 +29,7 @@ class Contacts:
 
     @property
     def hertz_radius(self) -> Differentiated:
-        """a [m] of a sphere on a half space without adhesion, a³ = 3 F R/(4 E'), as `hertz.contact_radius`, with derivatives."""
+        """a [m] of a sphere on a half space without adhesion, a³ = 3 F R/(4 E'): `hertz.contact_radius` with slopes."""
         return cbrt(0.75 * self.force * self.indenter_radius / self.reduced_modulus)
 
     @property
