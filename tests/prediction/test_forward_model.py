@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -137,7 +138,7 @@ def begun_late(entry: Recording) -> Recording:
         ({"d33": float("nan")}, (), "parameters.d33"),
         ({"d33": 14.0}, ("contact_creep",), r"recordings[row 0].dwell_s"),
         ({"d33": 14.0}, ("platen_friction",), "mechanisms"),
-        ({"d33": 14.0}, ("phlogiston",), "mechanism"),
+        ({"d33": 14.0}, ("phlogiston",), "mechanisms"),
     ],
 )
 def test_what_cannot_be_predicted_is_refused(
@@ -174,3 +175,49 @@ def test_columns_that_make_no_rows_are_refused() -> None:
 def test_a_sensor_that_the_skin_does_not_have_is_refused() -> None:
     with pytest.raises(InvalidInput, match="sensor"):
         rows(sensor="s9")
+
+
+@pytest.mark.parametrize(
+    ("column", "values"),
+    [
+        ("preload_n", [1.0, -1.0]),
+        ("preload_n", float("nan")),
+        ("preload_n", []),
+        ("preload_n", [[1.0]]),
+        ("indenter_radius_mm", -4.0),
+        ("frequency_hz", float("nan")),
+        ("frequency_hz", -3.0),
+        ("offset_x_mm", float("inf")),
+        ("dynamic_force_n", -0.1),
+        ("load_cycles", -1.0),
+    ],
+)
+def test_values_that_no_recording_can_have_are_refused_by_their_column(column: str, values: ArrayLike) -> None:
+    columns: dict[str, Any] = {"indenter_radius_mm": 4.0, "preload_n": 1.0, "frequency_hz": 30.0, column: values}
+    with pytest.raises(InvalidInput) as refused:
+        frf_conditions(SKIN, **columns)
+    assert refused.value.field == column
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("youngs_modulus_mpa", -16.0),
+        ("youngs_modulus_mpa", 0.0),
+        ("thickness_mm", -2.5),
+        ("thickness_mm", float("nan")),
+        ("sensor_radius_mm", 0.0),
+        ("poisson_ratio", 0.7),
+    ],
+)
+def test_a_skin_that_cannot_be_is_refused_by_its_field(field: str, value: float) -> None:
+    changed: dict[str, Any] = {field: value}
+    skin = replace(SKIN, **changed)
+    with pytest.raises(InvalidInput) as refused:
+        frf_conditions(skin, indenter_radius_mm=4.0, preload_n=1.0, frequency_hz=30.0)
+    assert refused.value.field == field
+
+
+def test_mechanisms_are_named_in_a_list() -> None:
+    with pytest.raises(InvalidInput, match="mechanisms = 'ageing': must be a list of names"):
+        predict(rows(), table(), {"d33": 14.0}, mechanisms="ageing")

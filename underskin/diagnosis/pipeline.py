@@ -49,8 +49,9 @@ def diagnose(
 ) -> DiagnosisResult:
     """What recordings and model disagree about, and what physics was left out.
 
-    Deterministic, but for a campaign that states times to come (underskin.campaign_findings). Raises InvalidInput where
-    the campaign has no FRF recording.
+    FRFs are diagnosed where the campaign has any; else its indentation curves, else its compression curves. From a
+    campaign that holds nothing usable nothing is concluded. Deterministic, but for a campaign that states times to come
+    (`recordings/plausibility.py`).
     """
     diagnosis = _diagnosed(campaign, table, progress, limits)
     return replace(diagnosis, findings=tuple(dict.fromkeys((*implausible(campaign), *diagnosis.findings))))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.errors import conflicting, not_one_of, out_of_range, required
+from underskin.errors import conflicting, not_one_of, out_of_range, required, wrong_type
 from underskin.mechanisms.base import Kind, Mechanism, Parameter
 from underskin.mechanisms.models.composed import Model, forward_model
 from underskin.mechanisms.models.composition import chosen, kind_of, parameters_together
@@ -81,6 +81,8 @@ def predict(
         For a mechanism or parameter that is unknown, missing or beyond its bounds, and for a recording that lacks what
         a mechanism needs.
     """
+    if isinstance(mechanisms, str):
+        raise wrong_type("mechanisms", mechanisms, "must be a list of names")
     kind = kind or kind_of(conditions)
     acting = chosen(mechanisms, CATALOGUE)
     for mechanism in acting:
@@ -139,8 +141,14 @@ def _fit_coordinates(model: Model, values: Mapping[str, float], own: int) -> NDA
 def _coordinate(entry: Parameter, value: float | None, needed: bool) -> float:
     if value is None:
         if needed:
-            raise required(f"parameters.{entry.name}", f"required, in {entry.unit}: {entry.reason}")
+            raise required(f"parameters.{entry.name}", f"required{_unit(entry.unit, ', in ')}: {entry.reason}")
         return entry.start
     if not entry.low <= value <= entry.high:
-        raise out_of_range(f"parameters.{entry.name}", value, f"must be {entry.low:g} to {entry.high:g} {entry.unit}")
+        raise out_of_range(
+            f"parameters.{entry.name}", value, f"must be {entry.low:g} to {entry.high:g}{_unit(entry.unit)}"
+        )
     return entry.to_fit(value)
+
+
+def _unit(unit: str, lead: str = " ") -> str:
+    return "" if unit == "-" else f"{lead}{unit}"

@@ -12,10 +12,11 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique, too_few, wrong_type
+from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique, out_of_range, too_few, wrong_type
+from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings import validation as field
 from underskin.recordings.shown_values import shown
-from underskin.units import Floats, to_si
+from underskin.units import Floats, checked, finite, non_negative, to_si
 
 
 @dataclass(frozen=True)
@@ -166,11 +167,12 @@ def frf_conditions(
     Raises
     ------
     InvalidInput
-        For a sensor that the skin does not have, a column that does not exist, or columns that do not broadcast.
+        For a sensor that the skin does not have, a column that does not exist, columns that do not broadcast or are
+        empty, and a value that is not finite or not positive where it must be.
     """
     unknown = [name for name in further if name not in _FURTHER_COLUMNS]
     if unknown:
-        raise not_one_of(unknown[0], "given", _FURTHER_COLUMNS)
+        raise not_one_of(unknown[0], "given", ("indenter_radius_mm", "preload_n", "frequency_hz", *_FURTHER_COLUMNS))
     skin = skin if skin.sensors else replace(skin, sensors=(Sensor("sensor", 0.0, 0.0),))
     centres = {entry.id: entry for entry in skin.sensors}
     if sensor is not None and sensor not in centres:
@@ -180,6 +182,7 @@ def frf_conditions(
     columns = {"offset_x_mm": 0.0, "offset_y_mm": 0.0, "dynamic_force_n": 0.0} | columns
     columns |= {"indenter_radius_mm": indenter_radius_mm, "preload_n": preload_n}
     lines = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
+    _check_values(skin, columns, lines)
     recordings = []
     for number, row in enumerate(_rows(columns)):
         place = centre.x_mm + row.pop("offset_x_mm"), centre.y_mm + row.pop("offset_y_mm")
@@ -190,6 +193,26 @@ def frf_conditions(
 
 
 _FURTHER_COLUMNS = ("offset_x_mm", "offset_y_mm", "dynamic_force_n", "dwell_s", "load_cycles")
+
+
+def _check_values(skin: SkinDescription, columns: Mapping[str, ArrayLike], lines: Floats) -> None:
+    """Raises InvalidInput at the first value that no recording can have; unlikely magnitudes are accepted."""
+    for name in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "d33_pc_per_n"):
+        value = getattr(skin, name)
+        if value is not None:
+            checked(name, value, units_checked=True)
+    if not 0 <= skin.poisson_ratio <= INCOMPRESSIBLE:
+        raise out_of_range("poisson_ratio", skin.poisson_ratio, f"must be 0 to {INCOMPRESSIBLE:g}")
+    for name, values in {**columns, "frequency_hz": lines}.items():
+        column = np.asarray(values, dtype=float)
+        if column.size == 0 or column.ndim > 1:
+            raise too_few(name, f"shape {column.shape}", "must be one number or a column of at least one")
+        if name in ("indenter_radius_mm", "preload_n"):
+            checked(name, column, units_checked=True)
+        elif name in ("offset_x_mm", "offset_y_mm"):
+            finite(name, column)
+        else:
+            non_negative(name, column)
 
 
 def _rows(columns: Mapping[str, ArrayLike]) -> list[dict[str, Any]]:

@@ -34,7 +34,7 @@ _RIVALS = 4
 
 
 @dataclass(frozen=True)
-class Plan:
+class NextRecordings:
     """The recordings to make next and what they promise; no recordings where none tells the rivals apart."""
 
     rivals: Sequence[Sequence[str]]  # the mechanisms of each
@@ -47,7 +47,7 @@ class Plan:
     differ_on: Collection[str] = ()  # axes on which the rivals differ, where there are no recordings
 
 
-def plan(problem: FittingProblem, search: Search, limits: RigLimits) -> Plan | None:
+def plan(problem: FittingProblem, search: Search, limits: RigLimits) -> NextRecordings | None:
     """The recordings to make, what they cost, and the chance that they decide; None if all is decided."""
     surviving = [answer for answer in search.answers if answer.probability > _SURVIVES][:_RIVALS]
     if len(surviving) < 2:
@@ -61,7 +61,9 @@ def plan(problem: FittingProblem, search: Search, limits: RigLimits) -> Plan | N
     return None if surviving[0].probability >= EXPLAINED else _nothing_to_plan(surviving)
 
 
-def _planned(problem: FittingProblem, surviving: Sequence[Answer], limits: RigLimits, beyond: bool) -> Plan | None:
+def _planned(
+    problem: FittingProblem, surviving: Sequence[Answer], limits: RigLimits, beyond: bool
+) -> NextRecordings | None:
     """The best recordings within these limits; None where none brings anything."""
     allowed = candidates(problem.lines.campaign, limits)
     rivals, outlook, allowed = _outlook(problem, surviving, allowed)
@@ -71,7 +73,7 @@ def _planned(problem: FittingProblem, surviving: Sequence[Answer], limits: RigLi
     if not chosen:
         return None
     spheres = {allowed[index].indenter_radius_mm for index in chosen}
-    return Plan(
+    return NextRecordings(
         rivals=[answer.names for answer in rivals],
         recordings=[allowed[index] for index in sorted(chosen)],
         first=allowed[chosen[0]],
@@ -82,11 +84,13 @@ def _planned(problem: FittingProblem, surviving: Sequence[Answer], limits: RigLi
     )
 
 
-def _nothing_to_plan(surviving: Sequence[Answer]) -> Plan:
+def _nothing_to_plan(surviving: Sequence[Answer]) -> NextRecordings:
     """No recordings, and on which axes the rivals would differ."""
     names = [answer.names for answer in surviving]
     axes = [{axis for name in own for axis in CATALOGUE[name].axes} for own in names if set(own) <= set(CATALOGUE)]
-    return Plan(names, differ_on={axis for own in axes for axis in own if any(axis not in other for other in axes)})
+    return NextRecordings(
+        names, differ_on={axis for own in axes for axis in own if any(axis not in other for other in axes)}
+    )
 
 
 def _outlook(

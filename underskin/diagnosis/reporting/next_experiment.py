@@ -4,12 +4,12 @@ from typing import Any
 
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import in_words
-from underskin.diagnosis.planning.optimal_design import Plan
+from underskin.diagnosis.planning.optimal_design import NextRecordings
 from underskin.diagnosis.reporting.statements import listed
 from underskin.findings.formatting import in_percent
 
 
-def next_experiment(plan: Plan | None) -> dict[str, Any]:
+def next_experiment(plan: NextRecordings | None) -> dict[str, Any]:
     """The document, in lab units; empty where nothing needs to be planned."""
     if plan is None:
         return {}
@@ -23,7 +23,7 @@ def next_experiment(plan: Plan | None) -> dict[str, Any]:
     }
 
 
-def _recordings(plan: Plan) -> list[dict[str, Any]]:
+def _recordings(plan: NextRecordings) -> list[dict[str, Any]]:
     documents = []
     for entry in dict.fromkeys(plan.recordings):
         described = {
@@ -39,7 +39,7 @@ def _recordings(plan: Plan) -> list[dict[str, Any]]:
     return documents
 
 
-def _statement(plan: Plan) -> str:
+def _statement(plan: NextRecordings) -> str:
     first = plan.first
     assert first is not None
     count = f"{len(plan.recordings)} recordings, first" if len(plan.recordings) > 1 else "One recording"
@@ -50,7 +50,7 @@ def _statement(plan: Plan) -> str:
     )
 
 
-def _why_none(plan: Plan) -> str:
+def _why_none(plan: NextRecordings) -> str:
     statement = f"No recording within these limits tells {_rivals(plan)} apart."
     if plan.differ_on:
         words = sorted(WORDS[axis][0] if axis in WORDS else axis for axis in plan.differ_on)
@@ -58,5 +58,5 @@ def _why_none(plan: Plan) -> str:
     return statement
 
 
-def _rivals(plan: Plan) -> str:
+def _rivals(plan: NextRecordings) -> str:
     return listed([in_words(names) for names in plan.rivals])

@@ -14,7 +14,7 @@ from underskin.diagnosis.localisation.effect_size import EffectSize
 from underskin.diagnosis.localisation.permutation_test import AxisResult
 from underskin.diagnosis.localisation.region import reaches_all_along
 from underskin.diagnosis.localisation.residual_shape import REACHES_NOISE, Shape
-from underskin.diagnosis.planning.optimal_design import Plan
+from underskin.diagnosis.planning.optimal_design import NextRecordings
 from underskin.diagnosis.reporting import next_experiment
 from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
@@ -57,7 +57,7 @@ class DiagnosisResult:
     groups: Sequence[cross_validation.HeldOut] = ()
     confounded: Sequence[Confounding] = ()
     shape: Shape | None = None  # of what remains, where no mechanism describes it
-    plan: Plan | None = None
+    plan: NextRecordings | None = None
 
     @property
     def next_experiment(self) -> dict[str, Any]:

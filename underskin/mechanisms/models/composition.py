@@ -117,7 +117,7 @@ def chosen(names: Sequence[str], catalogue: Mapping[str, Mechanism]) -> list[Mec
     """The mechanisms of these names in order of composition; raises InvalidInput for one unknown or twice."""
     for name in names:
         if name not in catalogue:
-            raise not_one_of("mechanism", name, catalogue)
+            raise not_one_of("mechanisms", name, catalogue)
         if list(names).count(name) > 1:
-            raise not_unique("mechanism", name, "must be named once")
+            raise not_unique("mechanisms", name, "must be named once")
     return [mechanism for name, mechanism in catalogue.items() if name in names]
