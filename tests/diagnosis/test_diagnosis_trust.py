@@ -24,7 +24,7 @@ from underskin.recordings.conditions import SkinDescription
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Floats
 
-EXAMPLE = ROOT / "service" / "pages" / "example" / "2024-11.json"
+EXAMPLE = ROOT / "service" / "pages" / "start" / "example" / "2024-11.json"
 
 
 @pytest.fixture(scope="module")
