@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-FOLDER = Path(__file__).parent.parent / "service" / "pages" / "example"
+FOLDER = Path(__file__).parent.parent / "service" / "pages" / "start" / "example"
 CAMPAIGNS: tuple[tuple[int, str, str, str, float, tuple[float, int], dict[str, Any]], ...] = (
     (1, "2024-05", "as built", "2024-05-14T08:30:00Z", 14.2, (130, 20), {}),
     (2, "2024-07", "after two months", "2024-07-09T09:10:00Z", 13.8, (130, 20), {}),
