@@ -1,6 +1,7 @@
 """Whether requests need a key: kept in the store from the first key on, and lifted by `underskin key open` alone."""
 
 from sqlalchemy import Connection, inspect, select
+from sqlalchemy.dialects import postgresql, sqlite
 
 from service.store.tables import AnyRow, key_requirement
 from service.store.times import now
@@ -36,7 +37,10 @@ def lift(connection: Connection) -> None:
 
 
 def _replace(connection: Connection, *, lifted: bool) -> None:
+    """Write the only row, whether or not another transaction writes it at the same time."""
     time = now()
-    connection.execute(key_requirement.delete())
     row = {"number": _ONLY, "needed_since": time, "lifted_at": time if lifted else None}
-    connection.execute(key_requirement.insert().values(row))
+    dialect = sqlite if connection.dialect.name == "sqlite" else postgresql
+    connection.execute(
+        dialect.insert(key_requirement).values(row).on_conflict_do_update(index_elements=["number"], set_=row)
+    )

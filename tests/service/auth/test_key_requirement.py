@@ -1,7 +1,9 @@
 """Once a key was made the service stays closed, whatever becomes of keys.json, until `underskin key open --yes`."""
 
 import shutil
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import httpx
@@ -256,3 +258,22 @@ def test_commands_say_that_the_file_of_keys_is_missing(place: Place) -> None:
             assert "revokes" not in said
         lifted = place.command("key", "list")
         assert (lifted.returncode, lifted.stdout, lifted.stderr) == (0, "", "")
+
+
+def test_several_that_note_it_at_once_all_do(place: Place) -> None:
+    """A server and `underskin key create` do, each in a transaction of its own."""
+    store = open_store(place.database_url, place.folder)
+    ready = threading.Barrier(8)
+
+    def note() -> None:
+        ready.wait()
+        with store.writing() as connection:
+            key_requirement.require(connection)
+
+    with ThreadPoolExecutor(8) as threads:
+        outcomes = [threads.submit(note) for _ in range(8)]
+    with store.reading() as connection:
+        needed = key_requirement.is_needed(connection)
+    store.close()
+    assert [outcome.exception() for outcome in outcomes] == [None] * 8
+    assert needed
