@@ -5,7 +5,6 @@ Only what physics and mechanisms need: arithmetic, a few functions, selecting ro
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,10 +14,11 @@ from underskin.units import Array
 
 
 class Differentiated:
-    """An array with its derivatives: `value`, mostly (rows,), and `slopes`, with the parameters along its first axis.
+    """An array with its derivatives: `value`, (…, rows), and `slopes`, with the parameters along its first axis.
 
-    A single row stands for all rows, as NumPy broadcasts. In a mechanism the derivatives are those with respect to the
-    fit coordinates of the model's parameters; a function of `underskin.physics` states what its own are taken by.
+    A single row stands for all rows, as NumPy broadcasts. Axes before the rows are those of several points at which a
+    model is evaluated at once. In a mechanism the derivatives are those with respect to the fit coordinates of the
+    model's parameters; a function of `underskin.physics` states what its own are taken by.
     """
 
     __slots__ = ("slopes", "value")
@@ -68,13 +68,16 @@ class Differentiated:
 
     def __getitem__(self, rows: Any) -> Differentiated:
         """The rows that an index array or slice selects; a single row that stands for all stays one."""
-        if len(self.value) == 1:
+        if self.value.shape[-1] == 1:
             return self
-        return Differentiated(self.value[rows], self.slopes[:, rows])
+        return Differentiated(self.value[..., rows], self.slopes[..., rows])
 
     def spread(self, rows: int) -> Differentiated:
         """The same with that many rows, where a single row stands for all."""
-        return Differentiated(np.broadcast_to(self.value, rows), np.broadcast_to(self.slopes, (len(self.slopes), rows)))
+        return Differentiated(
+            np.broadcast_to(self.value, (*self.value.shape[:-1], rows)),
+            np.broadcast_to(self.slopes, (*self.slopes.shape[:-1], rows)),
+        )
 
 
 def exp(x: Differentiated) -> Differentiated:
@@ -120,31 +123,29 @@ def where(condition: NDArray[np.bool_], yes: Differentiated, no: Differentiated 
     return Differentiated(np.where(condition, yes.value, no.value), np.where(condition, yes.slopes, no.slopes))
 
 
-def constant(value: Array | float, parameters: int) -> Differentiated:
-    """A number whose derivatives with respect to so many parameters are 0."""
+def constant(value: Array | float, parameters: int, points: tuple[int, ...] = ()) -> Differentiated:
+    """A number whose derivatives with respect to so many parameters are 0, at all of so many points."""
     rows = np.atleast_1d(np.asarray(value))
-    return Differentiated(rows, np.zeros((parameters, 1)))
+    ones = (1,) * len(points)
+    return Differentiated(rows.reshape(*ones, -1), np.zeros((parameters, *ones, 1)))
 
 
-def variables(values: Sequence[float], slopes: Sequence[float]) -> list[Differentiated]:
+def variables(values: Array, slopes: Array) -> list[Differentiated]:
     """The independent variables of a model.
 
     Parameters
     ----------
     values
-        Each parameter's value in its unit.
+        Each variable's value in its unit, shape (…, variables).
     slopes
-        Each value's derivative with respect to its own fit coordinate: 1, or the value where that is its logarithm.
+        Their derivatives by what the model is differentiated with respect to, shape (parameters, …, variables).
 
     Returns
     -------
     list of Differentiated
-        One variable of a single row for each parameter; its derivatives with respect to the others are 0.
+        One of a single row for each variable.
     """
-    return [
-        Differentiated(np.array([value]), row[:, None])
-        for value, row in zip(values, np.diag(np.asarray(slopes, dtype=float)), strict=True)
-    ]
+    return [Differentiated(values[..., [place]], slopes[..., [place]]) for place in range(values.shape[-1])]
 
 
 def sum_rows(x: Differentiated, owner: NDArray[np.intp], rows: int) -> Differentiated:
@@ -153,7 +154,7 @@ def sum_rows(x: Differentiated, owner: NDArray[np.intp], rows: int) -> Different
     Parameters
     ----------
     x
-        The terms, shape (terms,), or a single row that stands for all of them.
+        The terms, shape (…, terms), or a single row that stands for all of them.
     owner
         Which row of the result each term belongs to, shape (terms,).
     rows
@@ -162,8 +163,13 @@ def sum_rows(x: Differentiated, owner: NDArray[np.intp], rows: int) -> Different
     Returns
     -------
     Differentiated
-        Shape (rows,); 0 in a row that no term belongs to.
+        Shape (…, rows); 0 in a row that no term belongs to.
     """
     x = x.spread(len(owner))
-    value = np.bincount(owner, x.value, rows)
-    return Differentiated(value, np.stack([np.bincount(owner, slope, rows) for slope in x.slopes]))
+    return Differentiated(_summed(x.value, owner, rows), _summed(x.slopes, owner, rows))
+
+
+def _summed(terms: Array, owner: NDArray[np.intp], rows: int) -> Array:
+    sets = int(np.prod(terms.shape[:-1]))
+    place = (rows * np.arange(sets)[:, None] + owner).ravel()
+    return np.bincount(place, terms.ravel(), sets * rows).reshape(*terms.shape[:-1], rows)

@@ -86,8 +86,8 @@ def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits
     findings += inspected.findings
     if inspected.lacking:
         return DiagnosisResult(campaign.name, findings, provenance, lacking=inspected.lacking)
-    problem = frf_problem(inspected.campaign, inspected.uneven, table)
-    return _work_out(campaign.name, problem, search(problem), findings, provenance, progress, limits)
+    problem, known = frf_problem(inspected.campaign, inspected.uneven, table)
+    return _work_out(campaign.name, problem, search(problem, known), findings, provenance, progress, limits)
 
 
 def _work_out(
@@ -106,7 +106,7 @@ def _work_out(
     leader = result.answers[0]
     nothing = next(entry for entry in result.explanations if not entry.names)
     shown = result.shown_or_nothing(leader)
-    levels = shown.best.at.marginal.levels
+    levels = shown.best.levels
     gain = float(np.clip(levels.gain, 0.005, 0.05))
     against_base = residuals(problem, nothing, gain, levels.position)
     axes = locate(problem.lines, against_base)

@@ -23,7 +23,7 @@ from underskin.units import Complexes, Floats
 COLLAPSED_HZ = 30.0  # stands for the frequency of a collapsed line; no model that is given one asks for it
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lines:
     """Rows run over all recordings one after another; SI.
 
@@ -67,6 +67,11 @@ class Lines:
     def first(self) -> NDArray[np.intp]:
         """The first row of each recording."""
         return np.searchsorted(self.recording, np.arange(self.recordings))
+
+    @cached_property
+    def sensors(self) -> Floats:
+        """1 where a recording is of a sensor (recordings, sensors)."""
+        return np.eye(int(self.sensor.max()) + 1)[self.sensor]
 
     @cached_property
     def whitening(self) -> Whitening | None:

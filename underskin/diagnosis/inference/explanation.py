@@ -5,30 +5,35 @@ two under their prior.
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.evidence import Evidence, around, integrated
+from underskin.diagnosis.inference.evidence import Evidence, around
+from underskin.diagnosis.inference.evidence import integrated as over_all_values
 from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis
 from underskin.diagnosis.inference.likelihood import Curvature
+from underskin.diagnosis.inference.objective import Points
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.inference.position_curvature import curvature
-from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR
+from underskin.errors import InvalidInput
+from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import Model, compose
 from underskin.mechanisms.models.composition import parameters_together
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER, POSITION_RANGE
 from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats
 
 _QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7, 0.9), 3: (0.2, 0.5, 0.8)}
 _KEPT_STARTS = 3
 _DECIDED = 0.999  # probability beyond which a parent's positioning scatter, or none, is its offspring's
 _COUNTS = 8.0  # nats behind the other fit within which one counts
-_POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
 _LEAST_GAIN = 1.0  # in log posterior density
 _LEAST_SCATTER = 3e-3  # relative effect of positioning scatter on a recording below which it is not looked for
 
@@ -49,31 +54,42 @@ class Explanation:
         weights = np.array([prior + fit.log_evidence for prior, fit in each])
         total = float(np.logaddexp.reduce(weights))
         best = each[int(np.argmax(weights))][1]
-        scattered = [fit.fitter.hypothesis.placed for _, fit in each]
+        scattered = [fit.hypothesis.placed for _, fit in each]
         placed = float(np.exp(weights[scattered] - total).sum())
         return cls(tuple(name for name in CATALOGUE if name in names), total, best, placed, tuple(each))
-
-    def integrated(self) -> Self:
-        """With the evidence of each fit that counts over all values of what the lines leave loose."""
-        least = max(prior + fit.log_evidence for prior, fit in self.each) - _COUNTS
-        return self.of(
-            self.names,
-            [(prior, integrated(fit) if prior + fit.log_evidence > least else fit) for prior, fit in self.each],
-        )
 
     @property
     def model(self) -> Model:
         """The composed model."""
-        return self.best.fitter.hypothesis.model
+        return self.best.hypothesis.model
 
     @property
     def point(self) -> FitPoint:
         """The most probable parameters."""
-        return self.best.at.point
+        return self.best.point
 
     def own(self, name: str) -> list[float]:
         """The fit coordinates of one of its mechanisms."""
-        return list(self.point.fit[own_places(self.names, self.best.fitter.hypothesis.lines)[name]])
+        return list(self.point.fit[own_places(self.names, self.best.hypothesis.lines)[name]])
+
+
+@dataclass(frozen=True)
+class Request:
+    """A set of mechanisms to explain, from the explanation of a set with one mechanism less, where one is given."""
+
+    names: tuple[str, ...]
+    parent: Explanation | None = None
+
+    @property
+    def without_scatter(self) -> bool:
+        """Whether it is fitted without positioning scatter."""
+        return self.parent is None or self.parent.placed < _DECIDED
+
+    def gains(self, cost: float, placed: bool) -> bool:
+        """Whether a fit with or without positioning scatter is better than the parent's, where that can be compared."""
+        if self.parent is None or (self.parent.placed > 0.5) is not placed:
+            return True
+        return cost < self.parent.best.cost - _LEAST_GAIN
 
 
 def own_places(names: Sequence[str], lines: Lines) -> dict[str, slice]:
@@ -103,110 +119,146 @@ class FittingProblem:
         lines = self.lines if whole or any(CATALOGUE[name].needs_lines for name in names) else self.collapsed
         return Hypothesis(compose(names, lines.campaign, self.table, self.kind), lines, self.curvature, placed)
 
-    def explain(self, names: Sequence[str], parent: Explanation | None = None) -> Explanation | None:
-        """The set's explanation; from a parent's, which has one mechanism less, where one is given.
+    def explain(self, requests: Sequence[Request]) -> list[Explanation | None]:
+        """The sets' explanations.
 
-        None where the log posterior density gains less than `_LEAST_GAIN` over the parent: the added mechanism does
-        not show. Its evidence is a Laplace approximation, until it is `integrated`. Raises Unsupported.
+        None where the log posterior density gains less than `_LEAST_GAIN` over the parent's: the added mechanism does
+        not show. Evidences are Laplace approximations, until they are `integrated`. Raises Unsupported.
         """
-        plain = self.hypothesis(names, False)
-        fitters = [Fitter(plain), Fitter(replace(plain, placed=True))]
-        weights = np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER])
-        fits: list[tuple[float, Evidence]] = []
-        starts: list[Evaluated] = []
-        if parent is None or parent.placed < _DECIDED:
-            starts = [fitters[0].improve(at.point) for at in self._starts(fitters[0], names, parent)]
-            best = min(starts, key=lambda entry: entry.cost)
-            if not self._gains(best, parent, 0):
-                return None
-            if parent is None and not self._position_matters(best):
-                weights[0] = 0.0
-            fits.append((weights[0], around(fitters[0], best)))
-        if (parent is None and weights[0] < 0) or (parent is not None and parent.placed > 1 - _DECIDED):
-            beside = starts or self._starts(fitters[1], names, parent)
-            best = min((fitters[1].improve(_placed_start(fitters[1], at)) for at in beside), key=lambda at: at.cost)
-            if not self._gains(best, parent, 1):
-                return None
-            fits.append((weights[1], around(fitters[1], best)))
-        return Explanation.of(names, fits)
+        plain = [self.hypothesis(request.names, False) for request in requests]
+        placed = [replace(hypothesis, placed=True) for hypothesis in plain]
+        starts: dict[bool, dict[int, Points]] = {False: {}, True: {}}  # without and with positioning scatter
+        for number, request in enumerate(requests):
+            scattered = not request.without_scatter
+            starts[scattered][number] = _starts(Fitter([(placed if scattered else plain)[number]]), request)
+        fits: list[list[tuple[float, Evidence]]] = [[] for _ in requests]
+        log_priors = np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER])
+        for number, improved, evidence in _fitted(plain, starts[False], requests):
+            parent = requests[number].parent
+            also = parent.placed > 1 - _DECIDED if parent else self._position_matters(evidence)
+            fits[number].append((float(log_priors[0]) if also or parent else 0.0, evidence))
+            if also:
+                starts[True][number] = Fitter([placed[number]]).with_scatter(improved)
+        for number, _, evidence in _fitted(placed, starts[True], requests):
+            fits[number].append((float(log_priors[1]), evidence))
+        whole = [len(own) == sum(number in one for one in starts.values()) for number, own in enumerate(fits)]
+        return [
+            Explanation.of(request.names, own) if own and complete else None
+            for request, own, complete in zip(requests, fits, whole, strict=True)
+        ]
 
-    def refit(self, explanation: Explanation) -> Explanation | None:
-        """A set that was fitted to more recordings, fitted to these, from where it stood; by the Laplace approximation.
+    def refit(self, explanations: Sequence[Explanation]) -> list[Explanation | None]:
+        """Sets that were fitted to more recordings, fitted to these, from where they stood; by the Laplace approximation.
 
-        None where the set has other parameters here. Raises Unsupported.
+        None where a set has other parameters here, or these recordings do not support it.
         """
-        placed = explanation.best.fitter.hypothesis.placed
-        fitter = Fitter(self.hypothesis(explanation.names, placed))
-        if [entry.name for entry in fitter.parameters] != [entry.name for entry in explanation.model.parameters]:
-            return None
-        best = around(fitter, fitter.improve(replace(explanation.point, bend=fitter.no_bend)))
-        return Explanation.of(explanation.names, [(0.0, best)])
+        hypotheses: list[Hypothesis] = []
+        starts: dict[int, Points] = {}
+        for entry in explanations:
+            try:
+                hypothesis = self.hypothesis(entry.names, entry.best.hypothesis.placed)
+            except (Unsupported, InvalidInput):
+                continue  # what was left out is what the mechanism, or any model of a curve, needs
+            if [one.name for one in hypothesis.model.parameters] == [one.name for one in entry.model.parameters]:
+                fitter = Fitter([hypothesis])
+                starts[len(hypotheses)] = fitter.at(replace(entry.point, bend=fitter.no_bend))
+                hypotheses.append(hypothesis)
+        requests = [Request(hypothesis.model.names) for hypothesis in hypotheses]
+        fitted = {requests[number].names: evidence for number, _, evidence in _fitted(hypotheses, starts, requests)}
+        return [
+            Explanation.of(entry.names, [(0.0, fitted[entry.names])]) if entry.names in fitted else None
+            for entry in explanations
+        ]
 
-    @staticmethod
-    def _gains(at: Evaluated, parent: Explanation | None, placed: int) -> bool:
-        if parent is None or int(parent.placed > 0.5) != placed:
-            return True
-        return at.cost < parent.best.at.cost - _LEAST_GAIN
-
-    def _position_matters(self, at: Evaluated) -> bool:
-        slopes = at.prediction.position_slopes
-        if slopes is None:
+    def _position_matters(self, evidence: Evidence) -> bool:
+        """Whether positioning scatter as large as it usually gets would show in some recording."""
+        products = evidence.fitter.products(evidence.at.points, slopes=False, place=True)
+        if products.place_slopes is None:
             return False
         p = POSITION_RANGE[1]
-        size = np.abs(at.prediction.value) ** 2 + 1e-300
-        first = (np.abs(slopes) ** 2).sum(axis=0) / size
-        second = self.curvature.square[at_recording(self, at)]
-        effect = p**2 * first + 0.5 * p**4 * second
+        first = (products.place_slopes**2).sum(axis=0) / (products.level**2 + 1e-300)
+        effect = p**2 * first + 0.5 * p**4 * self.curvature.square
         return bool(effect.max() > _LEAST_SCATTER**2)
 
-    def _starts(self, fitter: Fitter, names: Sequence[str], parent: Explanation | None) -> list[Evaluated]:
-        """The best of the local minima of a grid over the new mechanisms' prior quantiles."""
-        lines = fitter.hypothesis.lines
-        places = own_places(names, lines)
-        own = np.zeros(max((place.stop for place in places.values()), default=0))
-        free: list[int] = []
-        axes: list[list[float]] = []
-        known = {} if parent is None else {name: parent.own(name) for name in parent.names}
-        # New too is what has other parameters beside the mechanism that was added.
-        new = [name for name, place in places.items() if len(known.get(name, ())) != place.stop - place.start]
-        parameters = {name: fitter.parameters[places[name]] for name in new}
-        quantiles = _QUANTILES.get(sum(map(len, parameters.values())), (0.5,))
-        for name, place in places.items():
-            if name in new:
-                free += range(place.start, place.stop)
-                axes += [[entry.quantile(q) for q in quantiles] for entry in parameters[name]]
-            else:
-                own[place] = known.get(name, [])
-        tried: dict[tuple[int, ...], Evaluated] = {}
-        for index in itertools.product(*(range(len(axis)) for axis in axes)):
-            own[free] = [axis[at] for axis, at in zip(axes, index, strict=True)]
-            tried[index] = fitter.settle(fitter.begin(own, parent.point if parent else None), 1)
-        lowest = [index for index in tried if _is_lowest(index, tried)]
-        return sorted((tried[index] for index in lowest), key=lambda entry: entry.cost)[:_KEPT_STARTS]
+
+def integrated(explanations: Sequence[Explanation]) -> list[Explanation]:
+    """With the evidence of each fit that counts over all values of what the lines leave loose."""
+    counting = []
+    for number, entry in enumerate(explanations):
+        least = max(prior + fit.log_evidence for prior, fit in entry.each) - _COUNTS
+        counting += [(number, place) for place, (prior, fit) in enumerate(entry.each) if prior + fit.log_evidence > least]
+    each = [list(entry.each) for entry in explanations]
+    whole = over_all_values([each[number][place][1] for number, place in counting])
+    for (number, place), fit in zip(counting, whole, strict=True):
+        each[number][place] = each[number][place][0], fit
+    return [Explanation.of(entry.names, own) for entry, own in zip(explanations, each, strict=True)]
 
 
-def _is_lowest(index: tuple[int, ...], tried: dict[tuple[int, ...], Evaluated]) -> bool:
-    """Whether no neighbour on the grid is lower."""
-    around = (tuple(np.add(index, step)) for step in itertools.product((-1, 0, 1), repeat=len(index)))
-    return all(tried[index].cost <= tried[other].cost for other in around if other in tried)
+def _fitted(
+    hypotheses: Sequence[Hypothesis], starts: Mapping[int, Points], requests: Sequence[Request]
+) -> list[tuple[int, Points, Evidence]]:
+    """Of each hypothesis that has starts, where it gains on its parent: its number, the starts improved, and the
+    evidence of the best."""
+    groups: dict[object, list[int]] = {}
+    for number in starts:
+        groups.setdefault(hypotheses[number].group(number), []).append(number)
+    fits = []
+    for members in groups.values():
+        fitter = Fitter([hypotheses[number] for number in members])
+        improved = fitter.improve(_stacked([starts[number] for number in members]))
+        best = [
+            row
+            for row in improved.best().tolist()
+            if requests[members[improved.points.owner[row]]].gains(float(improved.cost[row]), fitter.placed)
+        ]
+        if not best:
+            continue
+        for row, evidence in zip(best, around(fitter, improved[np.array(best)]), strict=True):
+            owner = improved.points.owner[row]
+            fits.append((members[owner], _alone(improved.points, owner, fitter.counts[owner]), evidence))
+    return fits
 
 
-def at_recording(problem: FittingProblem, at: Evaluated) -> np.ndarray:
-    """The recording of each row of an evaluated prediction."""
-    return (
-        problem.lines.recording if len(at.prediction.value) == len(problem.lines.value) else problem.collapsed.recording
-    )
+def _alone(points: Points, owner: int, count: int) -> Points:
+    """The points of one of several hypotheses, as those of it alone."""
+    own = points[points.owner == owner]
+    return Points(np.zeros_like(own.owner), own.fit[:, :count], own.covariance, own.bend)
 
 
-def _placed_start(fitter: Fitter, at: Evaluated) -> FitPoint:
-    """The best of a few scales of positioning scatter, d33 following each."""
-    if fitter.holds(at.point):
-        return at.point
-    gain, level, *own = at.point.covariance
-    # Where positioning scatter is large, what was fitted without it may be far off: also from d33 afresh
-    fresh = fitter.begin(at.point.fit[: len(at.point.fit) - fitter.nuisances])
-    tried = []
-    for begin, position in itertools.product((at, fresh), _POSITION_STARTS):
-        covariance = np.array([min(gain, GAIN_PRIOR.middle), level, np.log(position), *own])
-        tried.append(fitter.rescaled(begin, covariance))
-    return min(tried, key=lambda entry: entry.cost).point
+def _stacked(points: Sequence[Points]) -> Points:
+    """Points of several hypotheses, of the first, the second and so on, in this order."""
+    owner = np.repeat(np.arange(len(points)), [len(entry) for entry in points])
+    fit = np.zeros((len(owner), max(entry.fit.shape[1] for entry in points)))
+    for number, entry in enumerate(points):
+        fit[owner == number, : entry.fit.shape[1]] = entry.fit
+    covariance, bend = (np.concatenate([getattr(entry, name) for entry in points]) for name in ("covariance", "bend"))
+    return Points(owner, fit, covariance, bend)
+
+
+def _starts(fitter: Fitter, request: Request) -> Points:
+    """The best of the local minima of a grid over the new mechanisms' prior quantiles."""
+    hypothesis, parent = fitter.hypotheses[0], request.parent
+    places = own_places(request.names, hypothesis.lines)
+    known = {} if parent is None else {name: parent.own(name) for name in parent.names}
+    # New too is what has other parameters beside the mechanism that was added.
+    new = [name for name, place in places.items() if len(known.get(name, ())) != place.stop - place.start]
+    parameters = {name: hypothesis.model.parameters[places[name]] for name in new}
+    quantiles = _QUANTILES.get(sum(map(len, parameters.values())), (0.5,))
+    axes = [[entry.quantile(q) for q in quantiles] for name in new for entry in parameters[name]]
+    free = [place for name in new for place in range(places[name].start, places[name].stop)]
+    grid = list(itertools.product(*axes))
+    own = np.zeros((len(grid), hypothesis.own_parameters))
+    for name, values in known.items():
+        if name not in new:
+            own[:, places[name]] = values
+    own[:, free] = grid
+    tried = fitter.settle(fitter.begin(own, parent.point if parent else None), 1)
+    cost = tried.cost.reshape([len(axis) for axis in axes] or [1])
+    lowest = np.flatnonzero(_are_lowest(cost))
+    return tried.points[np.sort(lowest[np.argsort(tried.cost[lowest], kind="stable")][:_KEPT_STARTS])]
+
+
+def _are_lowest(cost: Floats) -> NDArray[np.bool_]:
+    """Where on a grid no neighbour is lower."""
+    around_each = minimum_filter(cost, size=3, mode="nearest")
+    return np.asarray(cost <= around_each)

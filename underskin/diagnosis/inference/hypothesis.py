@@ -2,21 +2,26 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.likelihood import Curvature
+from underskin.diagnosis.inference.products import CurveLines, CurveProducts, FrfProducts, Products, frf_lines
+from underskin.diagnosis.inference.pickup_rows import PickupRows
 from underskin.diagnosis.noise.correlated_error import USUAL
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR, Plateau, level_prior
 from underskin.mechanisms.base import Normal, Parameter
 from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.models.composition import parameters_together
+from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Floats
 
 _LEVELS = (0.1, 100.0)  # bounds of the lines' level
 _CURVE_LEVELS = (0.5, 3.0)  # no cell is more accurate, however smooth; rougher than its neighbours differ is no noise
+_NUMBERS_AT_ONCE = 2_000_000  # of a factor with its derivatives
 
 
 @dataclass(frozen=True)
@@ -26,7 +31,7 @@ class CovarianceParameter:
     name: str
     low: float
     high: float
-    log_density: Callable[[float], float]
+    log_density: Callable[[Floats | float], Floats]
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,7 @@ class Hypothesis:
         """The places of the model's parameters that move the mean."""
         return [index for index, entry in enumerate(self.model.parameters) if not entry.moves_covariance]
 
-    @property
+    @cached_property
     def covariance(self) -> tuple[CovarianceParameter, ...]:
         """Gain scatter, line level, position scatter or smooth error where there is one, then the model's own."""
         low, high = _CURVE_LEVELS if self.lines.curves else _LEVELS
@@ -61,11 +66,46 @@ class Hypothesis:
         if self.lines.curves:
             common.append(CovarianceParameter("smooth", np.log(1e-5), np.log(2.0), self.smooth.log_density))
         own = [
-            CovarianceParameter(entry.name, *entry.bounds, entry.log_prior)
+            CovarianceParameter(entry.name, *entry.bounds, _log_density(entry))
             for entry in self.model.parameters
             if entry.moves_covariance
         ]
         return (*common, *own)
+
+    @cached_property
+    def own_parameters(self) -> int:
+        """How many of the model's parameters are its mechanisms' own; they come first."""
+        mechanisms = [CATALOGUE[name] for name in self.model.names]
+        return sum(map(len, parameters_together(mechanisms, self.lines.campaign, self.lines.kind).values()))
+
+    def group(self, number: int) -> object:
+        """The same for hypotheses that can be evaluated together; `number` tells those apart that cannot."""
+        moves_covariance = any(entry.moves_covariance for entry in self.model.parameters)
+        alone = self.lines.curves or moves_covariance or any(CATALOGUE[name].needs_lines for name in self.model.names)
+        return number if alone else (id(self.lines), self.placed, self.gain, self.position)
+
+    @cached_property
+    def _curve_lines(self) -> CurveLines:
+        return CurveLines(self.lines)
+
+    def products(self, fit: Floats, *, slopes: bool, place: bool) -> Products:
+        """The inner products of the model at points (points, parameters); with derivatives by the parameters, and by
+        the contact's place, on request."""
+        model = self.model
+        if not isinstance(model, FrfModel):
+            answers = [model.predict(one) for one in fit]
+            force = np.array([answer.value for answer in answers])
+            by_force = np.array([answer.slopes for answer in answers]) if slopes else None
+            return CurveProducts.of(self._curve_lines, force, by_force)
+        lines = frf_lines(self.lines, model.design)
+        pickup = None if model.pickup is None else PickupRows(self.lines, model.pickup.rows, model.design.line)
+        own = len(model.design.line_frequency) * (len(model.parameters) if slopes else 1)
+        at_once = max(_NUMBERS_AT_ONCE // own, 1)
+        if len(fit) <= at_once:
+            return FrfProducts.of(lines, pickup, model.respond(fit, slopes=slopes, place=place))
+        parts = [fit[first : first + at_once] for first in range(0, len(fit), at_once)]
+        responses = (model.respond(part, slopes=slopes, place=place) for part in parts)
+        return FrfProducts.joined([FrfProducts.of(lines, pickup, response) for response in responses])
 
 
 @dataclass(frozen=True)
@@ -77,10 +117,11 @@ class FitPoint:
     bend: Floats
 
 
-def own_parameters(hypothesis: Hypothesis) -> int:
-    """How many of the model's parameters are its mechanisms' own; they come first."""
-    mechanisms = [CATALOGUE[name] for name in hypothesis.model.names]
-    return sum(map(len, parameters_together(mechanisms, hypothesis.lines.campaign, hypothesis.lines.kind).values()))
+def _log_density(entry: Parameter) -> Callable[[Floats | float], Floats]:
+    """A parameter's log prior density within its bounds."""
+    precision, centre = curvature_of_prior(entry)
+    peak = entry.log_prior(entry.start) + 0.5 * precision * (entry.start - centre) ** 2
+    return lambda x: np.asarray(peak - 0.5 * precision * (x - centre) ** 2)
 
 
 def curvature_of_prior(entry: Parameter) -> tuple[float, float]:

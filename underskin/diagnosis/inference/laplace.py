@@ -7,11 +7,17 @@ left by the ones before (exact for one bound; Mendell and Elston 1974).
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import log_ndtr
 
+from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis
+from underskin.diagnosis.inference.likelihood import Likelihoods
+from underskin.diagnosis.inference.objective import Places
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
+from underskin.diagnosis.noise.noise_levels import NoiseLevels
+from underskin.mechanisms.models.composed import Prediction
 from underskin.units import Floats
 
 _NEAR = 4.0  # standard deviations from a bound within which it counts
@@ -26,55 +32,101 @@ class Evidence:
     """log Z up to what all hypotheses share, the most probable point, and the parameters' covariance there."""
 
     log_evidence: float
-    fitter: Fitter
-    at: Evaluated
+    hypothesis: Hypothesis
+    point: FitPoint
+    cost: float
     covariance: Floats  # (mean parameters, mean parameters), of the quadratic, bounds not counted
+    growth: Floats | None = None  # (1, recordings, parameters), see Evaluated
+
+    @cached_property
+    def fitter(self) -> Fitter:
+        """What evaluates points of this hypothesis."""
+        return Fitter([self.hypothesis])
+
+    @cached_property
+    def at(self) -> Evaluated:
+        """The most probable point, evaluated."""
+        return replace(self.fitter.evaluate(self.fitter.at(self.point)), growth=self.growth)
+
+    @cached_property
+    def marginal(self) -> Likelihoods:
+        """The likelihood there."""
+        return self.fitter.marginal(self.at)
+
+    @cached_property
+    def prediction(self) -> Prediction:
+        """The model's prediction there, on the rows of the hypothesis."""
+        return self.hypothesis.model.predict(self.point.fit)
+
+    @cached_property
+    def levels(self) -> NoiseLevels:
+        """The noise levels there, as numbers."""
+        return self.fitter.levels(self.point.covariance).first
+
+    @property
+    def sensor_gains(self) -> Floats:
+        """The most probable log gain of each sensor (sensors,)."""
+        return self.marginal.sensor_gains[0]
+
+    @property
+    def pickup_variance(self) -> Floats:
+        """Of real and of imaginary part of each row [(C/N)²]."""
+        return replace(self.prediction, pickup=self.levels.pickup).pickup_variance
 
 
-def around(fitter: Fitter, at: Evaluated) -> Evidence:
-    """By the quadratic around a most probable point, which is first brought to where the whole gradient vanishes."""
-    if fitter.hypothesis.placed and at.growth is None:
-        at = fitter.with_growth(at)
-    equations = _equations(fitter, at)
+def around(fitter: Fitter, at: Evaluated) -> list[Evidence]:
+    """By the quadratics around most probable points, which are first brought to where their whole gradients vanish."""
+    unknown = np.flatnonzero(~fitter.grown(at))
+    if len(unknown):
+        at = fitter.replaced(at, unknown, fitter.with_growth(at[unknown]))
+    moving = np.arange(len(at))
     for _ in range(_POLISHING):
-        polished = _polish(fitter, at, *equations)
-        if polished is None:
+        moving, at = _polish(fitter, at, moving)
+        if not len(moving):
             break
-        at, equations = polished, _equations(fitter, polished)
-    log_evidence, covariance = _mean_part(fitter, at, *equations)
-    return Evidence(log_evidence + around_levels(fitter, at), fitter, at, covariance)
+    values, covariances = around_mean(fitter, at)
+    volumes = around_levels(fitter, at)
+    evidence = []
+    for number, (value, covariance) in enumerate(zip(values + volumes, covariances, strict=True)):
+        hypothesis = fitter.hypotheses[at.points.owner[number]]
+        count = len(hypothesis.model.parameters)
+        point = FitPoint(at.points.fit[number, :count], at.points.covariance[number], at.points.bend[number])
+        growth = None if at.growth is None else at.growth[number : number + 1, :, :count]
+        evidence.append(Evidence(float(value), hypothesis, point, float(at.cost[number]), covariance, growth))
+    return evidence
 
 
-def around_mean(fitter: Fitter, at: Evaluated) -> float:
-    """The log of the integral over the mean parameters, those of the covariance held."""
-    return _mean_part(fitter, at, *_equations(fitter, at))[0]
+def around_mean(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:
+    """The logs of the integrals over the mean parameters, those of the covariance held, and the quadratics' covariances."""
+    values, covariances = [], []
+    for number, (information, gradient) in enumerate(zip(*_equations(fitter, at), strict=True)):
+        owner = at.points.owner[number]
+        places = np.flatnonzero(fitter.free[owner])
+        fit, low, high = at.points.fit[number, places], fitter.low[owner, places], fitter.high[owner, places]
+        information, gradient = information[np.ix_(places, places)], gradient[places]
+        # Towards a bound the gradient stays; elsewhere, where polishing left much of it, the fit hangs at a kink, and
+        # what a smooth cost would still gain there is not to be had.
+        free = ~(((fit <= low) & (gradient > 0)) | ((fit >= high) & (gradient < 0)))
+        if 0.5 * gradient[free] @ np.linalg.solve(information[np.ix_(free, free)], gradient[free]) > _TRUSTED:
+            gradient = np.where(free, 0.0, gradient)
+        covariance: Floats = np.linalg.inv(information).astype(np.float64)
+        gain = 0.5 * gradient @ covariance @ gradient
+        volume = 0.5 * len(fit) * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(information)[1]
+        mean = (fit - covariance @ gradient).astype(np.float64)
+        values.append(float(-at.cost[number] + gain + volume + log_box(mean, covariance, low, high)))
+        covariances.append(covariance)
+    return np.array(values), covariances
 
 
-def _mean_part(fitter: Fitter, at: Evaluated, information: Floats, gradient: Floats) -> tuple[float, Floats]:
-    """That, and the covariance of the quadratic."""
-    places = fitter.places
-    fit, low, high = at.point.fit[places], fitter.low[places], fitter.high[places]
-    # Towards a bound the gradient stays; elsewhere, where polishing left much of it, the fit hangs at a kink, and what
-    # a smooth cost would still gain there is not to be had.
-    free = ~(((fit <= low) & (gradient > 0)) | ((fit >= high) & (gradient < 0)))
-    if 0.5 * gradient[free] @ np.linalg.solve(information[np.ix_(free, free)], gradient[free]) > _TRUSTED:
-        gradient = np.where(free, 0.0, gradient)
-    covariance: Floats = np.linalg.inv(information).astype(np.float64)
-    gain = 0.5 * gradient @ covariance @ gradient
-    volume = 0.5 * len(fit) * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(information)[1]
-    mean = (fit - covariance @ gradient).astype(np.float64)
-    return float(-at.cost + gain + volume + log_box(mean, covariance, low, high)), covariance
-
-
-def around_levels(fitter: Fitter, at: Evaluated) -> float:
-    """What the integral over the covariance's parameters adds to the log at their mode."""
+def around_levels(fitter: Fitter, at: Evaluated) -> Floats:
+    """What the integrals over the covariance's parameters add to the logs at their modes (points,)."""
     return log_volume(fitter.covariance_equations(at)[1])
 
 
-def log_volume(hessian: Floats) -> float:
-    """The log volume of the normal approximation in the logarithms of the noise levels."""
+def log_volume(hessian: Floats) -> Floats:
+    """The log volume of normal approximations in the logarithms of the noise levels (…, levels, levels)."""
     eigenvalues = np.maximum(np.linalg.eigvalsh(hessian), _LEAST_COVARIANCE_CURVATURE)
-    return float(0.5 * len(hessian) * np.log(2 * np.pi) - 0.5 * np.log(eigenvalues).sum())
+    return np.asarray(0.5 * hessian.shape[-1] * np.log(2 * np.pi) - 0.5 * np.log(eigenvalues).sum(axis=-1))
 
 
 def levels_covariance(hessian: Floats) -> Floats:
@@ -89,30 +141,38 @@ def levels_covariance(hessian: Floats) -> Floats:
 def _equations(fitter: Fitter, at: Evaluated) -> tuple[Floats, Floats]:
     """Information on the mean parameters and the gradient of the cost."""
     information, ascent = fitter.posterior_equations(at)
-    low, high = fitter.low[fitter.places], fitter.high[fitter.places]
-    return information + np.diag((_FLAT / (high - low)) ** 2), -ascent
+    owner = at.points.owner
+    span, every = (fitter.high - fitter.low)[owner], np.arange(fitter.low.shape[1])
+    information[:, every, every] += np.where(span > 0, _FLAT / np.where(span > 0, span, 1.0), 0.0) ** 2
+    return information, -ascent
 
 
-def _polish(fitter: Fitter, at: Evaluated, information: Floats, gradient: Floats) -> Evaluated | None:
-    """A Newton step with the whole gradient, within the bounds; None where it gains nothing."""
-    places = fitter.places
-    fit, low, high = at.point.fit[places], fitter.low[places], fitter.high[places]
-    held = ((fit <= low) & (gradient > 0)) | ((fit >= high) & (gradient < 0))
-    free = ~held
-    if not free.any():
-        return None
-    step = np.zeros(len(fit))
-    step[free] = -np.linalg.solve(information[np.ix_(free, free)], gradient[free])
-    if -0.5 * gradient @ step < _POLISHED:
-        return None
+def _polish(fitter: Fitter, at: Evaluated, moving: Places) -> tuple[Places, Evaluated]:
+    """Newton steps of some points with the whole gradient, within the bounds; and which of them gained."""
+    part = at[moving]
+    information, gradient = _equations(fitter, part)
+    owner, fit = part.points.owner, part.points.fit
+    low, high = fitter.low[owner], fitter.high[owner]
+    free = fitter.free[owner] & ~(((fit <= low) & (gradient > 0)) | ((fit >= high) & (gradient < 0)))
+    both = free[:, :, None] & free[:, None, :]
+    matrix = np.where(both, information, 0.0)
+    every = np.arange(fit.shape[1])
+    matrix[:, every, every] = np.where(free, matrix[:, every, every], 1.0)
+    step = -np.linalg.solve(matrix, np.where(free, gradient, 0.0)[..., None])[..., 0]
+    trying = np.flatnonzero(-0.5 * (gradient * step).sum(axis=1) >= _POLISHED)
+    gained: list[Places] = []
     for _ in range(5):
-        moved = at.point.fit.copy()
-        moved[places] = np.clip(fit + step, low, high)
-        tried = fitter.settle(fitter.evaluate(replace(at.point, fit=moved)), 1)
-        if tried.cost < at.cost - 0.2 * _POLISHED:
-            return replace(tried, growth=at.growth)
+        if not len(trying):
+            break
+        moved = np.clip(fit[trying] + step[trying], low[trying], high[trying])
+        tried = fitter.settle(fitter.evaluate(replace(part.points[trying], fit=moved)), 1)
+        better = tried.cost < part.cost[trying] - 0.2 * _POLISHED
+        growth = None if part.growth is None else part.growth[trying]
+        at = fitter.replaced(at, moving[trying[better]], replace(tried, growth=growth)[better])
+        gained.append(moving[trying[better]])
+        trying = trying[~better]
         step = step / 3
-    return None
+    return np.sort(np.concatenate([*gained, np.zeros(0, dtype=np.intp)])), at
 
 
 def log_box(mean: Floats, covariance: Floats, low: Floats, high: Floats) -> float:

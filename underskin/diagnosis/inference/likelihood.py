@@ -1,31 +1,27 @@
-"""How probable the recordings are under a model, with all of its noise marginalised exactly.
+"""How probable the recordings are under predictions, with all of their noise marginalised exactly.
 
 Recording i of sensor s, rows j:  y_ij = m_ij (1 + g_i) e^(b_s) + ∂m_ij·δ_i + n_ij, with
     n ~ N(0, κ² d_ij² + q_ij²) in real and imaginary part, g ~ N(0, s²), δ ~ N(0, p² I), b ~ N(0, τ²);
 q is mains pick-up, 0 on most rows.
-The contact's place scales a recording by a real factor, so m and ∂m are one direction u in each recording; where m
-vanishes, u is that of ∂m. C_i = κ² D + Q + V_i u uᵀ, V_i = s² a² + p² |t|² + ½ p⁴ tr(H²) a², with
-m = a u and ∂m = t u; sensors add τ² m mᵀ over their recordings. All of it is taken out by Sherman and Morrison's
-identity, so that time is linear in rows and recordings. The covariance follows the model, so log|C| stays.
+The contact's place scales a recording by a real factor, so m = L u and ∂m = t u have one direction u in each recording.
+C_i = κ² D + Q + V_i u uᵀ, V_i = s² a² + p² |t|² + ½ p⁴ tr(H²) a², with m = a u; sensors add τ² m mᵀ over their
+recordings. All of it is taken out by Sherman and Morrison's identity, so that time is linear in rows and recordings. The
+covariance follows the model, so log|C| stays.
 
 e^b is linearised at `bend`, the most probable b of each sensor: Laplace's method for b. Where a contact sits on an
 extremum of σ, p acts in second order: on the mean by the factor exp(½ p² ∇²σ/σ), on the variance as above, with H of
 the base model.
 """
 
-from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.pickup_rows import PickupRows
-from underskin.diagnosis.noise.noise_levels import NoiseLevels, SeveralLevels
-from underskin.mechanisms.models.composed import Prediction
-from underskin.units import Array, Floats
+from underskin.diagnosis.inference.products import Products, SlopeSums
+from underskin.diagnosis.noise.noise_levels import SeveralLevels
+from underskin.units import Floats
 
 _FROM_SLOPES = 1e-3  # m: a recording whose response changes by more than itself over this way is led by its slopes
 
@@ -38,248 +34,165 @@ class Curvature:
     square: Floats
 
 
-class Moments:
-    """All inner products over rows that the likelihood of one prediction needs, with 1/d² as the weight.
+class Likelihoods:
+    """Of predictions at several points, each at some sets of noise levels.
 
-    Products are real, Re(a* b), summed over the rows of one recording. `bend` (recordings,) is b of each one's sensor;
-    `position` is the p at which the second-order mean is taken, `ratio` the η/κ of curves (see correlated_error).
+    Attributes: `each` (points, sets), the log likelihoods. Of recordings (points, sets, recordings): `a` and `uu`, `ur`
+    and `rr`, Re u*u, Re u*r and |r|² of the residual r, over κ².
     """
 
     def __init__(
-        self,
-        lines: Lines,
-        prediction: Prediction,
-        bend: Floats,
-        curvature: Curvature,
-        position: float,
-        ratio: float = 0.0,
+        self, lines: Lines, curvature: Curvature, products: Products, levels: SeveralLevels, bend: Floats
     ) -> None:
-        """Weigh and sum."""
-        self._first = self.lines_first = lines.first
-        self._lines = lines
-        self._bend, self._laplacian, self.position = bend, curvature.laplacian, position
-        factor = np.exp(bend + 0.5 * position**2 * curvature.laplacian)
-        self._factor = factor[lines.recording]
-        self.ratio = ratio
-        self.log_determinant = 0.0 if lines.whitening is None else lines.whitening.log_determinant(ratio)
-        self._slopes = prediction.slopes
-        model = self._weighed(prediction.value * self._factor)
-        residual = self._weighed(lines.value) - model * (1 - bend[lines.recording])
-        direction, self.along = model, np.ones(lines.recordings)
-        self.moved = np.zeros(lines.recordings)
-        self.led = np.zeros(lines.recordings, dtype=bool)
-        if position > 0 and prediction.position_slopes is not None:
-            direction = self._direction(model, self._weighed(prediction.position_slopes * self._factor))
-        self._direction_rows = direction
-        self._residual = residual
-        self.second_order = curvature.square
-        self._sum_up()
-        self.pickup_rows = None if prediction.pickup_rows is None else PickupRows(lines, prediction.pickup_rows)
-
-    def summed(self, levels: NoiseLevels | SeveralLevels) -> tuple[Array, Array, Array, Floats | float]:
-        """uᵀu, uᵀr and rᵀr less what rows lose to pick-up, and what that adds to the log of the determinant."""
-        if self.pickup_rows is None or levels.pickup is None:
-            return self.uu, self.ur, self.rr, 0.0
-        lost, log_determinant = self.pickup_rows.lost(levels.pickup, levels.level)
-        u, r = self._direction_rows[self.pickup_rows.rows], self._residual[self.pickup_rows.rows]
-        uu, ur, rr = (
-            whole - self.pickup_rows.over_recordings(lost * (a.conj() * b).real)
-            for whole, a, b in ((self.uu, u, u), (self.ur, u, r), (self.rr, r, r))
-        )
-        return uu, ur, rr, log_determinant
-
-    def without(self, levels: NoiseLevels) -> "Moments":
-        """With all sums less what rows lose to pick-up."""
-        if self.pickup_rows is None or levels.pickup is None:
-            return self
-        other = copy(self)
-        other.uu, other.ur, other.rr, _ = self.summed(levels)
-        jj, uj, jr = self.slopes
-        (lost, _), rows = self.pickup_rows.lost(levels.pickup, levels.level), self.pickup_rows.rows
-        slopes, over = self._slope_rows[:, rows], self.pickup_rows.over_recordings
-        real = np.concatenate([slopes.real, slopes.imag], axis=1)
-        jj = jj - (real * np.tile(lost, 2)) @ real.T
-        uj = uj - over(lost * (self._direction_rows[rows].conj() * slopes).real).T
-        jr = jr - over(lost * (self._residual[rows].conj() * slopes).real).T
-        other.__dict__["slopes"] = jj, uj, jr
-        return other
-
-    def at_position(self, position: float | Floats, uu: Array, ur: Array, rr: Array) -> tuple[Array, Array, Array]:
-        """a, uᵀr, rᵀr with the second-order mean at another p than these were summed at."""
-        if np.all(position == self.position):
-            return self.along, ur, rr
-        factor = np.exp(0.5 * (position**2 - self.position**2) * self._laplacian)
-        less = (factor - 1) * (1 - self._bend) * self.along
-        return self.along * factor, ur - less * uu, rr - 2 * less * ur + less**2 * uu
-
-    @property
-    def log_slopes(self) -> Floats:
-        """log |t|² of each recording's position slopes, without the second-order factor; least where there are none."""
-        return np.asarray(np.log(self.moved * self.uu + 1e-300) - self.position**2 * self._laplacian)
-
-    def _direction(self, model: Array, slopes: Array) -> Array:
-        """u, whether the slopes lead it (`led`), and along it a (`along`) and |t|² (`moved`)."""
-        mm = self._sum(model, model)
-        sizes = np.stack([self._sum(slope, slope) for slope in slopes])
-        self.led = led = _FROM_SLOPES**2 * sizes.sum(axis=0) > mm
-        direction = model
-        if led.any():
-            larger = np.where((sizes[0] >= sizes[1])[self._lines.recording], slopes[0], slopes[1]) * _FROM_SLOPES
-            direction = np.where(led[self._lines.recording], larger, model)
-        uu = np.maximum(self._sum(direction, direction), 1e-300)
-        self.along = self._sum(direction, model) / uu
-        self.moved = (self._sum(direction, slopes[0]) / uu) ** 2 + (self._sum(direction, slopes[1]) / uu) ** 2
-        return direction
-
-    def at_ratio(self, ratio: float) -> "Moments":
-        """Of curves: the same prediction at another η/κ; the rows are turned already and only weighed again."""
-        assert self._lines.whitening is not None
-        change = self._lines.whitening.weight(ratio) / self._lines.whitening.weight(self.ratio)
-        other = copy(self)
-        other.__dict__.pop("slopes", None)
-        other.ratio = ratio
-        other.log_determinant = self._lines.whitening.log_determinant(ratio)
-        other._direction_rows = self._direction_rows * change
-        other._residual = self._residual * change
-        other._slope_rows = self._slope_rows * change
-        other._sum_up()
-        return other
-
-    def _sum_up(self) -> None:
-        self.uu = self._sum(self._direction_rows, self._direction_rows)
-        self.ur = self._sum(self._direction_rows, self._residual)
-        self.rr = self._sum(self._residual, self._residual)
-
-    def _weighed(self, rows: Array) -> Array:
-        """Over d; of curves such that their samples are independent."""
-        whitening = self._lines.whitening
-        return rows / self._lines.deviation if whitening is None else whitening(rows, self.ratio)
-
-    def _sum(self, a: Array, b: Array) -> Floats:
-        products = (a.conj() * b).real
-        return products if len(self._first) == len(products) else np.add.reduceat(products, self._first)
-
-    @cached_property
-    def _slope_rows(self) -> Array:
-        return self._weighed(self._slopes * self._factor)
-
-    @cached_property
-    def slopes(self) -> tuple[Floats, Floats, Floats]:
-        """Of the model's derivatives J: JᵀJ (P, P); for each recording uᵀJ and Jᵀr (recordings, P)."""
-        rows = self._slope_rows
-        real = np.concatenate([rows.real, rows.imag], axis=1)
-
-        def summed(products: Array) -> Array:
-            if len(self._first) != products.shape[1]:
-                products = np.add.reduceat(products, self._first, axis=1)
-            return products.T
-
-        uj = summed((self._direction_rows.conj() * rows).real)
-        jr = summed((self._residual.conj() * rows).real)
-        return real @ real.T, uj, jr
-
-
-class LogLikelihoods:
-    """Of one prediction at one set of noise levels (), or at several (K,): `each`."""
-
-    def __init__(self, lines: Lines, moments: Moments, levels: NoiseLevels | SeveralLevels) -> None:
-        """Take out pick-up, gain and position, recording by recording, then the sensors."""
+        """Levels are (points, sets, 1), `bend` (points, sensors)."""
+        self.levels, self._products, self._curvature = levels, products, curvature
+        self._sensors = lines.sensors
         self._k2 = k2 = levels.level**2
-        uu, ur, rr, from_pickup = moments.summed(levels)
-        along, ur, rr = moments.at_position(levels.position, uu, ur, rr)
-        self._along = along
-        uu, ur, rr = uu / k2, ur / k2, rr / k2
-        log_determinant: Any = moments.log_determinant + from_pickup
-        self._uu, self._ur = uu, ur
-        a2 = along**2
-        variance = levels.gain**2 * a2
-        if np.any(levels.position):
-            p2 = levels.position**2
-            variance = variance + p2 * moments.moved + 0.5 * p2**2 * moments.second_order * a2
-        self._reduced = 1 / (1 + variance * uu)  # 1 − (share of u taken out)
-        self._shrink = variance * self._reduced
-        self._mm = a2 * uu * self._reduced  # mᵀ C_i⁻¹ m
-        self._mr = along * ur * self._reduced
-        self._sensor_mm = _sensor_sums(self._mm, lines.sensor)
-        self._sensor_mr = _sensor_sums(self._mr, lines.sensor)
+        sums = products.summed(levels)
+        self._bend = own = bend[:, None, lines.sensor]
+        p2 = levels.position**2
+        self._factor = np.exp(own + 0.5 * p2 * curvature.laplacian) if np.any(p2) else np.exp(own)
+        self.a = a = products.level[:, None] * self._factor
+        self._known = known = a * (1 - own)
+        self.uu = uu = sums.uu / k2
+        self.ur = ur = (sums.uy - known * sums.uu) / k2
+        self.rr = rr = (sums.yy - known * (2 * sums.uy - known * sums.uu)) / k2
+        a2 = a**2
+        self._as_model = levels.gain**2 + 0.5 * p2**2 * curvature.square  # of V, in units of a²
+        variance = self._as_model * a2
+        self._moved: Floats | float = 0.0
+        if products.place_slopes is not None:
+            self._moved = p2 * (products.place_slopes**2).sum(axis=0)[:, None] * self._factor**2
+            variance = variance + self._moved
+        self._reduced = reduced = 1 / (1 + variance * uu)  # 1 − (share of u taken out)
+        self._shrink = variance * reduced
+        self._mm = a2 * uu * reduced  # mᵀ C_i⁻¹ m
+        self._mr = a * ur * reduced
         tau2 = levels.spread**2
+        self._tau2 = tau2
+        self._sensor_mm = self._mm @ self._sensors
+        self._sensor_mr = self._mr @ self._sensors
         self._sensor_shrink = tau2 / (1 + tau2 * self._sensor_mm)
         scatter, freedom = lines.scatter
-        chi2 = _over_recordings(rr - self._shrink * ur**2) - _over_recordings(self._sensor_shrink * self._sensor_mr**2)
-        log_determinant = log_determinant + (2 * len(lines.value) + freedom) * np.log(k2)
-        log_determinant = log_determinant - _over_recordings(np.log(self._reduced))
-        log_determinant = log_determinant + _over_recordings(np.log1p(tau2 * self._sensor_mm))
-        self.each: Floats = -0.5 * (chi2 + scatter / k2 + log_determinant)[..., 0]
-
-
-class Marginal(LogLikelihoods):
-    """The likelihood of one prediction at one set of noise levels; what is needed of it is worked out when asked."""
-
-    def __init__(self, lines: Lines, moments: Moments, levels: NoiseLevels) -> None:
-        """Take out the noise."""
-        super().__init__(lines, moments, levels)
-        self._lines, self.levels = lines, levels
-        self._all = moments
-        self.log_likelihood = float(self.each)
-
-    @cached_property
-    def moments(self) -> Moments:
-        """The inner products, less what rows lose to pick-up."""
-        return self._all.without(self.levels)
+        chi2 = (rr - self._shrink * ur**2).sum(axis=-1) - (self._sensor_shrink * self._sensor_mr**2).sum(axis=-1)
+        log_determinant = np.log1p(tau2 * self._sensor_mm).sum(axis=-1) - np.log(reduced).sum(axis=-1)
+        further = sums.log_determinant + (2 * len(lines.value) + freedom) * np.log(k2) + scatter / k2
+        self.each: Floats = -0.5 * (chi2 + log_determinant + np.asarray(further)[..., 0])
 
     @property
-    def sensor_gains(self) -> Array:
-        """The most probable b of each sensor (sensors,), given the model."""
-        return self._sensor_shrink * self._sensor_mr
+    def sensor_gains(self) -> Floats:
+        """The most probable b of each sensor (points, sensors), at the first set of noise levels."""
+        return np.asarray((self._sensor_shrink * self._sensor_mr)[:, 0])
 
-    def normal_equations(self, growth: Floats | None = None) -> tuple[Array, Array]:
-        """Jᵀ C⁻¹ J, the information on the parameters, and the gradient of the log likelihood.
+    def along(self, position: float) -> tuple[Floats, Floats, Floats]:
+        """Re u*m, Re u*r and Re u*u of the first point's recordings (recordings,) at another positioning scatter, with
+        weights that leave out κ."""
+        sums = self._products.summed(self.levels)
+        uu, uy = np.broadcast_to(sums.uu, self.a.shape)[0, 0], np.broadcast_to(sums.uy, self.a.shape)[0, 0]
+        bend = self._bend[0, 0]
+        a = self._products.level[0] * np.exp(bend + 0.5 * position**2 * self._curvature.laplacian)
+        return a * uu, uy - a * (1 - bend) * uu, uu
 
-        The gradient is that by the mean and by all columns that follow the model, ∂/∂θ (−½ log|C| − ½ rᵀC⁻¹r) with
-        dC = V_i (J mᵀ + m Jᵀ) + dV_i m mᵀ. dV_i, from how the position's slopes t change, is told by their `growth`
-        ∂ log |t|²/∂θ (recordings, P); without it they are taken to change as m does, or where they lead, not at all.
+    @property
+    def slopes_along(self) -> Floats:
+        """Re u*J of the first point's recordings (recordings, P), with the same weights."""
+        uj, _, _ = self._along_slopes()
+        return np.asarray(uj[0] * self._k2[0, 0, 0])
+
+    def information(self, uj: Floats, square: Floats) -> Floats:
+        """Jᵀ C⁻¹ J (points, P, P) of any J at the first set of noise levels, from Re u*J of the recordings (points,
+        recordings, P) and Re JᵀJ (points, P, P), both over κ²."""
+        shrink, weight = self._shrink[:, 0], (self.a * self._reduced)[:, 0, :, None]
+        by_sensor = self._over_sensors(uj * weight)
+        shared = by_sensor.transpose(0, 2, 1) @ (by_sensor * self._sensor_shrink[:, 0, :, None])
+        return np.asarray(square - np.einsum("nrp,nr,nrq->npq", uj, shrink, uj, optimize=True) - shared)
+
+    def normal_equations(self, growth: Floats | None = None) -> tuple[Floats, Floats]:
+        """Jᵀ C⁻¹ J (points, P, P), the information on the parameters, and the gradient of the log likelihood (points,
+        P), at the first set of noise levels.
+
+        The gradient is that by the mean and by all columns that follow the model, ∂/∂θ (−½ log|C| − ½ rᵀC⁻¹r). How the
+        position's slopes t change is told by their `growth` ∂ log |t|²/∂θ (points, recordings, P), finite where known;
+        else they are taken to change as L does, or where they lead, not at all.
         """
-        moments, k2 = self.moments, self._k2
-        jj, uj, jr = moments.slopes
-        jj, uj, jr = jj / k2, uj / k2, jr / k2
-        information = jj - uj.T @ (self._shrink[:, None] * uj)
-        jr = jr - uj * (self._shrink * self._ur)[:, None]
-        mj = uj * (self._along * self._reduced)[:, None]
-        sensor = self._lines.sensor
-        by_sensor = _sensor_sums(mj.T, sensor).T
-        information -= by_sensor.T @ (by_sensor * self._sensor_shrink[:, None])
+        a, uu, ur, reduced, shrink, mm, mr = (
+            part[:, 0, :, None] for part in (self.a, self.uu, self.ur, self._reduced, self._shrink, self._mm, self._mr)
+        )
+        uj, jr, square = self._along_slopes()
+        information = self.information(uj, square)
+        jr = jr - uj * (shrink * ur)
+        mj = uj * (a * reduced)
+        by_sensor = self._over_sensors(mj)
+        sensor_shrink = self._sensor_shrink[:, 0, :, None]
         # From here on with the sensors' columns in C as well
-        gains = self.sensor_gains
-        jr = jr - mj * gains[sensor, None]
-        mr = self._mr - self._mm * gains[sensor]
-        left = 1 - self._sensor_shrink[sensor] * self._mm
-        p2 = self.levels.position**2
-        placed = p2 * moments.moved
-        squares = self.levels.gain**2 + 0.5 * p2**2 * moments.second_order + np.where(moments.led, 0.0, placed)
-        own = squares[:, None] * (jr * mr[:, None] - mj * left[:, None])
-        tau2 = self.levels.spread**2
-        sensor_mr = self._sensor_mr - self._sensor_mm * gains
-        sensor_left = 1 - self._sensor_shrink * self._sensor_mm
-        shared = _sensor_sums(jr.T, sensor).T * sensor_mr[:, None] - by_sensor * sensor_left[:, None]
-        gradient = jr.sum(axis=0) + own.sum(axis=0) + tau2 * shared.sum(axis=0)
-        if growth is not None:
-            um = self._uu * self._along * self._reduced
-            explained = self._ur * self._reduced - um * gains[sensor]  # uᵀ C⁻¹ r
-            taken = self._uu * self._reduced - self._sensor_shrink[sensor] * um**2  # uᵀ C⁻¹ u
-            as_model = np.where(moments.led, 0.0, 2 / moments.uu)[:, None] * moments.slopes[1]
-            gradient = gradient + 0.5 * (placed * (explained**2 - taken)) @ (growth - as_model)
+        gains = self.sensor_gains[:, :, None]
+        own_gains, own_shrink = self._of_sensors(gains), self._of_sensors(sensor_shrink)
+        jr = jr - mj * own_gains
+        mr_left = mr - mm * own_gains
+        left = 1 - own_shrink * mm
+        own = self._as_model[:, 0, :, None] * (jr * mr_left - mj * left)
+        sensor_mr = self._sensor_mr[:, 0, :, None] - self._sensor_mm[:, 0, :, None] * gains
+        sensor_left = 1 - sensor_shrink * self._sensor_mm[:, 0, :, None]
+        shared = self._over_sensors(jr) * sensor_mr - by_sensor * sensor_left
+        gradient = jr.sum(axis=1) + own.sum(axis=1) + self._tau2[:, 0] * shared.sum(axis=1)
+        if isinstance(self._moved, np.ndarray):
+            um = uu * a * reduced
+            explained = ur * reduced - um * own_gains  # uᵀ C⁻¹ r
+            taken = uu * reduced - own_shrink * um**2  # uᵀ C⁻¹ u
+            by_growth = 0.5 * (explained**2 - taken) * self._growth(growth)
+            if self._turning is not None:
+                uv, vr = self._turning
+                mv = uv * (a * reduced)
+                by_growth = by_growth + (vr - uv * (shrink * ur) - mv * own_gains) * explained
+                by_growth = by_growth - (uv * reduced - own_shrink * um * mv)
+            gradient = gradient + (self._moved[:, 0, :, None] * by_growth).sum(axis=1)
         return information, gradient
 
+    def _along_slopes(self) -> tuple[Floats, Floats, Floats]:
+        """Re u*J and Re J*r of recordings (points, recordings, P), and Re JᵀJ (points, P, P), over κ²."""
+        k2 = self._k2[:, 0, :, None]
+        by_level = self._products.level_slopes
+        f, uu, ur = (part[:, 0, :, None] for part in (self._factor, self.uu, self.ur))
+        parts: list[tuple[Floats, Floats, Floats]] = []
+        if by_level is not None:
+            square = np.einsum("nrp,nr,nrq->npq", by_level, (f**2 * uu)[..., 0], by_level, optimize=True)
+            parts.append((by_level * f * uu, by_level * f * ur, square))
+        if self._turning is not None:
+            uv, vr = self._turning
+            level = self._products.level[..., None]
+            square = self._slope_sums.gram(((f * level) ** 2 / k2)[..., 0])
+            if by_level is not None:
+                crossed = np.einsum("nrp,nr,nrq->npq", by_level, (f**2 * level)[..., 0], uv, optimize=True)
+                square = square + crossed + crossed.transpose(0, 2, 1)
+            parts.append((f * level * uv, f * level * vr, square))
+        uj, jr, information = (sum(each[1:], each[0]) for each in zip(*parts, strict=True))
+        return uj, jr, information
 
-def _over_recordings(values: Floats) -> Floats:
-    return np.asarray(values.sum(axis=-1, keepdims=True))
+    @cached_property
+    def _slope_sums(self) -> SlopeSums:
+        return self._products.slope_sums(self.levels)
 
+    @cached_property
+    def _turning(self) -> tuple[Floats, Floats] | None:
+        """Re u*v and Re v*r over κ² (points, recordings, P), v the derivatives of u; None where u is 1."""
+        sums = self._slope_sums
+        if sums.uv is None or sums.vy is None:
+            return None
+        k2, known = self._k2[:, 0, :, None], self._known[:, 0, :, None]
+        return sums.uv / k2, (sums.vy - known * sums.uv) / k2
 
-def _sensor_sums(values: Floats, sensor: NDArray[np.intp]) -> Floats:
-    """Over the recordings of each sensor: (…, recordings) to (…, sensors)."""
-    sensors = int(sensor.max()) + 1
-    if values.ndim == 1:
-        return np.asarray(np.bincount(sensor, values, sensors), dtype=float)
-    owner = (np.arange(len(values))[:, None] * sensors + sensor).ravel()
-    sums = np.bincount(owner, values.ravel(), len(values) * sensors)
-    return np.asarray(sums, dtype=float).reshape(-1, sensors)
+    def _growth(self, known: Floats | None) -> Floats:
+        """∂ log |t|²/∂θ (points, recordings, P)."""
+        level, slopes, place = self._products.level, self._products.level_slopes, self._products.place_slopes
+        assert slopes is not None and place is not None
+        led = _FROM_SLOPES**2 * (place**2).sum(axis=0) > level**2
+        as_level = np.where(led[..., None], 0.0, 2 * slopes / np.where(led, 1.0, level)[..., None])
+        return as_level if known is None else np.where(np.isfinite(known), known, as_level)
+
+    def _over_sensors(self, rows: Floats) -> Floats:
+        """Sums over the recordings of each sensor (points, recordings, P) to (points, sensors, P)."""
+        return np.asarray(np.swapaxes(np.swapaxes(rows, 1, 2) @ self._sensors, 1, 2))
+
+    def _of_sensors(self, values: Floats) -> Floats:
+        """What each recording's sensor has (points, sensors, 1) to (points, recordings, 1)."""
+        return values[:, self._sensors.argmax(axis=1)]

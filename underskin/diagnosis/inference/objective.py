@@ -1,233 +1,282 @@
-"""One hypothesis evaluated: the cost of a point, its derivatives, and its noise levels brought to rest.
+"""Hypotheses evaluated at several points at once: costs, their derivatives, and noise levels brought to rest.
 
 What only enters the covariance (gain and position scatter, line level, and a mechanism's spread or pick-up) moves by
-Newton steps on the likelihood of the prediction at hand, which costs no model evaluation.
+Newton steps on the likelihood of the predictions at hand, which costs no model evaluation.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from underskin.diagnosis.inference.hypothesis import (
-    FitPoint,
-    Hypothesis,
-    curvature_of_prior,
-    own_parameters,
-)
-from underskin.diagnosis.inference.likelihood import LogLikelihoods, Marginal, Moments
-from underskin.diagnosis.noise.noise_levels import NoiseLevels, SeveralLevels
-from underskin.mechanisms.models.composed import Prediction
+from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis, curvature_of_prior
+from underskin.diagnosis.inference.likelihood import Likelihoods
+from underskin.diagnosis.inference.products import Products, joined
+from underskin.diagnosis.noise.noise_levels import SeveralLevels
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.units import Floats
 
-GAIN, POSITION = 0, 2  # places among the covariance's parameters, the latter where there is positioning scatter
+GAIN, LEVEL, POSITION = 0, 1, 2  # places among the covariance's parameters, the last where there is such scatter
+SMOOTH = 2  # of curves, which have no place
 
 _LARGEST_STEP = 0.7  # of a Newton step in a noise level's logarithm: a factor of 2
 _STEP = 0.05  # of the finite differences in the covariance's logarithms
 _FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
 _BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
 
+Places = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Points:
+    """Where fits stand: coordinates of the models (points, parameters), of the covariance, and the sensors' log gains.
+
+    `owner` says which hypothesis each point is of, in rising order; models with fewer parameters than others have
+    zeros behind their own.
+    """
+
+    owner: Places
+    fit: Floats
+    covariance: Floats
+    bend: Floats
+
+    def __len__(self) -> int:
+        return len(self.owner)
+
+    def __getitem__(self, points: NDArray[np.intp] | NDArray[np.bool_] | slice) -> "Points":
+        return Points(self.owner[points], self.fit[points], self.covariance[points], self.bend[points])
+
 
 @dataclass(frozen=True)
 class Evaluated:
-    """A point with what was worked out there; `cost` is minus the log posterior density (up to what all share).
+    """Points with what was worked out there; `cost` is minus the log posterior density (up to what all share).
 
-    `growth` of the position's slopes, once a fit has needed it, near there.
+    `growth` ∂ log |t|²/∂θ of the position's slopes (points, recordings, parameters): not finite where a fit has not
+    needed it yet.
     """
 
-    point: FitPoint
-    prediction: Prediction
-    moments: Moments
-    marginal: Marginal
-    cost: float
+    points: Points
+    products: Products
+    cost: Floats
     growth: Floats | None = None
 
-    @property
-    def pickup_variance(self) -> Floats:
-        """Of real and of imaginary part of each row, at the point's own levels [(C/N)²]."""
-        return replace(self.prediction, pickup=self.marginal.levels.pickup).pickup_variance
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __getitem__(self, points: NDArray[np.intp] | NDArray[np.bool_] | slice) -> "Evaluated":
+        growth = None if self.growth is None else self.growth[points]
+        return Evaluated(self.points[points], self.products[points], self.cost[points], growth)
+
+    def best(self) -> Places:
+        """The point of least cost of each hypothesis that has one."""
+        order = np.lexsort((self.cost, self.points.owner))
+        owner = self.points.owner[order]
+        return order[np.append(True, owner[1:] != owner[:-1])] if len(order) else order
 
 
 class Evaluator:
-    """Evaluates points of one hypothesis, and settles their noise levels."""
+    """Evaluates points of hypotheses of the same rows, which have the same covariance parameters.
 
-    def __init__(self, hypothesis: Hypothesis, held: int | None = None) -> None:
-        """Prepare the names and bounds; the parameter at `held` is fixed where a point has it, and has no prior."""
-        self.hypothesis = hypothesis
-        self.parameters = hypothesis.model.parameters
-        self.places = [place for place in hypothesis.mean_places if place != held]
-        self.covariance = hypothesis.covariance
-        bounds = np.array([entry.bounds for entry in self.parameters]).reshape(-1, 2)
-        self.low, self.high = bounds.T
+    Several hypotheses are taken together only where their models have no dynamics line by line.
+    """
+
+    def __init__(self, hypotheses: Sequence[Hypothesis], held: Sequence[int] | None = None) -> None:
+        """Prepare the names and bounds; the parameters at `held`, one of each hypothesis, stay where a point has them,
+        and have no prior."""
+        self.hypotheses = tuple(hypotheses)
+        first = hypotheses[0]
+        self.lines, self.curvature, self.placed = first.lines, first.curvature, first.placed
+        self.covariance = first.covariance
         self._lowest = np.array([entry.low for entry in self.covariance])
         self._highest = np.array([entry.high for entry in self.covariance])
-        self._priors = np.array([curvature_of_prior(entry) for entry in self.parameters])
-        own = [self.parameters[place] for place in self.places]
-        at_start = np.array([entry.start for entry in own]) - self._priors[self.places, 1]
-        densities = sum(entry.log_prior(entry.start) for entry in own)
-        self._log_prior_height = densities + 0.5 * float(self._priors[self.places, 0] @ at_start**2)
-        self._own = [index for index, entry in enumerate(self.parameters) if entry.moves_covariance]
+        self.counts = [len(entry.model.parameters) for entry in hypotheses]
+        shape = len(hypotheses), max(self.counts)
+        self.free = np.zeros(shape, dtype=bool)
+        self.low, self.high, self._precision, self._centre = (np.zeros(shape) for _ in range(4))
+        self._log_prior_height = np.zeros(len(hypotheses))
+        for number, hypothesis in enumerate(hypotheses):
+            parameters = hypothesis.model.parameters
+            own = slice(0, len(parameters))
+            places = [place for place in hypothesis.mean_places if held is None or place != held[number]]
+            self.free[number, places] = True
+            self.low[number, own], self.high[number, own] = np.array([entry.bounds for entry in parameters]).T
+            priors = np.array([curvature_of_prior(entry) for entry in parameters])
+            self._precision[number, places], self._centre[number, places] = priors[places].T
+            starts = np.array([parameters[place].start for place in places])
+            height = sum(parameters[place].log_prior(parameters[place].start) for place in places)
+            self._log_prior_height[number] = height + 0.5 * priors[places, 0] @ (starts - priors[places, 1]) ** 2
+        parameters = first.model.parameters
+        self._own = [index for index, entry in enumerate(parameters) if entry.moves_covariance]
+        self._names = [entry.name for entry in parameters]
         self._common = len(self.covariance) - len(self._own)
-        acts_on = [entry.acts_on for entry in self.parameters]
+        acts_on = [entry.acts_on for entry in parameters]
         self._spread = acts_on.index("gain_spread") if "gain_spread" in acts_on else None
-        self.nuisances = len(self.parameters) - own_parameters(hypothesis)
-        sensors = int(hypothesis.lines.sensor.max()) + 1
-        self.no_bend = np.zeros(sensors)
 
-    def evaluate(self, point: FitPoint, prediction: Prediction | None = None) -> Evaluated:
-        """Predict, where that was not done already, and weigh."""
-        hypothesis = self.hypothesis
-        prediction = prediction or hypothesis.model.predict(point.fit)
-        position = float(np.exp(point.covariance[POSITION])) if hypothesis.placed else 0.0
-        lines = hypothesis.lines
-        for _ in range(_BENDINGS):
-            ratio = self._smooth(point) / float(np.exp(point.covariance[1]))
-            moments = Moments(lines, prediction, point.bend[lines.sensor], hypothesis.curvature, position, ratio)
-            at = self._weigh(point, prediction, moments)
-            if self.levels(point).spread < _FREE_SPREAD:
-                break
-            bend = np.clip(at.marginal.sensor_gains, -_LARGEST_BEND, _LARGEST_BEND)
-            if np.abs(bend - point.bend).max() < _BENT:
-                break
-            point = replace(point, bend=bend)
-        return at
+    @property
+    def no_bend(self) -> Floats:
+        """Log gains of the sensors that are all 0."""
+        return np.zeros(self.lines.sensors.shape[1])
 
-    def _weigh(self, point: FitPoint, prediction: Prediction, moments: Moments) -> Evaluated:
-        lines, levels = self.hypothesis.lines, self.levels(point)
-        if lines.curves and levels.smooth != moments.ratio * levels.level:
-            moments = moments.at_ratio(levels.smooth / levels.level)
-        marginal = Marginal(lines, moments, levels)
-        cost = -marginal.log_likelihood - self._log_prior(point)
-        return Evaluated(point, prediction, moments, marginal, cost)
+    def at(self, point: FitPoint) -> Points:
+        """One point of the first hypothesis."""
+        return Points(np.zeros(1, dtype=np.intp), point.fit[None], point.covariance[None], point.bend[None])
 
-    def levels(self, point: FitPoint) -> NoiseLevels:
-        """The noise levels at a point."""
-        gain, level, *_ = np.exp(point.covariance).tolist()
-        position, spread, pickup = self._own_levels(point.covariance)
-        return NoiseLevels(gain, level, float(position), float(spread), pickup, self._smooth(point))
+    def evaluate(self, points: Points, *, slopes: bool = True) -> Evaluated:
+        """Predict, with derivatives unless they are not needed, and weigh."""
+        products = self.products(points, slopes=slopes, place=self.placed)
+        return self.weighed(points, products)
 
-    def _own_levels(self, covariance: Floats) -> tuple[Floats | float, Floats | float, Floats | None]:
-        """p, τ and the pick-up (…, pick-up rows) that covariance parameters (…, parameters) hold."""
-        position: Floats | float = np.exp(covariance[..., POSITION]) if self.hypothesis.placed else 0.0
-        spread: Floats | float = SENSOR_SPREAD
-        values = {}
+    def products(self, points: Points, *, slopes: bool, place: bool) -> Products:
+        """The inner products at points."""
+        edges = np.searchsorted(points.owner, np.arange(len(self.hypotheses) + 1))
+        parts = [
+            hypothesis.products(points.fit[low:high, :count], slopes=slopes, place=place)
+            for hypothesis, count, low, high in zip(self.hypotheses, self.counts, edges[:-1], edges[1:], strict=True)
+            if high > low
+        ]
+        return joined(parts, max(self.counts))
+
+    def weighed(self, points: Points, products: Products) -> Evaluated:
+        """Points whose predictions are known, with the sensors' gains that belong to them where these are free."""
+        if self._spread is not None:
+            for _ in range(_BENDINGS):
+                levels = self.levels(points.covariance[:, None])
+                gains = Likelihoods(self.lines, self.curvature, products, levels, points.bend).sensor_gains
+                free = levels.spread[:, 0] >= _FREE_SPREAD
+                bend = np.where(free, np.clip(gains, -_LARGEST_BEND, _LARGEST_BEND), points.bend)
+                bent = np.abs(bend - points.bend).max()
+                if bent < _BENT:
+                    break
+                points = replace(points, bend=bend)
+        return Evaluated(points, products, self._costs(points, products, points.covariance[:, None])[:, 0])
+
+    def marginal(self, at: Evaluated) -> Likelihoods:
+        """The likelihoods at points."""
+        levels = self.levels(at.points.covariance[:, None])
+        return Likelihoods(self.lines, self.curvature, at.products, levels, at.points.bend)
+
+    def levels(self, covariance: Floats) -> SeveralLevels:
+        """The noise levels that covariance parameters (…, parameters) hold, (…, 1)."""
+        values = np.exp(covariance[..., None])
+        shape = (*covariance.shape[:-1], 1)
+        spread, own = np.full(shape, SENSOR_SPREAD), {}
         for place, column in zip(self._own, range(self._common, len(self.covariance)), strict=True):
             if place == self._spread:
-                spread = np.exp(covariance[..., column])
+                spread = values[..., column, :]
             else:
-                values[self.parameters[place].name] = np.exp(covariance[..., [column]])
-        pickup = self.hypothesis.model.pickup
-        return position, spread, None if pickup is None else pickup.deviation(values)
-
-    def _smooth(self, point: FitPoint) -> float:
-        """η, which follows the two that all recordings have."""
-        return float(np.exp(point.covariance[2])) if self.hypothesis.lines.curves else 0.0
-
-    def _with_own(self, fit: Floats, covariance: Floats) -> Floats:
-        if not self._own:
-            return fit
-        whole = fit.copy()
-        whole[self._own] = covariance[self._common :]
-        return whole
-
-    def _log_prior(self, point: FitPoint) -> float:
-        return self._log_mean_prior(point) + sum(
-            entry.log_density(value) for entry, value in zip(self.covariance, point.covariance.tolist(), strict=True)
+                own[self._names[place]] = values[..., column, :]
+        pickup = self.hypotheses[0].model.pickup
+        return SeveralLevels(
+            gain=values[..., GAIN, :],
+            level=values[..., LEVEL, :],
+            position=values[..., POSITION, :] if self.placed else np.zeros(shape),
+            spread=spread,
+            pickup=None if pickup is None else pickup.deviation(own),
+            smooth=values[..., SMOOTH, :] if self.lines.curves else np.zeros(shape),
         )
 
-    def _log_mean_prior(self, point: FitPoint) -> float:
+    def _costs(self, points: Points, products: Products, covariances: Floats) -> Floats:
+        """The costs (points, sets) with covariance parameters (points, sets, parameters), where points predict."""
+        likelihoods = Likelihoods(self.lines, self.curvature, products, self.levels(covariances), points.bend).each
+        prior = sum(entry.log_density(covariances[..., place]) for place, entry in enumerate(self.covariance))
+        return -likelihoods - prior - self._log_mean_prior(points)[:, None]
+
+    def costs(self, at: Evaluated, covariances: Floats) -> Floats:
+        """The costs (points, sets) at the same predictions with other covariance parameters (points, sets, …)."""
+        return self._costs(at.points, at.products, covariances)
+
+    def _log_mean_prior(self, points: Points) -> Floats:
         """Of the parameters that move the mean."""
-        places = self.places
-        fit = point.fit[places]
-        if (fit < self.low[places]).any() or (fit > self.high[places]).any():
-            return -np.inf
-        precision, centre = self._priors[places].T
-        return self._log_prior_height - 0.5 * float(precision @ (fit - centre) ** 2)
+        owner, fit = points.owner, points.fit
+        outside = self.free[owner] & ((fit < self.low[owner]) | (fit > self.high[owner]))
+        square = (self._precision[owner] * (fit - self._centre[owner]) ** 2).sum(axis=1)
+        return np.where(outside.any(axis=1), -np.inf, self._log_prior_height[owner] - 0.5 * square)
 
     def posterior_equations(self, at: Evaluated) -> tuple[Floats, Floats]:
-        """Information and gradient of the log posterior in the mean parameters."""
-        information, gradient = at.marginal.normal_equations(at.growth)
-        places = self.places
-        information, gradient = information[np.ix_(places, places)], gradient[places]
-        precision, centre = self._priors[places].T
-        return information + np.diag(precision), gradient - precision * (at.point.fit[places] - centre)
+        """Information and gradient of the log posterior in the mean parameters (points, parameters, parameters).
+
+        What is held or no parameter has gradient 0 and information 1 of its own.
+        """
+        information, gradient = self.marginal(at).normal_equations(at.growth)
+        owner = at.points.owner
+        free = self.free[owner]
+        precision = self._precision[owner]
+        gradient = np.where(free, gradient - precision * (at.points.fit - self._centre[owner]), 0.0)
+        information = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
+        diagonal = np.arange(free.shape[1])
+        information[:, diagonal, diagonal] += np.where(free, precision, 1.0)
+        return information, gradient
 
     def settle(self, at: Evaluated, steps: int, held: int | None = None) -> Evaluated:
-        """Newton steps of the covariance parameters, one of which may be held, at a fixed prediction.
+        """Newton steps of the covariance parameters, one of which may be held, at fixed predictions.
 
         Several of a mechanism's own hang together, so that steps of one at a time would creep.
         """
+        low, high = self._lowest, self._highest
+        points, cost, moving = at.points, at.cost.copy(), np.arange(len(at))
         for _ in range(steps):
-            gradient, hessian = self.covariance_equations(at, mixed=len(self._own) > 1)
+            part = Evaluated(points[moving], at.products[moving], cost[moving])
+            gradient, hessian = self.covariance_equations(part, mixed=len(self._own) > 1)
             if held is not None:
-                hessian[held, :] = hessian[:, held] = gradient[held] = 0.0
-            low, high = self._lowest, self._highest
+                hessian[:, held, :] = hessian[:, :, held] = gradient[:, held] = 0.0
             eigenvalues, vectors = np.linalg.eigh(hessian)
-            step = -vectors @ ((vectors.T @ gradient) / np.maximum(np.abs(eigenvalues), 1.0))
-            outwards = ((at.point.covariance <= low) & (step < 0)) | ((at.point.covariance >= high) & (step > 0))
+            along = np.einsum("nij,ni->nj", vectors, gradient) / np.maximum(np.abs(eigenvalues), 1.0)
+            step = -np.einsum("nij,nj->ni", vectors, along)
+            here = part.points.covariance
+            outwards = ((here <= low) & (step < 0)) | ((here >= high) & (step > 0))
             step = np.where(outwards, 0.0, step)
-            step *= min(1.0, _LARGEST_STEP / max(np.abs(step).max(), 1e-12))
+            step *= np.minimum(1.0, _LARGEST_STEP / np.maximum(np.abs(step).max(axis=1), 1e-12))[:, None]
+            covariance, reached, gained = here.copy(), part.cost.copy(), np.zeros(len(part))
+            trying = np.arange(len(part))
             for _ in range(4):
-                point = self.moved(at.point, np.clip(at.point.covariance + step, low, high))
-                tried = self._weigh(point, at.prediction, at.moments)
-                if tried.cost < at.cost:
+                tried = np.clip(here[trying] + step[trying], low, high)
+                costs = self.costs(part[trying], tried[:, None])[:, 0]
+                lower = costs < part.cost[trying]
+                better = trying[lower]
+                covariance[better], reached[better] = tried[lower], costs[lower]
+                gained[better] = part.cost[better] - costs[lower]
+                trying = trying[~lower]
+                if not len(trying):
                     break
                 step = step / 4
-            else:
+            points = self._moved(points, moving, covariance)
+            cost[moving] = reached
+            moving = moving[gained >= 1e-3]
+            if not len(moving):
                 break
-            gained, at = at.cost - tried.cost, tried
-            if gained < 1e-3:
-                break
-        return self._summed_again(at)
+        return Evaluated(points, at.products, cost, at.growth)
 
-    def _summed_again(self, at: Evaluated) -> Evaluated:
-        """With the moments of the same prediction at the positioning scatter that the point has come to."""
-        same = at.marginal.levels.position == at.moments.position
-        return at if same else self.weighed_anew(at.point, at)
+    def _moved(self, points: Points, moving: Places, covariance: Floats) -> Points:
+        whole = points.covariance.copy()
+        whole[moving] = covariance
+        return self.with_covariance(points, whole)
 
-    def weighed_anew(self, point: FitPoint, at: Evaluated) -> Evaluated:
-        """A point with the prediction of another, whose moments are summed at the point's own scatter."""
-        lines, curvature = self.hypothesis.lines, self.hypothesis.curvature
-        position = self.levels(point).position
-        moments = Moments(lines, at.prediction, point.bend[lines.sensor], curvature, position)
-        return self._weigh(point, at.prediction, moments)
-
-    def moved(self, point: FitPoint, covariance: Floats) -> FitPoint:
-        """The point with other covariance parameters, a mechanism's own among the coordinates of the fit."""
-        return replace(point, covariance=covariance, fit=self._with_own(point.fit, covariance))
+    def with_covariance(self, points: Points, covariance: Floats) -> Points:
+        """The points with other covariance parameters, a mechanism's own among the coordinates of the fit."""
+        fit = points.fit
+        if self._own:
+            fit = fit.copy()
+            fit[:, self._own] = covariance[:, self._common :]
+        return replace(points, covariance=covariance, fit=fit)
 
     def covariance_equations(self, at: Evaluated, *, mixed: bool = True) -> tuple[Floats, Floats]:
-        """Gradient and Hessian of the cost in the covariance parameters, by differences; the mixed terms on request."""
-        here = at.point.covariance
-        count = len(here)
+        """Gradient and Hessian of the costs in the covariance parameters, by differences; the mixed terms on request."""
+        here = at.points.covariance
+        count = here.shape[1]
         steps = _STEP * np.eye(count)
         # Far enough inside the bounds for the differences
         centre = np.clip(here, self._lowest + 2 * _STEP, self._highest - 2 * _STEP)
         pairs = [(a, b) for a in range(count) for b in range(a if mixed else 0)]
         both = [steps[a] + steps[b] for a, b in pairs]
-        costs = self.costs(at, centre + np.array([np.zeros(count), *steps, *-steps, *both, *(-step for step in both)]))
-        middle, up, down = costs[0], costs[1 : count + 1], costs[count + 1 : 2 * count + 1]
+        shifts = np.array([np.zeros(count), *steps, *-steps, *both, *(-step for step in both)])
+        costs = self.costs(at, centre[:, None] + shifts)
+        middle, up, down = costs[:, :1], costs[:, 1 : count + 1], costs[:, count + 1 : 2 * count + 1]
         alone = up + down - 2 * middle
-        together = costs[2 * count + 1 :].reshape(2, -1).sum(axis=0) - 2 * middle
         gradient = (up - down) / (2 * _STEP)
-        hessian = np.diag(alone / _STEP**2)
-        for (a, b), both_ways in zip(pairs, together, strict=True):
-            hessian[a, b] = hessian[b, a] = (both_ways - alone[a] - alone[b]) / (2 * _STEP**2)
-        return gradient + hessian @ (here - centre), hessian
-
-    def costs(self, at: Evaluated, covariances: Floats) -> Floats:
-        """The costs with other covariance parameters (K, parameters) at the same prediction."""
-        if self.hypothesis.lines.curves:  # each of which weighs its rows anew
-            points = [self.moved(at.point, covariance) for covariance in covariances]
-            return np.array([self._weigh(point, at.prediction, at.moments).cost for point in points])
-        gain, level = np.exp(covariances[:, :2]).T[..., None]
-        position, spread, pickup = self._own_levels(covariances)
-        position, spread = (value if isinstance(value, float) else value[:, None] for value in (position, spread))
-        likelihoods = LogLikelihoods(
-            self.hypothesis.lines, at.moments, SeveralLevels(gain, level, position, spread, pickup)
-        ).each
-        prior = np.zeros(len(covariances))
-        for entry, column in zip(self.covariance, covariances.T.tolist(), strict=True):
-            density = {value: entry.log_density(value) for value in set(column)}
-            prior += [density[value] for value in column]
-        return -likelihoods - prior - self._log_mean_prior(at.point)
+        hessian = alone[:, :, None] / _STEP**2 * np.eye(count)
+        together = costs[:, 2 * count + 1 :].reshape(len(at), 2, -1).sum(axis=1) - 2 * middle
+        for place, (a, b) in enumerate(pairs):
+            hessian[:, a, b] = (together[:, place] - alone[:, a] - alone[:, b]) / (2 * _STEP**2)
+            hessian[:, b, a] = hessian[:, a, b]
+        return gradient + np.einsum("nij,nj->ni", hessian, here - centre), hessian

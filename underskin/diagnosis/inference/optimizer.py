@@ -1,18 +1,19 @@
-"""The most probable parameters of one hypothesis, by Gauss–Newton steps with a trust region.
+"""Points of hypotheses begun and improved, all at once: damped Gauss–Newton steps within the bounds.
 
-Mean parameters move by the model's derivatives; what only enters the covariance is settled in between. Fisher's
-information between the two groups is zero for a normal likelihood, so they are taken in turns.
+Every step of the mean parameters is followed by steps of the noise levels, which cost no prediction. Each point has its
+own damping, and rests once it has converged, while the others go on.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from underskin.diagnosis.inference.hypothesis import FitPoint
-from underskin.diagnosis.inference.objective import Evaluated, Evaluator
+from underskin.diagnosis.inference.objective import Evaluated, Evaluator, Places, Points
+from underskin.diagnosis.inference.products import FrfProducts, Products, joined
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
-from underskin.mechanisms.models.composed import Prediction
 from underskin.units import Floats
 
 __all__ = ["Evaluated", "Fitter"]
@@ -22,156 +23,230 @@ _SLOPE_STEP = 1e-4  # of a parameter's range, for differences of the position's 
 _LARGEST_STEP = 1.0
 _CONVERGED = 0.01  # in log posterior
 _MOST_ITERATIONS = 25
+_USUAL_GAIN = 0.03  # scatter of gains while nothing was fitted yet
+_POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
 
 
 class Fitter(Evaluator):
-    """Begins and improves points of one hypothesis."""
+    """Begins and improves points of hypotheses."""
 
-    def holds(self, point: FitPoint) -> bool:
-        """Whether a point has this hypothesis' covariance parameters."""
-        return len(point.covariance) == len(self.covariance)
+    def start(self, own: Floats, parents: FitPoint | None = None, hypothesis: int = 0) -> Points:
+        """Points of one hypothesis with these coordinates of its mechanisms (points, own), and the nuisances of a
+        parent or at their centre; noise as it is usual."""
+        entry = self.hypotheses[hypothesis]
+        count, mechanisms = self.counts[hypothesis], entry.own_parameters
+        fit = np.zeros((len(own), max(self.counts)))
+        nuisances = slice(mechanisms, count)
+        fit[:, nuisances] = [parameter.start for parameter in entry.model.parameters[nuisances]]
+        if parents is not None:
+            fit[:, nuisances] = parents.fit[len(parents.fit) - (count - mechanisms) :]
+        fit[:, :mechanisms] = own
+        common = [GAIN_PRIOR.middle, 0.0]
+        if self.placed:
+            common.append(POSITION_PRIOR.middle)
+        if self.lines.curves:
+            common.append(entry.smooth.middle)
+        covariance = np.concatenate([np.tile(common, (len(own), 1)), fit[:, self._own]], axis=1)
+        owner = np.full(len(own), hypothesis, dtype=np.intp)
+        return Points(owner, fit, covariance, np.tile(self.no_bend, (len(own), 1)))
 
-    def _uncentred(self, own: Sequence[float] | Floats, parent: FitPoint | None) -> FitPoint:
-        """A point with these coordinates of the mechanisms, and the nuisances of a parent or at their centre."""
-        fit = np.array([entry.start for entry in self.parameters])
-        fit[: len(own)] = own
-        if parent is not None:
-            fit[len(own) :] = parent.fit[len(parent.fit) - len(fit) + len(own) :]
-        covariance = [GAIN_PRIOR.middle, 0.0]
-        if self.hypothesis.placed:
-            covariance.append(POSITION_PRIOR.middle)
-        if self.hypothesis.lines.curves:
-            covariance.append(self.hypothesis.smooth.middle)
-        return FitPoint(fit, np.array([*covariance, *fit[self._own]]), self.no_bend)
+    def begin(self, own: Floats, parent: FitPoint | None = None, *, slopes: bool = False) -> Evaluated:
+        """The starts of these coordinates of one hypothesis, d33 as the data would have it, evaluated."""
+        points = self.start(own, parent)
+        products = self.products(points, slopes=slopes, place=self.placed)
+        if not any(entry.proportional for entry in self.hypotheses[0].model.parameters):
+            return self.weighed(points, products)
+        ratio = self._ratio(points, products)
+        if isinstance(products, FrfProducts):
+            return self.weighed(*self._scaled(points, products, ratio))
+        place = self._d33[0]
+        fit = points.fit.copy()
+        change = np.log(np.where(ratio > 0, ratio, 1.0))
+        fit[:, place] = np.clip(fit[:, place] + change, self.low[0, place], self.high[0, place])
+        return self.evaluate(replace(points, fit=fit), slopes=slopes)
 
-    def start(
-        self, own: Sequence[float] | Floats, parent: FitPoint | None = None, prediction: Prediction | None = None
-    ) -> FitPoint:
-        """A point with these coordinates of the mechanisms, E and h of a parent or their centre, d33 as data say."""
-        point = self._uncentred(own, parent)
-        fit = point.fit
-        place = next((index for index, entry in enumerate(self.parameters) if entry.proportional), None)
-        if place is not None:
-            lines = self.hypothesis.lines
-            value = (prediction or self.hypothesis.model.predict(fit)).value
-            weight = 1 / (lines.deviation**2 + (0.03 * np.abs(value)) ** 2)
-            ratio = np.sum(weight * (value.conj() * lines.value).real) / np.sum(weight * np.abs(value) ** 2)
-            if ratio > 0:
-                fit[place] = np.clip(fit[place] + np.log(ratio), self.low[place], self.high[place])
-        return point
+    def _ratio(self, points: Points, products: Products) -> Floats:
+        """What the measured recordings are of the predicted ones (points,): their mean, weighed by noise and scatter."""
+        sums = products.summed(self.levels(points.covariance[:, None]))
+        uu, uy = sums.uu[:, 0], sums.uy[:, 0]
+        level = products.level
+        weight = 1 / (1 + _USUAL_GAIN**2 * level**2 * uu)
+        return np.asarray((weight * level * uy).sum(axis=1) / np.maximum((weight * level**2 * uu).sum(axis=1), 1e-300))
 
-    def begin(self, own: Sequence[float] | Floats, parent: FitPoint | None = None) -> Evaluated:
-        """The start of these coordinates, evaluated with a single prediction where d33 only scales it."""
-        prediction = self.hypothesis.model.predict(self._uncentred(own, parent).fit)
-        point = self.start(own, parent, prediction)
-        names = [entry.name for entry in self.parameters]
-        if "d33" not in names:
-            return self.evaluate(point)
-        place = names.index("d33")
-        return self.evaluate(point, _scaled(prediction, point.fit[place] - self._uncentred(own, parent).fit[place]))
+    def with_scatter(self, points: Points) -> Points:
+        """For each point fitted without positioning scatter, the best of a few scales of it, d33 following each.
 
-    def rescaled(self, begin: Evaluated, covariance: Floats) -> Evaluated:
-        """At other covariance parameters, and d33 as they would have it: no further prediction."""
-        at = self.weighed_anew(self.moved(begin.point, covariance), begin)
-        place = [entry.name for entry in self.parameters].index("d33")
+        Where the scatter is large, what was fitted without it may be far off: also from the nuisances' centres.
+        """
+        fresh = points.fit.copy()
+        for number, (hypothesis, count) in enumerate(zip(self.hypotheses, self.counts, strict=True)):
+            nuisances = slice(hypothesis.own_parameters, count)
+            starts = [entry.start for entry in hypothesis.model.parameters[nuisances]]
+            fresh[points.owner == number, nuisances] = starts
+        scales = np.log(_POSITION_STARTS)
+        gain, level, own = points.covariance[:, :1], points.covariance[:, 1:2], points.covariance[:, 2:]
+        common = np.minimum(gain, GAIN_PRIOR.middle), level
+        covariances = [np.concatenate([*common, np.full_like(gain, scale), own], axis=1) for scale in scales]
+        twice = np.repeat(np.arange(len(points)), 2)
+        is_fresh = np.tile([False, True], len(points))
+        both = points[twice]
+        both = replace(both, fit=np.where(is_fresh[:, None], fresh[twice], both.fit), covariance=covariances[0][twice])
+        products = self.products(both, slopes=True, place=True)
+        both, products = self._scaled(both, products, np.where(is_fresh, self._ratio(both, products), 1.0))
+        rows = np.repeat(np.arange(len(both)), len(scales))
+        each = np.stack(covariances, axis=1)[twice].reshape(len(rows), -1)
+        at = self._with_d33(self.weighed(self.with_covariance(both[rows], each), products[rows]))
+        sets = 2 * len(scales)
+        return at.points[at.cost.reshape(-1, sets).argmin(axis=1) + sets * np.arange(len(points))]
+
+    def _scaled(self, points: Points, products: Products, ratio: Floats) -> tuple[Points, Products]:
+        """With d33 so many times as large (points,), within its bounds; as it is where the ratio is not above 0."""
+        number, place = np.arange(len(points)), self._d33[points.owner]
+        fit = points.fit.copy()
+        change = np.log(np.where(ratio > 0, ratio, 1.0))
+        low, high = self.low[points.owner, place], self.high[points.owner, place]
+        fit[number, place] = np.clip(fit[number, place] + change, low, high)
+        assert isinstance(products, FrfProducts)
+        return replace(points, fit=fit), products.scaled(np.exp(fit[number, place] - points.fit[number, place]))
+
+    def _with_d33(self, at: Evaluated) -> Evaluated:
+        """With the d33 that the data would have at these noise levels: no further prediction."""
         information, gradient = self.posterior_equations(at)
-        index = self.places.index(place)
-        fit = at.point.fit.copy()
-        step = float(gradient[index] / information[index, index])
-        fit[place] = np.clip(
-            fit[place] + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP), self.low[place], self.high[place]
-        )
-        prediction = _scaled(at.prediction, fit[place] - at.point.fit[place])
-        return self.settle(self.weighed_anew(replace(at.point, fit=fit), replace(at, prediction=prediction)), 2)
+        number, place = np.arange(len(at)), self._d33[at.points.owner]
+        step = np.clip(gradient[number, place] / information[number, place, place], -_LARGEST_STEP, _LARGEST_STEP)
+        return self.settle(self.weighed(*self._scaled(at.points, at.products, np.exp(step))), 2)
 
-    def improve(self, start: FitPoint) -> Evaluated:
-        """The most probable point near the start."""
-        if not self.hypothesis.lines.curves:
-            return self.settle(self._descend(self.settle(self.evaluate(start), 3), 1), 2)
+    @cached_property
+    def _d33(self) -> Places:
+        """Where each hypothesis has the parameter that the prediction is proportional to."""
+        proportional = [[entry.proportional for entry in one.model.parameters] for one in self.hypotheses]
+        return np.array([own.index(True) for own in proportional])
+
+    def improve(self, start: Points) -> Evaluated:
+        """The most probable points near the starts."""
+        if not self.lines.curves:
+            return self.settle(self.descend(self.settle(self.evaluate(start), 3), 1), 2)
         # Small smooth error and close fit, or large and loose: each may be a maximum of its own.
-        fits = []
-        for smooth in (self.hypothesis.smooth.low, self.hypothesis.smooth.middle):
-            begin = replace(start, covariance=np.array([GAIN_PRIOR.middle, 0.0, smooth]))
-            fitted = self.settle(self._descend(self.evaluate(begin), 0), _CURVE_SETTLING)
-            fits.append(self.settle(self._descend(fitted, 1), _CURVE_SETTLING))
-        return min(fits, key=lambda at: at.cost)
+        smooth = self.hypotheses[0].smooth
+        each = []
+        for value in (smooth.low, smooth.middle):
+            covariance = np.tile([GAIN_PRIOR.middle, 0.0, value], (len(start), 1))
+            fitted = self.settle(self.descend(self.evaluate(replace(start, covariance=covariance)), 0), _CURVE_SETTLING)
+            each.append(self.settle(self.descend(fitted, 1), _CURVE_SETTLING))
+        one, other = each
+        better = np.flatnonzero(other.cost < one.cost)
+        return self.replaced(one, better, other[better])
 
-    def _descend(self, best: Evaluated, settling: int) -> Evaluated:
+    def descend(self, best: Evaluated, settling: int) -> Evaluated:
         """Steps of the mean parameters, each followed by so many of the covariance's."""
-        damping = 1e-3
+        damping = np.full(len(best), 1e-3)
+        moving = np.arange(len(best))
         for _ in range(_MOST_ITERATIONS):
-            step, slope = self._step(best, damping)
-            if slope < _CONVERGED and (best.growth is not None or not self.hypothesis.placed):
-                settled = replace(self.settle(best, settling), growth=best.growth)
-                if best.cost - settled.cost < _CONVERGED:
-                    return settled
-                best = settled
-                continue
-            moved = replace(best.point, fit=np.clip(best.point.fit + step, self.low, self.high))
-            tried = self.settle(self.evaluate(moved), settling)
-            gained = best.cost - tried.cost
-            if gained > 0:
-                best = replace(tried, growth=best.growth)
-                damping = max(damping / 10, 1e-6)
-                if gained < _CONVERGED:
-                    break
-            elif damping > 1e4 or np.abs(step).max() < 1e-7:
+            part = best[moving]
+            step, slope = self._step(part, damping[moving])
+            grown = self.grown(part)
+            resting = (slope < _CONVERGED) & grown
+            going = np.ones(len(part), dtype=bool)
+            if resting.any():
+                settled = self.settle(part[resting], settling)
+                going[resting] = part.cost[resting] - settled.cost >= _CONVERGED
+                best = self.replaced(best, moving[resting], settled)
+            tried_at = np.flatnonzero(~resting)
+            if len(tried_at):
+                there = part[tried_at]
+                owner = there.points.owner
+                fit = np.clip(there.points.fit + step[tried_at], self.low[owner], self.high[owner])
+                tried = self.settle(self.evaluate(replace(there.points, fit=fit)), settling)
+                tried = replace(tried, growth=there.growth)
+                gained = there.cost - tried.cost
+                better = gained > 0
+                number = moving[tried_at]
+                best = self.replaced(best, number[better], tried[better])
+                stuck = ~better & ((damping[number] > 1e4) | (np.abs(step[tried_at]).max(axis=1) < 1e-7))
+                blind = ~better & ~stuck & ~grown[tried_at]
+                if blind.any():
+                    best = self.replaced(best, number[blind], self.with_growth(best[number[blind]]))
+                failed = ~better & ~stuck & ~blind
+                damping[number[better]] = np.maximum(damping[number[better]] / 10, 1e-6)
+                damping[number[failed]] = np.maximum(damping[number[failed]] * 10, 1e-2)
+                idle = failed & (gained > -_CONVERGED) & (damping[number] > 1)
+                going[tried_at] = ~(stuck | idle | (better & (gained < _CONVERGED)))
+            moving = moving[going]
+            if not len(moving):
                 break
-            elif self.hypothesis.placed and best.growth is None:
-                best = self.with_growth(best)
-            else:
-                damping = max(damping * 10, 1e-2)
-                if gained > -_CONVERGED and damping > 1:
-                    break
         return best
 
-    def with_growth(self, at: Evaluated) -> Evaluated:
-        """With ∂ log |t|²/∂θ (recordings, parameters) of the position's slopes t, by differences."""
-        slopes = at.moments.log_slopes
-        growth = np.zeros((len(slopes), len(self.parameters)))
-        for place in self.places:
-            step = _SLOPE_STEP * (self.high[place] - self.low[place])
-            moved = at.point.fit.copy()
-            moved[place] += step if moved[place] + step <= self.high[place] else -step
-            growth[:, place] = (self.evaluate(replace(at.point, fit=moved)).moments.log_slopes - slopes) / (
-                moved[place] - at.point.fit[place]
+    def grown(self, at: Evaluated) -> NDArray[np.bool_]:
+        """Which points know how the position's slopes change, or have no use for it."""
+        if not self.placed:
+            return np.ones(len(at), dtype=bool)
+        if at.growth is None:
+            return np.zeros(len(at), dtype=bool)
+        return np.asarray(np.isfinite(at.growth).all(axis=(1, 2)))
+
+    def replaced(self, at: Evaluated, where: Places, other: Evaluated) -> Evaluated:
+        """With other points in the place of some."""
+        if not len(where):
+            return at
+        order = np.arange(len(at))
+        order[where] = len(at) + np.arange(len(other))
+
+        def of(one: Floats, two: Floats) -> Floats:
+            return np.concatenate([one, two])[order]
+
+        one, two = at.points, other.points
+        points = Points(
+            np.concatenate([one.owner, two.owner])[order],
+            of(one.fit, two.fit),
+            of(one.covariance, two.covariance),
+            of(one.bend, two.bend),
+        )
+        growth = None
+        if at.growth is not None or other.growth is not None:
+            unknown = np.full((1, self.lines.recordings, max(self.counts)), np.nan)
+            growth = of(
+                *(np.repeat(unknown, len(one), axis=0) if one.growth is None else one.growth for one in (at, other))
             )
+        products = joined([at.products, other.products], max(self.counts))[order]
+        return Evaluated(points, products, of(at.cost, other.cost), growth)
+
+    def with_growth(self, at: Evaluated) -> Evaluated:
+        """With ∂ log |t|²/∂θ (points, recordings, parameters) of the position's slopes t, by differences."""
+        count = max(self.counts)
+        owner = at.points.owner
+        step = _SLOPE_STEP * (self.high - self.low)[owner]
+        step = np.where(at.points.fit + step <= self.high[owner], step, -step)
+        number, place = np.nonzero(self.free[owner])
+        moved = at.points[number]
+        fit = moved.fit.copy()
+        fit[np.arange(len(fit)), place] += step[number, place]
+        slopes = [self.products(points, slopes=False, place=True) for points in (at.points, replace(moved, fit=fit))]
+        here, there = (_log_slopes(products) for products in slopes)
+        growth = np.zeros((len(at), here.shape[1], count))
+        growth[number, :, place] = (there - here[number]) / step[number, place][:, None]
         return replace(at, growth=growth)
 
-    def _step(self, at: Evaluated, damping: float) -> tuple[Floats, float]:
-        """A damped Gauss–Newton step of the mean parameters within the bounds, and what the gradient says it gains."""
+    def _step(self, at: Evaluated, damping: Floats) -> tuple[Floats, Floats]:
+        """Damped Gauss–Newton steps of the mean parameters within the bounds, and what the gradients say they gain."""
         information, gradient = self.posterior_equations(at)
-        places = np.array(self.places)
-        fit = at.point.fit[places]
-        low, high = self.low[places], self.high[places]
-        free = np.ones(len(places), dtype=bool)
-        step = np.zeros(len(fit))
-        for _ in range(len(places)):
-            matrix = information[np.ix_(free, free)]
-            matrix = matrix + damping * np.diag(np.diag(matrix)) + 1e-10 * np.eye(len(matrix))
-            step[:] = 0.0
-            step[free] = np.linalg.solve(matrix, gradient[free])
+        owner, fit = at.points.owner, at.points.fit
+        low, high = self.low[owner], self.high[owner]
+        free, every = self.free[owner], np.arange(fit.shape[1])
+        diagonal = information[:, every, every]
+        for _ in every:
+            matrix = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
+            matrix[:, every, every] = np.where(free, diagonal * (1 + damping[:, None]) + 1e-10, 1.0)
+            step = np.linalg.solve(matrix, np.where(free, gradient, 0.0)[..., None])[..., 0]
             scale = np.abs(step) / np.maximum(_LARGEST_STEP, 0.3 * (high - low))
-            step /= max(1.0, scale.max())
+            step /= np.maximum(1.0, scale.max(axis=1))[:, None]
             leaving = free & (((fit <= low) & (step < 0)) | ((fit >= high) & (step > 0)))
             if not leaving.any():
                 break
-            free &= ~leaving
-            if not free.any():
-                step[:] = 0.0
-                break
-        whole = np.zeros(len(self.parameters))
-        whole[places] = step
-        return whole, float(gradient @ step)
+            free = free & ~leaving
+        return step, (gradient * step).sum(axis=1)
 
 
-def _scaled(prediction: Prediction, log_factor: float) -> Prediction:
-    """Of another d33."""
-    factor = float(np.exp(log_factor))
-    slopes = prediction.position_slopes
-    return replace(
-        prediction,
-        value=factor * prediction.value,
-        slopes=factor * prediction.slopes,
-        position_slopes=None if slopes is None else factor * slopes,
-    )
+def _log_slopes(products: Products) -> Floats:
+    """log |t|² (points, recordings) of the position's slopes; least where there are none."""
+    assert products.place_slopes is not None
+    return np.log((products.place_slopes**2).sum(axis=0) + 1e-300)

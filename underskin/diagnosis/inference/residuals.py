@@ -25,7 +25,7 @@ class Residuals:
 
 def whole_prediction(problem: FittingProblem, explanation: Explanation) -> Array:
     """The explanation's prediction on all lines."""
-    value: Array = explanation.best.at.prediction.value
+    value: Array = explanation.best.prediction.value
     return value if len(value) == len(problem.lines.value) else value[problem.lines.recording]
 
 
@@ -34,9 +34,9 @@ def line_residuals(problem: FittingProblem, explanation: Explanation) -> tuple[A
 
     The variance is that before the noise's level; mains pick-up adds to it.
     """
-    lines, prediction, at = problem.lines, whole_prediction(problem, explanation), explanation.best.at
+    lines, prediction, best = problem.lines, whole_prediction(problem, explanation), explanation.best
     first = lines.first
-    further = 0.0 if at.prediction.pickup_rows is None else at.pickup_variance / at.marginal.levels.level**2
+    further = 0.0 if best.prediction.pickup_rows is None else best.pickup_variance / best.levels.level**2
     precision = 1 / (lines.deviation**2 + further)
     along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, first)
     size = np.add.reduceat(precision * np.abs(prediction) ** 2, first)
@@ -52,14 +52,11 @@ def residuals(problem: FittingProblem, explanation: Explanation, gain: float, po
     precision = lines.deviation**-2
     size = np.add.reduceat(precision * np.abs(prediction) ** 2, lines.first)
     along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, lines.first)
-    moments = explanation.best.at.moments
-    slopes = explanation.best.at.prediction.position_slopes
+    best = explanation.best
+    slopes, first = best.prediction.position_slopes, best.hypothesis.lines.first
     if slopes is None:
-        slopes = np.zeros((2, len(explanation.best.at.prediction.value)))
-    first = moments.lines_first
-    relative = np.abs(slopes[:, first]) ** 2 / np.maximum(
-        np.abs(explanation.best.at.prediction.value[first]) ** 2, 1e-60
-    )
-    placed = position**2 * relative.sum(axis=0) + 0.5 * position**4 * moments.second_order
+        slopes = np.zeros((2, len(best.prediction.value)))
+    relative = np.abs(slopes[:, first]) ** 2 / np.maximum(np.abs(best.prediction.value[first]) ** 2, 1e-60)
+    placed = position**2 * relative.sum(axis=0) + 0.5 * position**4 * problem.curvature.square
     line, weight = line_residuals(problem, explanation)
     return Residuals(along / size - 1, np.sqrt(gain**2 + placed + 1 / size), line, weight)

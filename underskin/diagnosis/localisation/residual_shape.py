@@ -112,7 +112,7 @@ def contradicts(problem: FittingProblem, null: Explanation) -> bool:
     about their neighbours by as much as those do."""
     if problem.lines.smooth is not None:
         return _is_above_noise(*_smooth_part(problem, null))
-    return null.best.at.marginal.levels.level > _STRUCTURED
+    return null.best.levels.level > _STRUCTURED
 
 
 def largest_floor_percent(problem: FittingProblem, null: Explanation, groups: Sequence[HeldOut]) -> float:
@@ -122,7 +122,7 @@ def largest_floor_percent(problem: FittingProblem, null: Explanation, groups: Se
 
 def _smooth_part(problem: FittingProblem, explanation: Explanation) -> tuple[float, float]:
     """Of curves: the size of what is left smoothly, and a sample's noise, both relative to the largest force."""
-    lines, levels = problem.lines, explanation.best.at.marginal.levels
+    lines, levels = problem.lines, explanation.best.levels
     assert lines.smooth is not None
     return levels.smooth, levels.level * float(np.median(lines.deviation / lines.smooth.scale))
 
@@ -147,7 +147,7 @@ def _along_curves(problem: FittingProblem, explanation: Explanation) -> list[Sha
 
 def _over_axes(problem: FittingProblem, explanation: Explanation) -> list[ShapeForm]:
     """The best forms over each of the recordings' axes, and over the lines'."""
-    levels = explanation.best.at.marginal.levels
+    levels = explanation.best.levels
     left = residuals(problem, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
     forms: list[ShapeForm] = []
     for name, column in _axes(problem.lines.campaign).items():
@@ -179,7 +179,7 @@ def _axes(campaign: Campaign) -> dict[str, Floats]:
 def _circling(problem: FittingProblem, explanation: Explanation, left: Residuals) -> list[ShapeForm]:
     """A contact that circles about its place while recordings are made, with the period that fits best."""
     rank = order(problem.lines.campaign)
-    slopes = 1e-3 * relative_place_slopes(explanation.best.at).T  # per mm
+    slopes = 1e-3 * relative_place_slopes(explanation.best).T  # per mm
     if not np.abs(slopes).max() > 0 or len(rank) < _LEAST_IN_ORDER:
         return []
     root = 1 / left.gain_deviation

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.noise.noise_priors import Plateau
-from underskin.units import Array, Floats
+from underskin.units import Floats
 
 USUAL = Plateau.of((1e-3, 1e-2), (1.0, 0.25))
 UNNAMED = Plateau.of((2e-2, 0.5), (0.05, 0.05))
@@ -54,20 +54,19 @@ class Whitening:
             sizes.append(np.maximum(size, 0.0))
         self._size = np.concatenate(sizes)
 
-    def log_determinant(self, ratio: float) -> float:
-        """log|I + (η/κ)² D^(−½) B D^(−½)|."""
-        return float(np.log1p(ratio**2 * self._size).sum())
+    def log_determinant(self, ratio: Floats) -> Floats:
+        """log|I + (η/κ)² D^(−½) B D^(−½)| at ratios η/κ (…, 1)."""
+        return np.asarray(np.log1p(ratio**2 * self._size).sum(axis=-1, keepdims=True))
 
-    def weight(self, ratio: float) -> Floats:
-        """What weighs the turned rows at η/κ (rows,)."""
-        return np.asarray(1 / np.sqrt(1 + ratio**2 * self._size))
+    def weight(self, ratio: Floats) -> Floats:
+        """What products of turned rows weigh at ratios η/κ (…, 1): (…, rows)."""
+        return np.asarray(1 / (1 + ratio**2 * self._size))
 
-    def __call__(self, rows: Array, ratio: float) -> Floats:
-        """The rows (…, rows), forces, such that their covariance is κ² times the unit matrix, at η/κ."""
-        scaled = rows.real / self._deviation
-        turned = [scaled[..., span] @ turn.T for span, turn in zip(self._spans, self._turns, strict=True)]
-        weighed: Floats = np.concatenate(turned, axis=-1) * self.weight(ratio)
-        return weighed
+    def turned(self, rows: Floats) -> Floats:
+        """The rows (…, rows), forces, such that their covariance is κ² diag(1/weight)."""
+        scaled = rows / self._deviation
+        parts = [scaled[..., span] @ turn.T for span, turn in zip(self._spans, self._turns, strict=True)]
+        return np.concatenate(parts, axis=-1)
 
 
 def _likeness(place: Floats) -> Floats:

@@ -19,10 +19,20 @@ class NoiseLevels:
 
 @dataclass(frozen=True)
 class SeveralLevels:
-    """K sets of noise levels; each a column (K, 1), or a number that all share; of pick-up (K, pick-up rows)."""
+    """Sets of noise levels (…, 1); of pick-up (…, pick-up rows)."""
 
     gain: Floats
     level: Floats
-    position: Floats | float
-    spread: Floats | float
+    position: Floats
+    spread: Floats
     pickup: Floats | None
+    smooth: Floats
+
+    @property
+    def first(self) -> NoiseLevels:
+        """The first set, as numbers."""
+        gain, level, position, spread, smooth = (
+            float(values.flat[0]) for values in (self.gain, self.level, self.position, self.spread, self.smooth)
+        )
+        pickup = None if self.pickup is None else self.pickup.reshape(-1, self.pickup.shape[-1])[0]
+        return NoiseLevels(gain, level, position, spread, pickup, smooth)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.recordings.usual_scatter import GAIN_RANGE, POSITION_RANGE
+from underskin.units import Floats
 
 GAIN_FALL = (0.35, 0.12)  # sd of the logarithm below and above
 POSITION_FALL = (0.15, 0.15)  # the same of positions
@@ -35,11 +36,11 @@ class Plateau:
         """The middle of the constant part."""
         return (self.low + self.high) / 2
 
-    def log_density(self, x: float) -> float:
+    def log_density(self, x: Floats | float) -> Floats:
         """The logarithm of the density."""
         area = self.high - self.low + np.sqrt(np.pi / 2) * (self.fall_low + self.fall_high)
-        outside = (self.low - x) / self.fall_low if x < self.low else max(x - self.high, 0.0) / self.fall_high
-        return float(-0.5 * outside**2 - np.log(area))
+        outside = np.maximum((self.low - x) / self.fall_low, 0.0) + np.maximum((x - self.high) / self.fall_high, 0.0)
+        return np.asarray(-0.5 * outside**2 - np.log(area))
 
 
 @dataclass(frozen=True)
@@ -54,9 +55,9 @@ class LogNormal:
         """The mean."""
         return self.mean
 
-    def log_density(self, x: float) -> float:
+    def log_density(self, x: Floats | float) -> Floats:
         """The logarithm of the density."""
-        return float(-0.5 * ((x - self.mean) / self.sd) ** 2 - np.log(self.sd * np.sqrt(2 * np.pi)))
+        return np.asarray(-0.5 * ((x - self.mean) / self.sd) ** 2 - np.log(self.sd * np.sqrt(2 * np.pi)))
 
 
 GAIN_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)

@@ -122,8 +122,8 @@ def _outlook(
     for answer, prediction in zip(rivals, predictions, strict=True):
         explanation = answer.explanation
         assert explanation is not None
-        levels, value = explanation.best.at.marginal.levels, prediction.value[kept]
-        slopes = (prediction.slopes[explanation.best.fitter.places][:, kept] / value).real
+        levels, value = explanation.best.levels, prediction.value[kept]
+        slopes = (prediction.slopes[explanation.best.hypothesis.mean_places][:, kept] / value).real
         responses.append(np.log(np.abs(value)))
         unknown.append(slopes.T @ np.linalg.cholesky(explanation.best.covariance))
         variance = levels.gain**2 + (levels.level * line / np.abs(value)) ** 2

@@ -71,9 +71,9 @@ class Thinned:
 
     def points(self, explanation: Explanation) -> Points:
         """Measured, and predicted by an explanation with the sensors' fitted gains."""
-        lines, best = self.lines, explanation.best.at
-        levels = best.marginal.levels
-        gains = np.exp(best.marginal.sensor_gains)[lines.sensor][lines.recording]
+        lines, best = self.lines, explanation.best
+        levels = best.levels
+        gains = np.exp(best.sensor_gains)[lines.sensor][lines.recording]
         predicted = whole_prediction(self.problem, explanation) * gains
         variance = (levels.level**2 / self._total) + self._mean(self._placed(explanation))
         unit = 1.0 if lines.curves else 1e12
@@ -102,13 +102,13 @@ class Thinned:
 
     def _placed(self, explanation: Explanation) -> Floats:
         """The variance from positioning and mains pick-up, of each row."""
-        prediction, levels = explanation.best.at.prediction, explanation.best.at.marginal.levels
+        prediction, levels = explanation.best.prediction, explanation.best.levels
         variance = np.zeros(len(prediction.value))
         if self.lines.smooth is not None:
             variance += (levels.smooth * self.lines.smooth.scale) ** 2
         if prediction.position_slopes is not None:
             variance += levels.position**2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
-        variance += explanation.best.at.pickup_variance
+        variance += explanation.best.pickup_variance
         return variance if len(variance) == len(self.lines.value) else variance[self.lines.recording]
 
     def _mean(self, column: Floats) -> Floats:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from underskin.diagnosis.data.names import SIMPLEST, in_words
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, at_recording, own_places
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, own_places
 from underskin.diagnosis.localisation.residual_shape import NOISY
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -16,7 +16,7 @@ def fit_warnings(problem: FittingProblem, explanation: Explanation) -> list[Find
 
 def _at_bounds(explanation: Explanation) -> list[Finding]:
     findings = []
-    for name, place in own_places(explanation.names, explanation.best.fitter.hypothesis.lines).items():
+    for name, place in own_places(explanation.names, explanation.best.hypothesis.lines).items():
         for index in range(place.start, place.stop):
             entry = explanation.model.parameters[index]
             if min(abs(explanation.point.fit[index] - bound) for bound in entry.bounds) < 1e-9:
@@ -32,8 +32,8 @@ def _at_bounds(explanation: Explanation) -> list[Finding]:
 
 
 def _beyond_tables(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
-    at = explanation.best.at
-    outside = np.unique(at_recording(problem, at)[~at.prediction.inside])
+    best = explanation.best
+    outside = np.unique(best.hypothesis.lines.recording[~best.prediction.inside])
     answer = in_words(explanation.names) or SIMPLEST[problem.kind]
     entries = problem.lines.campaign.recordings
     return [
@@ -43,7 +43,7 @@ def _beyond_tables(problem: FittingProblem, explanation: Explanation) -> list[Fi
 
 
 def _noisy(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
-    level = explanation.best.at.marginal.levels.level
+    level = explanation.best.levels.level
     if problem.lines.curves or level < NOISY:
         return []
     return [Finding(Reason.LINE_NOISE_LEVEL, "", "frf_re_pc_per_n", {"level": level})]

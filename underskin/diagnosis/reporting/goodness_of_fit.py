@@ -41,9 +41,9 @@ def explains_percent(
 
 def _share_of_variance(explanation: Explanation) -> float:
     """What mains pick-up is of the lines' variance where it acts: Σ q² · q²/(q² + n²) / Σ q², n a line's own noise."""
-    at = explanation.best.at
-    pickup = at.pickup_variance
-    noise = (at.marginal.levels.level * explanation.best.fitter.hypothesis.lines.deviation) ** 2
+    best = explanation.best
+    pickup = best.pickup_variance
+    noise = (best.levels.level * best.hypothesis.lines.deviation) ** 2
     return float((pickup**2 / (pickup + noise)).sum() / pickup.sum())
 
 
@@ -93,7 +93,7 @@ def modulus(problem: FittingProblem, explanation: Explanation) -> dict[str, Any]
 
 
 def _noise(explanation: Explanation) -> dict[str, Any]:
-    levels = explanation.best.at.marginal.levels
+    levels = explanation.best.levels
     return {
         "gain_percent": rounded(100 * levels.gain),
         "position_mm": rounded(1e3 * levels.position),

@@ -28,14 +28,13 @@ def place_of(explanation: Explanation, name: str) -> int:
 
 def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
     """A parameter's most probable value and 95 % interval, within its bounds."""
-    fitter, point = explanation.best.fitter, explanation.point
-    entry = fitter.parameters[place]
+    best, point = explanation.best, explanation.point
+    entry = explanation.model.parameters[place]
     if entry.moves_covariance:
-        names = [parameter.name for parameter in fitter.covariance]
-        own = names.index(entry.name)
-        variance = float(levels_covariance(fitter.covariance_equations(explanation.best.at)[1])[own, own])
+        own = [parameter.name for parameter in best.hypothesis.covariance].index(entry.name)
+        variance = float(levels_covariance(best.fitter.covariance_equations(best.at)[1][0])[own, own])
     else:
-        index = fitter.places.index(place)
+        index = best.hypothesis.mean_places.index(place)
         variance = float(explanation.best.covariance[index, index])
     half_width = _QUANTILE * np.sqrt(max(variance, 0.0))
     low, high = entry.bounds

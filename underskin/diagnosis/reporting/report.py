@@ -148,7 +148,7 @@ def _d33(
 
 
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:
-    places = own_places(explanation.names, explanation.best.fitter.hypothesis.lines)
+    places = own_places(explanation.names, explanation.best.hypothesis.lines)
     whole = cross_validation.in_sample(problem, explanation)
     sets = [answer for answer in search.answers if answer.explanation is not None]
     return [

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from underskin.diagnosis.data.dataset import lines
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign
@@ -24,30 +24,30 @@ _SPEAKS = 10.0  # nats of evidence over the base model from which a law's course
 _CHANGED = 0.03  # change of the noise of some line, relative, below which it stays as it was
 
 
-def frf_problem(campaign: Campaign, uneven: Mapping[str, Floats], table: SigmaTable) -> FittingProblem:
-    """The lines of a campaign's FRFs with their noise, ready to be explained."""
+def frf_problem(
+    campaign: Campaign, uneven: Mapping[str, Floats], table: SigmaTable
+) -> tuple[FittingProblem, list[Explanation]]:
+    """The lines of a campaign's FRFs with their noise, ready to be explained; and the explanations that are known."""
     problem = FittingProblem(lines(campaign, uneven), table)
-    best = _best_along_frequency(problem)
-    if best is None:
-        return problem
-    refined = lines(campaign, uneven, best.best.at.prediction.value)
+    nothing, *singles = known = _along_frequency(problem)
+    fixed = [one for one in singles if not any(entry.acts_on == "line_variance" for entry in one.model.parameters)]
+    best = max(fixed, key=lambda entry: entry.log_evidence, default=nothing)
+    if best.log_evidence <= nothing.log_evidence + _SPEAKS:
+        return problem, known
+    refined = lines(campaign, uneven, best.best.prediction.value)
     change = np.abs(refined.deviation / problem.lines.deviation - 1).max()
-    return FittingProblem(refined, table) if change > _CHANGED else problem
+    return (FittingProblem(refined, table), []) if change > _CHANGED else (problem, known)
 
 
-def _best_along_frequency(problem: FittingProblem) -> Explanation | None:
-    """The single mechanism acting on lines apart that explains them best, where it does so far better than nothing."""
-    nothing = problem.explain(())
-    assert nothing is not None
-    singles = []
+def _along_frequency(problem: FittingProblem) -> list[Explanation]:
+    """Nothing, and the single mechanisms that act on lines apart."""
+    requests = [Request(())]
     for name, mechanism in CATALOGUE.items():
         if "frf" not in mechanism.kinds or not mechanism.needs_lines:
             continue
         try:
-            single = problem.explain((name,))
+            problem.hypothesis((name,), placed=False)
         except Unsupported:
             continue
-        if single is not None and not any(entry.acts_on == "line_variance" for entry in single.model.parameters):
-            singles.append(single)
-    best = max(singles, key=lambda entry: entry.log_evidence, default=nothing)
-    return best if best.log_evidence > nothing.log_evidence + _SPEAKS else None
+        requests.append(Request((name,)))
+    return [entry for entry in problem.explain(requests) if entry is not None]

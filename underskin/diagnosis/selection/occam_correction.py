@@ -24,9 +24,9 @@ _ACCURACY = 0.1  # of Laplace's method, in nats
 
 def fit_and_plausibility(explanation: Explanation) -> float:
     """s: the log posterior density at the best fit, were each own parameter's prior 1 at its peak."""
-    places = own_places(explanation.names, explanation.best.fitter.hypothesis.lines)
+    places = own_places(explanation.names, explanation.best.hypothesis.lines)
     own = [entry for place in places.values() for entry in explanation.model.parameters[place]]
-    return -explanation.best.at.cost - sum(entry.log_prior(entry.start) for entry in own)
+    return -explanation.best.cost - sum(entry.log_prior(entry.start) for entry in own)
 
 
 def without_occam(explanations: Sequence[Explanation], log_weights: Sequence[float]) -> Floats:

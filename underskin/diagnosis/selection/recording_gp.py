@@ -14,8 +14,8 @@ import numpy as np
 from scipy.special import logsumexp
 
 from underskin.diagnosis.data.axes import order, preload_before, recording_axes
+from underskin.diagnosis.inference.evidence import Evidence
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.optimizer import Evaluated
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, normalised
 from underskin.mechanisms.base import Normal, Parameter
@@ -94,19 +94,18 @@ class GainResidual:
     """Each recording's gain residual, linear in the model's parameters, sensors' gains and a process' features."""
 
     def __init__(self, problem: FittingProblem, explanation: Explanation) -> None:
-        at, parameters = explanation.best.at, explanation.best.fitter.parameters
-        self._moments = moments = at.marginal.moments
-        _, uj, _ = moments.slopes
-        size = moments.along * moments.uu
+        self._best, parameters = explanation.best, explanation.model.parameters
+        best = self._best
+        size, _, _ = best.marginal.along(best.levels.position)
         self._least = _FAINT * np.abs(size).max()
-        slopes = uj / self._not_faint(size)[:, None]
-        centre = np.array([entry.start for entry in parameters]) - at.point.fit
+        slopes = best.marginal.slopes_along / self._not_faint(size)[:, None]
+        centre = np.array([entry.start for entry in parameters]) - best.point.fit
         scale = np.array([_prior_sd(entry) for entry in parameters])
         self._known = slopes @ centre
         sensors = np.eye(int(problem.lines.sensor.max()) + 1)[problem.lines.sensor]
         sensors = sensors[:, sensors.any(axis=0)]
-        self.fixed = np.concatenate([slopes * scale, at.marginal.levels.spread * sensors], axis=1)
-        self._moving = relative_place_slopes(at)
+        self.fixed = np.concatenate([slopes * scale, best.levels.spread * sensors], axis=1)
+        self._moving = relative_place_slopes(best)
         self.usual = self._scatters(_USUAL_POSITION)
 
     def _not_faint(self, size: Floats) -> Floats:
@@ -114,14 +113,15 @@ class GainResidual:
 
     def _scatters(self, positions: Floats) -> list[ScatterNode]:
         """No scatter of position and each of these [m], with each of gain; relative to the model's mean under it."""
-        moments, scatters = self._moments, []
+        best, scatters = self._best, []
         for position, share in _shares(positions).items():
-            along, ur, _ = moments.at_position(position, moments.uu, moments.ur, moments.rr)
-            size = self._not_faint(along * moments.uu)
-            placed = position**2 * (self._moving**2).sum(axis=0) + 0.5 * position**4 * moments.second_order
+            size, ur, uu = best.marginal.along(position)
+            size = self._not_faint(size)
+            second_order = best.hypothesis.curvature.square
+            placed = position**2 * (self._moving**2).sum(axis=0) + 0.5 * position**4 * second_order
             for gain in _GAINS:
                 log_weight = GAIN_PRIOR.log_density(float(np.log(gain))) + np.log(share) - np.log(np.abs(size)).sum()
-                variance = gain**2 + placed + moments.uu / size**2
+                variance = gain**2 + placed + uu / size**2
                 scatters.append(ScatterNode(float(log_weight), ur / size - self._known, variance))
         return scatters
 
@@ -169,10 +169,10 @@ def _grams(columns: Floats, count: int) -> Floats:
     return np.asarray(blocks @ blocks.transpose(0, 2, 1))
 
 
-def relative_place_slopes(at: Evaluated) -> Floats:
+def relative_place_slopes(best: Evidence) -> Floats:
     """∇m/m of each recording over its contact's place [1/m] (2, recordings)."""
-    first, slopes = at.moments.lines_first, at.prediction.position_slopes
-    value = at.prediction.value[first]
+    first, slopes = best.hypothesis.lines.first, best.prediction.position_slopes
+    value = best.prediction.value[first]
     if slopes is None:
         return np.zeros((2, len(first)))
     answers = np.abs(value) > _FAINT * np.abs(value).max()

@@ -5,13 +5,15 @@ probable. Singles are all fitted; pairs and triples grow greedily from the best.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from underskin.diagnosis.inference.explanation import integrated as integrate
 from underskin.diagnosis.selection.occam_correction import without_occam
 from underskin.diagnosis.selection.unnamed_rivals import Discrepancy, discrepancy
 from underskin.mechanisms.base import Unsupported
@@ -128,38 +130,51 @@ def log_prior_beneath(size: int, supported: int) -> float:
     return log_prior(size, supported) + math.log(PRIORS[NONE_OF_THESE] * PRIORS["two"] / PRIORS["one"])
 
 
-def search(problem: FittingProblem) -> Search:
-    """Fit nothing, every single, then what grows from the best."""
-    nothing = problem.explain(())
-    assert nothing is not None
-    explanations: Explanations = {frozenset(): nothing}
+def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search:
+    """Fit nothing, every single, then what grows from the best; what is `known` of them is taken over."""
+    explanations: Explanations = {frozenset(entry.names): entry for entry in known}
     unsupported: dict[str, str] = {}
     for name in CATALOGUE:
         try:
-            single = problem.explain((name,))
+            problem.hypothesis((name,), placed=False)
         except Unsupported as refusal:
             unsupported[name] = refusal.reason
-            continue
-        assert single is not None
-        explanations[frozenset((name,))] = single
     names = [name for name in CATALOGUE if name not in unsupported]
+    _explain(problem, explanations, [Request(()), *(Request((name,)) for name in names)])
     integrated: Explanations = {}
     for size in (2, 3):
         integrated |= _integrated(explanations, frozenset(integrated), unsupported, 1)
         explanations |= integrated
-        for parent in _parents(Search(tuple(explanations.values()), (), unsupported), size):
-            for name in names:
-                chosen = frozenset((*parent.names, name))
-                if len(chosen) != size or chosen in explanations:
-                    continue
-                grown = problem.explain(tuple(chosen), parent)
-                if grown is not None:
-                    explanations[chosen] = grown
+        requests = [
+            Request(tuple(entry for entry in CATALOGUE if entry in {*parent.names, name}), parent)
+            for parent in _parents(Search(tuple(explanations.values()), (), unsupported), size)
+            for name in names
+            if name not in parent.names
+        ]
+        _explain(problem, explanations, requests)
     explanations |= _integrated(explanations, frozenset(integrated), unsupported, _BEST)
     result = Search(tuple(explanations.values()), (), unsupported)
     best = sorted((entry for entry in result.explanations if entry.names), key=result.log_weight, reverse=True)[:2]
-    processes = tuple((entry, discrepancy(problem, entry)) for entry in (nothing, *best))
+    processes = tuple((entry, discrepancy(problem, entry)) for entry in (explanations[frozenset()], *best))
     return replace(result, discrepancies=processes)
+
+
+def _explain(problem: FittingProblem, explanations: Explanations, requests: Sequence[Request]) -> None:
+    """Add the explanations of sets that have none yet, from the first parent in whose company the last one shows."""
+    while requests:
+        now, later = {}, []
+        for request in requests:
+            key = frozenset(request.names)
+            if key in explanations:
+                continue
+            if key in now:
+                later.append(request)
+            else:
+                now[key] = request
+        for key, explanation in zip(now, problem.explain(list(now.values())), strict=True):
+            if explanation is not None:
+                explanations[key] = explanation
+        requests = later
 
 
 def _integrated(
@@ -172,11 +187,12 @@ def _integrated(
     weight = Search(tuple(explanations.values()), (), unsupported).log_weight
     ranked = sorted(explanations, key=lambda names: weight(explanations[names]), reverse=True)
     least = weight(explanations[ranked[0]]) - _WITHIN
-    return {
-        names: explanations[names].integrated()
+    chosen = [
+        names
         for place, names in enumerate(ranked)
         if names not in done and (place < best or weight(explanations[names]) > least)
-    }
+    ]
+    return dict(zip(chosen, integrate([explanations[names] for names in chosen]), strict=True))
 
 
 def _parents(result: Search, size: int) -> list[Explanation]:

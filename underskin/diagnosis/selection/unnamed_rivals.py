@@ -54,8 +54,8 @@ def discrepancy(problem: FittingProblem, explanation: Explanation) -> Discrepanc
 
 def _unusual_scatter(explanation: Explanation) -> dict[str, float]:
     """What scatter beyond the usual gains; looked for where the fit went beyond the usual itself."""
-    levels = explanation.best.at.marginal.levels
-    usual = explanation.best.fitter.hypothesis
+    levels = explanation.best.levels
+    usual = explanation.best.hypothesis
     evidence = {}
     if levels.gain > GAIN_RANGE[1]:
         wider = replace(usual, gain=UNUSUAL_GAIN)
@@ -68,10 +68,11 @@ def _unusual_scatter(explanation: Explanation) -> dict[str, float]:
 
 def _refitted(hypothesis: Hypothesis, explanation: Explanation, place: int, least: float) -> float:
     """The evidence of a hypothesis whose `place`-th parameter of the covariance is large, from at least `least`."""
-    fitter = Fitter(hypothesis)
+    fitter = Fitter([hypothesis])
     covariance = explanation.point.covariance.copy()
     covariance[place] = max(covariance[place], least)
-    return laplace(fitter, fitter.improve(replace(explanation.point, covariance=covariance))).log_evidence
+    point = replace(explanation.point, covariance=covariance)
+    return laplace(fitter, fitter.improve(fitter.at(point))).log_evidence
 
 
 def _along_curves(problem: FittingProblem, explanation: Explanation) -> Discrepancy:

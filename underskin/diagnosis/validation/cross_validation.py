@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.selection.search import log_prior
-from underskin.errors import InvalidInput
-from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import Prediction, compose
 from underskin.recordings.conditions import frf_of
 
@@ -120,16 +118,8 @@ def hold_out(
     held_out = []
     for name, rows in groups(problem.lines).items():
         smaller = FittingProblem(problem.lines.part(~rows), problem.table)
-        fits: dict[tuple[str, ...], Explanation] = {}
-        for entry in (nothing, *rivals):
-            if entry.names in fits:
-                continue
-            try:
-                fit = smaller.refit(entry)
-            except (Unsupported, InvalidInput):
-                continue  # what was left out is what the mechanism, or any model of a curve, needs
-            if fit is not None:
-                fits[entry.names] = fit
+        entries = {entry.names: entry for entry in (nothing, *rivals)}
+        fits = {entry.names: entry for entry in smaller.refit(list(entries.values())) if entry is not None}
         if nothing.names not in fits:
             continue
         chosen = max(fits.values(), key=lambda entry: entry.log_evidence + log_prior(len(entry.names), supported))
@@ -144,12 +134,12 @@ def _predict(
     """Some of the rows from a fit to others; sensors that were seen keep the gain that was found for them."""
     left = problem.lines.part(rows)
     model = compose(explanation.names, problem.lines.campaign, problem.table, problem.kind)
-    point, levels = explanation.point, explanation.best.at.marginal.levels
+    point, levels = explanation.point, explanation.best.levels
     whole = model.predict(point.fit)
     prediction, pickup_variance = _some(whole, rows), whole.pickup_variance
     seen = np.isin(left.sensor, smaller.lines.sensor)
     gains = np.zeros(max(int(left.sensor.max()), int(smaller.lines.sensor.max())) + 1)
-    fitted_gains = explanation.best.at.marginal.sensor_gains
+    fitted_gains = explanation.best.sensor_gains
     gains[: len(fitted_gains)] = fitted_gains
     # A contact on an extremum of σ feels positioning scatter in second order, as in the likelihood
     p2, curvature, recording = levels.position**2, problem.curvature, problem.lines.recording[rows]

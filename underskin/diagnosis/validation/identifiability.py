@@ -10,22 +10,23 @@ another, each further parameter at its middle and at either end of its usual ran
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum, auto
 
 import numpy as np
 
+from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.explanation import FittingProblem
-from underskin.diagnosis.inference.likelihood import Marginal, Moments
+from underskin.diagnosis.inference.likelihood import Likelihoods
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.noise.correlated_error import TYPICAL
-from underskin.diagnosis.noise.noise_levels import NoiseLevels
+from underskin.diagnosis.noise.noise_levels import SeveralLevels
 from underskin.diagnosis.selection.search import Answer
 from underskin.mechanisms.base import Normal, Parameter, Unsupported
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.usual_scatter import USUAL_GAIN
-from underskin.units import Floats
+from underskin.units import Array, Floats
 
 _LEAST_CHI2 = 9.0
 _TWINS = 0.98
@@ -54,8 +55,10 @@ class Confounding:
 
 def confounding(problem: FittingProblem) -> list[Confounding]:
     """What cannot be told apart here; mechanisms that the campaign does not support at all are not listed."""
-    fitter = Fitter(problem.hypothesis((), placed=False, whole=True))
-    base = fitter.evaluate(fitter.start(np.zeros(0)))
+    fitter = Fitter([problem.hypothesis((), placed=False)])
+    base = fitter.evaluate(fitter.start(np.zeros((1, 0))))
+    nuisances = fitter.hypotheses[0].model.predict(base.points.fit[0])
+    rows = _Rows(problem, nuisances.value)
     owners, signatures = [], []
     for name, mechanism in CATALOGUE.items():
         if problem.kind not in mechanism.kinds:
@@ -64,21 +67,65 @@ def confounding(problem: FittingProblem) -> list[Confounding]:
         if any(entry.moves_covariance for entry in parameters):
             continue
         try:
-            hypothesis = problem.hypothesis((name,), placed=False, whole=True)
+            hypothesis = problem.hypothesis((name,), placed=False)
         except Unsupported:
             continue
         for own in _shapes(parameters):
             owners.append(name)
-            signatures.append(hypothesis.model.predict(np.concatenate([own, base.point.fit])).value)
+            value = hypothesis.model.predict(np.concatenate([own, base.points.fit[0]])).value
+            along, rest = rows.split(value, hypothesis.lines)
+            signatures.append((along - rows.base, rest))
     if not owners:
         return []
-    slopes = np.concatenate([base.prediction.slopes, np.array(signatures) - base.prediction.value])
-    prediction = replace(base.prediction, slopes=slopes)
-    lines = problem.lines
-    ratio = TYPICAL if lines.curves else 0.0
-    moments = Moments(lines, prediction, np.zeros(lines.recordings), problem.curvature, 0.0, ratio)
-    information, _ = Marginal(lines, moments, NoiseLevels(USUAL_GAIN, 1.0, 0.0, SENSOR_SPREAD)).normal_equations()
-    return _confounding(owners, information, fitter.parameters)
+    each = [*(rows.split(slope, fitter.lines) for slope in nuisances.slopes), *signatures]
+    gain, level, position, spread, smooth = (
+        np.full((1, 1, 1), value) for value in (USUAL_GAIN, 1.0, 0.0, SENSOR_SPREAD, rows.smooth)
+    )
+    levels = SeveralLevels(gain, level, position, spread, None, smooth)
+    likelihood = Likelihoods(fitter.lines, problem.curvature, base.products, levels, base.points.bend)
+    information = likelihood.information(*rows.products(each))[0]
+    return _confounding(owners, information, fitter.hypotheses[0].model.parameters)
+
+
+class _Rows:
+    """Rows as what they are along the base model's own direction in each recording, and the rest across it."""
+
+    def __init__(self, problem: FittingProblem, base: Array) -> None:
+        """From the base model's prediction of the collapsed lines, or of curves."""
+        self.smooth = TYPICAL if problem.lines.curves else 0.0
+        self._lines = problem.lines
+        whitening = problem.lines.whitening
+        self._root = 1.0 if whitening is None else np.sqrt(whitening.weight(np.array([self.smooth])))
+        self._direction = self._whitened(base.real if problem.lines.curves else np.ones(len(problem.lines.value)))
+        self._size = np.sqrt(self._sums(self._direction**2))
+        self.base, _ = self.split(base, problem.collapsed)
+
+    def split(self, value: Array, lines: Lines) -> tuple[Floats, Floats | None]:
+        """Along it (recordings,), and across it (numbers,), None where that is 0, of a prediction of these lines."""
+        if lines is not self._lines:
+            return value.real * self._size, None
+        whitened = self._whitened(value.real)
+        along = self._sums(self._direction * whitened) / self._size
+        across = whitened - self._direction * (along / self._size)[lines.recording]
+        return along, across if lines.curves else np.concatenate([across, self._whitened(value.imag)])
+
+    def products(self, parts: Sequence[tuple[Floats, Floats | None]]) -> tuple[Floats, Floats]:
+        """Re u*J (1, recordings, P) and Re JᵀJ (1, P, P) of columns J split like that."""
+        along = np.array([own for own, _ in parts])
+        square = along @ along.T
+        beside = [number for number, (_, rest) in enumerate(parts) if rest is not None]
+        if beside:
+            across = np.array([rest for _, rest in parts if rest is not None])
+            square[np.ix_(beside, beside)] += across @ across.T
+        return (along * self._size).T[None], square[None]
+
+    def _whitened(self, rows: Floats) -> Floats:
+        """Real rows such that their errors are independent and of variance 1."""
+        whitening = self._lines.whitening
+        return rows / self._lines.deviation if whitening is None else whitening.turned(rows) * self._root
+
+    def _sums(self, rows: Floats) -> Floats:
+        return np.add.reduceat(rows, self._lines.first)
 
 
 def _shapes(parameters: Sequence[Parameter]) -> list[Floats]:

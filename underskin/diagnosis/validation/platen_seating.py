@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.inference.explanation import FittingProblem
+from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.diagnosis.selection.search import SHOWS
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -38,8 +38,9 @@ def without_seating(
     if rows.recordings < len(campaign.recordings):
         return None
     problem = FittingProblem(rows, table)
-    stiffer = problem.explain(tuple(names))
-    plain = problem.explain(tuple(name for name in names if name not in imitated))
+    stiffer, plain = problem.explain(
+        [Request(tuple(names)), Request(tuple(name for name in names if name not in imitated))]
+    )
     assert stiffer is not None
     assert plain is not None
     if stiffer.log_evidence - plain.log_evidence > SHOWS:

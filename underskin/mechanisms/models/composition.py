@@ -58,23 +58,30 @@ class Composition:
         self._gain_spreads = {entry.name for entry in self.parameters if entry.acts_on == "gain_spread"}
         self._log = np.array([parameter.scale == "log" for parameter in self.parameters])
 
-    def values(self, fit: Floats, further: int = 0) -> tuple[dict[str, Values], Values, list[Differentiated]]:
+    def values(
+        self, fit: Floats, further: int = 0, *, slopes: bool = True
+    ) -> tuple[dict[str, Values], Values, list[Differentiated]]:
         """Each mechanism's parameters by name, and the nuisances, as values in their units with derivatives.
 
-        `further` variables of value 0 follow, with respect to which the model is differentiated as well.
+        `fit` is (…, parameters), one or several points. `further` variables of value 0 follow, with respect to which
+        the model is differentiated as well; without `slopes` it is by these alone.
 
         Raises InvalidInput where `fit` has another length than the parameters.
         """
-        if np.shape(fit) != (len(self.parameters),):
-            allowed = f"must hold {len(self.parameters)} coordinates"
+        count = len(self.parameters)
+        if np.shape(fit)[-1:] != (count,):
+            allowed = f"must hold {count} coordinates"
             raise InvalidInput("fit", np.shape(fit), allowed, code=ErrorCode.UNEQUAL_LENGTHS)
-        value = np.where(self._log, np.exp(np.where(self._log, fit, 0.0)), fit)
-        slope = np.where(self._log, value, 1.0)
-        seeds = variables([*value, *np.zeros(further)], [*slope, *np.ones(further)])
+        points = np.shape(fit)[:-1]
+        value = np.concatenate([np.where(self._log, np.exp(np.where(self._log, fit, 0.0)), fit), np.zeros((*points, further))], axis=-1)
+        by_own = np.zeros((count + further, *points, count + further))
+        own = np.arange(count + further)
+        by_own[own, ..., own] = np.moveaxis(np.concatenate([np.where(self._log, value[..., :count], 1.0), np.ones((*points, further))], axis=-1), -1, 0)
+        seeds = variables(value, by_own if slopes else by_own[count:])
         return (
             {name: {key: seeds[place] for key, place in places.items()} for name, places in self._places.items()},
             {name: seeds[place] for name, place in self._nuisances.items()},
-            seeds[len(self.parameters) :],
+            seeds[count:],
         )
 
     def sensor_spread(self, fit: Floats) -> tuple[float, Floats]:

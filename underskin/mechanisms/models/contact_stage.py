@@ -51,17 +51,20 @@ def _on_layer(contacts: Contacts, curves: ContactCurves) -> PressedContacts:
     load = contacts.force * contacts.indenter_radius / scale
     adhesion = contacts.work_of_adhesion
     root = None if adhesion is None else contacts.indenter_radius * (adhesion / scale) ** 0.5
-    solved = curves.at_load(load.value, np.zeros_like(load.value) if root is None else root.value)
+    shape = load.value.shape
+    solved = curves.at_load(load.value.ravel(), np.zeros(load.value.size) if root is None else root.value.ravel())
     slip = contacts.slip
 
     beyond = np.isnan(solved.alpha.value)  # of the curves' reach, which is beyond the table's
 
     def by_parameters(quantity: Differentiated, otherwise: Floats | float) -> Differentiated:
-        by_load, by_root, by_poisson_ratio, by_slip = np.where(beyond, 0.0, quantity.slopes)
+        slopes = np.where(beyond, 0.0, quantity.slopes).reshape(-1, *shape)
+        by_load, by_root, by_poisson_ratio, by_slip = slopes
         terms = [(by_load, load), (by_poisson_ratio, contacts.poisson_ratio)]
         terms += [] if root is None else [(by_root, root)]
         terms += [] if slip is None else [(by_slip, slip)]
-        return chain(np.where(beyond, otherwise, quantity.value), *terms)
+        value = np.where(beyond.reshape(shape), otherwise, quantity.value.reshape(shape))
+        return chain(value, *terms)
 
     share = None if root is None else by_parameters(solved.sphere_load, load.value) / load
     return PressedContacts(by_parameters(solved.alpha, LARGEST_A_OVER_H), contacts.cbrt_load, share)
@@ -70,9 +73,11 @@ def _on_layer(contacts: Contacts, curves: ContactCurves) -> PressedContacts:
 def stiffness(contacts: Contacts, pressed: PressedContacts, curves: ContactCurves) -> Differentiated:
     """dF/dδ = 2 E' a S(a/h) [N/m] of the layer at the contact radius in force, the edge held, E' unrelaxed."""
     alpha = pressed.a_over_h
-    at_radius = curves.stiffness_at(np.minimum(alpha.value, LARGEST_A_OVER_H))
-    by_alpha, by_poisson_ratio, by_slip = at_radius.slopes
+    shape = alpha.value.shape
+    at_radius = curves.stiffness_at(np.minimum(alpha.value, LARGEST_A_OVER_H).ravel())
+    by_alpha, by_poisson_ratio, by_slip = at_radius.slopes.reshape(-1, *shape)
     terms = [(by_alpha, alpha), (by_poisson_ratio, contacts.poisson_ratio)]
     terms += [] if contacts.slip is None else [(by_slip, contacts.slip)]
-    held = 2.0 * contacts.reduced_modulus * alpha * contacts.thickness * chain(at_radius.value, *terms)
+    held = chain(at_radius.value.reshape(shape), *terms) * alpha * contacts.thickness
+    held = 2.0 * contacts.reduced_modulus * held
     return held if contacts.relaxed is None else held / contacts.relaxed

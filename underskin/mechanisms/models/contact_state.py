@@ -8,7 +8,7 @@ from underskin.units import Floats
 
 @dataclass
 class Contacts:
-    """One row a contact; a Differentiated of a single row stands for all of them."""
+    """One row a contact, (…, contacts); a Differentiated of a single row stands for all of them."""
 
     force: Floats  # F [N]
     indenter_radius: Floats  # R [m]

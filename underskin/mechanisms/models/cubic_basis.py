@@ -31,13 +31,13 @@ class CubicBasis:
         return np.moveaxis(np.asarray(make_interp_spline(self.nodes, values, k=_DEGREE, axis=axis).c), 0, axis)
 
     def weights(self, at: Floats) -> tuple[NDArray[np.intp], Floats, Floats]:
-        """For each point: the first of its four functions, their values (points, 4) and their slopes (points, 4).
+        """For each point (…): the first of its four functions, their values (…, 4) and their slopes (…, 4).
 
         Beyond the nodes every function is continued along its tangent.
         """
         inside = np.clip(at, self.nodes[0], self.nodes[-1])
         cell = np.searchsorted(self._knots[1:-1], inside, side="right")
-        u = (inside - self._knots[cell])[:, None]
+        u = (inside - self._knots[cell])[..., None]
         c0, c1, c2, c3 = self._cubics[:, cell]
         slope = (3 * c3 * u + 2 * c2) * u + c1
-        return cell, ((c3 * u + c2) * u + c1) * u + c0 + slope * (at - inside)[:, None], slope
+        return cell, ((c3 * u + c2) * u + c1) * u + c0 + slope * (at - inside)[..., None], slope

@@ -9,12 +9,13 @@ Pick-up stands beside, as a covariance.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from underskin.autodiff import Differentiated, chain, constant, sum_rows
-from underskin.errors import required
+from underskin.errors import ErrorCode, InvalidInput, required
 from underskin.mechanisms.base import Mechanism, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
 from underskin.mechanisms.models.contact_stage import layer_curves, press, stiffness
@@ -23,13 +24,53 @@ from underskin.mechanisms.models.frf_design import FrfDesign, Indices, largest_o
 from underskin.mechanisms.models.nuisances import FRF_NUISANCES
 from underskin.mechanisms.models.off_centre_response import PROFILE_END, offset_sigma
 from underskin.mechanisms.models.pickup import Pickup, together
-from underskin.mechanisms.models.sigma_curves import layer_of, sigma_curves
+from underskin.mechanisms.models.sigma_curves import SigmaOfContacts, layer_of
 from underskin.recordings.conditions import Conditions
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats, to_si
 
 _NUISANCE_STRETCH = 1.06  # the thickness' bounds
 _POSITION = 2  # two more variables: the contact's x and y
+
+
+@dataclass(frozen=True)
+class Response:
+    """FRFs at one or several points of the fit coordinates, in two factors: leading axes are those of the points.
+
+    `place_slopes` are by the contact's x and y, None where they were not asked for.
+    """
+
+    level: Differentiated  # (…, recordings) [C/N], real: before the dynamics
+    place_slopes: Floats | None  # (2, …, recordings) [C/N/m]
+    lines: Differentiated | None  # (…, distinct lines) complex: the dynamics' factor; None where there are none
+    inside: NDArray[np.bool_]  # (…, recordings)
+
+    def part(self, index: int | slice) -> "Response":
+        """At some of several points."""
+
+        def of(x: Differentiated) -> Differentiated:
+            return Differentiated(x.value[index], x.slopes[:, index])
+
+        place = None if self.place_slopes is None else self.place_slopes[:, index]
+        return Response(of(self.level), place, None if self.lines is None else of(self.lines), self.inside[index])
+
+
+def joined(responses: Sequence[Response]) -> Response:
+    """Responses of one model at several sets of points, as one."""
+
+    def of(parts: Sequence[Differentiated]) -> Differentiated:
+        return Differentiated(
+            np.concatenate([part.value for part in parts]), np.concatenate([part.slopes for part in parts], axis=1)
+        )
+
+    place = [entry.place_slopes for entry in responses if entry.place_slopes is not None]
+    lines = [entry.lines for entry in responses if entry.lines is not None]
+    return Response(
+        of([entry.level for entry in responses]),
+        np.concatenate(place, axis=1) if place else None,
+        of(lines) if lines else None,
+        np.concatenate([entry.inside for entry in responses]),
+    )
 
 
 class FrfModel:
@@ -82,41 +123,64 @@ class FrfModel:
         InvalidInput
             Where `fit` has another length.
         """
-        own, nuisances, position = self._composition.values(np.asarray(fit, dtype=float), _POSITION)
-        contacts = self._contacts(own, nuisances)
-        sigma, inside = self._sigma_at_points(contacts, own, position)
-        level = self._level(contacts, sigma, own, nuisances)
-        lines = self._line_factor(contacts, own)
-        value, slopes = _on_rows(
-            level.spread(len(self.design.point)),
-            None if lines is None else lines.spread(len(self.design.line_frequency)),
-            self.design,
-        )
+        fit = np.asarray(fit, dtype=float)
+        if fit.ndim != 1:
+            raise InvalidInput("fit", fit.shape, "must be one point: (parameters,)", code=ErrorCode.UNEQUAL_LENGTHS)
+        response = self.respond(fit, place=True)
+        assert response.place_slopes is not None
+        level = response.level
+        whole = Differentiated(level.value, np.concatenate([level.slopes, response.place_slopes]))
+        value, slopes = _on_rows(whole, response.lines, self.design)
         count = len(self.parameters)
+        own, _, _ = self._composition.values(fit)
         return Prediction(
             value=value,
             slopes=slopes[:count],
             position_slopes=slopes[count:],
             pickup=None if self.pickup is None else self.pickup.deviation(_by_name(own)),
             pickup_rows=None if self.pickup is None else self.pickup.rows,
-            inside=inside[self.design.point][self.recording],
+            inside=response.inside[self.recording],
+        )
+
+    def respond(self, fit: Floats, *, slopes: bool = True, place: bool = False) -> Response:
+        """The response at points (…, parameters); its derivatives by the parameters and by the contact's place on
+        request."""
+        further = _POSITION if place else 0
+        own, nuisances, position = self._composition.values(fit, further, slopes=slopes)
+        contacts = self._contacts(own, nuisances, fit.shape[:-1], (len(self.parameters) if slopes else 0) + further)
+        if fit.ndim > 1 and not _on_one_layer(contacts):
+            return joined([self.respond(one, slopes=slopes, place=place) for one in fit[:, None]])
+        sigma, inside = self._sigma_at_points(contacts, own, position)
+        level = self._level(contacts, sigma, own, nuisances)
+        level = level.spread(len(self.design.point))
+        lines = self._line_factor(contacts, own)
+        count = len(level.slopes) - further
+        if lines is not None:
+            lines = lines.spread(len(self.design.line_frequency))
+            lines = Differentiated(lines.value, lines.slopes[:count])
+        return Response(
+            Differentiated(level.value, level.slopes[:count]),
+            level.slopes[count:] if place else None,
+            lines,
+            inside[..., self.design.point],
         )
 
     def sensor_spread_of(self, fit: Floats) -> tuple[float, Floats]:
         """The sd of the sensors' log gains, and its derivative (parameters,)."""
         return self._composition.sensor_spread(np.asarray(fit, dtype=float))
 
-    def _contacts(self, own: dict[str, Values], nuisances: Values) -> Contacts:
+    def _contacts(
+        self, own: dict[str, Values], nuisances: Values, points: tuple[int, ...], variables: int
+    ) -> Contacts:
         """The contacts at all force nodes, one node after another, as declared and as the mechanisms change them."""
         nodes = len(self._force)
-        count = len(self.parameters) + _POSITION
         contacts = Contacts(
             force=self._force.ravel(),
             indenter_radius=np.tile(self.design.indenter_radius, nodes),
             dwell=np.tile(self.design.dwell, nodes),
             modulus=self._modulus * nuisances["youngs_modulus"],
             thickness=self._thickness * nuisances["thickness"],
-            poisson_ratio=constant(self._poisson_ratio, count),
+            poisson_ratio=constant(self._poisson_ratio, variables, points),
         )
         for mechanism in self._mechanisms:
             mechanism.on_declared(contacts, own[mechanism.name])
@@ -139,21 +203,19 @@ class FrfModel:
         pressed = press(contacts, layer if contacts.layered else None)
         if layer is not None and self._needs_stiffness:
             contacts.stiffness = stiffness(contacts, pressed, layer)
-        curves = sigma_curves(self._sigma, contacts, pressed, rho, layer if contacts.layered else None)
-        offset = self._offset(own, position) / contacts.thickness
+        of_contacts = SigmaOfContacts(self._sigma, contacts, pressed, rho, layer if contacts.layered else None)
+        offset = self._offset(own, position or 2 * [0.0 * contacts.thickness]) / contacts.thickness
         place = self._sigma.place(offset.value)
         sigma = []
         inside = place.inside & (offset.value + rho.value <= PROFILE_END)
         for node in range(len(self._force)):
             contact = design.point_contact + node * len(design.force)
-            (value, *partial), by_offset = self._sigma.at(curves.coefficients, contact, place)
-            at_points = (variable[contact] for variable in curves.variables)
-            sigma.append(chain(value, (by_offset, offset), *zip(partial, at_points, strict=True)))
-            inside &= curves.inside[contact]
+            sigma.append(of_contacts.at(contact, place, offset))
+            inside = inside & of_contacts.inside[..., contact]
         return sigma, inside
 
     def _offset(self, own: dict[str, Values], position: Sequence[Differentiated]) -> Differentiated:
-        """The distance of each point's contact from its sensor's centre [m]."""
+        """The distance of each point's contact from its sensor's centre [m], `position` added to its place."""
         x, y = (
             place + shift for place, shift in zip((self.design.point_x, self.design.point_y), position, strict=True)
         )
@@ -231,16 +293,22 @@ def _force_nodes(
     return np.stack(forces), increments
 
 
+def _on_one_layer(contacts: Contacts) -> bool:
+    """Whether the contacts at several points of the fit coordinates all are on the same linear layer."""
+    layers = [x.value for x in (contacts.poisson_ratio, contacts.slip) if x is not None]
+    return all(bool((value == value.flat[0]).all()) for value in layers)
+
+
 def _on_rows(level: Differentiated, lines: Differentiated | None, design: FrfDesign) -> tuple[Array, Array]:
-    """Level times line factor on every row, and the slopes (variables, rows)."""
+    """Level times line factor on every row, and the slopes (variables, rows); the factor has those of the parameters,
+    which come first."""
     recording: Indices = design.recording
     if lines is None:
         return level.value[recording].astype(complex), level.slopes[:, recording].astype(complex)
     factor = lines.value[design.line]
     on_rows = level.value[recording]
-    slopes = np.empty((len(level.slopes), len(recording)), dtype=complex)
-    for row, of_level, of_lines in zip(slopes, level.slopes, lines.slopes, strict=True):
-        np.multiply(of_level[recording], factor, out=row)
+    slopes = level.slopes[:, recording] * factor
+    for row, of_lines in zip(slopes, lines.slopes, strict=False):
         if of_lines.any():
             row += on_rows * of_lines[design.line]
     return on_rows * factor, slopes

@@ -6,6 +6,7 @@ are points, and a contact at one frequency is a line. Only these distinct ones a
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ Indices = NDArray[np.intp]
 NEIGHBOUR_PITCHES = 1.2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FrfDesign:
     """Arrays over recordings, contacts, points, neighbours, lines and rows; SI."""
 
@@ -47,6 +48,12 @@ class FrfDesign:
     @classmethod
     def of(cls, conditions: Conditions, fields: Collection[str], *, neighbours: bool) -> "FrfDesign":
         """The design; `fields` may name what else tells contacts apart: "dwell_s", "dynamic_force_n"."""
+        apart = frozenset(fields) & {"dwell_s", "dynamic_force_n"}
+        return _design(conditions, apart, neighbours)
+
+    @classmethod
+    def worked_out(cls, conditions: Conditions, fields: Collection[str], *, neighbours: bool) -> "FrfDesign":
+        """The same, anew."""
         recordings = frf_of(conditions)
         sensor_ids = tuple(sensor.id for sensor in conditions.skin.sensors)
         number = {name: index for index, name in enumerate(sensor_ids)}
@@ -95,6 +102,11 @@ class FrfDesign:
             row_dynamic_force=np.array([entry.dynamic_force_n for entry in recordings])[recording],
             row_frequency=row_frequency,
         )
+
+
+@lru_cache(maxsize=8)  # by the conditions' identity: a diagnosis composes dozens of models of one campaign
+def _design(conditions: Conditions, fields: frozenset[str], neighbours: bool) -> FrfDesign:
+    return FrfDesign.worked_out(conditions, fields, neighbours=neighbours)
 
 
 def frequencies(entry: FrfConditions) -> Floats:

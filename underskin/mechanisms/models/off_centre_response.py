@@ -1,8 +1,7 @@
 """σ of many contacts on one skin at any offset, with derivatives, fast enough for a fit.
 
 The table's bottom profile, averaged over the sensor's disc at its offset, is tabulated once as a
-cubic spline in a/h, L^(1/3), log(rT/h) and e/h; a contact then is a curve over e/h. To it may be added what a linear
-layer of another transmission or a pressure of another shape puts there, by its Hankel integral
+cubic spline in a/h, L^(1/3), log(rT/h) and e/h. To it may be added what a linear layer of another transmission or a pressure of another shape puts there, by its Hankel integral
 (underskin/physics/hankel_transform.py):
 
     σ = linear(p̂, M; a, e) + [table(a, L, e) − table(a, 0, e)].
@@ -33,24 +32,13 @@ _WAVENUMBER_END, _NODES_PER_TURN = 24.0, 4  # M decays as e^(−k)
 
 
 @dataclass(frozen=True)
-class Curves:
-    """σ over the offset: spline coefficients (quantities, contacts, offsets), and which contacts are in the table.
-
-    The first quantity is σ, the others its partial derivatives; which, the maker says.
-    """
-
-    coefficients: Floats
-    inside: NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
 class Place:
-    """The four functions of each offset that differ from 0, their values and their slopes (points, 4)."""
+    """The four functions of each offset that differ from 0, their values and their slopes (…, points, 4)."""
 
     functions: NDArray[np.intp]
     values: Floats
     slopes: Floats
-    inside: NDArray[np.bool_]  # (points,) False beyond the profile's end, where all four are 0
+    inside: NDArray[np.bool_]  # (…, points) False beyond the profile's end, where all four are 0
 
 
 class OffsetSigma:
@@ -73,10 +61,10 @@ class OffsetSigma:
         self.bases = [CubicBasis(np.asarray(nodes)) for nodes in (a, x, np.log(rho), offsets)]
         for axis, basis in enumerate(self.bases):
             values = basis.coefficients(values, axis)
-        self._count = values.shape
-        self._table = np.ascontiguousarray(values).reshape(-1, values.shape[-1])
+        self._strides = [int(np.prod(values.shape[axis + 1 :])) for axis in range(4)]
+        self._table = np.ascontiguousarray(values).ravel()
         # The first coefficient over L^(1/3) is the value at L = 0, and splines sum to 1.
-        self._strained = (values - values[:, :1]).reshape(-1, values.shape[-1])
+        self._strained = (values - values[:, :1]).ravel()
         self.wavenumber, self._weight = _wavenumbers(float(offsets[-1] + rho[-1] + a[-1]))
         bessel = j0(np.multiply.outer(self.wavenumber, offsets)) * (self._weight * self.wavenumber / 3)[:, None]
         self._bessel = self.bases[3].coefficients(bessel, 1)
@@ -86,52 +74,65 @@ class OffsetSigma:
         """The grid of contacts with a layer whose pressures' transforms are at this object's wavenumbers."""
         return CurveGrid(self.wavenumber)
 
-    def table_curves(self, a_over_h: Floats, cbrt_load: Floats, rt_over_h: float) -> Curves:
-        """σ and ∂/∂(a/h), ∂/∂L^(1/3), ∂/∂(rT/h) of the table, one row a contact."""
-        return self._curves(self._table, a_over_h, cbrt_load, rt_over_h)
-
-    def finite_strain_curves(self, a_over_h: Floats, cbrt_load: Floats, rt_over_h: float) -> Curves:
-        """What finite strain adds to the linear layer: the table less its own value at L = 0, same quantities."""
-        return self._curves(self._strained, a_over_h, cbrt_load, rt_over_h)
-
-    def linear_curves(self, transforms: Floats) -> Floats:
-        """The Hankel integral of the transforms p̂ · M · 2 J1(kρ)/(kρ): (quantities, contacts, k) to (…, offsets)."""
-        return np.asarray(transforms @ self._bessel)
-
-    def _curves(self, table: Floats, a: Floats, x: Floats, rt_over_h: float) -> Curves:
-        rows = len(a)
-        first_a, value_a, slope_a = self.bases[0].weights(a)
-        first_x, value_x, slope_x = self.bases[1].weights(x)
-        first_r, value_r, slope_r = self.bases[2].weights(np.array([np.log(rt_over_h)]))
-        four = np.arange(4)
-        row_a = (first_a[:, None] + four) * self._count[1]
-        row_x = (row_a[:, :, None] + (first_x[:, None] + four)[:, None, :]) * self._count[2]
-        index = (row_x[..., None] + first_r[0] + four).reshape(rows, 64)
-        weights = np.empty((rows, 4, 4, 4, 4))
-        for number, (of_a, of_x, of_r) in enumerate(
-            (
-                (value_a, value_x, value_r),
-                (slope_a, value_x, value_r),
-                (value_a, slope_x, value_r),
-                (value_a, value_x, slope_r / rt_over_h),
-            )
-        ):
-            weights[:, number] = of_a[:, :, None, None] * of_x[:, None, :, None] * of_r[0]
-        contracted = np.matmul(weights.reshape(rows, 4, 64), table[index])
-        inside = (a <= self.bases[0].nodes[-1]) & (x <= self.bases[1].nodes[-1])
-        return Curves(np.ascontiguousarray(contracted.transpose(1, 0, 2)), inside)
+    def contains(self, a_over_h: Floats, cbrt_load: Floats) -> NDArray[np.bool_]:
+        """Which contacts the table holds; the others are continued."""
+        return np.asarray((a_over_h <= self.bases[0].nodes[-1]) & (cbrt_load <= self.bases[1].nodes[-1]))
 
     def place(self, offset: Floats) -> Place:
-        """Where offsets e/h (points,) lie among the curves' coefficients."""
+        """Where offsets e/h (…, points) lie among the functions of the offset."""
         end = min(float(self.bases[3].nodes[-1]), PROFILE_END)
         inside = offset <= end
         first, value, slope = self.bases[3].weights(np.minimum(offset, end))
-        return Place(first[:, None] + np.arange(4), value * inside[:, None], slope * inside[:, None], inside)
+        within = inside[..., None]
+        return Place(first[..., None] + np.arange(4), value * within, slope * within, inside)
 
-    def at(self, coefficients: Floats, contact: NDArray[np.intp], place: Place) -> tuple[Floats, Floats]:
-        """The quantities (quantities, points) of each point's contact at its place, and ∂σ/∂(e/h) (points,)."""
-        near = coefficients[:, contact[:, None], place.functions]
-        return np.einsum("qpf,pf->qp", near, place.values), np.einsum("pf,pf->p", near[0], place.slopes)
+    def at(
+        self, a_over_h: Floats, cbrt_load: Floats, rt_over_h: Floats, place: Place, *, strained: bool, slopes: bool
+    ) -> list[Floats]:
+        """σ of the table at contacts and places (…, points), and its derivative by e/h; with `slopes` also those by
+        a/h, L^(1/3) and rT/h. `strained`: less its own value at L = 0, which is what finite strain adds."""
+        shape = np.broadcast_shapes(a_over_h.shape, place.inside.shape)
+        first_a, value_a, slope_a = self.bases[0].weights(a_over_h)
+        first_x, value_x, slope_x = self.bases[1].weights(cbrt_load)
+        first_r, value_r, slope_r = self.bases[2].weights(np.log(rt_over_h))
+        four, (of_a, of_x, of_r, _) = np.arange(4), self._strides
+        cell = (first_a * of_a + first_x * of_x + first_r * of_r)[..., None, None, None]
+        cell = cell + (four[:, None, None] * of_a + four[:, None] * of_x + four * of_r)
+        index = cell.reshape(*cell.shape[:-3], 64, 1) + place.functions[..., None, :]
+        near = (self._strained if strained else self._table)[index].reshape(-1, 64, 4)
+        of_place = np.stack([place.values, place.slopes], axis=-1)
+        near, by_place = np.moveaxis(near @ np.broadcast_to(of_place, (*shape, 4, 2)).reshape(-1, 4, 2), -1, 0)
+
+        def weights(of_a: Floats, of_x: Floats, of_r: Floats) -> Floats:
+            product = of_a[..., :, None, None] * of_x[..., None, :, None] * of_r[..., None, None, :]
+            return np.broadcast_to(product, (*shape, 4, 4, 4)).reshape(-1, 64)
+
+        def total(weight: Floats, values: Floats) -> Floats:
+            return np.einsum("nw,nw->n", weight, values).reshape(shape)
+
+        here = weights(value_a, value_x, value_r)
+        answers = [total(here, near), total(here, by_place)]
+        if slopes:
+            answers += [
+                total(weights(slope_a, value_x, value_r), near),
+                total(weights(value_a, slope_x, value_r), near),
+                total(weights(value_a, value_x, slope_r / rt_over_h[..., None]), near),
+            ]
+        return answers
+
+    def linear_curves(self, transforms: Floats) -> Floats:
+        """The Hankel integral of the transforms p̂ · M · 2 J1(kρ)/(kρ): (…, k) to functions of the offset."""
+        return np.asarray(transforms @ self._bessel)
+
+    def linear_at(
+        self, curves: Floats, contact: NDArray[np.intp], place: Place, *, slopes: bool
+    ) -> tuple[Floats, Floats]:
+        """Such curves (quantities, …, contacts, functions) of these contacts at their places (quantities, …, points),
+        the first alone without `slopes`, and the derivative of the first by e/h."""
+        near = np.take_along_axis(
+            (curves if slopes else curves[:1])[..., contact, :], np.broadcast_to(place.functions, (*curves.shape[1:-2], len(contact), 4))[None], axis=-1
+        )
+        return (near * place.values).sum(axis=-1), (near[0] * place.slopes).sum(axis=-1)
 
 
 @lru_cache(maxsize=8)
