@@ -59,9 +59,9 @@ class Layer:
 
     Parameters
     ----------
-    poisson_ratio : float
-        0 to 0.5, 0.5 included.
-    slip : float
+    poisson_ratio : float, or ndarray (…, 1)
+        0 to 0.5, 0.5 included. Arrays are several layers; functions then answer (…, k).
+    slip : float, or ndarray (…, 1)
         0 (bonded) to 1 (frictionless).
 
     Raises
@@ -70,13 +70,13 @@ class Layer:
         Outside these ranges.
     """
 
-    poisson_ratio: float = 0.5
-    slip: float = 0.0
+    poisson_ratio: float | Floats = 0.5
+    slip: float | Floats = 0.0
 
     def __post_init__(self) -> None:
-        if not 0 <= self.poisson_ratio <= 0.5:
+        if not np.all((self.poisson_ratio >= 0) & (self.poisson_ratio <= 0.5)):
             raise out_of_range("poisson_ratio", self.poisson_ratio, "must be 0 to 0.5")
-        if not 0 <= self.slip <= 1:
+        if not np.all((self.slip >= 0) & (self.slip <= 1)):
             raise out_of_range("slip", self.slip, "must be 0 (bonded) to 1 (frictionless)")
 
     def transmission(self, k: Floats) -> Differentiated:
@@ -119,7 +119,7 @@ class Layer:
         constant, linear, quadratic = bonded
         held, yielding = constant + p * (linear + p * quadratic), 2 * k * (1 - p) * glue
         by_p = (1 - s) * (linear + 2 * p * quadratic) - 2 * k * s * glue
-        return Differentiated((1 - s) * held + s * yielding, np.stack([by_p, yielding - held]))
+        return Differentiated((1 - s) * held + s * yielding, np.stack(np.broadcast_arrays(by_p, yielding - held)))
 
 
 def gamma_n(layer: Layer, offset: ArrayLike, rho: ArrayLike) -> Floats:

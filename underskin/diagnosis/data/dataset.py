@@ -69,6 +69,16 @@ class Lines:
         return np.searchsorted(self.recording, np.arange(self.recordings))
 
     @cached_property
+    def about_means(self) -> tuple[float, int]:
+        """Σ|y − ȳ|²/d² about each recording's mean, and how many real numbers the lines are, collapsed or not."""
+        square, freedom = self.scatter
+        if not self.curves:
+            weight = self.deviation**-2
+            mean = np.add.reduceat(weight * self.value, self.first) / np.add.reduceat(weight, self.first)
+            square += float(np.sum(weight * np.abs(self.value - mean[self.recording]) ** 2))
+        return square, 2 * len(self.value) + freedom
+
+    @cached_property
     def sensors(self) -> Floats:
         """1 where a recording is of a sensor (recordings, sensors)."""
         return np.eye(int(self.sensor.max()) + 1)[self.sensor]

@@ -80,9 +80,8 @@ class Hypothesis:
 
     def group(self, number: int) -> object:
         """The same for hypotheses that can be evaluated together; `number` tells those apart that cannot."""
-        moves_covariance = any(entry.moves_covariance for entry in self.model.parameters)
-        alone = self.lines.curves or moves_covariance or any(CATALOGUE[name].needs_lines for name in self.model.names)
-        return number if alone else (id(self.lines), self.placed, self.gain, self.position)
+        alone = self.lines.curves or any(entry.moves_covariance for entry in self.model.parameters)
+        return number if alone else (self.placed, self.gain, self.position)
 
     @cached_property
     def _curve_lines(self) -> CurveLines:
@@ -105,7 +104,8 @@ class Hypothesis:
             return FrfProducts.of(lines, pickup, model.respond(fit, slopes=slopes, place=place))
         parts = [fit[first : first + at_once] for first in range(0, len(fit), at_once)]
         responses = (model.respond(part, slopes=slopes, place=place) for part in parts)
-        return FrfProducts.joined([FrfProducts.of(lines, pickup, response) for response in responses])
+        products = [FrfProducts.of(lines, pickup, response) for response in responses]
+        return FrfProducts.joined(products, len(model.parameters))
 
 
 @dataclass(frozen=True)

@@ -73,10 +73,10 @@ class Likelihoods:
         self._sensor_mm = self._mm @ self._sensors
         self._sensor_mr = self._mr @ self._sensors
         self._sensor_shrink = tau2 / (1 + tau2 * self._sensor_mm)
-        scatter, freedom = lines.scatter
+        about_means, numbers = lines.about_means
         chi2 = (rr - self._shrink * ur**2).sum(axis=-1) - (self._sensor_shrink * self._sensor_mr**2).sum(axis=-1)
         log_determinant = np.log1p(tau2 * self._sensor_mm).sum(axis=-1) - np.log(reduced).sum(axis=-1)
-        further = sums.log_determinant + (2 * len(lines.value) + freedom) * np.log(k2) + scatter / k2
+        further = sums.log_determinant + numbers * np.log(k2) + about_means / k2
         self.each: Floats = -0.5 * (chi2 + log_determinant + np.asarray(further)[..., 0])
 
     @property
@@ -160,7 +160,8 @@ class Likelihoods:
         if self._turning is not None:
             uv, vr = self._turning
             level = self._products.level[..., None]
-            square = self._slope_sums.gram(((f * level) ** 2 / k2)[..., 0])
+            assert self._slope_sums is not None
+            square = np.einsum("nrpq,nr->npq", self._slope_sums.vv, ((f * level) ** 2 / k2)[..., 0])
             if by_level is not None:
                 crossed = np.einsum("nrp,nr,nrq->npq", by_level, (f**2 * level)[..., 0], uv, optimize=True)
                 square = square + crossed + crossed.transpose(0, 2, 1)
@@ -169,14 +170,14 @@ class Likelihoods:
         return uj, jr, information
 
     @cached_property
-    def _slope_sums(self) -> SlopeSums:
+    def _slope_sums(self) -> SlopeSums | None:
         return self._products.slope_sums(self.levels)
 
     @cached_property
     def _turning(self) -> tuple[Floats, Floats] | None:
         """Re u*v and Re v*r over κ² (points, recordings, P), v the derivatives of u; None where u is 1."""
         sums = self._slope_sums
-        if sums.uv is None or sums.vy is None:
+        if sums is None:
             return None
         k2, known = self._k2[:, 0, :, None], self._known[:, 0, :, None]
         return sums.uv / k2, (sums.vy - known * sums.uv) / k2

@@ -32,13 +32,6 @@ class PickupRows:
         sums[..., self._owner[self._first]] = np.add.reduceat(products, self._first, axis=-1)
         return sums
 
-    def over_lines(self, lost: Floats, of_recordings: Floats, lines: int) -> Floats:
-        """Σ over the rows of each distinct line of the weight lost times what their recordings have (…, lines)."""
-        values = lost * of_recordings[..., self._owner]
-        place = np.arange(len(values))[:, None] * lines + self.line
-        summed = np.bincount(place.ravel(), values.ravel(), len(values) * lines)
-        return np.asarray(summed, dtype=float).reshape(-1, lines)
-
     @property
     def value(self) -> Array:
         """What was measured."""

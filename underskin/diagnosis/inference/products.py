@@ -7,13 +7,15 @@ with the derivatives v of u, Re u*v, Re v*y and Re v*v. Arrays are (points, reco
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
 from scipy.sparse import csr_array
 
+from underskin.autodiff import Differentiated
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.pickup_rows import PickupRows
 from underskin.diagnosis.noise.noise_levels import SeveralLevels
@@ -24,7 +26,10 @@ from underskin.units import Array, Floats
 
 @dataclass(frozen=True)
 class Sums:
-    """Re u*u, Re u*y and |y|² of each recording, and what the noise levels add to the log of the determinant."""
+    """Re u*u, Re u*y and |y|² of each recording, and what the noise levels add to the log of the determinant.
+
+    Of FRFs |y|² is that of each recording's mean: the rest is the same in all models (`Lines.about_means`).
+    """
 
     uu: Floats
     uy: Floats
@@ -34,12 +39,11 @@ class Sums:
 
 @dataclass(frozen=True)
 class SlopeSums:
-    """Re u*v and Re v*y (points, recordings, parameters); None where v is 0. `gram` gives Σ s Re v*v (points,
-    parameters, parameters) for factors s (points, recordings)."""
+    """Re u*v and Re v*y (points, recordings, parameters), and Re v*v (points, recordings, parameters, parameters)."""
 
-    uv: Floats | None
-    vy: Floats | None
-    gram: Callable[[Floats], Floats | float]
+    uv: Floats
+    vy: Floats
+    vv: Floats
 
 
 class FrfLines:
@@ -60,7 +64,7 @@ class FrfLines:
         self.uu, self.uy = (
             np.add.reduceat(weight * values, lines.first) for values in (np.ones(len(weight)), lines.value.real)
         )
-        self.yy = np.add.reduceat(weight * np.abs(lines.value) ** 2, lines.first)
+        self.yy = np.abs(np.add.reduceat(weight * lines.value, lines.first)) ** 2 / self.uu
 
 
 @lru_cache(maxsize=4)  # by identity: a diagnosis weighs dozens of models of one design
@@ -71,74 +75,80 @@ def frf_lines(lines: Lines, design: FrfDesign) -> FrfLines:
 
 @dataclass(frozen=True)
 class FrfProducts:
-    """Of FRFs. `factor` (points, lines) and `factor_slopes` (points, parameters, lines) are u and v, None where u is 1 or
-    no longer asked for."""
+    """Of FRFs; `turning` is None where u is 1, or where no derivatives were asked for."""
 
-    lines: FrfLines
-    pickup: PickupRows | None
-    level: Floats  # (points, recordings)
+    yy: Floats  # (recordings,)
+    uu: Floats  # (points, recordings)
+    uy: Floats
+    level: Floats
     level_slopes: Floats | None  # (points, recordings, parameters)
     place_slopes: Floats | None  # (2, points, recordings)
-    factor: Array | None
-    factor_slopes: Array | None
-    uu: Floats
-    uy: Floats
+    turning: SlopeSums | None
+    pickup: "PickupProducts | None" = None
 
     @classmethod
     def of(cls, lines: FrfLines, pickup: PickupRows | None, response: Response) -> Self:
         """Of a model's response at several points, and the rows that its pick-up reaches."""
         level, factor = response.level, response.lines
         slopes = np.moveaxis(level.slopes, 0, -1) if len(level.slopes) else None
-        if factor is None:
-            uu, uy = np.broadcast_to(lines.uu, level.value.shape), np.broadcast_to(lines.uy, level.value.shape)
-            return cls(lines, pickup, level.value, slopes, response.place_slopes, None, None, uu, uy)
-        u = factor.value
-        uu = (lines.weight @ (u.real**2 + u.imag**2).T).T
-        uy = (lines.real @ u.real.T + lines.imag @ u.imag.T).T
-        of_factor = None if slopes is None else np.moveaxis(factor.slopes, 0, 1)
-        kept = None if slopes is None and pickup is None else u
-        return cls(lines, pickup, level.value, slopes, response.place_slopes, kept, of_factor, uu, uy)
+        uu, uy = np.broadcast_to(lines.uu, level.value.shape), np.broadcast_to(lines.uy, level.value.shape)
+        turning = None
+        if factor is not None:
+            u = factor.value
+            uu = _over_rows(lines.weight, u.real**2 + u.imag**2)
+            uy = _over_rows(lines.real, u.real) + _over_rows(lines.imag, u.imag)
+            turning = None if slopes is None else _turning(lines, u, np.moveaxis(factor.slopes, 0, 1))
+        of_pickup = None if pickup is None else PickupProducts.of(pickup, len(level.value), factor)
+        return cls(lines.yy, uu, uy, level.value, slopes, response.place_slopes, turning, of_pickup)
 
     def __len__(self) -> int:
         return len(self.level)
 
     def __getitem__(self, points: Array | slice) -> Self:
         """At some of the points."""
-
-        def of(values: Any) -> Any:
-            return None if values is None else values[points]
-
+        place, slopes = self.place_slopes, self.level_slopes
         return replace(
             self,
-            level=self.level[points],
-            level_slopes=of(self.level_slopes),
-            place_slopes=None if self.place_slopes is None else self.place_slopes[:, points],
-            factor=of(self.factor),
-            factor_slopes=of(self.factor_slopes),
             uu=self.uu[points],
             uy=self.uy[points],
+            level=self.level[points],
+            level_slopes=None if slopes is None else slopes[points],
+            place_slopes=None if place is None else place[:, points],
+            turning=_of_each(lambda values: values[points], self.turning),
+            pickup=_of_each(lambda values: values[points], self.pickup),
         )
 
     @classmethod
-    def joined(cls, parts: Sequence["FrfProducts"]) -> Self:
-        """At the points of several, one after another."""
+    def joined(cls, parts: Sequence["FrfProducts"], parameters: int) -> Self:
+        """At the points of several, one after another, with so many parameters in all."""
+        filled = [part.filled(parameters, turning=any(one.turning for one in parts)) for part in parts]
 
         def of(name: str, axis: int = 0) -> Any:
-            values = [getattr(part, name) for part in parts]
+            values = [getattr(part, name) for part in filled]
             return None if values[0] is None else np.concatenate(values, axis=axis)
 
-        first = parts[0]
-        slopes, place = of("level_slopes"), of("place_slopes", axis=1)
-        sums = of("uu"), of("uy")
-        return cls(first.lines, first.pickup, of("level"), slopes, place, of("factor"), of("factor_slopes"), *sums)
+        def of_each(name: str) -> Any:
+            values = [getattr(part, name) for part in filled]
+            return None if values[0] is None else _of_each(lambda *own: np.concatenate(own), *values)
 
-    def filled(self, parameters: int) -> Self:
-        """With derivatives that are 0 by further parameters, so many in all."""
+        level = of("level"), of("level_slopes"), of("place_slopes", axis=1)
+        return cls(parts[0].yy, of("uu"), of("uy"), *level, of_each("turning"), of_each("pickup"))
+
+    def filled(self, parameters: int, *, turning: bool) -> Self:
+        """With derivatives that are 0 by further parameters, so many in all, also those of u where it has none."""
         slopes = self.level_slopes
-        if slopes is None or slopes.shape[-1] == parameters:
+        if slopes is None:
             return self
-        further = np.zeros((*slopes.shape[:-1], parameters - slopes.shape[-1]))
-        return replace(self, level_slopes=np.concatenate([slopes, further], axis=-1))
+        further = parameters - slopes.shape[-1]
+        slopes = np.pad(slopes, ((0, 0), (0, 0), (0, further))) if further else slopes
+        own = self.turning
+        if own is None:
+            none = np.zeros_like(slopes)
+            own = SlopeSums(none, none, np.broadcast_to(none[..., None], (*none.shape, parameters))) if turning else None
+        elif further:
+            uv, vy = (np.pad(values, ((0, 0), (0, 0), (0, further))) for values in (own.uv, own.vy))
+            own = SlopeSums(uv, vy, np.pad(own.vv, ((0, 0), (0, 0), (0, further), (0, further))))
+        return replace(self, level_slopes=slopes, turning=own)
 
     def scaled(self, factor: Floats) -> Self:
         """Of levels so many times as large (points,)."""
@@ -149,58 +159,82 @@ class FrfProducts:
 
     def summed(self, levels: SeveralLevels) -> Sums:
         """The sums at noise levels (points, sets, 1), as (points, sets, recordings)."""
-        uu, uy, yy = self.uu[:, None], self.uy[:, None], self.lines.yy
-        rows = self.pickup
-        if rows is None or levels.pickup is None:
-            return Sums(uu, uy, yy, 0.0)
-        lost, log_determinant = rows.lost(levels.pickup, levels.level)
-        u = self._on_pickup(rows)[:, None]
-        return Sums(
-            uu - rows.summed(lost, u, u), uy - rows.summed(lost, u), yy - rows.summed(lost, rows.value), log_determinant
-        )
+        sums = Sums(self.uu[:, None], self.uy[:, None], self.yy, 0.0)
+        return sums if self.pickup is None else self.pickup.less(sums, levels)
 
-    def slope_sums(self, levels: SeveralLevels) -> SlopeSums:
-        """The sums with derivatives, at the first of the sets of noise levels."""
-        factor, slopes = self.factor, self.factor_slopes
-        if factor is None or slopes is None:
-            return SlopeSums(None, None, lambda _: 0.0)
-        moving = np.flatnonzero(slopes.any(axis=(0, 2)))
-        v, lines, rows, lost = slopes[:, moving], self.lines, self.pickup, None
+    def slope_sums(self, levels: SeveralLevels) -> SlopeSums | None:
+        """The sums with derivatives, at the first of the sets of noise levels; None where u is 1."""
+        if self.pickup is None or self.turning is None:
+            return self.turning
+        return self.pickup.slopes_less(self.turning, levels)
 
-        def over_rows(matrix: csr_array, values: Floats) -> Floats:
-            """(points, parameters, lines) to (points, recordings, parameters)."""
-            flat = matrix @ values.reshape(-1, values.shape[-1]).T
-            return np.asarray(flat.reshape(-1, *values.shape[:2]).transpose(1, 0, 2))
 
-        uv = over_rows(lines.weight, (factor.conj()[:, None] * v).real)
-        vy = over_rows(lines.real, v.real) + over_rows(lines.imag, v.imag)
-        if rows is not None and levels.pickup is not None:
-            lost, _ = rows.lost(levels.pickup[:, 0], levels.level[:, 0])
-            u, at_rows = self._on_pickup(rows)[:, None], v[..., rows.line]
-            uv = uv - np.moveaxis(rows.summed(lost[:, None], u, at_rows), 1, -1)
-            vy = vy - np.moveaxis(rows.summed(lost[:, None], at_rows), 1, -1)
-        parameters = slopes.shape[1]
+@dataclass(frozen=True)
+class PickupProducts:
+    """What u is on the rows that pick-up reaches (points, rows), and v (points, parameters, rows), None where it is 0."""
 
-        def placed(values: Floats) -> Floats:
-            whole = np.zeros((*values.shape[:-1], parameters))
-            whole[..., moving] = values
-            return whole
+    rows: PickupRows
+    u: Array
+    v: Array | None
 
-        def gram(factors: Floats) -> Floats:
-            weight = (lines.weight.T @ factors.T).T
-            if rows is not None and lost is not None:
-                weight = weight - rows.over_lines(lost, factors, weight.shape[-1])
-            both = np.concatenate([v.real, v.imag], axis=-1)
-            whole = np.zeros((len(v), parameters, parameters))
-            products = (both * np.tile(weight, 2)[:, None]) @ both.transpose(0, 2, 1)
-            whole[np.ix_(np.arange(len(v)), moving, moving)] = products
-            return whole
+    @classmethod
+    def of(cls, rows: PickupRows, points: int, factor: Differentiated | None) -> Self:
+        """Of the dynamics' factor on a model's distinct lines."""
+        if factor is None:
+            return cls(rows, np.ones((points, len(rows.line))), None)
+        slopes = np.moveaxis(factor.slopes, 0, 1)[..., rows.line] if len(factor.slopes) else None
+        return cls(rows, factor.value[:, rows.line], slopes)
 
-        return SlopeSums(placed(uv), placed(vy), gram)
+    def less(self, sums: Sums, levels: SeveralLevels) -> Sums:
+        """The sums less what rows lose to pick-up."""
+        assert levels.pickup is not None
+        lost, log_determinant = self.rows.lost(levels.pickup, levels.level)
+        u, summed = self.u[:, None], self.rows.summed
+        uu, uy = sums.uu - summed(lost, u, u), sums.uy - summed(lost, u)
+        return Sums(uu, uy, sums.yy - summed(lost, self.rows.value), log_determinant)
 
-    def _on_pickup(self, rows: PickupRows) -> Array:
-        """u on the rows that pick-up reaches (points or 1, rows)."""
-        return np.ones((1, len(rows.line))) if self.factor is None else self.factor[:, rows.line]
+    def slopes_less(self, sums: SlopeSums, levels: SeveralLevels) -> SlopeSums:
+        """The sums with derivatives less what rows lose, at the first of the sets of noise levels."""
+        assert levels.pickup is not None
+        if self.v is None:
+            return sums
+        lost, _ = self.rows.lost(levels.pickup[:, 0], levels.level[:, 0])
+        lost, v, summed = lost[:, None], self.v, self.rows.summed
+        uv, vy = sums.uv - np.moveaxis(summed(lost, self.u[:, None], v), 1, -1), sums.vy - np.moveaxis(summed(lost, v), 1, -1)
+        vv = summed(lost[:, None], v[:, :, None], v[:, None])
+        return SlopeSums(uv, vy, sums.vv - np.moveaxis(vv, -1, 1))
+
+
+def _over_rows(matrix: csr_array, values: Floats) -> Floats:
+    """Sums over the rows of each recording of values on distinct lines: (…, lines) to (…, recordings)."""
+    flat = matrix @ values.reshape(-1, values.shape[-1]).T
+    return np.asarray(flat.T.reshape(*values.shape[:-1], -1))
+
+
+def _turning(lines: FrfLines, u: Array, slopes: Array) -> SlopeSums:
+    """The sums with the derivatives v of u (points, parameters, lines)."""
+    moving = np.flatnonzero(slopes.any(axis=(0, 2)))
+    v, count = slopes[:, moving], slopes.shape[1]
+    uv = np.moveaxis(_over_rows(lines.weight, (u.conj()[:, None] * v).real), 1, -1)
+    vy = np.moveaxis(_over_rows(lines.real, v.real) + _over_rows(lines.imag, v.imag), 1, -1)
+    one, other = np.triu_indices(len(moving))
+    vv = _over_rows(lines.weight, (v[:, one].conj() * v[:, other]).real)
+    whole = SlopeSums(*(np.zeros((*uv.shape[:2], *further)) for further in ((count,), (count,), (count, count))))
+    whole.uv[..., moving], whole.vy[..., moving] = uv, vy
+    for number, (a, b) in enumerate(zip(moving[one], moving[other], strict=True)):
+        whole.vv[..., a, b] = whole.vv[..., b, a] = vv[:, number]
+    return whole
+
+
+def _of_each(function: Callable[..., Array], *parts: Any) -> Any:
+    """The same of all arrays of a record; None of None."""
+    if parts[0] is None:
+        return None
+    own = {field.name: [getattr(part, field.name) for part in parts] for field in fields(parts[0])}
+    return replace(
+        parts[0],
+        **{name: function(*values) for name, values in own.items() if isinstance(values[0], np.ndarray)},
+    )
 
 
 class CurveLines:
@@ -257,32 +291,23 @@ class CurveProducts:
 
     def slope_sums(self, levels: SeveralLevels) -> SlopeSums:
         """The sums with derivatives, at the first of the sets of noise levels."""
-        slopes = self.force_slopes
+        slopes, sums = self.force_slopes, self.lines.sums
         assert slopes is not None
         weighed = self.lines.whitening.weight((levels.smooth / levels.level)[:, :1]) * slopes
-        uv = self.lines.sums(weighed * self.force[:, None])
-        vy = self.lines.sums(weighed * self.lines.measured)
-        samples = np.diff(np.append(self.lines.first, self.force.shape[-1]))
-
-        def gram(factors: Floats) -> Floats:
-            of_samples = np.repeat(factors, samples, axis=-1)[:, None]
-            return np.asarray((weighed * of_samples) @ slopes.transpose(0, 2, 1))
-
-        return SlopeSums(np.moveaxis(uv, 1, -1), np.moveaxis(vy, 1, -1), gram)
+        uv, vy = sums(weighed * self.force[:, None]), sums(weighed * self.lines.measured)
+        edges = [*self.lines.first, self.force.shape[-1]]
+        vv = [weighed[..., low:high] @ slopes[..., low:high].transpose(0, 2, 1) for low, high in pairwise(edges)]
+        return SlopeSums(np.moveaxis(uv, 1, -1), np.moveaxis(vy, 1, -1), np.stack(vv, axis=1))
 
 
 Products = FrfProducts | CurveProducts
 
 
 def joined(parts: Sequence[Products], parameters: int) -> Products:
-    """Products of models of the same rows one after another, their parameters filled up to so many.
-
-    Of several models u must be 1.
-    """
+    """Products of models of the same recordings one after another, their parameters filled up to so many."""
     curves = [part for part in parts if isinstance(part, CurveProducts)]
     if curves:
         slopes = [part.force_slopes for part in curves if part.force_slopes is not None]
         force = np.concatenate([part.force for part in curves])
         return CurveProducts(curves[0].lines, force, np.concatenate(slopes) if slopes else None)
-    filled = [part.filled(parameters) for part in parts if isinstance(part, FrfProducts)]
-    return filled[0] if len(filled) == 1 else FrfProducts.joined(filled)
+    return FrfProducts.joined([part for part in parts if isinstance(part, FrfProducts)], parameters)

@@ -148,7 +148,7 @@ class FrfModel:
         further = _POSITION if place else 0
         own, nuisances, position = self._composition.values(fit, further, slopes=slopes)
         contacts = self._contacts(own, nuisances, fit.shape[:-1], (len(self.parameters) if slopes else 0) + further)
-        if fit.ndim > 1 and not _on_one_layer(contacts):
+        if fit.ndim > 1 and (contacts.layered or self._needs_stiffness) and not _on_one_layer(contacts):
             return joined([self.respond(one, slopes=slopes, place=place) for one in fit[:, None]])
         sigma, inside = self._sigma_at_points(contacts, own, position)
         level = self._level(contacts, sigma, own, nuisances)

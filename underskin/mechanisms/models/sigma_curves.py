@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import jv
+from scipy.special import j0
 
 from underskin.autodiff import Differentiated, chain
 from underskin.mechanisms.models.contact_stage import PressedContacts
@@ -72,7 +72,7 @@ def layer_of(contacts: Contacts) -> Layer:
 
 def _as_in_the_table(contacts: Contacts, pressed: PressedContacts) -> bool:
     nu = contacts.poisson_ratio
-    incompressible = nu.value.flat[0] == INCOMPRESSIBLE and not nu.slopes.any()
+    incompressible = (nu.value == INCOMPRESSIBLE).all() and not nu.slopes.any()
     return pressed.sphere_share is None and contacts.slip is None and bool(incompressible)
 
 
@@ -81,7 +81,8 @@ def _transforms(
 ) -> tuple[Floats, list[Differentiated]]:
     """p̂ · M · disc (quantities, …, contacts, k): its value, its derivatives by a/h, rT/h and what follows; and that."""
     shape = _half_space_shape(k, pressed) if layer is None else _layer_shape(pressed, layer)
-    transmission = layer_of(contacts).transmission(k)
+    slip = np.zeros(1) if contacts.slip is None else contacts.slip.value
+    transmission = Layer(contacts.poisson_ratio.value[..., None], slip[..., None]).transmission(k)
     by_poisson_ratio, by_slip = transmission.slopes
     disc, by_rho = _disc(k, rho[..., None])
     passed = transmission.value * disc
@@ -142,5 +143,6 @@ def _layer_shape(pressed: PressedContacts, layer: ContactCurves) -> _Shape:
 
 
 def _disc(k: Floats, rho: Floats) -> tuple[Floats, Floats]:
-    """2 J1(kρ)/(kρ) and its derivative by ρ."""
-    return disc_average(k * rho), -2 * jv(2, k * rho) / rho
+    """2 J1(kρ)/(kρ) and its derivative by ρ, −2 J2(kρ)/ρ with J2(x) = 2 J1(x)/x − J0(x)."""
+    average = disc_average(k * rho)
+    return average, 2 * (j0(k * rho) - average) / rho
