@@ -85,11 +85,12 @@ class Request:
         """Whether it is fitted without positioning scatter."""
         return self.parent is None or self.parent.placed < _DECIDED
 
-    def gains(self, cost: float, placed: bool) -> bool:
-        """Whether a fit with or without positioning scatter is better than the parent's, where that can be compared."""
+    def target(self, placed: bool) -> float:
+        """The cost below which a fit with or without positioning scatter is better than the parent's, where that can be
+        compared; else ∞."""
         if self.parent is None or (self.parent.placed > 0.5) is not placed:
-            return True
-        return cost < self.parent.best.cost - _LEAST_GAIN
+            return np.inf
+        return self.parent.best.cost - _LEAST_GAIN
 
 
 def own_places(names: Sequence[str], lines: Lines) -> dict[str, slice]:
@@ -205,11 +206,13 @@ def _fitted(
     fits = []
     for members in groups.values():
         fitter = Fitter([hypotheses[number] for number in members])
-        improved = fitter.improve(_stacked([starts[number] for number in members]))
+        points = _stacked([starts[number] for number in members])
+        targets = np.array([requests[number].target(fitter.placed) for number in members])
+        improved = fitter.improve(points, targets[points.owner])
         best = [
             row
             for row in improved.best().tolist()
-            if requests[members[improved.points.owner[row]]].gains(float(improved.cost[row]), fitter.placed)
+            if improved.cost[row] < targets[improved.points.owner[row]]
         ]
         if not best:
             continue

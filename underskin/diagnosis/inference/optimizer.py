@@ -19,6 +19,7 @@ from underskin.units import Floats
 __all__ = ["Evaluated", "Fitter"]
 
 _CURVE_SETTLING = 8
+_PROMISED, _MARGIN = 10.0, 2.0  # times what the gradient says, and nats beyond, that a fit may still gain
 _SLOPE_STEP = 1e-4  # of a parameter's range, for differences of the position's slopes
 _LARGEST_STEP = 1.0
 _CONVERGED = 0.01  # in log posterior
@@ -122,23 +123,27 @@ class Fitter(Evaluator):
         proportional = [[entry.proportional for entry in one.model.parameters] for one in self.hypotheses]
         return np.array([own.index(True) for own in proportional])
 
-    def improve(self, start: Points) -> Evaluated:
-        """The most probable points near the starts."""
+    def improve(self, start: Points, target: Floats | None = None) -> Evaluated:
+        """The most probable points near the starts; only roughly where a `target` cost (points,) will not be reached."""
         if not self.lines.curves:
-            return self.settle(self.descend(self.settle(self.evaluate(start), 3), 1), 2)
+            return self.settle(self.descend(self.settle(self.evaluate(start), 3), 1, target), 2)
         # Small smooth error and close fit, or large and loose: each may be a maximum of its own.
         smooth = self.hypotheses[0].smooth
         each = []
         for value in (smooth.low, smooth.middle):
             covariance = np.tile([GAIN_PRIOR.middle, 0.0, value], (len(start), 1))
             fitted = self.settle(self.descend(self.evaluate(replace(start, covariance=covariance)), 0), _CURVE_SETTLING)
-            each.append(self.settle(self.descend(fitted, 1), _CURVE_SETTLING))
+            each.append(self.settle(self.descend(fitted, 1, target), _CURVE_SETTLING))
         one, other = each
         better = np.flatnonzero(other.cost < one.cost)
         return self.replaced(one, better, other[better])
 
-    def descend(self, best: Evaluated, settling: int) -> Evaluated:
-        """Steps of the mean parameters, each followed by so many of the covariance's."""
+    def descend(self, best: Evaluated, settling: int, target: Floats | None = None) -> Evaluated:
+        """Steps of the mean parameters, each followed by so many of the covariance's.
+
+        A point goes no further once it promises no cost below its target.
+        """
+        target = np.full(len(best), np.inf) if target is None else target
         damping = np.full(len(best), 1e-3)
         moving = np.arange(len(best))
         for _ in range(_MOST_ITERATIONS):
@@ -146,12 +151,13 @@ class Fitter(Evaluator):
             step, slope = self._step(part, damping[moving])
             grown = self.grown(part)
             resting = (slope < _CONVERGED) & grown
-            going = np.ones(len(part), dtype=bool)
+            going = part.cost - _PROMISED * slope - _MARGIN < target[moving]
+            resting &= going
             if resting.any():
                 settled = self.settle(part[resting], settling)
                 going[resting] = part.cost[resting] - settled.cost >= _CONVERGED
                 best = self.replaced(best, moving[resting], settled)
-            tried_at = np.flatnonzero(~resting)
+            tried_at = np.flatnonzero(going & ~resting)
             if len(tried_at):
                 there = part[tried_at]
                 owner = there.points.owner

@@ -34,12 +34,13 @@ _FAINT = 1e-12  # of the largest response, below which a recording has no direct
 
 
 @dataclass(frozen=True)
-class ScatterNode:
-    """One scatter of gain and one of place: log weight, and under it each recording's residual and variance."""
+class ScatterNodes:
+    """One scatter of place with several of gain: log weights (gains,), and under it each recording's residual, and its
+    variances (gains, recordings)."""
 
-    log_weight: float
+    log_weights: Floats
     residual: Floats
-    variance: Floats
+    variances: Floats
 
 
 def over_recordings(problem: FittingProblem, explanation: Explanation) -> dict[str, float]:
@@ -111,18 +112,17 @@ class GainResidual:
     def _not_faint(self, size: Floats) -> Floats:
         return np.where(np.abs(size) > self._least, size, self._least)
 
-    def _scatters(self, positions: Floats) -> list[ScatterNode]:
-        """No scatter of position and each of these [m], with each of gain; relative to the model's mean under it."""
+    def _scatters(self, positions: Floats) -> list[ScatterNodes]:
+        """No scatter of position and each of these [m], with all of gain; relative to the model's mean under it."""
         best, scatters = self._best, []
         for position, share in _shares(positions).items():
             size, ur, uu = best.marginal.along(position)
             size = self._not_faint(size)
             second_order = best.hypothesis.curvature.square
             placed = position**2 * (self._moving**2).sum(axis=0) + 0.5 * position**4 * second_order
-            for gain in _GAINS:
-                log_weight = GAIN_PRIOR.log_density(float(np.log(gain))) + np.log(share) - np.log(np.abs(size)).sum()
-                variance = gain**2 + placed + uu / size**2
-                scatters.append(ScatterNode(float(log_weight), ur / size - self._known, variance))
+            log_weights = GAIN_PRIOR.log_density(np.log(_GAINS)) + np.log(share) - np.log(np.abs(size)).sum()
+            variances = _GAINS[:, None] ** 2 + placed + uu / size**2
+            scatters.append(ScatterNodes(log_weights, ur / size - self._known, variances))
         return scatters
 
     def moved(self, sets: Floats) -> Floats:
@@ -133,40 +133,44 @@ class GainResidual:
     def _plain(self) -> float:
         """log p(residual) without a process."""
         nothing = np.zeros((1, len(self._known), 1))
-        return float(logsumexp([self._with(nothing, np.ones(1), entry) for entry in self._scatters(_ANY_POSITION)]))
+        each = [self._with(nothing, np.ones(1), entry) for entry in self._scatters(_ANY_POSITION)]
+        return float(logsumexp(each))
 
     def gains(self, sets: Floats, amplitudes: Floats) -> Floats:
         """What each set of features (sets, recordings, features) gains over none at all, in log evidence (sets,).
 
         Over the priors of the scatters, and of the amplitudes, each as probable as the others.
         """
-        each = np.array([self._with(sets, amplitudes, entry) for entry in self.usual])
+        each = np.concatenate([self._with(sets, amplitudes, entry) for entry in self.usual])
         return np.asarray(logsumexp(each, axis=0) - self._plain)
 
-    def _with(self, sets: Floats, amplitudes: Floats, scatter: ScatterNode) -> Floats:
-        """log p(residual, features) at one scatter (sets,)."""
-        root = 1 / np.sqrt(scatter.variance)
-        fixed, z = self.fixed * root[:, None], scatter.residual * root
-        lower = np.linalg.cholesky(fixed.T @ fixed + np.eye(fixed.shape[1]))
+    def _with(self, sets: Floats, amplitudes: Floats, scatter: ScatterNodes) -> Floats:
+        """log p(residual, features) at one scatter of place and each of gain (gains, sets)."""
         count, rows, size = sets.shape
-        shapes = (sets * root[:, None]).transpose(1, 0, 2).reshape(rows, count * size)
-        taken = np.linalg.solve(lower, fixed.T @ np.column_stack([z, shapes]))
-        chi2 = z @ z - taken[:, 0] @ taken[:, 0]
-        log_determinant = np.log(scatter.variance).sum() + 2 * np.log(np.diagonal(lower)).sum()
-        moment = (shapes.T @ z - taken[:, 1:].T @ taken[:, 0]).reshape(count, size)
-        gram = _grams(shapes, count) - _grams(taken[:, 1:], count)
+        root = 1 / np.sqrt(scatter.variances)[:, :, None]
+        fixed = self.fixed * root
+        shapes = sets.transpose(1, 0, 2).reshape(rows, -1)
+        z, shapes = scatter.residual[:, None] * root, shapes * root  # (gains, recordings, columns)
+        lower = np.linalg.cholesky(fixed.transpose(0, 2, 1) @ fixed + np.eye(fixed.shape[2]))
+        taken = np.linalg.solve(lower, fixed.transpose(0, 2, 1) @ np.concatenate([z, shapes], axis=2))
+        chi2 = (z**2).sum(axis=(1, 2)) - (taken[..., 0] ** 2).sum(axis=1)
+        log_determinant = np.log(scatter.variances).sum(axis=1)
+        log_determinant = log_determinant + 2 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
+        moment = shapes.transpose(0, 2, 1) @ z - taken[..., 1:].transpose(0, 2, 1) @ taken[..., :1]
+        moment = moment.reshape(-1, count, size).swapaxes(0, 1)
+        gram = _grams(shapes, count) - _grams(taken[..., 1:], count)
         values, vectors = np.linalg.eigh(gram)
-        values = np.maximum(values, 0.0)[:, None] * amplitudes[:, None] ** 2
-        along = (vectors.transpose(0, 2, 1) @ moment[..., None])[..., 0]
-        gained = (amplitudes[:, None] ** 2 * along[:, None] ** 2 / (1 + values)).sum(axis=2)
-        gained = np.logaddexp.reduce(0.5 * (gained - np.log1p(values).sum(axis=2)), axis=1) - np.log(len(amplitudes))
-        return np.asarray(scatter.log_weight - 0.5 * (chi2 + log_determinant) + gained)
+        values = np.maximum(values, 0.0)[..., None, :] * amplitudes[:, None] ** 2
+        along = (vectors.swapaxes(-1, -2) @ moment[..., None])[..., 0]
+        gained = (amplitudes[:, None] ** 2 * along[..., None, :] ** 2 / (1 + values)).sum(axis=-1)
+        gained = np.logaddexp.reduce(0.5 * (gained - np.log1p(values).sum(axis=-1)), axis=-1) - np.log(len(amplitudes))
+        return np.asarray((scatter.log_weights - 0.5 * (chi2 + log_determinant))[:, None] + gained.T)
 
 
 def _grams(columns: Floats, count: int) -> Floats:
-    """The products of each of `count` blocks of columns with itself (count, size, size)."""
-    blocks = columns.reshape(len(columns), count, -1).transpose(1, 2, 0)
-    return np.asarray(blocks @ blocks.transpose(0, 2, 1))
+    """The products of each of `count` blocks of columns (gains, rows, columns) with itself (count, gains, size, size)."""
+    blocks = columns.reshape(*columns.shape[:2], count, -1).transpose(2, 0, 3, 1)
+    return np.asarray(blocks @ blocks.swapaxes(-1, -2))
 
 
 def relative_place_slopes(best: Evidence) -> Floats:

@@ -79,8 +79,14 @@ class FrfModel:
     Rows are all lines of all recordings, one recording after another.
     """
 
-    def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions, table: SigmaTable) -> None:
-        """Work out everything that no parameter changes."""
+    def __init__(
+        self,
+        mechanisms: Sequence[Mechanism],
+        conditions: Conditions,
+        table: SigmaTable,
+        beside: Sequence[Mechanism] = (),
+    ) -> None:
+        """Work out everything that no parameter changes; σ with room for the mechanisms `beside` as well."""
         self._composition = Composition(mechanisms, conditions, "frf", FRF_NUISANCES)
         self.names = tuple(mechanism.name for mechanism in mechanisms)
         self.parameters = self._composition.parameters
@@ -95,8 +101,9 @@ class FrfModel:
         self._thickness = _required("thickness_mm", skin.thickness_mm)
         self._sensor_radius = _required("sensor_radius_mm", skin.sensor_radius_mm)
         self._poisson_ratio = skin.poisson_ratio
-        further = max((mechanism.largest_offset for mechanism in mechanisms), default=0.0)
-        stretch = _NUISANCE_STRETCH * max((mechanism.largest_stretch for mechanism in mechanisms), default=1.0)
+        room = (*mechanisms, *beside)
+        further = max((mechanism.largest_offset for mechanism in room), default=0.0)
+        stretch = _NUISANCE_STRETCH * max((mechanism.largest_stretch for mechanism in room), default=1.0)
         reached = min(PROFILE_END, stretch * largest_offset(design, further) / self._thickness)
         self._sigma = offset_sigma(table, self._sensor_radius / self._thickness, stretch, reached)
         self._needs_stiffness = any(mechanism.needs_stiffness for mechanism in mechanisms)
@@ -205,14 +212,15 @@ class FrfModel:
             contacts.stiffness = stiffness(contacts, pressed, layer)
         of_contacts = SigmaOfContacts(self._sigma, contacts, pressed, rho, layer if contacts.layered else None)
         offset = self._offset(own, position or 2 * [0.0 * contacts.thickness]) / contacts.thickness
-        place = self._sigma.place(offset.value)
-        sigma = []
-        inside = place.inside & (offset.value + rho.value <= PROFILE_END)
-        for node in range(len(self._force)):
-            contact = design.point_contact + node * len(design.force)
-            sigma.append(of_contacts.at(contact, place, offset))
-            inside = inside & of_contacts.inside[..., contact]
-        return sigma, inside
+        nodes, points = len(self._force), len(design.point_contact)
+        every = np.tile(np.arange(points), nodes)
+        contact = (design.point_contact + len(design.force) * np.arange(nodes)[:, None]).ravel()
+        at_nodes = offset.spread(points)[every] if nodes > 1 else offset
+        sigma = of_contacts.at(contact, self._sigma.place(at_nodes.value), at_nodes)
+        near = (offset.value <= self._sigma.end) & (offset.value + rho.value <= PROFILE_END)
+        reached = of_contacts.inside[..., contact]
+        inside = near & reached.reshape(*reached.shape[:-1], nodes, points).all(axis=-2)
+        return [sigma[points * node : points * (node + 1)] for node in range(nodes)] if nodes > 1 else [sigma], inside
 
     def _offset(self, own: dict[str, Values], position: Sequence[Differentiated]) -> Differentiated:
         """The distance of each point's contact from its sensor's centre [m], `position` added to its place."""

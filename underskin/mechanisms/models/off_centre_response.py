@@ -33,18 +33,20 @@ _WAVENUMBER_END, _NODES_PER_TURN = 24.0, 4  # M decays as e^(−k)
 
 @dataclass(frozen=True)
 class Place:
-    """The four functions of each offset that differ from 0, their values and their slopes (…, points, 4)."""
+    """The four functions of each offset that differ from 0, their values and their slopes (…, points, 4).
+
+    Beyond the profile's end all four are 0.
+    """
 
     functions: NDArray[np.intp]
     values: Floats
     slopes: Floats
-    inside: NDArray[np.bool_]  # (…, points) False beyond the profile's end, where all four are 0
 
 
 class OffsetSigma:
     """σ(a/h, L^(1/3), rT/h, e/h) around one rT/h, for offsets up to `largest_offset` (in h).
 
-    Attributes: `wavenumber` (k,) in units of 1/h, at which transforms for `linear_curves` are wanted.
+    Attributes: `wavenumber` (k,) in units of 1/h, at which transforms for `linear_at` are wanted.
     """
 
     def __init__(self, table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> None:
@@ -67,7 +69,7 @@ class OffsetSigma:
         self._strained = (values - values[:, :1]).ravel()
         self.wavenumber, self._weight = _wavenumbers(float(offsets[-1] + rho[-1] + a[-1]))
         bessel = j0(np.multiply.outer(self.wavenumber, offsets)) * (self._weight * self.wavenumber / 3)[:, None]
-        self._bessel = self.bases[3].coefficients(bessel, 1)
+        self._bessel = np.ascontiguousarray(self.bases[3].coefficients(bessel, 1).T)  # (functions, k)
 
     @cached_property
     def contact_grid(self) -> CurveGrid:
@@ -80,18 +82,21 @@ class OffsetSigma:
 
     def place(self, offset: Floats) -> Place:
         """Where offsets e/h (…, points) lie among the functions of the offset."""
-        end = min(float(self.bases[3].nodes[-1]), PROFILE_END)
-        inside = offset <= end
-        first, value, slope = self.bases[3].weights(np.minimum(offset, end))
-        within = inside[..., None]
-        return Place(first[..., None] + np.arange(4), value * within, slope * within, inside)
+        first, value, slope = self.bases[3].weights(np.minimum(offset, self.end))
+        within = (offset <= self.end)[..., None]
+        return Place(first[..., None] + np.arange(4), value * within, slope * within)
+
+    @property
+    def end(self) -> float:
+        """The largest offset e/h that has a place; beyond it σ is 0."""
+        return min(float(self.bases[3].nodes[-1]), PROFILE_END)
 
     def at(
         self, a_over_h: Floats, cbrt_load: Floats, rt_over_h: Floats, place: Place, *, strained: bool, slopes: bool
     ) -> list[Floats]:
         """σ of the table at contacts and places (…, points), and its derivative by e/h; with `slopes` also those by
         a/h, L^(1/3) and rT/h. `strained`: less its own value at L = 0, which is what finite strain adds."""
-        shape = np.broadcast_shapes(a_over_h.shape, place.inside.shape)
+        shape = np.broadcast_shapes(a_over_h.shape, place.values.shape[:-1])
         first_a, value_a, slope_a = self.bases[0].weights(a_over_h)
         first_x, value_x, slope_x = self.bases[1].weights(cbrt_load)
         first_r, value_r, slope_r = self.bases[2].weights(np.log(rt_over_h))
@@ -120,19 +125,17 @@ class OffsetSigma:
             ]
         return answers
 
-    def linear_curves(self, transforms: Floats) -> Floats:
-        """The Hankel integral of the transforms p̂ · M · 2 J1(kρ)/(kρ): (…, k) to functions of the offset."""
-        return np.asarray(transforms @ self._bessel)
-
     def linear_at(
-        self, curves: Floats, contact: NDArray[np.intp], place: Place, *, slopes: bool
+        self, transforms: Floats, contact: NDArray[np.intp], place: Place, *, slopes: bool
     ) -> tuple[Floats, Floats]:
-        """Such curves (quantities, …, contacts, functions) of these contacts at their places (quantities, …, points),
-        the first alone without `slopes`, and the derivative of the first by e/h."""
-        near = np.take_along_axis(
-            (curves if slopes else curves[:1])[..., contact, :], np.broadcast_to(place.functions, (*curves.shape[1:-2], len(contact), 4))[None], axis=-1
+        """The Hankel integrals of transforms p̂ · M · 2 J1(kρ)/(kρ) (quantities, …, contacts, k) of these contacts at
+        their places (quantities, …, points), the first alone without `slopes`; and the first's derivative by e/h."""
+        kernel, by_place = (
+            sum(self._bessel[place.functions[..., number]] * weights[..., number, None] for number in range(4))
+            for weights in (place.values, place.slopes)
         )
-        return (near * place.values).sum(axis=-1), (near[0] * place.slopes).sum(axis=-1)
+        of_points = (transforms if slopes else transforms[:1])[..., contact, :]
+        return np.einsum("...k,...k->...", of_points, kernel), np.einsum("...k,...k->...", of_points[0], by_place)
 
 
 @lru_cache(maxsize=8)

@@ -43,9 +43,8 @@ class SigmaOfContacts:
         self.inside = sigma.contains(pressed.a_over_h.value, pressed.cbrt_load.value)
         self._linear: Floats | None = None
         if layer is not None or not _as_in_the_table(contacts, pressed):
-            transforms, further = _transforms(sigma.wavenumber, contacts, pressed, rho.value, layer)
+            self._linear, further = _transforms(sigma.wavenumber, contacts, pressed, rho.value, layer)
             self._variables += further
-            self._linear = sigma.linear_curves(transforms)
             self.inside = self.inside & (pressed.a_over_h.value < LARGEST_A_OVER_H)
 
     def at(self, contact: NDArray[np.intp], place: Place, offset: Differentiated) -> Differentiated:
