@@ -80,8 +80,8 @@ class Hypothesis:
 
     def group(self, number: int) -> object:
         """The same for hypotheses that can be evaluated together; `number` tells those apart that cannot."""
-        alone = self.lines.curves or any(entry.moves_covariance for entry in self.model.parameters)
-        return number if alone else (self.placed, self.gain, self.position)
+        own = tuple(entry.name for entry in self.covariance)
+        return number if self.lines.curves else (self.gain, self.position, own)
 
     @cached_property
     def _curve_lines(self) -> CurveLines:

@@ -76,10 +76,7 @@ class Evaluated:
 
 
 class Evaluator:
-    """Evaluates points of hypotheses of the same rows, which have the same covariance parameters.
-
-    Several hypotheses are taken together only where their models have no dynamics line by line.
-    """
+    """Evaluates points of hypotheses of the same recordings, which have the same covariance parameters."""
 
     def __init__(self, hypotheses: Sequence[Hypothesis], held: Sequence[int] | None = None) -> None:
         """Prepare the names and bounds; the parameters at `held`, one of each hypothesis, stay where a point has them,
@@ -97,21 +94,27 @@ class Evaluator:
         self._log_prior_height = np.zeros(len(hypotheses))
         for number, hypothesis in enumerate(hypotheses):
             parameters = hypothesis.model.parameters
-            own = slice(0, len(parameters))
+            whole = slice(0, len(parameters))
             places = [place for place in hypothesis.mean_places if held is None or place != held[number]]
             self.free[number, places] = True
-            self.low[number, own], self.high[number, own] = np.array([entry.bounds for entry in parameters]).T
+            self.low[number, whole], self.high[number, whole] = np.array([entry.bounds for entry in parameters]).T
             priors = np.array([curvature_of_prior(entry) for entry in parameters])
             self._precision[number, places], self._centre[number, places] = priors[places].T
             starts = np.array([parameters[place].start for place in places])
             height = sum(parameters[place].log_prior(parameters[place].start) for place in places)
             self._log_prior_height[number] = height + 0.5 * priors[places, 0] @ (starts - priors[places, 1]) ** 2
-        parameters = first.model.parameters
-        self._own = [index for index, entry in enumerate(parameters) if entry.moves_covariance]
-        self._names = [entry.name for entry in parameters]
-        self._common = len(self.covariance) - len(self._own)
-        acts_on = [entry.acts_on for entry in parameters]
-        self._spread = acts_on.index("gain_spread") if "gain_spread" in acts_on else None
+        # Where each hypothesis has the covariance parameters that are its mechanisms' own, which come last.
+        self.own = np.array(
+            [
+                [place for place, entry in enumerate(one.model.parameters) if entry.moves_covariance]
+                for one in hypotheses
+            ],
+            dtype=np.intp,
+        ).reshape(len(hypotheses), -1)
+        own = [first.model.parameters[place] for place in self.own[0]]
+        self._common = len(self.covariance) - len(own)
+        spreads = [self._common + place for place, entry in enumerate(own) if entry.acts_on == "gain_spread"]
+        self._spread = spreads[0] if spreads else None
 
     @property
     def no_bend(self) -> Floats:
@@ -160,18 +163,13 @@ class Evaluator:
         """The noise levels that covariance parameters (…, parameters) hold, (…, 1)."""
         values = np.exp(covariance[..., None])
         shape = (*covariance.shape[:-1], 1)
-        spread, own = np.full(shape, SENSOR_SPREAD), {}
-        for place, column in zip(self._own, range(self._common, len(self.covariance)), strict=True):
-            if place == self._spread:
-                spread = values[..., column, :]
-            else:
-                own[self._names[place]] = values[..., column, :]
+        own = {entry.name: values[..., column, :] for column, entry in enumerate(self.covariance)}
         pickup = self.hypotheses[0].model.pickup
         return SeveralLevels(
             gain=values[..., GAIN, :],
             level=values[..., LEVEL, :],
             position=values[..., POSITION, :] if self.placed else np.zeros(shape),
-            spread=spread,
+            spread=np.full(shape, SENSOR_SPREAD) if self._spread is None else values[..., self._spread, :],
             pickup=None if pickup is None else pickup.deviation(own),
             smooth=values[..., SMOOTH, :] if self.lines.curves else np.zeros(shape),
         )
@@ -217,7 +215,7 @@ class Evaluator:
         points, cost, moving = at.points, at.cost.copy(), np.arange(len(at))
         for _ in range(steps):
             part = Evaluated(points[moving], at.products[moving], cost[moving])
-            gradient, hessian = self.covariance_equations(part, mixed=len(self._own) > 1)
+            gradient, hessian = self.covariance_equations(part, mixed=self.own.shape[1] > 1)
             if held is not None:
                 hessian[:, held, :] = hessian[:, :, held] = gradient[:, held] = 0.0
             eigenvalues, vectors = np.linalg.eigh(hessian)
@@ -254,10 +252,8 @@ class Evaluator:
 
     def with_covariance(self, points: Points, covariance: Floats) -> Points:
         """The points with other covariance parameters, a mechanism's own among the coordinates of the fit."""
-        fit = points.fit
-        if self._own:
-            fit = fit.copy()
-            fit[:, self._own] = covariance[:, self._common :]
+        fit = points.fit.copy()
+        np.put_along_axis(fit, self.own[points.owner], covariance[:, self._common :], axis=1)
         return replace(points, covariance=covariance, fit=fit)
 
     def covariance_equations(self, at: Evaluated, *, mixed: bool = True) -> tuple[Floats, Floats]:

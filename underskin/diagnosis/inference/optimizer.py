@@ -47,7 +47,7 @@ class Fitter(Evaluator):
             common.append(POSITION_PRIOR.middle)
         if self.lines.curves:
             common.append(entry.smooth.middle)
-        covariance = np.concatenate([np.tile(common, (len(own), 1)), fit[:, self._own]], axis=1)
+        covariance = np.concatenate([np.tile(common, (len(own), 1)), fit[:, self.own[hypothesis]]], axis=1)
         owner = np.full(len(own), hypothesis, dtype=np.intp)
         return Points(owner, fit, covariance, np.tile(self.no_bend, (len(own), 1)))
 

@@ -148,7 +148,8 @@ class FrfProducts:
         elif further:
             uv, vy = (np.pad(values, ((0, 0), (0, 0), (0, further))) for values in (own.uv, own.vy))
             own = SlopeSums(uv, vy, np.pad(own.vv, ((0, 0), (0, 0), (0, further), (0, further))))
-        return replace(self, level_slopes=slopes, turning=own)
+        pickup = None if self.pickup is None else self.pickup.filled(parameters)
+        return replace(self, level_slopes=slopes, turning=own, pickup=pickup)
 
     def scaled(self, factor: Floats) -> Self:
         """Of levels so many times as large (points,)."""
@@ -184,6 +185,11 @@ class PickupProducts:
             return cls(rows, np.ones((points, len(rows.line))), None)
         slopes = np.moveaxis(factor.slopes, 0, 1)[..., rows.line] if len(factor.slopes) else None
         return cls(rows, factor.value[:, rows.line], slopes)
+
+    def filled(self, parameters: int) -> Self:
+        """With derivatives that are 0 by further parameters, so many in all."""
+        v = np.zeros((*self.u.shape[:1], 0, self.u.shape[1])) if self.v is None else self.v
+        return replace(self, v=np.pad(v, ((0, 0), (0, parameters - v.shape[1]), (0, 0))))
 
     def less(self, sums: Sums, levels: SeveralLevels) -> Sums:
         """The sums less what rows lose to pick-up."""
