@@ -35,6 +35,7 @@ _KEPT_STARTS = 3
 _DECIDED = 0.999  # probability beyond which a parent's positioning scatter, or none, is its offspring's
 _COUNTS = 8.0  # nats behind the other fit within which one counts
 _LEAST_GAIN = 1.0  # in log posterior density
+_HOPELESS = 30.0  # nats of it behind the best beyond which a fit is left: its evidence is more than 10 behind
 _LEAST_SCATTER = 3e-3  # relative effect of positioning scatter on a recording below which it is not looked for
 
 
@@ -120,11 +121,12 @@ class FittingProblem:
         lines = self.lines if whole or any(CATALOGUE[name].needs_lines for name in names) else self.collapsed
         return Hypothesis(compose(names, lines.campaign, self.table, self.kind), lines, self.curvature, placed)
 
-    def explain(self, requests: Sequence[Request]) -> list[Explanation | None]:
+    def explain(self, requests: Sequence[Request], best: float = np.inf) -> list[Explanation | None]:
         """The sets' explanations.
 
         None where the log posterior density gains less than `_LEAST_GAIN` over the parent's: the added mechanism does
-        not show. Evidences are Laplace approximations, until they are `integrated`. Raises Unsupported.
+        not show; and where a set of mechanisms is hopeless, by `_HOPELESS` nats behind the others or what is the `best`
+        cost so far. Evidences are Laplace approximations, until they are `integrated`. Raises Unsupported.
         """
         plain = [self.hypothesis(request.names, False) for request in requests]
         placed = [replace(hypothesis, placed=True) for hypothesis in plain]
@@ -134,19 +136,22 @@ class FittingProblem:
             starts[scattered][number] = _starts(Fitter([(placed if scattered else plain)[number]]), request)
         fits: list[list[tuple[float, Evidence]]] = [[] for _ in requests]
         log_priors = np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER])
-        for number, improved, evidence in _fitted(plain, starts[False], requests):
+        for number, improved, evidence in _fitted(plain, starts[False], requests, best):
             parent = requests[number].parent
-            also = parent.placed > 1 - _DECIDED if parent else self._position_matters(evidence)
-            fits[number].append((float(log_priors[0]) if also or parent else 0.0, evidence))
+            if evidence is None and parent is not None and parent.placed <= 0.5:
+                continue
+            also = parent.placed > 1 - _DECIDED if parent else self._position_matters(plain[number], improved)
+            if evidence is not None:
+                fits[number].append((float(log_priors[0]) if also or parent else 0.0, evidence))
             if also:
                 starts[True][number] = Fitter([placed[number]]).with_scatter(improved)
-        for number, _, evidence in _fitted(placed, starts[True], requests):
-            fits[number].append((float(log_priors[1]), evidence))
-        whole = [len(own) == sum(number in one for one in starts.values()) for number, own in enumerate(fits)]
-        return [
-            Explanation.of(request.names, own) if own and complete else None
-            for request, own, complete in zip(requests, fits, whole, strict=True)
-        ]
+        best = min([best, *(evidence.cost for own in fits for _, evidence in own)])
+        for number, _, evidence in _fitted(placed, starts[True], requests, best):
+            if evidence is not None:
+                fits[number].append((float(log_priors[1]), evidence))
+            elif np.isfinite(requests[number].target(True)):
+                fits[number].clear()
+        return [Explanation.of(request.names, own) if own else None for request, own in zip(requests, fits, strict=True)]
 
     def refit(self, explanations: Sequence[Explanation]) -> list[Explanation | None]:
         """Sets that were fitted to more recordings, fitted to these, from where they stood; by the Laplace approximation.
@@ -166,14 +171,15 @@ class FittingProblem:
                 hypotheses.append(hypothesis)
         requests = [Request(hypothesis.model.names) for hypothesis in hypotheses]
         fitted = {requests[number].names: evidence for number, _, evidence in _fitted(hypotheses, starts, requests)}
+        each = [fitted.get(entry.names) for entry in explanations]
         return [
-            Explanation.of(entry.names, [(0.0, fitted[entry.names])]) if entry.names in fitted else None
-            for entry in explanations
+            Explanation.of(entry.names, [(0.0, evidence)]) if evidence else None
+            for entry, evidence in zip(explanations, each, strict=True)
         ]
 
-    def _position_matters(self, evidence: Evidence) -> bool:
+    def _position_matters(self, hypothesis: Hypothesis, points: Points) -> bool:
         """Whether positioning scatter as large as it usually gets would show in some recording."""
-        products = evidence.fitter.products(evidence.at.points, slopes=False, place=True)
+        products = hypothesis.products(points.fit, slopes=False, place=True)
         if products.place_slopes is None:
             return False
         p = POSITION_RANGE[1]
@@ -196,29 +202,32 @@ def integrated(explanations: Sequence[Explanation]) -> list[Explanation]:
 
 
 def _fitted(
-    hypotheses: Sequence[Hypothesis], starts: Mapping[int, Points], requests: Sequence[Request]
-) -> list[tuple[int, Points, Evidence]]:
-    """Of each hypothesis that has starts, where it gains on its parent: its number, the starts improved, and the
-    evidence of the best."""
+    hypotheses: Sequence[Hypothesis], starts: Mapping[int, Points], requests: Sequence[Request], best: float = np.inf
+) -> list[tuple[int, Points, Evidence | None]]:
+    """Of each hypothesis that has starts: its number, the starts improved, and the evidence of the best; None where
+    that does not gain on its parent, or is hopeless beside the others and the `best` cost so far."""
     groups: dict[object, list[int]] = {}
     for number in starts:
         groups.setdefault(hypotheses[number].group(number), []).append(number)
-    fits = []
+    fits: list[tuple[int, Points, Evidence | None]] = []
     for members in groups.values():
         fitter = Fitter([hypotheses[number] for number in members])
         points = _stacked([starts[number] for number in members])
-        targets = np.array([requests[number].target(fitter.placed) for number in members])
-        improved = fitter.improve(points, targets[points.owner])
-        best = [
-            row
-            for row in improved.best().tolist()
-            if improved.cost[row] < targets[improved.points.owner[row]]
-        ]
-        if not best:
-            continue
-        for row, evidence in zip(best, around(fitter, improved[np.array(best)]), strict=True):
-            owner = improved.points.owner[row]
-            fits.append((members[owner], _alone(improved.points, owner, fitter.counts[owner]), evidence))
+        gains = np.array([requests[number].target(fitter.placed) for number in members])[points.owner]
+        hopeless = np.array([_HOPELESS if requests[number].names else np.inf for number in members])[points.owner]
+
+        def target(at: Evaluated, gains: Floats = gains, hopeless: Floats = hopeless, best: float = best) -> Floats:
+            return np.minimum(gains, min(best, float(at.cost.min())) + hopeless)
+
+        improved = fitter.improve(points, target)
+        shown = [row for row in improved.best().tolist() if improved.cost[row] < target(improved)[row]]
+        best = min(best, float(improved.cost.min()))
+        evidence: dict[int, Evidence] = {}
+        if shown:
+            owners = improved.points.owner[shown].tolist()
+            evidence = dict(zip(owners, around(fitter, improved[np.array(shown)]), strict=True))
+        for owner, number in enumerate(members):
+            fits.append((number, _alone(improved.points, owner, fitter.counts[owner]), evidence.get(owner)))
     return fits
 
 

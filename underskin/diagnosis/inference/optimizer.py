@@ -4,6 +4,7 @@ Every step of the mean parameters is followed by steps of the noise levels, whic
 own damping, and rests once it has converged, while the others go on.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 
@@ -26,6 +27,9 @@ _CONVERGED = 0.01  # in log posterior
 _MOST_ITERATIONS = 25
 _USUAL_GAIN = 0.03  # scatter of gains while nothing was fitted yet
 _POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
+
+
+Target = Callable[[Evaluated], Floats]  # costs (points,) that points must get below to be of any use
 
 
 class Fitter(Evaluator):
@@ -123,8 +127,8 @@ class Fitter(Evaluator):
         proportional = [[entry.proportional for entry in one.model.parameters] for one in self.hypotheses]
         return np.array([own.index(True) for own in proportional])
 
-    def improve(self, start: Points, target: Floats | None = None) -> Evaluated:
-        """The most probable points near the starts; only roughly where a `target` cost (points,) will not be reached."""
+    def improve(self, start: Points, target: Target | None = None) -> Evaluated:
+        """The most probable points near the starts; only roughly where their targets will not be reached."""
         if not self.lines.curves:
             return self.settle(self.descend(self.settle(self.evaluate(start), 3), 1, target), 2)
         # Small smooth error and close fit, or large and loose: each may be a maximum of its own.
@@ -138,12 +142,11 @@ class Fitter(Evaluator):
         better = np.flatnonzero(other.cost < one.cost)
         return self.replaced(one, better, other[better])
 
-    def descend(self, best: Evaluated, settling: int, target: Floats | None = None) -> Evaluated:
+    def descend(self, best: Evaluated, settling: int, target: Target | None = None) -> Evaluated:
         """Steps of the mean parameters, each followed by so many of the covariance's.
 
         A point goes no further once it promises no cost below its target.
         """
-        target = np.full(len(best), np.inf) if target is None else target
         damping = np.full(len(best), 1e-3)
         moving = np.arange(len(best))
         for _ in range(_MOST_ITERATIONS):
@@ -151,7 +154,9 @@ class Fitter(Evaluator):
             step, slope = self._step(part, damping[moving])
             grown = self.grown(part)
             resting = (slope < _CONVERGED) & grown
-            going = part.cost - _PROMISED * slope - _MARGIN < target[moving]
+            going = np.ones(len(part), dtype=bool)
+            if target is not None:
+                going = part.cost - _PROMISED * slope - _MARGIN < target(best)[moving]
             resting &= going
             if resting.any():
                 settled = self.settle(part[resting], settling)

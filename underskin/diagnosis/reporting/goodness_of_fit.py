@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.data.names import NOTHING_MISSING
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation import cross_validation
@@ -30,9 +30,9 @@ def explains_percent(
     if any(entry.acts_on == "line_variance" for entry in own):
         return round(100 * _share_of_variance(explanation), 1)
     rest = tuple(entry for entry in explanation.names if entry != name)
-    without = next((entry for entry in search.explanations if entry.names == rest), None)
-    if without is None:
-        return None
+    known = [entry for entry in search.explanations if entry.names == rest]
+    without = known[0] if known else problem.explain([Request(rest)])[0]
+    assert without is not None  # alone, nothing is left out
     misfit = cross_validation.in_sample(problem, without)
     beyond = misfit.square / misfit.size - whole.noise / whole.size
     left = whole.square / whole.size - whole.noise / whole.size

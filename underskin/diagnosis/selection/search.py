@@ -171,7 +171,8 @@ def _explain(problem: FittingProblem, explanations: Explanations, requests: Sequ
                 later.append(request)
             else:
                 now[key] = request
-        for key, explanation in zip(now, problem.explain(list(now.values())), strict=True):
+        best = min((entry.best.cost for entry in explanations.values()), default=np.inf)
+        for key, explanation in zip(now, problem.explain(list(now.values()), best), strict=True):
             if explanation is not None:
                 explanations[key] = explanation
         requests = later
