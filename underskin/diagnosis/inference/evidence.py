@@ -127,7 +127,8 @@ def _over_loose(evidence: list[Evidence]) -> list[Evidence]:
 
     def log_values(numbers: list[int], values: Floats) -> Floats:
         points = _held_points(held, evidence, known, numbers, values)
-        found = around(held, held.descend(held.settle(held.evaluate(points), 1), 1))
+        begun = held.settle(held.evaluate(points), 1)
+        found = around(held, held.descend(begun, 1, _within_reach))
         own = [held.hypotheses[number].model.parameters[known[number]] for number in numbers]
         priors = [entry.log_prior(value) for entry, value in zip(own, values.tolist(), strict=True)]
         for number, entry, prior in zip(numbers, found, priors, strict=True):
@@ -147,6 +148,13 @@ def _over_loose(evidence: list[Evidence]) -> list[Evidence]:
             again = around(fitter, settled)
             whole[number] = _over_loose(again)[0] if _loosest(again[0]) is not None else again[0]
     return whole
+
+
+def _within_reach(at: Evaluated) -> Floats:
+    """The cost that points must get below to count in the integrals that they belong to."""
+    least = np.full(at.points.owner.max() + 1, np.inf)
+    np.minimum.at(least, at.points.owner, at.cost)
+    return np.asarray(least[at.points.owner] + _GONE + _TRUSTED)
 
 
 def _loosest(evidence: Evidence) -> int | None:

@@ -38,9 +38,8 @@ def without_seating(
     if rows.recordings < len(campaign.recordings):
         return None
     problem = FittingProblem(rows, table)
-    stiffer, plain = problem.explain(
-        [Request(tuple(names)), Request(tuple(name for name in names if name not in imitated))]
-    )
+    (stiffer,) = problem.explain([Request(tuple(names))])
+    (plain,) = problem.explain([Request(tuple(name for name in names if name not in imitated))])
     assert stiffer is not None
     assert plain is not None
     if stiffer.log_evidence - plain.log_evidence > SHOWS:

@@ -25,8 +25,8 @@ class CubicBasis:
         basis = BSpline(knots, np.eye(count), _DEGREE)
         powers = [np.asarray(basis(self._knots[:-1], nu=order)) / math.factorial(order) for order in range(4)]
         cells = np.arange(len(self._knots) - 1)[:, None]
-        # (power, cell, function): the four functions of each cell, lowest power first
-        self._cubics = np.stack([power[cells, cells + np.arange(4)] for power in powers])
+        # (cell, power, function): the four functions of each cell, lowest power first
+        self._cubics = np.stack([power[cells, cells + np.arange(4)] for power in powers], axis=1)
 
     def coefficients(self, values: Floats, axis: int) -> Floats:
         """The spline's coefficients, along one axis of the values."""
@@ -37,9 +37,14 @@ class CubicBasis:
 
         Beyond the nodes every function is continued along its tangent.
         """
-        inside = np.clip(at, self.nodes[0], self.nodes[-1])
+        inside = np.minimum(np.maximum(at, self.nodes[0]), self.nodes[-1])
         cell = np.searchsorted(self._knots[1:-1], inside, side="right")
-        u = (inside - self._knots[cell])[..., None]
-        c0, c1, c2, c3 = self._cubics[:, cell]
-        slope = (3 * c3 * u + 2 * c2) * u + c1
-        return cell, ((c3 * u + c2) * u + c1) * u + c0 + slope * (at - inside)[..., None], slope
+        u = inside - self._knots[cell]
+        square = u * u
+        powers = np.empty((*u.shape, 2, 4))
+        powers[..., 0, 0], powers[..., 0, 1], powers[..., 0, 2], powers[..., 0, 3] = 1.0, u, square, square * u
+        powers[..., 1, 0], powers[..., 1, 1], powers[..., 1, 2], powers[..., 1, 3] = 0.0, 1.0, 2 * u, 3 * square
+        weights = powers @ self._cubics[cell]
+        value, slope = weights[..., 0, :], weights[..., 1, :]
+        beyond = at - inside
+        return cell, value + slope * beyond[..., None] if beyond.any() else value, slope

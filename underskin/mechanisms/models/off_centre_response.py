@@ -38,7 +38,7 @@ class Place:
     Beyond the profile's end all four are 0.
     """
 
-    functions: NDArray[np.intp]
+    first: NDArray[np.intp]  # of the four (…, points)
     values: Floats
     slopes: Floats
 
@@ -63,10 +63,9 @@ class OffsetSigma:
         self.bases = [CubicBasis(np.asarray(nodes)) for nodes in (a, x, np.log(rho), offsets)]
         for axis, basis in enumerate(self.bases):
             values = basis.coefficients(values, axis)
-        self._strides = [int(np.prod(values.shape[axis + 1 :])) for axis in range(4)]
-        self._table = np.ascontiguousarray(values).ravel()
+        self._table = _windows(values)
         # The first coefficient over L^(1/3) is the value at L = 0, and splines sum to 1.
-        self._strained = (values - values[:, :1]).ravel()
+        self._strained = _windows(values - values[:, :1])
         self.wavenumber, self._weight = _wavenumbers(float(offsets[-1] + rho[-1] + a[-1]))
         bessel = j0(np.multiply.outer(self.wavenumber, offsets)) * (self._weight * self.wavenumber / 3)[:, None]
         self._bessel = np.ascontiguousarray(self.bases[3].coefficients(bessel, 1).T)  # (functions, k)
@@ -84,7 +83,7 @@ class OffsetSigma:
         """Where offsets e/h (…, points) lie among the functions of the offset."""
         first, value, slope = self.bases[3].weights(np.minimum(offset, self.end))
         within = (offset <= self.end)[..., None]
-        return Place(first[..., None] + np.arange(4), value * within, slope * within)
+        return Place(first, value * within, slope * within)
 
     @property
     def end(self) -> float:
@@ -96,32 +95,23 @@ class OffsetSigma:
     ) -> list[Floats]:
         """σ of the table at contacts and places (…, points), and its derivative by e/h; with `slopes` also those by
         a/h, L^(1/3) and rT/h. `strained`: less its own value at L = 0, which is what finite strain adds."""
-        shape = np.broadcast_shapes(a_over_h.shape, place.values.shape[:-1])
         first_a, value_a, slope_a = self.bases[0].weights(a_over_h)
         first_x, value_x, slope_x = self.bases[1].weights(cbrt_load)
         first_r, value_r, slope_r = self.bases[2].weights(np.log(rt_over_h))
-        four, (of_a, of_x, of_r, _) = np.arange(4), self._strides
-        cell = (first_a * of_a + first_x * of_x + first_r * of_r)[..., None, None, None]
-        cell = cell + (four[:, None, None] * of_a + four[:, None] * of_x + four * of_r)
-        index = cell.reshape(*cell.shape[:-3], 64, 1) + place.functions[..., None, :]
-        near = (self._strained if strained else self._table)[index].reshape(-1, 64, 4)
-        of_place = np.stack([place.values, place.slopes], axis=-1)
-        near, by_place = np.moveaxis(near @ np.broadcast_to(of_place, (*shape, 4, 2)).reshape(-1, 4, 2), -1, 0)
-
-        def weights(of_a: Floats, of_x: Floats, of_r: Floats) -> Floats:
-            product = of_a[..., :, None, None] * of_x[..., None, :, None] * of_r[..., None, None, :]
-            return np.broadcast_to(product, (*shape, 4, 4, 4)).reshape(-1, 64)
-
-        def total(weight: Floats, values: Floats) -> Floats:
-            return np.einsum("nw,nw->n", weight, values).reshape(shape)
-
-        here = weights(value_a, value_x, value_r)
-        answers = [total(here, near), total(here, by_place)]
+        near = (self._strained if strained else self._table)[first_a, first_x, first_r, place.first]  # (…, a, x, r, e)
+        near = near.reshape(*near.shape[:-4], 64, 4) @ np.stack([place.values, place.slopes], axis=-1)
+        of_r = np.stack([value_r, slope_r / rt_over_h[..., None]], axis=-1)[..., None, :, :]
+        value, by_place = (near[..., number].reshape(*near.shape[:-2], 4, 4, 4) for number in range(2))
+        value = value @ of_r  # (…, a, x, 2)
+        answers = [
+            np.einsum("...a,...ax,...x->...", value_a, value[..., 0], value_x),
+            np.einsum("...a,...axr,...x,...r->...", value_a, by_place, value_x, value_r),
+        ]
         if slopes:
             answers += [
-                total(weights(slope_a, value_x, value_r), near),
-                total(weights(value_a, slope_x, value_r), near),
-                total(weights(value_a, value_x, slope_r / rt_over_h[..., None]), near),
+                np.einsum("...a,...ax,...x->...", slope_a, value[..., 0], value_x),
+                np.einsum("...a,...ax,...x->...", value_a, value[..., 0], slope_x),
+                np.einsum("...a,...ax,...x->...", value_a, value[..., 1], value_x),
             ]
         return answers
 
@@ -131,7 +121,7 @@ class OffsetSigma:
         """The Hankel integrals of transforms p̂ · M · 2 J1(kρ)/(kρ) (quantities, …, contacts, k) of these contacts at
         their places (quantities, …, points), the first alone without `slopes`; and the first's derivative by e/h."""
         kernel, by_place = (
-            sum(self._bessel[place.functions[..., number]] * weights[..., number, None] for number in range(4))
+            sum(self._bessel[place.first + number] * weights[..., number, None] for number in range(4))
             for weights in (place.values, place.slopes)
         )
         of_points = (transforms if slopes else transforms[:1])[..., contact, :]
@@ -142,6 +132,11 @@ class OffsetSigma:
 def offset_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> OffsetSigma:
     """The same, kept for the next model of the same skin."""
     return OffsetSigma(table, rt_over_h, stretch, largest_offset)
+
+
+def _windows(values: Floats) -> Floats:
+    """All blocks of 4 × 4 × 4 × 4 neighbouring coefficients, by the first of each (a view)."""
+    return np.lib.stride_tricks.sliding_window_view(np.ascontiguousarray(values), (4, 4, 4, 4))  # type: ignore[call-overload,no-any-return]
 
 
 def _disc_averages(radii: Floats, offsets: Floats, rt_over_h: float) -> Floats:
