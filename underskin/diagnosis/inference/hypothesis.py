@@ -1,6 +1,5 @@
 """One hypothesis: a model, the lines it is to explain, and the coordinates in which it is fitted."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,12 +25,12 @@ _NUMBERS_AT_ONCE = 2_000_000  # of a factor with its derivatives
 
 @dataclass(frozen=True)
 class CovarianceParameter:
-    """A coordinate that moves the covariance alone: its name, bounds and log prior density."""
+    """A coordinate that moves the covariance alone: its name, bounds and prior."""
 
     name: str
     low: float
     high: float
-    log_density: Callable[[Floats | float], Floats]
+    prior: Plateau
 
 
 @dataclass(frozen=True)
@@ -57,16 +56,16 @@ class Hypothesis:
         low, high = _CURVE_LEVELS if self.lines.curves else _LEVELS
         level = level_prior(self.lines.noise.log_level_sd)
         common = [
-            CovarianceParameter("gain", np.log(1e-3), np.log(0.5), self.gain.log_density),
-            CovarianceParameter("level", np.log(low), np.log(high), level.log_density),
+            CovarianceParameter("gain", np.log(1e-3), np.log(0.5), self.gain),
+            CovarianceParameter("level", np.log(low), np.log(high), level),
         ]
         if self.placed:
             highest = self.position.high + np.log(2.0)
-            common.append(CovarianceParameter("position", np.log(2e-5), highest, self.position.log_density))
+            common.append(CovarianceParameter("position", np.log(2e-5), highest, self.position))
         if self.lines.curves:
-            common.append(CovarianceParameter("smooth", np.log(1e-5), np.log(2.0), self.smooth.log_density))
+            common.append(CovarianceParameter("smooth", np.log(1e-5), np.log(2.0), self.smooth))
         own = [
-            CovarianceParameter(entry.name, *entry.bounds, _log_density(entry))
+            CovarianceParameter(entry.name, *entry.bounds, _as_plateau(entry))
             for entry in self.model.parameters
             if entry.moves_covariance
         ]
@@ -117,11 +116,13 @@ class FitPoint:
     bend: Floats
 
 
-def _log_density(entry: Parameter) -> Callable[[Floats | float], Floats]:
-    """A parameter's log prior density within its bounds."""
-    precision, centre = curvature_of_prior(entry)
-    peak = entry.log_prior(entry.start) + 0.5 * precision * (entry.start - centre) ** 2
-    return lambda x: np.asarray(peak - 0.5 * precision * (x - centre) ** 2)
+def _as_plateau(entry: Parameter) -> Plateau:
+    """A parameter's prior within its bounds, normalised there."""
+    if isinstance(entry.prior, Normal):
+        peak = entry.log_prior(entry.start) + 0.5 * ((entry.start - entry.prior.mean) / entry.prior.sd) ** 2
+        return Plateau(entry.prior.mean, entry.prior.mean, entry.prior.sd, entry.prior.sd, float(np.exp(-peak)))
+    low, high = entry.bounds
+    return Plateau(low, high, 1.0, 1.0, high - low)
 
 
 def curvature_of_prior(entry: Parameter) -> tuple[float, float]:

@@ -51,17 +51,22 @@ class Likelihoods:
         sums = products.summed(levels)
         self._bend = own = bend[:, None, lines.sensor]
         p2 = levels.position**2
-        self._factor = np.exp(own + 0.5 * p2 * curvature.laplacian) if np.any(p2) else np.exp(own)
-        self.a = a = products.level[:, None] * self._factor
-        self._known = known = a * (1 - own)
+        placed, bent = bool(np.any(p2)), bool(bend.any())
+        level = products.level[:, None]
+        exponent = own + 0.5 * p2 * curvature.laplacian if placed else own
+        self._factor: Floats = np.exp(exponent) if placed or bent else np.ones((1, 1, 1))
+        self.a = a = level * self._factor if placed or bent else level
+        self._known = known = a * (1 - own) if bent else a
         self.uu = uu = sums.uu / k2
         self.ur = ur = (sums.uy - known * sums.uu) / k2
         self.rr = rr = (sums.yy - known * (2 * sums.uy - known * sums.uu)) / k2
         a2 = a**2
-        self._as_model = levels.gain**2 + 0.5 * p2**2 * curvature.square  # of V, in units of a²
+        self._as_model = levels.gain**2  # of V, in units of a²
+        if placed:
+            self._as_model = self._as_model + 0.5 * p2**2 * curvature.square
         variance = self._as_model * a2
         self._moved: Floats | float = 0.0
-        if products.place_slopes is not None:
+        if placed and products.place_slopes is not None:
             self._moved = p2 * (products.place_slopes**2).sum(axis=0)[:, None] * self._factor**2
             variance = variance + self._moved
         self._reduced = reduced = 1 / (1 + variance * uu)  # 1 − (share of u taken out)

@@ -14,6 +14,7 @@ from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis, curva
 from underskin.diagnosis.inference.likelihood import Likelihoods
 from underskin.diagnosis.inference.products import Products, joined
 from underskin.diagnosis.noise.noise_levels import SeveralLevels
+from underskin.diagnosis.noise.noise_priors import Plateaus
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.units import Floats
 
@@ -85,6 +86,7 @@ class Evaluator:
         first = hypotheses[0]
         self.lines, self.curvature, self.placed = first.lines, first.curvature, first.placed
         self.covariance = first.covariance
+        self._covariance_prior = Plateaus([entry.prior for entry in self.covariance])
         self._lowest = np.array([entry.low for entry in self.covariance])
         self._highest = np.array([entry.high for entry in self.covariance])
         self.counts = [len(entry.model.parameters) for entry in hypotheses]
@@ -177,8 +179,7 @@ class Evaluator:
     def _costs(self, points: Points, products: Products, covariances: Floats) -> Floats:
         """The costs (points, sets) with covariance parameters (points, sets, parameters), where points predict."""
         likelihoods = Likelihoods(self.lines, self.curvature, products, self.levels(covariances), points.bend).each
-        prior = sum(entry.log_density(covariances[..., place]) for place, entry in enumerate(self.covariance))
-        return -likelihoods - prior - self._log_mean_prior(points)[:, None]
+        return -likelihoods - self._covariance_prior.log_density(covariances) - self._log_mean_prior(points)[:, None]
 
     def costs(self, at: Evaluated, covariances: Floats) -> Floats:
         """The costs (points, sets) at the same predictions with other covariance parameters (points, sets, …)."""
@@ -213,8 +214,9 @@ class Evaluator:
         """
         low, high = self._lowest, self._highest
         points, cost, moving = at.points, at.cost.copy(), np.arange(len(at))
+        products = at.products.values
         for _ in range(steps):
-            part = Evaluated(points[moving], at.products[moving], cost[moving])
+            part = Evaluated(points[moving], products[moving], cost[moving])
             gradient, hessian = self.covariance_equations(part, mixed=self.own.shape[1] > 1)
             if held is not None:
                 hessian[:, held, :] = hessian[:, :, held] = gradient[:, held] = 0.0

@@ -118,6 +118,12 @@ class FrfProducts:
             pickup=_of_each(lambda values: values[points], self.pickup),
         )
 
+    @property
+    def values(self) -> Self:
+        """Without derivatives by the parameters."""
+        pickup = None if self.pickup is None else replace(self.pickup, v=None)
+        return replace(self, level_slopes=None, turning=None, pickup=pickup)
+
     @classmethod
     def joined(cls, parts: Sequence["FrfProducts"], parameters: int) -> Self:
         """At the points of several, one after another, with so many parameters in all."""
@@ -281,6 +287,11 @@ class CurveProducts:
         """At some of the points."""
         slopes = None if self.force_slopes is None else self.force_slopes[points]
         return replace(self, force=self.force[points], force_slopes=slopes)
+
+    @property
+    def values(self) -> Self:
+        """Without derivatives by the parameters."""
+        return replace(self, force_slopes=None)
 
     @property
     def level(self) -> Floats:

@@ -6,6 +6,7 @@
 - line noise: its level as estimated from the lines' roughness, times a factor near 1.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,17 +20,27 @@ POSITION_FALL = (0.15, 0.15)  # the same of positions
 
 @dataclass(frozen=True)
 class Plateau:
-    """A density of a logarithm: constant between two values, falling off as half Gaussians outside."""
+    """A density of a logarithm: constant between two values, falling off as half Gaussians outside.
+
+    Normal where the two are one; uniform where `area`, the integral of what is 1 at the plateau, counts only the range.
+    """
 
     low: float
     high: float
     fall_low: float
     fall_high: float
+    area: float
 
     @classmethod
     def of(cls, limits: tuple[float, float], falls: tuple[float, float]) -> "Plateau":
         """From the values, not their logarithms."""
-        return cls(float(np.log(limits[0])), float(np.log(limits[1])), *falls)
+        low, high = np.log(limits).tolist()
+        return cls(low, high, *falls, high - low + float(np.sqrt(np.pi / 2)) * sum(falls))
+
+    @classmethod
+    def normal(cls, mean: float, sd: float) -> "Plateau":
+        """A normal density."""
+        return cls(mean, mean, sd, sd, sd * float(np.sqrt(2 * np.pi)))
 
     @property
     def middle(self) -> float:
@@ -38,26 +49,26 @@ class Plateau:
 
     def log_density(self, x: Floats | float) -> Floats:
         """The logarithm of the density."""
-        area = self.high - self.low + np.sqrt(np.pi / 2) * (self.fall_low + self.fall_high)
         outside = np.maximum((self.low - x) / self.fall_low, 0.0) + np.maximum((x - self.high) / self.fall_high, 0.0)
-        return np.asarray(-0.5 * outside**2 - np.log(area))
+        return np.asarray(-0.5 * outside**2 - np.log(self.area))
 
 
-@dataclass(frozen=True)
-class LogNormal:
-    """A normal density of a logarithm."""
+class Plateaus:
+    """Several such densities of independent coordinates."""
 
-    mean: float
-    sd: float
+    def __init__(self, each: Sequence[Plateau]) -> None:
+        """In the order of the coordinates."""
+        names = "low", "high", "fall_low", "fall_high"
+        self._low, self._high, self._fall_low, self._fall_high = (
+            np.array([getattr(entry, name) for entry in each]) for name in names
+        )
+        self._log_areas = float(np.log([entry.area for entry in each]).sum())
 
-    @property
-    def middle(self) -> float:
-        """The mean."""
-        return self.mean
-
-    def log_density(self, x: Floats | float) -> Floats:
-        """The logarithm of the density."""
-        return np.asarray(-0.5 * ((x - self.mean) / self.sd) ** 2 - np.log(self.sd * np.sqrt(2 * np.pi)))
+    def log_density(self, x: Floats) -> Floats:
+        """The logarithm of their product at (…, coordinates)."""
+        below = np.maximum((self._low - x) / self._fall_low, 0.0)
+        above = np.maximum((x - self._high) / self._fall_high, 0.0)
+        return np.asarray(-0.5 * ((below + above) ** 2).sum(axis=-1) - self._log_areas)
 
 
 GAIN_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
@@ -67,6 +78,6 @@ UNUSUAL_GAIN = Plateau.of((0.08, 0.5), (0.12, 0.12))
 UNUSUAL_POSITION = Plateau.of((0.4e-3, 2e-3), (0.15, 0.15))
 
 
-def level_prior(log_level_sd: float) -> LogNormal:
+def level_prior(log_level_sd: float) -> Plateau:
     """Of the factor on the lines' deviations; wider than the estimate's own error: noise is not quite normal."""
-    return LogNormal(0.0, float(np.hypot(log_level_sd, 0.05)))
+    return Plateau.normal(0.0, float(np.hypot(log_level_sd, 0.05)))

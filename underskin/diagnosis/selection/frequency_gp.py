@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import line_residuals
-from underskin.diagnosis.noise.noise_priors import LogNormal, level_prior
+from underskin.diagnosis.noise.noise_priors import Plateau, level_prior
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, matern, normalised
 from underskin.units import Array, Floats
 
@@ -71,7 +71,7 @@ class _LineNoise:
 
     chi2: float
     freedom: int
-    prior: LogNormal
+    prior: Plateau
 
     def gains(self, gram: Array, moment: Array) -> list[float]:
         """log p of the lines with a process of each amplitude, at the level that suits it best."""

@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
-from underskin.autodiff import Differentiated, cbrt
+import numpy as np
+
+from underskin.autodiff import Differentiated, chain
 from underskin.units import Floats
 
 
@@ -30,11 +32,15 @@ class Contacts:
     @property
     def hertz_radius(self) -> Differentiated:
         """a [m] of a sphere on a half space without adhesion, a³ = 3 F R/(4 E'): `hertz.contact_radius` with slopes."""
-        return cbrt(0.75 * self.force * self.indenter_radius / self.reduced_modulus)
+        nu = self.poisson_ratio.value
+        area = 1 - nu * nu
+        a = np.cbrt(0.75 * self.force * self.indenter_radius * area / self.modulus.value)
+        return chain(a, (-a / (3 * self.modulus.value), self.modulus), (a * (-2 * nu / (3 * area)), self.poisson_ratio))
 
     @property
     def cbrt_load(self) -> Differentiated:
         """L^(1/3) with which to enter the tables, which are for ν = 0.5: L = F/(R² E) · (0.75/(1 − ν²))²."""
-        cbrt_load = cbrt(self.force / self.indenter_radius**2 / self.modulus)
-        stiffer = 0.75 / (1 - self.poisson_ratio**2.0)
-        return cbrt_load * cbrt(stiffer) * cbrt(stiffer)
+        nu = self.poisson_ratio.value
+        area = 1 - nu * nu
+        x = np.cbrt(self.force / self.indenter_radius**2 / self.modulus.value * (0.75 / area) ** 2)
+        return chain(x, (-x / (3 * self.modulus.value), self.modulus), (x * (4 * nu / (3 * area)), self.poisson_ratio))

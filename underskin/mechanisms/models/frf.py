@@ -107,6 +107,7 @@ class FrfModel:
         reached = min(PROFILE_END, stretch * largest_offset(design, further) / self._thickness)
         self._sigma = offset_sigma(table, self._sensor_radius / self._thickness, stretch, reached)
         self._needs_stiffness = any(mechanism.needs_stiffness for mechanism in mechanisms)
+        self._stressed = [one for one in mechanisms if type(one).on_d33 is not Mechanism.on_d33]
         pickups = [mechanism.pickup(conditions, design) for mechanism in self._mechanisms]
         self.pickup: Pickup | None = together([pickup for pickup in pickups if pickup is not None])
         self._force, self._increments = _force_nodes(self._mechanisms, design)
@@ -248,10 +249,11 @@ class FrfModel:
             oscillating = oscillating + mechanism.mobility(own[mechanism.name]) * (rate - oscillating)
         rho = self._sensor_radius / contacts.thickness
         charge = oscillating * (1.5e-12 * nuisances["d33"] * rho * rho)
-        mean_stress = sigma[0] * (1.5 / np.pi * design.force[design.point_contact]) / (contacts.thickness**2.0)
-        for mechanism in self._mechanisms:
-            factor = mechanism.on_d33(mean_stress, own[mechanism.name])
-            charge = charge if factor is None else charge * factor
+        if self._stressed:
+            mean_stress = sigma[0] * (1.5 / np.pi * design.force[design.point_contact]) / (contacts.thickness**2.0)
+            for mechanism in self._stressed:
+                factor = mechanism.on_d33(mean_stress, own[mechanism.name])
+                charge = charge if factor is None else charge * factor
         level = charge[design.point]
         for mechanism in self._mechanisms:
             fraction = mechanism.neighbour_fraction(own[mechanism.name])

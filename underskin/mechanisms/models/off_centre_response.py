@@ -136,7 +136,7 @@ def offset_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_of
 
 def _windows(values: Floats) -> Floats:
     """All blocks of 4 × 4 × 4 × 4 neighbouring coefficients, by the first of each (a view)."""
-    return np.lib.stride_tricks.sliding_window_view(np.ascontiguousarray(values), (4, 4, 4, 4))  # type: ignore[call-overload,no-any-return]
+    return np.lib.stride_tricks.sliding_window_view(np.ascontiguousarray(values), (4, 4, 4, 4))
 
 
 def _disc_averages(radii: Floats, offsets: Floats, rt_over_h: float) -> Floats:
