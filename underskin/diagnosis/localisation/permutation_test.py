@@ -180,19 +180,16 @@ def _freedman_lane(
     residual = beyond((gain * weight)[:, None])
     direction, size, _ = np.linalg.svd(beyond(basis * weight[:, None]), full_matrices=False)
     direction = direction[:, size > 1e-8 * size.max()]
-    shuffled = np.empty((len(gain), PERMUTATIONS))
-    for number in range(PERMUTATIONS):
-        shuffled[:, number] = residual[_permutation(blocks, random), 0]
-    every = np.concatenate([residual, shuffled], axis=1)
+    every = np.concatenate([residual, residual[_permutations(blocks, random), 0].T], axis=1)
     return ((direction.T @ beyond(every)) ** 2).sum(axis=0)
 
 
-def _permutation(blocks: NDArray[np.intp], random: np.random.Generator) -> NDArray[np.intp]:
-    order = np.lexsort((random.random(len(blocks)), blocks))
-    place = np.argsort(blocks, kind="stable")
-    permutation = np.empty(len(blocks), dtype=np.intp)
-    permutation[place] = order
-    return permutation
+def _permutations(blocks: NDArray[np.intp], random: np.random.Generator) -> NDArray[np.intp]:
+    """Orders of the recordings (permutations, recordings), each within its block."""
+    drawn = random.random((PERMUTATIONS, len(blocks)))
+    permutations = np.empty(drawn.shape, dtype=np.intp)
+    permutations[:, np.argsort(blocks, kind="stable")] = np.lexsort((drawn, np.broadcast_to(blocks, drawn.shape)))
+    return permutations
 
 
 def _sign_flips(lines: Lines, residuals: Residuals, random: np.random.Generator) -> dict[str, Floats]:

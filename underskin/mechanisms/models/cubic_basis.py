@@ -12,13 +12,13 @@ _DEGREE = 3
 
 
 class CubicBasis:
-    """The cubic splines through values at `nodes` (not-a-knot ends)."""
+    """The cubic splines through values at `nodes` (not-a-knot ends); `to_coefficients` (functions, nodes)."""
 
     def __init__(self, nodes: Floats) -> None:
         """Write each basis function of each cell as a cubic in the distance from the cell's lower knot."""
         self.nodes = nodes
         interpolating = make_interp_spline(nodes, np.eye(len(nodes)), k=_DEGREE)
-        self._to_coefficients = np.asarray(interpolating.c)
+        self.to_coefficients = np.asarray(interpolating.c)
         knots = np.asarray(interpolating.t)
         count = len(knots) - _DEGREE - 1
         self._knots = knots[_DEGREE:-_DEGREE]
@@ -30,7 +30,7 @@ class CubicBasis:
 
     def coefficients(self, values: Floats, axis: int) -> Floats:
         """The spline's coefficients, along one axis of the values."""
-        return np.moveaxis(np.tensordot(self._to_coefficients, values, (1, axis)), 0, axis)
+        return np.moveaxis(np.tensordot(self.to_coefficients, values, (1, axis)), 0, axis)
 
     def weights(self, at: Floats) -> tuple[NDArray[np.intp], Floats, Floats]:
         """For each point (…): the first of its four functions, their values (…, 4) and their slopes (…, 4).

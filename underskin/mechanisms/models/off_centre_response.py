@@ -15,7 +15,6 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline, make_interp_spline
 from scipy.special import j0
 
 from underskin.mechanisms.models.cubic_basis import CubicBasis
@@ -58,7 +57,8 @@ class OffsetSigma:
         radii = np.append(radii, radii[-1] + _SPACING * np.arange(1, 4)) if len(radii) < 4 else radii
         a, x = table.axes[0], table.axes[2]
         profile = table.profile(radii[:, None, None], a[:, None], x**3)
-        average = np.stack([_disc_averages(radii, np.abs(offsets), ratio) for ratio in rho])
+        along = CubicBasis(radii)
+        average = np.stack([_disc_averages(along, np.abs(offsets), ratio) for ratio in rho])
         values: Floats = np.einsum("mer,rax->axme", average, profile, optimize=True)
         self.bases = [CubicBasis(np.asarray(nodes)) for nodes in (a, x, np.log(rho), offsets)]
         for axis, basis in enumerate(self.bases):
@@ -128,9 +128,13 @@ class OffsetSigma:
         return np.einsum("...k,...k->...", of_points, kernel), np.einsum("...k,...k->...", of_points[0], by_place)
 
 
-@lru_cache(maxsize=8)
 def offset_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> OffsetSigma:
-    """The same, kept for the next model of the same skin."""
+    """The same, kept for the next model of the same skin; with room for offsets up to the next half of h."""
+    return _kept(table, rt_over_h, stretch, min(PROFILE_END, float(np.ceil(2 * largest_offset) / 2)))
+
+
+@lru_cache(maxsize=8)
+def _kept(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> OffsetSigma:
     return OffsetSigma(table, rt_over_h, stretch, largest_offset)
 
 
@@ -139,24 +143,23 @@ def _windows(values: Floats) -> Floats:
     return np.lib.stride_tricks.sliding_window_view(np.ascontiguousarray(values), (4, 4, 4, 4))
 
 
-def _disc_averages(radii: Floats, offsets: Floats, rt_over_h: float) -> Floats:
-    """The matrix (offsets, radii) that averages a profile given at the radii over the offset disc; 0 beyond them."""
+def _disc_averages(along: CubicBasis, offsets: Floats, rt_over_h: float) -> Floats:
+    """The matrix (offsets, radii) that averages a profile given at its radii over the offset disc; 0 beyond them."""
     x, weight = np.polynomial.legendre.leggauss(_RADIAL)
     s = rt_over_h * (x + 1) / 2
     weight = np.repeat(weight * (x + 1) / 2 / _ANGULAR, _ANGULAR)
     angle = np.pi * (np.arange(_ANGULAR) + 0.5) / _ANGULAR
     across = offsets[:, None, None]
     distance = np.sqrt(across**2 + s[:, None] ** 2 + 2 * across * s[:, None] * np.cos(angle)).reshape(-1)
-    knots = make_interp_spline(radii, radii, k=3).t
-    reached = distance <= radii[-1]
-    design = BSpline.design_matrix(np.where(reached, distance, 0.0), knots, 3)
+    reached = distance <= along.nodes[-1]
+    first, functions, _ = along.weights(np.where(reached, distance, 0.0))
     weights = np.where(reached, np.tile(weight, len(offsets)), 0.0)
     # Sums over each disc of the four functions at each of its points.
-    disc = np.repeat(np.arange(len(offsets)) * len(radii), len(weight))
-    place = np.repeat(disc, 4) + design.indices
-    total = np.asarray(np.bincount(place, np.repeat(weights, 4) * design.data, len(offsets) * len(radii)), dtype=float)
-    to_coefficients = np.asarray(make_interp_spline(radii, np.eye(len(radii)), k=3).c)
-    return total.reshape(len(offsets), -1) @ to_coefficients
+    count = len(along.nodes)
+    disc = np.repeat(np.arange(len(offsets)) * count, len(weight))
+    place = (disc + first)[:, None] + np.arange(4)
+    total: Floats = np.bincount(place.ravel(), (weights[:, None] * functions).ravel(), len(offsets) * count).astype(float)
+    return total.reshape(len(offsets), -1) @ along.to_coefficients
 
 
 def _wavenumbers(highest: float) -> tuple[Floats, Floats]:
