@@ -16,7 +16,7 @@ from bench.diagnosed import Effects, recorded
 from bench.figures import Figure
 from tests.support.nested_sampling import Posterior, Sampled, nested
 from underskin.diagnosis.data.dataset import lines
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request, integrated
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.selection.search import log_prior
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
@@ -100,13 +100,14 @@ def _compared(effects: Effects) -> Compared:
 
 
 def _explained(problem: FittingProblem) -> list[Explanation]:
-    results = [problem.explain(names) for names in HYPOTHESES]
-    return [entry.integrated() for entry in results if entry is not None]  # without a parent none is left out
+    # One by one, so that none is left for being hopeless beside the others.
+    results = [explanation for names in HYPOTHESES for explanation in problem.explain([Request(names)])]
+    return integrated([entry for entry in results if entry is not None])
 
 
 def _sampled(problem: FittingProblem, explained: Explanation) -> Sampled:
     """Without positioning scatter and, where the diagnosis looked for it, with it."""
-    plain, placed = (Fitter(problem.hypothesis(explained.names, placed)) for placed in (False, True))
+    plain, placed = (Fitter([problem.hypothesis(explained.names, placed)]) for placed in (False, True))
     without = nested(Posterior(plain, explained.point))
     if explained.placed == 0:
         return without

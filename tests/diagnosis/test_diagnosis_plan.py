@@ -135,10 +135,10 @@ def recorded(
     """The planned recordings as they come out if an explanation is true, its parameters drawn from what is known."""
     model = compose(truth.names, together, table)
     fit = truth.point.fit.copy()
-    places = truth.best.fitter.places
+    places = truth.best.hypothesis.mean_places
     fit[places] = random.multivariate_normal(fit[places], truth.best.covariance)
-    value = 1e12 * model.predict(np.clip(fit, truth.best.fitter.low, truth.best.fitter.high)).value
-    levels = truth.best.at.marginal.levels
+    value = 1e12 * model.predict(np.clip(fit, truth.best.fitter.low[0], truth.best.fitter.high[0])).value
+    levels = truth.best.levels
     entries = list(together.recordings)
     for number in range(own, len(entries)):
         entry = entries[number]
@@ -171,8 +171,8 @@ def test_a_plan_decides_as_often_as_it_promises(narrow: Left, table: SigmaTable)
         log_posterior = np.log(prior)
         for number, explanation in enumerate(explanations):
             assert explanation is not None
-            again = problem.refit(explanation)
-            before = narrow.problem.refit(explanation)
+            (again,) = problem.refit([explanation])
+            (before,) = narrow.problem.refit([explanation])
             assert again is not None
             assert before is not None
             log_posterior[number] += again.log_evidence - before.log_evidence

@@ -11,10 +11,10 @@ from rig.draw import drawn, record
 from rig.recorded import campaign as recorded
 from tests.support.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.data.dataset import lines
-from underskin.diagnosis.inference.explanation import FittingProblem
+from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.selection.frequency_gp import frequency_bins
-from underskin.diagnosis.selection.recording_gp import GainResidual, ScatterNode
+from underskin.diagnosis.selection.recording_gp import GainResidual, ScatterNodes
 from underskin.recordings.campaign import from_dict
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
@@ -77,17 +77,20 @@ def test_the_scatter_of_an_ordinary_rig_is_nothing_missing(gain: float, position
 def test_the_evidence_of_a_process_is_that_of_the_whole_covariance(table: SigmaTable) -> None:
     """Blocks, projections and eigenvalues against dense covariance matrices, one for each scatter and amplitude."""
     problem = FittingProblem(lines(campaign(Made(offsets_mm=(0.0, 1.0), position_mm=0.1), table)), table)
-    nothing = problem.explain(())
+    (nothing,) = problem.explain([Request(())])
     assert nothing is not None
     residual = GainResidual(problem, nothing)
     amplitudes = np.array([0.02, 0.2])
     sets = np.random.default_rng(1).normal(size=(3, problem.lines.recordings, 4))
     known = residual.fixed @ residual.fixed.T
 
-    def log_density(scatter: ScatterNode, shapes: np.ndarray) -> float:
-        whole = np.diag(scatter.variance) + known + shapes @ shapes.T
-        density = multivariate_normal(np.zeros(len(whole)), whole).logpdf(scatter.residual)
-        return scatter.log_weight + float(density)
+    def log_density(scatter: ScatterNodes, shapes: np.ndarray) -> float:
+        each = []
+        for log_weight, variances in zip(scatter.log_weights, scatter.variances, strict=True):
+            whole = np.diag(variances) + known + shapes @ shapes.T
+            density = multivariate_normal(np.zeros(len(whole)), whole).logpdf(scatter.residual)
+            each.append(log_weight + float(density))
+        return float(logsumexp(each))
 
     found = residual.gains(sets, amplitudes)
     expected = [

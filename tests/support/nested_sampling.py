@@ -23,7 +23,9 @@ class Posterior:
     def __init__(self, fitter: Fitter, around: FitPoint) -> None:
         """`around` gives the place where the sensors' gains are linearised first."""
         self.fitter, self._around = fitter, around
-        self._mean = [fitter.parameters[place] for place in fitter.places]
+        hypothesis = fitter.hypotheses[0]
+        self._places = hypothesis.mean_places
+        self._mean = [hypothesis.model.parameters[place] for place in self._places]
         self._covariance = [_quantiles(entry) for entry in fitter.covariance]
         bounds = [*(entry.bounds for entry in self._mean), *((entry.low, entry.high) for entry in fitter.covariance)]
         self._low, self._high = np.array(bounds).T
@@ -39,15 +41,16 @@ class Posterior:
         if ((x < self._low) | (x > self._high)).any():
             return -np.inf
         fit = self._around.fit.copy()
-        fit[fitter.places] = x[:count]
-        return -fitter.evaluate(fitter.moved(replace(self._around, fit=fit), x[count:])).cost
+        fit[self._places] = x[:count]
+        points = fitter.with_covariance(fitter.at(replace(self._around, fit=fit)), x[None, count:])
+        return -float(fitter.evaluate(points, slopes=False).cost[0])
 
     def log_prior(self, x: Floats) -> float:
         """The prior's density, within the bounds."""
         count = len(self._mean)
         mean = sum(entry.log_prior(value) for entry, value in zip(self._mean, x[:count], strict=True))
         covariance = zip(self.fitter.covariance, x[count:].tolist(), strict=True)
-        return mean + sum(entry.log_density(value) for entry, value in covariance)
+        return mean + sum(float(entry.prior.log_density(value)) for entry, value in covariance)
 
     def log_likelihood(self, x: Floats) -> float:
         """The likelihood alone, within the bounds."""
@@ -64,7 +67,7 @@ class Posterior:
 def _quantiles(entry: CovarianceParameter) -> Callable[[float], float]:
     """The quantile function of a covariance parameter's prior, whose mass is all within its bounds."""
     x = np.linspace(entry.low, entry.high, _NODES)
-    density = np.exp([entry.log_density(value) for value in x.tolist()])
+    density = np.exp(entry.prior.log_density(x))
     below = np.append(0.0, np.cumsum((density[1:] + density[:-1]) / 2))
     return lambda probability: float(np.interp(probability * below[-1], below, x))
 

@@ -62,7 +62,7 @@ class SphereOnLayer:
     @property
     def plane_modulus(self) -> float:
         """E' = E/(1 − ν²) [Pa]."""
-        return self.youngs_modulus / (1 - self.layer.poisson_ratio**2)
+        return float(self.youngs_modulus / (1 - self.layer.poisson_ratio**2))
 
     def at_radius(self, contact_radius: float) -> SphereContact:
         """The equilibrium of a given a [m]; InvalidInput unless 0 < a/h ≤ 10."""

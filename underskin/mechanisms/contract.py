@@ -14,7 +14,7 @@ from underskin.errors import InvalidInput, not_finite, not_unique, required
 from underskin.extensions import described
 from underskin.mechanisms.base import AXES, NEEDED_FIELDS, UNITS, Kind, Mechanism, Normal, Parameter, Stage, Uniform
 from underskin.mechanisms.models.compression import CompressionModel
-from underskin.mechanisms.models.frf import FrfModel
+from underskin.mechanisms.models.frf import FrfModel, joined
 from underskin.mechanisms.models.indentation import IndentationModel
 from underskin.mechanisms.models.nuisances import FRF_NUISANCES
 from underskin.mechanisms.reference_campaigns import reference_campaign
@@ -148,12 +148,29 @@ def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
     field = f"law ({kind})"
     model = _called(field, lambda: _model(mechanism, campaign, kind))
     count = len(_parameters(mechanism, kind))
-    for fit, place in _points(model.parameters[:count], model.parameters[count:]):
+    points = list(_points(model.parameters[:count], model.parameters[count:]))
+    if isinstance(model, FrfModel):
+        _check_several_points(model, np.array([fit for fit, _ in points]), field)
+    for fit, place in points:
         with np.errstate(all="ignore"):
             answer = _called(f"{field} at {place}", partial(model.predict, fit))
         numbers = [answer.value, answer.slopes, *([] if answer.pickup is None else [answer.pickup])]
         if not all(np.isfinite(part).all() for part in numbers):
             raise not_finite(f"{field} at {place}", None, "gives numbers that are not finite")
+
+
+def _check_several_points(model: FrfModel, fits: Floats, field: str) -> None:
+    """Several points at once give what each gives alone: a diagnosis evaluates them together."""
+    with np.errstate(all="ignore"):
+        together = _called(f"{field} at several points", lambda: model.respond(fits))
+        alone = joined([_called(field, partial(model.respond, fit[None])) for fit in fits])
+    real = np.isrealobj(together.level.value)
+    _require(f"{field}, level", None, real, "must be real: a complex factor belongs in on_lines")
+    allowed = "must be what each point gives alone: hooks must treat the last axis as rows and keep those before it"
+    for one, other in ((together.level, alone.level), (together.lines, alone.lines)):
+        if one is not None and other is not None:
+            same = one.value.shape == other.value.shape and np.allclose(one.value, other.value, 1e-9, 0, equal_nan=True)
+            _require(f"{field} at several points", None, same, allowed)
 
 
 def _model(mechanism: Mechanism, campaign: Campaign, kind: Kind) -> FrfModel | IndentationModel | CompressionModel:

@@ -75,7 +75,7 @@ class _Integral:
     def missing(self) -> list[float]:
         """The values of x that are wanted next; none where Z is gone both ways."""
         if not self.log_values:
-            steps = [step for step in range(-_AT_ONCE, _AT_ONCE + 1)]
+            steps = list(range(-_AT_ONCE, _AT_ONCE + 1))
             values = [self.begin + step * self.stride for step in steps]
         else:
             least = max(self.log_values.values()) - _GONE
@@ -183,7 +183,9 @@ def _held_points(
         fits[row, mean] += along * (value - entry.point.fit[place])
         fits[row] = np.clip(fits[row], held.low[number], held.high[number])
         fits[row, place] = value
-    covariance, bend = (np.array([getattr(evidence[number].point, name) for number in numbers]) for name in ("covariance", "bend"))
+    covariance, bend = (
+        np.array([getattr(evidence[number].point, name) for number in numbers]) for name in ("covariance", "bend")
+    )
     return Points(np.array(numbers, dtype=np.intp), fits, covariance, bend)
 
 

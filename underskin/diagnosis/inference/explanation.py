@@ -151,10 +151,12 @@ class FittingProblem:
                 fits[number].append((float(log_priors[1]), evidence))
             elif np.isfinite(requests[number].target(True)):
                 fits[number].clear()
-        return [Explanation.of(request.names, own) if own else None for request, own in zip(requests, fits, strict=True)]
+        return [
+            Explanation.of(request.names, own) if own else None for request, own in zip(requests, fits, strict=True)
+        ]
 
     def refit(self, explanations: Sequence[Explanation]) -> list[Explanation | None]:
-        """Sets that were fitted to more recordings, fitted to these, from where they stood; by the Laplace approximation.
+        """Sets fitted to more recordings, fitted to these from where they stood; by the Laplace approximation.
 
         None where a set has other parameters here, or these recordings do not support it.
         """
@@ -193,7 +195,9 @@ def integrated(explanations: Sequence[Explanation]) -> list[Explanation]:
     counting = []
     for number, entry in enumerate(explanations):
         least = max(prior + fit.log_evidence for prior, fit in entry.each) - _COUNTS
-        counting += [(number, place) for place, (prior, fit) in enumerate(entry.each) if prior + fit.log_evidence > least]
+        counting += [
+            (number, place) for place, (prior, fit) in enumerate(entry.each) if prior + fit.log_evidence > least
+        ]
     each = [list(entry.each) for entry in explanations]
     whole = over_all_values([each[number][place][1] for number, place in counting])
     for (number, place), fit in zip(counting, whole, strict=True):

@@ -6,9 +6,11 @@ from functools import cached_property
 import numpy as np
 
 from underskin.diagnosis.data.dataset import Lines
+from underskin.diagnosis.inference.curve_products import CurveLines, CurveProducts
+from underskin.diagnosis.inference.frf_products import FrfProducts, frf_lines
 from underskin.diagnosis.inference.likelihood import Curvature
-from underskin.diagnosis.inference.products import CurveLines, CurveProducts, FrfProducts, Products, frf_lines
 from underskin.diagnosis.inference.pickup_rows import PickupRows
+from underskin.diagnosis.inference.products import Products
 from underskin.diagnosis.noise.correlated_error import USUAL
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR, Plateau, level_prior
 from underskin.mechanisms.base import Normal, Parameter
@@ -20,7 +22,7 @@ from underskin.units import Floats
 
 _LEVELS = (0.1, 100.0)  # bounds of the lines' level
 _CURVE_LEVELS = (0.5, 3.0)  # no cell is more accurate, however smooth; rougher than its neighbours differ is no noise
-_NUMBERS_AT_ONCE = 2_000_000  # of a factor with its derivatives
+_NUMBERS_AT_ONCE = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -97,8 +99,8 @@ class Hypothesis:
             return CurveProducts.of(self._curve_lines, force, by_force)
         lines = frf_lines(self.lines, model.design)
         pickup = None if model.pickup is None else PickupRows(self.lines, model.pickup.rows, model.design.line)
-        own = len(model.design.line_frequency) * (len(model.parameters) if slopes else 1)
-        at_once = max(_NUMBERS_AT_ONCE // own, 1)
+        of_lines = len(model.design.line_frequency) * (len(model.parameters) if slopes else 1)
+        at_once = max(_NUMBERS_AT_ONCE // (model.numbers + of_lines), 1)
         if len(fit) <= at_once:
             return FrfProducts.of(lines, pickup, model.respond(fit, slopes=slopes, place=place))
         parts = [fit[first : first + at_once] for first in range(0, len(fit), at_once)]

@@ -97,7 +97,7 @@ def around(fitter: Fitter, at: Evaluated) -> list[Evidence]:
 
 
 def around_mean(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:
-    """The logs of the integrals over the mean parameters, those of the covariance held, and the quadratics' covariances."""
+    """The logs of the integrals over the mean parameters, the covariance's held, and the quadratics' covariances."""
     values, covariances = [], []
     for number, (information, gradient) in enumerate(zip(*_equations(fitter, at), strict=True)):
         owner = at.points.owner[number]

@@ -5,8 +5,8 @@ Recording i of sensor s, rows j:  y_ij = m_ij (1 + g_i) e^(b_s) + ∂m_ij·δ_i 
 q is mains pick-up, 0 on most rows.
 The contact's place scales a recording by a real factor, so m = L u and ∂m = t u have one direction u in each recording.
 C_i = κ² D + Q + V_i u uᵀ, V_i = s² a² + p² |t|² + ½ p⁴ tr(H²) a², with m = a u; sensors add τ² m mᵀ over their
-recordings. All of it is taken out by Sherman and Morrison's identity, so that time is linear in rows and recordings. The
-covariance follows the model, so log|C| stays.
+recordings. All of it is taken out by Sherman and Morrison's identity, so that time is linear in rows and in
+recordings. The covariance follows the model, so log|C| stays.
 
 e^b is linearised at `bend`, the most probable b of each sensor: Laplace's method for b. Where a contact sits on an
 extremum of σ, p acts in second order: on the mean by the factor exp(½ p² ∇²σ/σ), on the variance as above, with H of
@@ -19,7 +19,8 @@ from functools import cached_property
 import numpy as np
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.products import Products, SlopeSums
+from underskin.diagnosis.inference.products import Products
+from underskin.diagnosis.inference.sums import SlopeSums
 from underskin.diagnosis.noise.noise_levels import SeveralLevels
 from underskin.units import Floats
 
@@ -190,7 +191,8 @@ class Likelihoods:
     def _growth(self, known: Floats | None) -> Floats:
         """∂ log |t|²/∂θ (points, recordings, P)."""
         level, slopes, place = self._products.level, self._products.level_slopes, self._products.place_slopes
-        assert slopes is not None and place is not None
+        assert slopes is not None
+        assert place is not None
         led = _FROM_SLOPES**2 * (place**2).sum(axis=0) > level**2
         as_level = np.where(led[..., None], 0.0, 2 * slopes / np.where(led, 1.0, level)[..., None])
         return as_level if known is None else np.where(np.isfinite(known), known, as_level)

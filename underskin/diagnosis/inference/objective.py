@@ -24,6 +24,7 @@ SMOOTH = 2  # of curves, which have no place
 _LARGEST_STEP = 0.7  # of a Newton step in a noise level's logarithm: a factor of 2
 _STEP = 0.05  # of the finite differences in the covariance's logarithms
 _FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
+_NUMBERS_AT_ONCE = 500_000
 _BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
 
 Places = NDArray[np.intp]
@@ -178,6 +179,11 @@ class Evaluator:
 
     def _costs(self, points: Points, products: Products, covariances: Floats) -> Floats:
         """The costs (points, sets) with covariance parameters (points, sets, parameters), where points predict."""
+        size = covariances.shape[1] * self.lines.recordings
+        at_once = max(_NUMBERS_AT_ONCE // size, 1)
+        if len(points) > at_once:
+            parts = [slice(first, first + at_once) for first in range(0, len(points), at_once)]
+            return np.concatenate([self._costs(points[part], products[part], covariances[part]) for part in parts])
         likelihoods = Likelihoods(self.lines, self.curvature, products, self.levels(covariances), points.bend).each
         return -likelihoods - self._covariance_prior.log_density(covariances) - self._log_mean_prior(points)[:, None]
 
@@ -259,7 +265,7 @@ class Evaluator:
         return replace(points, covariance=covariance, fit=fit)
 
     def covariance_equations(self, at: Evaluated, *, mixed: bool = True) -> tuple[Floats, Floats]:
-        """Gradient and Hessian of the costs in the covariance parameters, by differences; the mixed terms on request."""
+        """Gradient and Hessian of the costs in the covariance parameters, by differences; mixed terms on request."""
         here = at.points.covariance
         count = here.shape[1]
         steps = _STEP * np.eye(count)

@@ -11,9 +11,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.diagnosis.inference.frf_products import FrfProducts
 from underskin.diagnosis.inference.hypothesis import FitPoint
 from underskin.diagnosis.inference.objective import Evaluated, Evaluator, Places, Points
-from underskin.diagnosis.inference.products import FrfProducts, Products, joined
+from underskin.diagnosis.inference.products import Products, joined
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
 from underskin.units import Floats
 
@@ -71,7 +72,7 @@ class Fitter(Evaluator):
         return self.evaluate(replace(points, fit=fit), slopes=slopes)
 
     def _ratio(self, points: Points, products: Products) -> Floats:
-        """What the measured recordings are of the predicted ones (points,): their mean, weighed by noise and scatter."""
+        """What measured recordings are of the predicted ones (points,): their mean, weighed by noise and scatter."""
         sums = products.summed(self.levels(points.covariance[:, None]))
         uu, uy = sums.uu[:, 0], sums.uy[:, 0]
         level = products.level

@@ -26,7 +26,10 @@ class PickupRows:
         return ratio / (1 + ratio) / self._deviation**2, np.asarray(2 * np.log1p(ratio).sum(axis=-1, keepdims=True))
 
     def summed(self, lost: Floats, one: Array, other: Array | None = None) -> Floats:
-        """What Σ Re one* other of each recording loses (…, recordings), of rows (…, pick-up rows); None: the measured."""
+        """What Σ Re one* other of each recording loses (…, recordings), of rows (…, pick-up rows).
+
+        `other` None stands for what was measured.
+        """
         products = lost * (np.conj(one) * (self._value if other is None else other)).real
         sums = np.zeros((*products.shape[:-1], self._recordings))
         sums[..., self._owner[self._first]] = np.add.reduceat(products, self._first, axis=-1)

@@ -168,7 +168,7 @@ class GainResidual:
 
 
 def _grams(columns: Floats, count: int) -> Floats:
-    """The products of each of `count` blocks of columns (gains, rows, columns) with itself (count, gains, size, size)."""
+    """Products of each of `count` blocks of columns (gains, rows, columns) with itself (count, gains, size, size)."""
     blocks = columns.reshape(*columns.shape[:2], count, -1).transpose(2, 0, 3, 1)
     return np.asarray(blocks @ blocks.swapaxes(-1, -2))
 

@@ -56,7 +56,7 @@ class Confounding:
 def confounding(problem: FittingProblem) -> list[Confounding]:
     """What cannot be told apart here; mechanisms that the campaign does not support at all are not listed."""
     fitter = Fitter([problem.hypothesis((), placed=False)])
-    base = fitter.evaluate(fitter.start(np.zeros((1, 0))))
+    base = fitter.begin(np.zeros((1, 0)))
     nuisances = fitter.hypotheses[0].model.predict(base.points.fit[0])
     rows = _Rows(problem, nuisances.value)
     owners, signatures = [], []

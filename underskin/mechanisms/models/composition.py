@@ -73,10 +73,14 @@ class Composition:
             allowed = f"must hold {count} coordinates"
             raise InvalidInput("fit", np.shape(fit), allowed, code=ErrorCode.UNEQUAL_LENGTHS)
         points = np.shape(fit)[:-1]
-        value = np.concatenate([np.where(self._log, np.exp(np.where(self._log, fit, 0.0)), fit), np.zeros((*points, further))], axis=-1)
+        value = np.concatenate(
+            [np.where(self._log, np.exp(np.where(self._log, fit, 0.0)), fit), np.zeros((*points, further))], axis=-1
+        )
         by_own = np.zeros((count + further, *points, count + further))
         own = np.arange(count + further)
-        by_own[own, ..., own] = np.moveaxis(np.concatenate([np.where(self._log, value[..., :count], 1.0), np.ones((*points, further))], axis=-1), -1, 0)
+        by_own[own, ..., own] = np.moveaxis(
+            np.concatenate([np.where(self._log, value[..., :count], 1.0), np.ones((*points, further))], axis=-1), -1, 0
+        )
         seeds = variables(value, by_own if slopes else by_own[count:])
         return (
             {name: {key: seeds[place] for key, place in places.items()} for name, places in self._places.items()},

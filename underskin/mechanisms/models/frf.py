@@ -30,6 +30,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats, to_si
 
 _NUISANCE_STRETCH = 1.06  # the thickness' bounds
+_QUANTITIES, _BLOCK = 6, 4**4  # of a linear layer's contact, and coefficients around a place in the table
 _POSITION = 2  # two more variables: the contact's x and y
 
 
@@ -150,6 +151,14 @@ class FrfModel:
             inside=response.inside[self.recording],
         )
 
+    @property
+    def numbers(self) -> int:
+        """How many numbers a response without derivatives takes, roughly: bounds the points that are worked out at
+        once."""
+        nodes, contacts, points = len(self._force), len(self.design.force), len(self.design.point_contact)
+        transforms = (_QUANTITIES * contacts + points) * len(self._sigma.wavenumber)
+        return nodes * (points * _BLOCK + transforms) + len(self.design.line_frequency)
+
     def respond(self, fit: Floats, *, slopes: bool = True, place: bool = False) -> Response:
         """The response at points (…, parameters); its derivatives by the parameters and by the contact's place on
         request."""
@@ -177,9 +186,7 @@ class FrfModel:
         """The sd of the sensors' log gains, and its derivative (parameters,)."""
         return self._composition.sensor_spread(np.asarray(fit, dtype=float))
 
-    def _contacts(
-        self, own: dict[str, Values], nuisances: Values, points: tuple[int, ...], variables: int
-    ) -> Contacts:
+    def _contacts(self, own: dict[str, Values], nuisances: Values, points: tuple[int, ...], variables: int) -> Contacts:
         """The contacts at all force nodes, one node after another, as declared and as the mechanisms change them."""
         nodes = len(self._force)
         contacts = Contacts(

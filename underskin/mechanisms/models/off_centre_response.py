@@ -1,8 +1,8 @@
 """σ of many contacts on one skin at any offset, with derivatives, fast enough for a fit.
 
-The table's bottom profile, averaged over the sensor's disc at its offset, is tabulated once as a
-cubic spline in a/h, L^(1/3), log(rT/h) and e/h. To it may be added what a linear layer of another transmission or a pressure of another shape puts there, by its Hankel integral
-(underskin/physics/hankel_transform.py):
+The table's bottom profile, averaged over the sensor's disc at its offset, is tabulated once as a cubic spline in a/h,
+L^(1/3), log(rT/h) and e/h. To it may be added what a linear layer of another transmission or a pressure of another
+shape puts there, by its Hankel integral (underskin/physics/hankel_transform.py):
 
     σ = linear(p̂, M; a, e) + [table(a, L, e) − table(a, 0, e)].
 
@@ -158,7 +158,9 @@ def _disc_averages(along: CubicBasis, offsets: Floats, rt_over_h: float) -> Floa
     count = len(along.nodes)
     disc = np.repeat(np.arange(len(offsets)) * count, len(weight))
     place = (disc + first)[:, None] + np.arange(4)
-    total: Floats = np.bincount(place.ravel(), (weights[:, None] * functions).ravel(), len(offsets) * count).astype(float)
+    total: Floats = np.bincount(place.ravel(), (weights[:, None] * functions).ravel(), len(offsets) * count).astype(
+        float
+    )
     return total.reshape(len(offsets), -1) @ along.to_coefficients
 
 

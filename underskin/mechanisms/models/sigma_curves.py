@@ -52,7 +52,9 @@ class SigmaOfContacts:
         a, x, rho = (variable[contact] for variable in self._variables[:3])
         moving = any(variable.slopes.any() for variable in self._variables)
         strained = self._linear is not None
-        value, by_offset, *partial = self._sigma.at(a.value, x.value, rho.value, place, strained=strained, slopes=moving)
+        value, by_offset, *partial = self._sigma.at(
+            a.value, x.value, rho.value, place, strained=strained, slopes=moving
+        )
         if self._linear is not None:
             of_contact, by_place = self._sigma.linear_at(self._linear, contact, place, slopes=moving)
             value, by_offset = value + of_contact[0], by_offset + by_place

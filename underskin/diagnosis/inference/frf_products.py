@@ -1,0 +1,226 @@
+"""The inner products over the lines of FRFs: see `products`."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+from typing import Any, Self
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from underskin.autodiff import Differentiated
+from underskin.diagnosis.data.dataset import Lines
+from underskin.diagnosis.inference.pickup_rows import PickupRows
+from underskin.diagnosis.inference.sums import SlopeSums, Sums
+from underskin.diagnosis.noise.noise_levels import SeveralLevels
+from underskin.mechanisms.models.frf import Response
+from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.units import Array, Floats
+
+
+class FrfLines:
+    """The measured lines of FRFs as matrices that sum a model's distinct lines over the rows of each recording."""
+
+    def __init__(self, lines: Lines, design: FrfDesign) -> None:
+        """Place the weights; the design says which distinct line each row is."""
+        weight = lines.deviation**-2.0
+        by_recording = np.append(lines.first, len(lines.value))
+        shape = (lines.recordings, len(design.line_frequency))
+
+        def matrix(values: Floats) -> csr_array:
+            return csr_array((values, design.line, by_recording), shape=shape)
+
+        self.weight, self.real, self.imag = (
+            matrix(weight * values) for values in (np.ones(len(weight)), lines.value.real, lines.value.imag)
+        )
+        self.uu, self.uy = (
+            np.add.reduceat(weight * values, lines.first) for values in (np.ones(len(weight)), lines.value.real)
+        )
+        self.yy = np.abs(np.add.reduceat(weight * lines.value, lines.first)) ** 2 / self.uu
+
+
+@lru_cache(maxsize=4)  # by identity: a diagnosis weighs dozens of models of one design
+def frf_lines(lines: Lines, design: FrfDesign) -> FrfLines:
+    """The matrices of these lines for models of this design."""
+    return FrfLines(lines, design)
+
+
+@dataclass(frozen=True)
+class FrfProducts:
+    """Of FRFs; `turning` is None where u is 1, or where no derivatives were asked for."""
+
+    yy: Floats  # (recordings,)
+    uu: Floats  # (points, recordings)
+    uy: Floats
+    level: Floats
+    level_slopes: Floats | None  # (points, recordings, parameters)
+    place_slopes: Floats | None  # (2, points, recordings)
+    turning: SlopeSums | None
+    pickup: "PickupProducts | None" = None
+
+    @classmethod
+    def of(cls, lines: FrfLines, pickup: PickupRows | None, response: Response) -> Self:
+        """Of a model's response at several points, and the rows that its pick-up reaches."""
+        level, factor = response.level, response.lines
+        slopes = np.moveaxis(level.slopes, 0, -1) if len(level.slopes) else None
+        uu, uy = np.broadcast_to(lines.uu, level.value.shape), np.broadcast_to(lines.uy, level.value.shape)
+        turning = None
+        if factor is not None:
+            u = factor.value
+            uu = _over_rows(lines.weight, u.real**2 + u.imag**2)
+            uy = _over_rows(lines.real, u.real) + _over_rows(lines.imag, u.imag)
+            turning = None if slopes is None else _turning(lines, u, np.moveaxis(factor.slopes, 0, 1))
+        of_pickup = None if pickup is None else PickupProducts.of(pickup, len(level.value), factor)
+        return cls(lines.yy, uu, uy, level.value, slopes, response.place_slopes, turning, of_pickup)
+
+    def __len__(self) -> int:
+        return len(self.level)
+
+    def __getitem__(self, points: Array | slice) -> Self:
+        """At some of the points."""
+        place, slopes = self.place_slopes, self.level_slopes
+        return replace(
+            self,
+            uu=self.uu[points],
+            uy=self.uy[points],
+            level=self.level[points],
+            level_slopes=None if slopes is None else slopes[points],
+            place_slopes=None if place is None else place[:, points],
+            turning=_of_each(lambda values: values[points], self.turning),
+            pickup=_of_each(lambda values: values[points], self.pickup),
+        )
+
+    @property
+    def values(self) -> Self:
+        """Without derivatives by the parameters."""
+        pickup = None if self.pickup is None else replace(self.pickup, v=None)
+        return replace(self, level_slopes=None, turning=None, pickup=pickup)
+
+    @classmethod
+    def joined(cls, parts: Sequence["FrfProducts"], parameters: int) -> Self:
+        """At the points of several, one after another, with so many parameters in all."""
+        filled = [part.filled(parameters, turning=any(one.turning for one in parts)) for part in parts]
+
+        def of(name: str, axis: int = 0) -> Any:
+            values = [getattr(part, name) for part in filled]
+            return None if values[0] is None else np.concatenate(values, axis=axis)
+
+        def of_each(name: str) -> Any:
+            values = [getattr(part, name) for part in filled]
+            return None if values[0] is None else _of_each(lambda *own: np.concatenate(own), *values)
+
+        level = of("level"), of("level_slopes"), of("place_slopes", axis=1)
+        return cls(parts[0].yy, of("uu"), of("uy"), *level, of_each("turning"), of_each("pickup"))
+
+    def filled(self, parameters: int, *, turning: bool) -> Self:
+        """With derivatives that are 0 by further parameters, so many in all, also those of u where it has none."""
+        slopes = self.level_slopes
+        if slopes is None:
+            return self
+        further = parameters - slopes.shape[-1]
+        slopes = np.pad(slopes, ((0, 0), (0, 0), (0, further))) if further else slopes
+        own = self.turning
+        if own is None:
+            none = np.zeros_like(slopes)
+            own = (
+                SlopeSums(none, none, np.broadcast_to(none[..., None], (*none.shape, parameters))) if turning else None
+            )
+        elif further:
+            uv, vy = (np.pad(values, ((0, 0), (0, 0), (0, further))) for values in (own.uv, own.vy))
+            own = SlopeSums(uv, vy, np.pad(own.vv, ((0, 0), (0, 0), (0, further), (0, further))))
+        pickup = None if self.pickup is None else self.pickup.filled(parameters)
+        return replace(self, level_slopes=slopes, turning=own, pickup=pickup)
+
+    def scaled(self, factor: Floats) -> Self:
+        """Of levels so many times as large (points,)."""
+        by = factor[:, None]
+        slopes = None if self.level_slopes is None else self.level_slopes * by[..., None]
+        place = None if self.place_slopes is None else self.place_slopes * by
+        return replace(self, level=self.level * by, level_slopes=slopes, place_slopes=place)
+
+    def summed(self, levels: SeveralLevels) -> Sums:
+        """The sums at noise levels (points, sets, 1), as (points, sets, recordings)."""
+        sums = Sums(self.uu[:, None], self.uy[:, None], self.yy, 0.0)
+        return sums if self.pickup is None else self.pickup.less(sums, levels)
+
+    def slope_sums(self, levels: SeveralLevels) -> SlopeSums | None:
+        """The sums with derivatives, at the first of the sets of noise levels; None where u is 1."""
+        if self.pickup is None or self.turning is None:
+            return self.turning
+        return self.pickup.slopes_less(self.turning, levels)
+
+
+@dataclass(frozen=True)
+class PickupProducts:
+    """On the rows that pick-up reaches u (points, rows) and v (points, parameters, rows), None where it is 0."""
+
+    rows: PickupRows
+    u: Array
+    v: Array | None
+
+    @classmethod
+    def of(cls, rows: PickupRows, points: int, factor: Differentiated | None) -> Self:
+        """Of the dynamics' factor on a model's distinct lines."""
+        if factor is None:
+            return cls(rows, np.ones((points, len(rows.line))), None)
+        slopes = np.moveaxis(factor.slopes, 0, 1)[..., rows.line] if len(factor.slopes) else None
+        return cls(rows, factor.value[:, rows.line], slopes)
+
+    def filled(self, parameters: int) -> Self:
+        """With derivatives that are 0 by further parameters, so many in all."""
+        v = np.zeros((*self.u.shape[:1], 0, self.u.shape[1])) if self.v is None else self.v
+        return replace(self, v=np.pad(v, ((0, 0), (0, parameters - v.shape[1]), (0, 0))))
+
+    def less(self, sums: Sums, levels: SeveralLevels) -> Sums:
+        """The sums less what rows lose to pick-up."""
+        assert levels.pickup is not None
+        lost, log_determinant = self.rows.lost(levels.pickup, levels.level)
+        u, summed = self.u[:, None], self.rows.summed
+        uu, uy = sums.uu - summed(lost, u, u), sums.uy - summed(lost, u)
+        return Sums(uu, uy, sums.yy - summed(lost, self.rows.value), log_determinant)
+
+    def slopes_less(self, sums: SlopeSums, levels: SeveralLevels) -> SlopeSums:
+        """The sums with derivatives less what rows lose, at the first of the sets of noise levels."""
+        assert levels.pickup is not None
+        if self.v is None:
+            return sums
+        lost, _ = self.rows.lost(levels.pickup[:, 0], levels.level[:, 0])
+        lost, v, summed = lost[:, None], self.v, self.rows.summed
+        uv, vy = (
+            sums.uv - np.moveaxis(summed(lost, self.u[:, None], v), 1, -1),
+            sums.vy - np.moveaxis(summed(lost, v), 1, -1),
+        )
+        vv = summed(lost[:, None], v[:, :, None], v[:, None])
+        return SlopeSums(uv, vy, sums.vv - np.moveaxis(vv, -1, 1))
+
+
+def _over_rows(matrix: csr_array, values: Floats) -> Floats:
+    """Sums over the rows of each recording of values on distinct lines: (…, lines) to (…, recordings)."""
+    flat = matrix @ values.reshape(-1, values.shape[-1]).T
+    return np.asarray(flat.T.reshape(*values.shape[:-1], -1))
+
+
+def _turning(lines: FrfLines, u: Array, slopes: Array) -> SlopeSums:
+    """The sums with the derivatives v of u (points, parameters, lines)."""
+    moving = np.flatnonzero(slopes.any(axis=(0, 2)))
+    v, count = slopes[:, moving], slopes.shape[1]
+    uv = np.moveaxis(_over_rows(lines.weight, (u.conj()[:, None] * v).real), 1, -1)
+    vy = np.moveaxis(_over_rows(lines.real, v.real) + _over_rows(lines.imag, v.imag), 1, -1)
+    one, other = np.triu_indices(len(moving))
+    vv = _over_rows(lines.weight, (v[:, one].conj() * v[:, other]).real)
+    whole = SlopeSums(*(np.zeros((*uv.shape[:2], *further)) for further in ((count,), (count,), (count, count))))
+    whole.uv[..., moving], whole.vy[..., moving] = uv, vy
+    for number, (a, b) in enumerate(zip(moving[one], moving[other], strict=True)):
+        whole.vv[..., a, b] = whole.vv[..., b, a] = vv[:, number]
+    return whole
+
+
+def _of_each(function: Callable[..., Array], *parts: Any) -> Any:
+    """The same of all arrays of a record; None of None."""
+    if parts[0] is None:
+        return None
+    own = {field.name: [getattr(part, field.name) for part in parts] for field in fields(parts[0])}
+    return replace(
+        parts[0],
+        **{name: function(*values) for name, values in own.items() if isinstance(values[0], np.ndarray)},
+    )
