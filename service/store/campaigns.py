@@ -96,9 +96,10 @@ def rows_of(number: int, stored: Sequence[Recording]) -> list[dict[str, Any]]:
     ]
 
 
-def find(connection: Connection, campaign_id: str) -> AnyRow:
-    """The row of a campaign; raises Missing."""
-    row = connection.execute(select(campaigns).where(campaigns.c.id == campaign_id)).first()
+def find(connection: Connection, campaign_id: str, *, lock: bool = False) -> AnyRow:
+    """The row of a campaign, where asked locked until the transaction ends; raises Missing."""
+    query = select(campaigns).where(campaigns.c.id == campaign_id)
+    row = connection.execute(query.with_for_update() if lock else query).first()
     if row is None:
         raise Missing(f"There is no campaign {campaign_id!r}.")
     return row
@@ -110,6 +111,11 @@ def listed(connection: Connection, filters: CampaignFilters, before: int | None,
     if before is not None:
         query = query.where(campaigns.c.number < before)
     return connection.execute(query.order_by(campaigns.c.number.desc()).limit(limit)).all()
+
+
+def latest(connection: Connection, root: str) -> AnyRow | None:
+    """The row of a skin's current campaign that arrived last; None where none is current."""
+    return next(iter(listed(connection, CampaignFilters(skin=root, state="current"), None, 1)), None)
 
 
 def state(row: AnyRow) -> State:
@@ -185,10 +191,7 @@ def of_skin(connection: Connection, root: str) -> Iterator[AnyRow]:
 
 def _changeable(connection: Connection, campaign_id: str) -> AnyRow:
     """The row, locked until the transaction ends; raises Missing, or Conflict where it is no longer current."""
-    query = select(campaigns).where(campaigns.c.id == campaign_id).with_for_update()
-    row = connection.execute(query).first()
-    if row is None:
-        raise Missing(f"There is no campaign {campaign_id!r}.")
+    row = find(connection, campaign_id, lock=True)
     if row.withdrawn_at is not None:
         raise Conflict(f"Campaign {campaign_id!r} was withdrawn: {row.withdraw_reason}")
     if row.corrected_by is not None:

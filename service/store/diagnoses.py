@@ -57,10 +57,7 @@ def ask(connection: Connection, campaign_id: str, table_sha256: str, version: st
 
     Raises Missing, and Conflict where the campaign is not current. One that failed or was cancelled is asked anew.
     """
-    query = select(campaigns).where(campaigns.c.id == campaign_id).with_for_update()
-    campaign = connection.execute(query).first()
-    if campaign is None:
-        raise Missing(f"There is no campaign {campaign_id!r}.")
+    campaign = kept_campaigns.find(connection, campaign_id, lock=True)
     why = _unused(campaign)
     if why is not None:
         raise Conflict(f"Campaign {campaign_id!r} is not diagnosed: it was {why}.")

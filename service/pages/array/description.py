@@ -106,8 +106,8 @@ def _latest(store: Database, skin_id: str) -> Mapping[str, Any]:
     """The skin as its latest campaign declares it."""
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
-        latest = campaigns.listed(connection, campaigns.CampaignFilters(skin=root, state="current"), None, 1)
-    skin: dict[str, Any] = latest[0].about["skin"] if latest else {"sensors": []}
+        latest = campaigns.latest(connection, root)
+    skin: dict[str, Any] = {"sensors": []} if latest is None else latest.about["skin"]
     if not skin["sensors"]:
         raise InvalidInput("skin", skin_id, "must have a current campaign that names its sensors")
     return skin

@@ -258,8 +258,8 @@ def _latest(store: Database, skin: str | None) -> Mapping[str, Any]:
         return {}
     with store.reading() as connection, suppress(Missing):
         root = skins.require_root(connection, skin)
-        rows = campaigns.listed(connection, campaigns.CampaignFilters(skin=root, state="current"), None, 1)
-        return dict(rows[0].about["skin"]) if rows else {}
+        row = campaigns.latest(connection, root)
+        return {} if row is None else dict(row.about["skin"])
     return {}
 
 
