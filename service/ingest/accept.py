@@ -88,8 +88,7 @@ def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> 
     for upload in uploads:
         if upload.field == RIG:
             try:
-                with upload.path.open("rb") as file:
-                    return parse_rig(file.read(LARGEST_BYTES + 1), upload.label or RIG)
+                return sent_rig(upload)
             except FileError as error:
                 raise error.of_field(RIG, upload.label) from None
             except InvalidInput as error:
@@ -99,8 +98,20 @@ def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> 
         names = [options.skin] if options.skin is not None else []
         if options.corrects is not None:
             names.append(campaigns.find(connection, options.corrects).skin_id)
-        rigs = [rig for name in names if (rig := skins.rig_of(connection, name)) is not None]
-    return from_dict(orjson.loads(rigs[0])) if rigs else None
+        rigs = (kept_rig(connection, name) for name in names)
+        return next((rig for rig in rigs if rig is not None), None)
+
+
+def sent_rig(upload: Upload) -> RigDescription:
+    """The rig description in an uploaded file; raises FileError, InvalidInput."""
+    with upload.path.open("rb") as file:
+        return parse_rig(file.read(LARGEST_BYTES + 1), upload.label or RIG)
+
+
+def kept_rig(connection: Connection, skin_id: str) -> RigDescription | None:
+    """The rig description that is kept with a skin."""
+    document = skins.rig_of(connection, skin_id)
+    return None if document is None else from_dict(orjson.loads(document))
 
 
 def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, options: IngestOptions) -> list[CheckedCampaign]:

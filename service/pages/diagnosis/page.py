@@ -19,7 +19,7 @@ from service.store import campaigns, diagnoses, models, skins
 from service.store.engine import Database
 from service.store.tables import AnyRow
 from service.usecases import diagnoses as usecase
-from service.usecases.models import adopt as adopt_model
+from service.usecases.adopted_models import adopt as adopt_model
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -123,7 +123,7 @@ def adopt(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response
     with store.writing() as connection:
         skin = diagnoses.find(connection, diagnosis_id).skin_id
         model = adopt_model(connection, skin, diagnosis_id, sender(request))
-    return see(f"/skins/{quote(model.model_skin, safe='')}?model=adopted")
+    return see(f"/skins/{quote(model.model_skin_id, safe='')}?model=adopted")
 
 
 def _not_adopted(report: Mapping[str, Any]) -> str | None:

@@ -55,7 +55,7 @@ def skin(
         diagnosed = overview.latest_diagnoses(connection, numbers)
         model_row = models.last(connection, root)
         last_model = None if model_row is None else of_rows(connection, [model_row])[0]
-        model = last_model if last_model is not None and last_model.withdrawn is None else None
+        model = last_model if last_model is not None and last_model.withdrawn_at is None else None
         adopted = [] if model is None else [model.diagnosis_id]
         verdict = verdicts.of_rows(connection, list(diagnosed.values()), adopted)
         verdict_of = {number: verdict[row.id] for number, row in diagnosed.items()}
