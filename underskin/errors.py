@@ -10,7 +10,8 @@ UnderskinError
 └── Unreachable       no answer from the server: nothing listens there, or time ran out (raised by the client)
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Self
@@ -182,6 +183,17 @@ class FileError(UnderskinError):
         """The same error of a field whose value is the file, by the name that it was sent under."""
         allowed = ": ".join(part for part in (self.place, self.reason) if part)
         return InvalidInput(field, file, allowed, code=self.code)
+
+
+@contextmanager
+def damage_said(file: str, place: str, said: Callable[[Exception], str]) -> Iterator[None]:
+    """Turns whatever a library lets through where a file is damaged into FileError; memory that is short stays so."""
+    try:
+        yield
+    except (MemoryError, FileError):
+        raise
+    except Exception as error:
+        raise FileError(file, place, said(error)) from None
 
 
 class TableError(UnderskinError):

@@ -16,6 +16,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, checked, finite, non_negative, to_lab, to_si
 
 SigmaModelName = Literal["layer", "half_space"]
+_SKIN = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio")
 _FRF_UNCERTAINTY = "frf_uncertainty_pc_per_n"
 
 
@@ -100,13 +101,7 @@ def d33(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> 
 
 def pressed(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Transmission:
     """What reaches the sensor of a skin described in lab units; raises InvalidInput."""
-    skin = Skin.from_lab(
-        thickness_mm=given["thickness_mm"],
-        youngs_modulus_mpa=given["youngs_modulus_mpa"],
-        sensor_radius_mm=given["sensor_radius_mm"],
-        poisson_ratio=given["poisson_ratio"],
-        units_checked=units_checked,
-    )
+    skin = Skin.from_lab(**{name: given[name] for name in _SKIN}, units_checked=units_checked)
     indenter = Indenter.from_lab(indenter_radius_mm=given["indenter_radius_mm"], units_checked=units_checked)
     return transmission(table, skin, indenter, checked("preload_n", given["preload_n"], units_checked=units_checked))
 
