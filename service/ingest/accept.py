@@ -12,8 +12,7 @@ from service.ingest import repeats
 from service.ingest.reading import CheckedCampaign, ReadCampaign, checked, joined, read, require_few
 from service.ingest.uploads import Upload
 from service.problems import Refusal
-from service.store import answers, campaigns, skins
-from service.store.engine import Database
+from service.store import Database, answers, campaigns, skins
 from underskin.errors import FileError, InvalidInput, conflicting, required
 from underskin.recordings import plausibility, validation
 from underskin.recordings.campaign import Campaign
@@ -104,8 +103,7 @@ def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> 
 
 def sent_rig(upload: Upload) -> RigDescription:
     """The rig description in an uploaded file; raises FileError, InvalidInput."""
-    with upload.path.open("rb") as file:
-        return parse_rig(file.read(LARGEST_BYTES + 1), upload.label or RIG)
+    return parse_rig(upload.start(LARGEST_BYTES + 1), upload.label or RIG)
 
 
 def kept_rig(connection: Connection, skin_id: str) -> RigDescription | None:

@@ -13,9 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from service.jobs.process import Worker
 from service.jobs.runner import JobSettings, logger
 from service.problems import Refusal
-from service.store import diagnoses
-from service.store.engine import Database
-from service.store.tables import AnyRow
+from service.store import AnyRow, Database, diagnoses
 from underskin.recordings.readers import json_file
 
 if TYPE_CHECKING:

@@ -13,10 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from service.jobs.process import Worker
 from service.jobs.worker import Job
 from service.log import LastingFailure
-from service.store import diagnoses
-from service.store.engine import Database, StorageFull
-from service.store.errors import StoreMoved
-from service.store.tables import AnyRow
+from service.store import AnyRow, Database, StorageFull, StoreMoved, diagnoses
 from underskin import __version__
 from underskin.recordings.readers import json_file
 

@@ -11,10 +11,7 @@ from sqlalchemy import Connection
 from service.problems import Refusal
 from service.schemas.diagnoses import ModelEntry, ModelVersion
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS, PressedSkinColumns
-from service.store import diagnoses, models, skins
-from service.store.engine import Database
-from service.store.errors import Conflict
-from service.store.tables import AnyRow
+from service.store import AnyRow, Conflict, Database, diagnoses, models, skins
 from underskin.errors import conflicting, out_of_range, required
 from underskin.physics.charge_response import gain
 from underskin.prediction.answers import pressed

@@ -9,10 +9,7 @@ import orjson
 
 from service.problems import Refusal
 from service.schemas.campaign_d33 import D33
-from service.store import campaigns, inversions
-from service.store.engine import Database, StorageFull
-from service.store.errors import Conflict, StoreMoved
-from service.store.tables import AnyRow
+from service.store import AnyRow, Conflict, Database, StorageFull, StoreMoved, campaigns, inversions
 from service.usecases import figure_data
 from service.usecases.adopted_models import ModelInForce, model_in_force
 from service.usecases.campaign_d33 import of_inversion, of_moduli

@@ -7,9 +7,7 @@ from sqlalchemy import Connection
 
 from service.ingest import repeats
 from service.schemas import skins as models
-from service.store import campaigns, inversions, skins
-from service.store.engine import Database
-from service.store.tables import AnyRow
+from service.store import AnyRow, Database, campaigns, inversions, skins
 from service.usecases import adopted_models, d33_cache
 from underskin import InvalidInput
 from underskin.inversion.trend import FEWEST, SIGNIFICANT, Trend, holm, trend

@@ -227,8 +227,7 @@ class Mechanism:
     moves_predictions: ClassVar[bool] = True  # False: it acts on the covariance alone
     needs_history: ClassVar[bool] = False  # a curve without its beginning cannot be predicted
     imitated_by_seating: ClassVar[bool] = False  # a platen that seats bends the beginning of a compression alike
-    # Axes over which its figure is drawn, keys of PANELS in docs/mechanisms/signatures.py; empty: the first two of
-    # `axes` that have a panel.
+    # Axes of its figure, keys of PANELS in docs/mechanisms/signatures.py; empty: the first two of `axes` with a panel.
     figure: ClassVar[tuple[str, ...]] = ()
 
     @property

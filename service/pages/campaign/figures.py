@@ -7,9 +7,7 @@ from typing import Any
 from urllib.parse import quote
 
 from service.pages.shared.figures import Drawn, drawn, drawn_curves
-from service.store import campaigns
-from service.store.engine import Database
-from service.store.tables import AnyRow
+from service.store import AnyRow, Database, campaigns
 from service.usecases.figure_data import MOST_SINGLE, measured, spreads, spreads_of
 from underskin.recordings.campaign import Campaign, FrfRecording
 

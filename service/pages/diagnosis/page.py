@@ -15,9 +15,7 @@ from service.pages.shared.figures import Drawn, csv_answer, drawn, drawn_before
 from service.pages.shared.forms import OWN_FORM, see
 from service.pages.shared.html import page, render
 from service.problems import Refusal
-from service.store import campaigns, diagnoses, models, skins
-from service.store.engine import Database
-from service.store.tables import AnyRow
+from service.store import AnyRow, Database, campaigns, diagnoses, models, skins
 from service.usecases import diagnoses as usecase
 from service.usecases.adopted_models import adopt as adopt_model
 

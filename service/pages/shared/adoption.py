@@ -8,10 +8,7 @@ from sqlalchemy import Connection
 from service.pages.shared.verdicts import mechanisms_of
 from service.problems import Refusal
 from service.schemas.diagnoses import ModelVersion
-from service.store import diagnoses
-from service.store.engine import Database
-from service.store.errors import Conflict
-from service.store.tables import AnyRow
+from service.store import AnyRow, Conflict, Database, diagnoses
 from service.usecases import adopted_models, d33_cache
 from underskin import InvalidInput
 from underskin.diagnosis.data.names import in_words

@@ -73,6 +73,11 @@ def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> Response:
     return Response(csv_text(columns), headers=headers, media_type="text/csv; charset=utf-8")
 
 
+def csv_of_rows(name: str, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> Response:
+    """Rows as a CSV file of these columns; a cell is NaN where a row lacks it."""
+    return csv_answer(name, {column: [row.get(column) for row in rows] for column in names})
+
+
 def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
     """Columns as CSV."""
     return to_csv({name: [_cell(value) for value in column] for name, column in columns.items()}, "\r\n")

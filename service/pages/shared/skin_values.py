@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from service.store import campaigns, overview, skins
-from service.store.engine import Database
+from service.store import Database, campaigns, overview, skins
 from underskin.surrogate.sigma_table import SigmaTable
 
 PROTOTYPE = {

@@ -5,19 +5,18 @@ from statistics import median
 from typing import Annotated, Any, Literal
 from urllib.parse import quote
 
+import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 from starlette.background import BackgroundTask
 
 from service.dependencies import WRITE, SkinId, Store, Table, number_of_cursor, sender
 from service.pages.shared import same_request, verdicts
 from service.pages.shared.adoption import answer_by_it, change_percent, of_rows
-from service.pages.shared.figures import Drawn, csv_answer, drawn
+from service.pages.shared.figures import Drawn, csv_of_rows, drawn
 from service.pages.shared.forms import Form, reason, see
 from service.pages.shared.html import page
 from service.schemas.skins import History, SensorHistory
-from service.store import campaigns, inversions, models, overview, skins
-from service.store.engine import Database
-from service.store.tables import AnyRow
+from service.store import AnyRow, Database, campaigns, inversions, models, overview, skins
 from service.usecases import d33_cache, histories
 from service.usecases.adopted_models import model_in_force
 from underskin.surrogate.sigma_table import SigmaTable
@@ -122,7 +121,7 @@ def map_csv(skin_id: SkinId, store: Store, table: Table, by: Annotated[By, Query
     trends = {entry.sensor: entry.trend for entry in _history_by(store, table, root, by).sensors}
     with store.reading() as connection:
         row = campaigns.latest(connection, root)
-    columns: dict[str, list[Any]] = {name: [] for name in (*_MAP_COLUMNS, *_TREND_COLUMNS)}
+    rows: list[dict[str, Any]] = []
     if row is not None:
         answer = (
             d33_cache.answer(store, table, row, None)
@@ -131,13 +130,9 @@ def map_csv(skin_id: SkinId, store: Store, table: Table, by: Annotated[By, Query
         )
         places = {entry["id"]: entry for entry in row.about["skin"]["sensors"]}
         for entry in answer["sensors"]:
-            values = {**entry, **places[entry["sensor"]]}
             line = trends.get(entry["sensor"])
-            for name in _TREND_COLUMNS:
-                values[name] = None if line is None else getattr(line, name)
-            for name in (*_MAP_COLUMNS, *_TREND_COLUMNS):
-                columns[name].append(values[name])
-    return csv_answer("map", columns)
+            rows.append({**entry, **places[entry["sensor"]], **({} if line is None else line.model_dump())})
+    return csv_of_rows("map", (*_MAP_COLUMNS, *_TREND_COLUMNS), rows)
 
 
 _MAP_COLUMNS = (
@@ -161,7 +156,7 @@ def history_csv(
         for entry in history.sensors
         for point in entry.points
     ]
-    return csv_answer("history", {name: [point[name] for point in points] for name in _HISTORY_COLUMNS})
+    return csv_of_rows("history", _HISTORY_COLUMNS, points)
 
 
 def _array(answer: Mapping[str, Any]) -> float | None:
@@ -206,8 +201,8 @@ def _map(root: str, row: AnyRow, answer: Mapping[str, Any], history: History, sh
         names,
         [places[name]["x_mm"] for name in names],
         [places[name]["y_mm"] for name in names],
-        _floats(values),
-        _floats(uncertainties),
+        np.array(values, dtype=float),
+        np.array(uncertainties, dtype=float),
         ["; ".join(flag["reason"] for flag in entry["flags"]) for entry in entries],
         quantity,
     )
@@ -262,7 +257,3 @@ def trend_in_words(entry: SensorHistory) -> str:
         return f"no trend: {entry.no_trend}"
     slope = f"{line.slope_pc_per_n_per_year:+.2g} ± {line.slope_uncertainty_pc_per_n_per_year:.1g} pC/N a year"
     return slope if line.significant else f"no significant trend ({slope})"
-
-
-def _floats(values: Sequence[float | None]) -> list[float]:
-    return [float("nan") if value is None else value for value in values]

@@ -13,8 +13,7 @@ from service.ingest.reading import error_entry
 from service.ingest.uploads import Upload
 from service.pages.upload.pending_uploads import PendingUpload
 from service.problems import Refusal
-from service.store.engine import Database
-from service.store.errors import Conflict, Missing
+from service.store import Conflict, Database, Missing
 from underskin.errors import ErrorCode, FileError, InvalidInput
 
 SKIN_FIELD, CORRECTS = "skin", "corrects"

@@ -5,8 +5,7 @@ from typing import Any
 from service.ingest.accept import kept_rig, sent_rig
 from service.ingest.uploads import Upload
 from service.pages.upload.keep import field_errors
-from service.store import campaigns
-from service.store.engine import Database
+from service.store import Database, campaigns
 from underskin.errors import FileError, InvalidInput
 from underskin.recordings.rig_description import RigDescription
 
