@@ -81,8 +81,8 @@ class UnderskinError(Exception):
 class InvalidInput(UnderskinError, ValueError):
     """A value that cannot be used.
 
-    Attributes: `field` (the name the user knows), `index` (row in a column, or None), `value`, `allowed`
-    (what would be accepted, in words), `code` (what kind of error it is).
+    Attributes: `field` (the name the user knows), `index` (row in a column, or None), `place` (both), `value`,
+    `allowed` (what would be accepted, in words), `code` (what kind of error it is).
     """
 
     def __init__(
@@ -99,8 +99,8 @@ class InvalidInput(UnderskinError, ValueError):
         self.allowed = allowed
         self.index = index
         self.code = code
-        place = field if index is None else f"{field}[{index}]"
-        super().__init__(f"{place} = {value!r}: {allowed}")
+        self.place = field if index is None else f"{field}[{index}]"
+        super().__init__(f"{self.place} = {value!r}: {allowed}")
 
     def at(self, field: str) -> "InvalidInput":
         """The same error of a field that is called differently from outside."""

@@ -205,8 +205,7 @@ def _nothing(refused: int) -> dict[str, Any]:
 
 
 def _invalid(error: InvalidInput) -> dict[str, Any]:
-    place = error.field if error.index is None else f"{error.field}[{error.index}]"
-    return error_entry(place, error.value, error.allowed, error.code)
+    return error_entry(error.place, error.value, error.allowed, error.code)
 
 
 def error_entry(name: str, value: Any, allowed: str, code: ErrorCode) -> dict[str, Any]:

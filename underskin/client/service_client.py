@@ -146,7 +146,8 @@ class Client:
         return kind(**{field.name: _field(field.name, document, single) for field in fields(kind)})
 
     def _request(self, method: str, path: str, body: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        content = None if body is None else orjson.dumps(body, _number, orjson.OPT_SERIALIZE_NUMPY)
+        # orjson does not take a single number as an array
+        content = None if body is None else orjson.dumps(body, float, orjson.OPT_SERIALIZE_NUMPY)
         return self._session.json(method, path, content=content, headers={"Content-Type": "application/json"})
 
 
@@ -158,11 +159,6 @@ _SHARED = (*_LINES, "frequency_hz", "band_hz", "units_checked", "model", "skin_i
 
 def _array(value: Any) -> Floats:
     return np.asarray(value, dtype=float, order="C")
-
-
-def _number(array: Floats) -> float:
-    """A single number, which orjson does not take as an array."""
-    return float(array)
 
 
 def _shared(name: str, value: Any) -> Any:

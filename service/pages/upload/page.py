@@ -98,7 +98,7 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
         return exported_skin.shown(request, pending)
     file = min(file, len(pending.files) - 1)
     if file not in pending.drawn:
-        _draw(pending, file, _looked(request, pending, file))
+        pending.draw(file, figures(_looked(request, pending, file), f"/upload/{pending.id}/{file}/"))
     with store.reading() as connection:
         known = [row.id for row in skins.listed(connection, None, None, _MOST_SKINS)]
         about = _latest(store, pending.skin or pending.seen[file].skin)
@@ -233,10 +233,6 @@ def _look(request: Request, pending: PendingUpload) -> None:
         if number == 0:
             drawn = figures(inspected, f"/upload/{pending.id}/0/")
     pending.seen, pending.drawn = summaries, {0: drawn}
-
-
-def _draw(pending: PendingUpload, number: int, inspected: InspectedFile) -> None:
-    pending.draw(number, figures(inspected, f"/upload/{pending.id}/{number}/"))
 
 
 def _latest(store: Database, skin: str | None) -> Mapping[str, Any]:

@@ -61,7 +61,7 @@ def _whole_segments(stream: BinaryIO, file: str) -> tuple[int, list[str]]:
 
 
 def _block(group: TdmsGroup, about_file: Mapping[str, Any], file: str) -> Block:
-    channels = [channel for channel in group.channels() if _is_numeric(channel)]
+    channels = [channel for channel in group.channels() if channel.dtype.kind in "iufc" and len(channel) > 0]
     steps = {channel.properties.get("wf_increment") for channel in channels} - {None, 0}
     step = steps.pop() if len(steps) == 1 else None
     rate = 1 / step if isinstance(step, float) and step > 0 else None
@@ -80,10 +80,6 @@ def _moment(given: Any) -> str | None:
     except OverflowError:
         return None
     return moment.isoformat().replace("+00:00", "Z") if moment.year >= FIRST_YEAR else None
-
-
-def _is_numeric(channel: TdmsChannel) -> bool:
-    return channel.dtype.kind in "iufc" and len(channel) > 0
 
 
 def _channel(channel: TdmsChannel, file: str) -> Channel:

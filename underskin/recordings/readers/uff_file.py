@@ -38,7 +38,7 @@ def read(stream: BinaryIO, file: str) -> Contents:
         raise FileError(file, "", f"holds no whole dataset {_FUNCTION}; its datasets: {types or 'none'}")
     if len(functions) < len(types):
         notes.append(f"datasets other than {_FUNCTION} are left out: {sorted(set(types) - {_FUNCTION})}")
-    frfs = [function for function in functions if _is_frf(function)]
+    frfs = [one for one in functions if int(one["func_type"]) == _FRF and np.iscomplexobj(one["data"])]
     if len(frfs) < 2:
         return Contents(_blocks(functions), {}, tuple(notes))
     blocks, used = _each_alone(frfs, functions)
@@ -69,10 +69,6 @@ def _function(universal: Any, index: int, file: str) -> dict[str, Any]:
     if stored < announced or len(function["x"]) < announced or announced < 1:
         raise FileError(file, place, f"holds {stored} of the {announced} points that it announces")
     return {**function, "x": function["x"][:announced], "data": function["data"][:announced], "number": index + 1}
-
-
-def _is_frf(function: dict[str, Any]) -> bool:
-    return int(function["func_type"]) == _FRF and np.iscomplexobj(function["data"])
 
 
 def _each_alone(
