@@ -1,6 +1,7 @@
 """What routes and pages are given, as annotated types."""
 
-from typing import Annotated
+from collections.abc import Awaitable, Callable
+from typing import Annotated, Any
 
 from fastapi import Depends, Path, Request, Security
 from fastapi.security import SecurityScopes
@@ -14,21 +15,20 @@ from underskin.errors import wrong_type
 from underskin.surrogate.sigma_table import SigmaTable
 
 
-def _table(request: Request) -> SigmaTable:
-    table: SigmaTable = request.app.state.table
-    return table
+def _of_app(name: str) -> Callable[[Request], Awaitable[Any]]:
+    """What the application holds under a name."""
+
+    async def held(request: Request) -> Any:
+        return getattr(request.app.state, name)
+
+    return held
 
 
-Table = Annotated[SigmaTable, Depends(_table)]
-
-
-def _store_to_read(request: Request) -> Database:
-    store: Database = request.app.state.store
-    return store
-
-
+Table = Annotated[SigmaTable, Depends(_of_app("table"))]
+RunnerInUse = Annotated[Runner, Depends(_of_app("runner"))]
+PlannerInUse = Annotated[Planner, Depends(_of_app("planner"))]
 # For routes that keep nothing, whatever their method.
-StoreToRead = Annotated[Database, Depends(_store_to_read)]
+StoreToRead = Annotated[Database, Depends(_of_app("store"))]
 
 
 def _store(request: Request, store: StoreToRead) -> Database:
@@ -62,20 +62,6 @@ def sender(request: Request) -> str | None:
     """Name of the API key that a request came with."""
     key: Key | None = request.scope["key"]
     return None if key is None else key.name
-
-
-def _runner(request: Request) -> Runner:
-    runner: Runner = request.app.state.runner
-    return runner
-
-
-def _planner(request: Request) -> Planner:
-    planner: Planner = request.app.state.planner
-    return planner
-
-
-RunnerInUse = Annotated[Runner, Depends(_runner)]
-PlannerInUse = Annotated[Planner, Depends(_planner)]
 
 
 def number_of_cursor(cursor: str | None) -> int | None:

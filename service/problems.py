@@ -5,7 +5,7 @@ import reprlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from http import HTTPStatus
-from typing import Any
+from typing import Any, TypeVar
 
 import orjson
 from pydantic import BaseModel, Field, ValidationError
@@ -15,6 +15,7 @@ from underskin.errors import ErrorCode, InvalidInput
 _MOST_LOGGED = 3
 RETRY_LATER = {"Retry-After": "5"}  # seconds
 MEDIA_TYPE = "application/problem+json"
+_Model = TypeVar("_Model", bound=BaseModel)
 
 
 class FieldError(BaseModel):
@@ -144,6 +145,14 @@ def from_validation(errors: ValidationError | Sequence[Any]) -> Refusal:
     """The same problem from pydantic's list of errors."""
     details = errors.errors(include_url=False) if isinstance(errors, ValidationError) else errors
     return invalid_input(_as_invalid_input(detail) for detail in details)
+
+
+def validated(kind: type[_Model], document: Any) -> _Model:
+    """The model of a document; raises Refusal with all that is wrong."""
+    try:
+        return kind.model_validate(document)
+    except ValidationError as error:
+        raise from_validation(error) from None
 
 
 def first_refused(error: ValidationError) -> InvalidInput:

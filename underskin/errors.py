@@ -10,7 +10,8 @@ UnderskinError
 └── Unreachable       no answer from the server: nothing listens there, or time ran out (raised by the client)
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Self
@@ -80,8 +81,8 @@ class UnderskinError(Exception):
 class InvalidInput(UnderskinError, ValueError):
     """A value that cannot be used.
 
-    Attributes: `field` (the name the user knows), `index` (row in a column, or None), `value`, `allowed`
-    (what would be accepted, in words), `code` (what kind of error it is).
+    Attributes: `field` (the name the user knows), `index` (row in a column, or None), `place` (both), `value`,
+    `allowed` (what would be accepted, in words), `code` (what kind of error it is).
     """
 
     def __init__(
@@ -98,8 +99,8 @@ class InvalidInput(UnderskinError, ValueError):
         self.allowed = allowed
         self.index = index
         self.code = code
-        place = field if index is None else f"{field}[{index}]"
-        super().__init__(f"{place} = {value!r}: {allowed}")
+        self.place = field if index is None else f"{field}[{index}]"
+        super().__init__(f"{self.place} = {value!r}: {allowed}")
 
     def at(self, field: str) -> "InvalidInput":
         """The same error of a field that is called differently from outside."""
@@ -182,6 +183,17 @@ class FileError(UnderskinError):
         """The same error of a field whose value is the file, by the name that it was sent under."""
         allowed = ": ".join(part for part in (self.place, self.reason) if part)
         return InvalidInput(field, file, allowed, code=self.code)
+
+
+@contextmanager
+def damage_said(file: str, place: str, said: Callable[[Exception], str]) -> Iterator[None]:
+    """Turns whatever a library lets through where a file is damaged into FileError; memory that is short stays so."""
+    try:
+        yield
+    except (MemoryError, FileError):
+        raise
+    except Exception as error:
+        raise FileError(file, place, said(error)) from None
 
 
 class TableError(UnderskinError):

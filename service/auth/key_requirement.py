@@ -7,9 +7,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from service.auth.keys import KeyStore
 from service.log import LastingFailure
-from service.store import key_requirement
-from service.store.engine import Database, StorageFull
-from service.store.errors import StoreMoved
+from service.store import Database, StorageFull, StoreMoved, key_requirement
 
 logger = logging.getLogger("underskin")
 

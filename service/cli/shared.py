@@ -7,9 +7,7 @@ from pydantic import ValidationError
 from sqlalchemy.exc import DBAPIError
 
 from service.settings import Settings
-from service.store import StoreError
-from service.store.engine import StorageFull
-from service.store.errors import StoreMoved
+from service.store import StorageFull, StoreError, StoreMoved
 
 STORE_ERRORS = (StoreError, StoreMoved, StorageFull, DBAPIError)
 

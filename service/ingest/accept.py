@@ -12,8 +12,7 @@ from service.ingest import repeats
 from service.ingest.reading import CheckedCampaign, ReadCampaign, checked, joined, read, require_few
 from service.ingest.uploads import Upload
 from service.problems import Refusal
-from service.store import answers, campaigns, skins
-from service.store.engine import Database
+from service.store import Database, answers, campaigns, skins
 from underskin.errors import FileError, InvalidInput, conflicting, required
 from underskin.recordings import plausibility, validation
 from underskin.recordings.campaign import Campaign
@@ -88,8 +87,7 @@ def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> 
     for upload in uploads:
         if upload.field == RIG:
             try:
-                with upload.path.open("rb") as file:
-                    return parse_rig(file.read(LARGEST_BYTES + 1), upload.label or RIG)
+                return sent_rig(upload)
             except FileError as error:
                 raise error.of_field(RIG, upload.label) from None
             except InvalidInput as error:
@@ -99,8 +97,19 @@ def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> 
         names = [options.skin] if options.skin is not None else []
         if options.corrects is not None:
             names.append(campaigns.find(connection, options.corrects).skin_id)
-        rigs = [rig for name in names if (rig := skins.rig_of(connection, name)) is not None]
-    return from_dict(orjson.loads(rigs[0])) if rigs else None
+        rigs = (kept_rig(connection, name) for name in names)
+        return next((rig for rig in rigs if rig is not None), None)
+
+
+def sent_rig(upload: Upload) -> RigDescription:
+    """The rig description in an uploaded file; raises FileError, InvalidInput."""
+    return parse_rig(upload.start(LARGEST_BYTES + 1), upload.label or RIG)
+
+
+def kept_rig(connection: Connection, skin_id: str) -> RigDescription | None:
+    """The rig description that is kept with a skin."""
+    document = skins.rig_of(connection, skin_id)
+    return None if document is None else from_dict(orjson.loads(document))
 
 
 def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, options: IngestOptions) -> list[CheckedCampaign]:

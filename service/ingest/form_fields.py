@@ -54,5 +54,4 @@ def _is_short_text(upload: Upload) -> bool:
 
 def _start(upload: Upload) -> str:
     """As much of a text as an error shows."""
-    with upload.path.open("rb") as file:
-        return file.read(100).decode("utf-8", "replace")
+    return upload.start(100).decode("utf-8", "replace")

@@ -92,7 +92,7 @@ def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> In
         _require_usable(reading.campaign)
     except FileError as error:
         allowed = Requirement(Mention(error.place), ": ", error.reason) if error.place else error.reason
-        errors = [_error("file", upload.label, allowed, error.code)]
+        errors = [error_entry("file", upload.label, allowed, error.code)]
         return InspectedFile(kind, contents, [ReadCampaign(upload.label, errors=errors)])
     except InvalidInput as error:
         return InspectedFile(kind, contents, [ReadCampaign(upload.label, errors=[_invalid(error)])])
@@ -109,7 +109,7 @@ def checked(read: ReadCampaign) -> CheckedCampaign:
     for number, problem in enumerate(read.reading.problems):
         errors = refused.setdefault(problem.recording, [])
         if number < _MOST_ERRORS:
-            errors.append(_error(problem.field, problem.value, problem.allowed, problem.code))
+            errors.append(error_entry(problem.field, problem.value, problem.allowed, problem.code))
     count = len(read.reading.problems)
     unlisted = max(0, count - _MOST_ERRORS)
     if unlisted:
@@ -162,7 +162,9 @@ def _read_json(upload: Upload, most_bytes: int) -> list[ReadCampaign]:
                 400, f"The body is not JSON: line {error.lineno}, column {error.colno}: {error.msg}."
             ) from None
         allowed = f"must be JSON; line {error.lineno}, column {error.colno}: {error.msg}"
-        return [ReadCampaign(upload.label, errors=[_error("file", upload.label, allowed, ErrorCode.UNREADABLE_FILE)])]
+        return [
+            ReadCampaign(upload.label, errors=[error_entry("file", upload.label, allowed, ErrorCode.UNREADABLE_FILE)])
+        ]
     try:
         require_unique_keys(content)
     except Refusal as twice:
@@ -170,7 +172,7 @@ def _read_json(upload: Upload, most_bytes: int) -> list[ReadCampaign]:
             ReadCampaign(
                 upload.label,
                 errors=[
-                    _error(error["field"], error["value"], error["allowed"], ErrorCode.NOT_UNIQUE)
+                    error_entry(error["field"], error["value"], error["allowed"], ErrorCode.NOT_UNIQUE)
                     for error in twice.errors
                 ],
             )
@@ -197,15 +199,15 @@ def _checked(label: str | None, document: Any) -> ReadCampaign:
 
 
 def _nothing(refused: int) -> dict[str, Any]:
-    return _error(
+    return error_entry(
         "recordings", f"{refused} refused", "must hold at least one recording without errors", ErrorCode.TOO_FEW
     )
 
 
 def _invalid(error: InvalidInput) -> dict[str, Any]:
-    place = error.field if error.index is None else f"{error.field}[{error.index}]"
-    return _error(place, error.value, error.allowed, error.code)
+    return error_entry(error.place, error.value, error.allowed, error.code)
 
 
-def _error(name: str, value: Any, allowed: str, code: ErrorCode) -> dict[str, Any]:
+def error_entry(name: str, value: Any, allowed: str, code: ErrorCode) -> dict[str, Any]:
+    """An error as answers and pages list it."""
     return {"code": str(code), "field": name, "value": value, "allowed": allowed}

@@ -9,9 +9,7 @@ from typing import Any, BinaryIO
 from pydantic import BaseModel, Field, ValidationError
 
 from service.ingest.uploads import Upload
-from service.store import diagnosis_export, import_checks, importing
-from service.store.engine import Database
-from service.store.errors import Conflict
+from service.store import Conflict, Database, diagnosis_export, import_checks, importing
 from underskin.errors import FileError, InvalidInput, unreadable
 from underskin.recordings.skin_export import ExportedCampaign, Overview, read_campaigns, read_overview
 

@@ -20,8 +20,8 @@ from python_multipart.exceptions import FormParserError
 from python_multipart.multipart import parse_options_header
 
 from service.problems import Refusal
-from service.store.engine import StorageFull, is_full
-from service.store.errors import StoreMoved
+from service.store import StorageFull, StoreMoved
+from service.store.engine import is_full
 
 if TYPE_CHECKING:
     from python_multipart.multipart import MultipartCallbacks
@@ -41,6 +41,15 @@ class Upload:
     field: str | None
     sha256: str
     in_form: bool
+
+    def start(self, most: int) -> bytes:
+        """Its first bytes."""
+        with self.path.open("rb") as file:
+            return file.read(most)
+
+    def text(self, most: int) -> str:
+        """What a field of a form says, up to so many bytes."""
+        return self.start(most).decode("utf-8", "replace").strip()
 
 
 class UploadFolder:

@@ -12,11 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from service.jobs.process import Worker
 from service.jobs.runner import JobSettings, logger
-from service.jobs.worker import Job
 from service.problems import Refusal
-from service.store import diagnoses
-from service.store.engine import Database
-from service.store.tables import AnyRow
+from service.store import AnyRow, Database, diagnoses
 from underskin.recordings.readers import json_file
 
 if TYPE_CHECKING:
@@ -104,15 +101,7 @@ class Planner:
         with self._store.reading() as connection:
             campaign, _ = diagnoses.campaign_of(connection, row)
         content = json_file.write(campaign)
-        job_settings = self._job_settings
-        job = Job(
-            len(content),
-            str(job_settings.table),
-            job_settings.table_sha256,
-            job_settings.memory_bytes,
-            (),
-            asdict(limits),
-        )
+        job = self._job_settings.job(content, limits=asdict(limits))
         with tempfile.TemporaryFile() as stderr, Worker(job, content, stderr) as worker:
             with self._lock:
                 self._worker = worker

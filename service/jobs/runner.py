@@ -13,10 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from service.jobs.process import Worker
 from service.jobs.worker import Job
 from service.log import LastingFailure
-from service.store import diagnoses
-from service.store.engine import Database, StorageFull
-from service.store.errors import StoreMoved
-from service.store.tables import AnyRow
+from service.store import AnyRow, Database, StorageFull, StoreMoved, diagnoses
 from underskin import __version__
 from underskin.recordings.readers import json_file
 
@@ -36,6 +33,12 @@ class JobSettings:
     memory_bytes: int
     table: Path
     table_sha256: str
+
+    def job(
+        self, campaign: bytes, excluded: tuple[tuple[str, str], ...] = (), limits: dict[str, Any] | None = None
+    ) -> Job:
+        """A worker's, on a campaign."""
+        return Job(len(campaign), str(self.table), self.table_sha256, self.memory_bytes, excluded, limits)
 
 
 class Runner:
@@ -112,8 +115,7 @@ class Runner:
             campaign, excluded = diagnoses.campaign_of(connection, row)
         content = json_file.write(campaign)
         left_out = tuple((left.recording, left.reason) for left in excluded)
-        job_settings = self._job_settings
-        job = Job(len(content), str(job_settings.table), job_settings.table_sha256, job_settings.memory_bytes, left_out)
+        job = self._job_settings.job(content, left_out)
         with tempfile.TemporaryFile() as stderr, Worker(job, content, stderr) as worker:
             with self._lock:
                 self._jobs[threading.current_thread()] = worker

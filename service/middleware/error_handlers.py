@@ -10,9 +10,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from service.problems import RETRY_LATER, Refusal, from_validation, invalid_input, is_browsing, unexpected
+from service.store import Conflict, Missing, StorageFull, StoreMoved
 from service.store.answers import OtherRequest
-from service.store.engine import StorageFull
-from service.store.errors import Conflict, Missing, StoreMoved
 from underskin import InvalidInput
 
 logger = logging.getLogger("underskin")

@@ -125,7 +125,8 @@ async def post(
             most_json_bytes=settings.max_body_bytes,
         )
         answer, repeats = await run_in_threadpool(accept, store, uploads, options)
-        await run_in_threadpool(d33_cache.derive, store, table, _ids(answer))
+        kept = [result["id"] for result in answer.get("campaigns", [answer]) if result["id"] is not None]
+        await run_in_threadpool(d33_cache.derive, store, table, kept)
     headers = {"Idempotency-Replayed": "true"} if repeats else {}
     return Response(orjson.dumps(answer), status_code=201, headers=headers, media_type="application/json")
 
@@ -136,11 +137,6 @@ def _options(query: models.SendOptions, fields: Mapping[str, str]) -> dict[str, 
         return query.with_form(fields).model_dump()
     except ValidationError as error:
         raise from_validation(error) from None
-
-
-def _ids(answer: dict[str, Any]) -> list[str]:
-    """Of the campaigns that were kept."""
-    return [result["id"] for result in answer.get("campaigns", [answer]) if result["id"] is not None]
 
 
 @router.get("/campaigns", operation_id="campaigns", summary="Campaigns, the latest first")

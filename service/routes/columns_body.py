@@ -2,11 +2,10 @@
 
 from typing import Any, TypeVar
 
-from pydantic import ValidationError
 from pydantic_core import from_json
 
 from service.middleware.unique_keys import require_unique_keys
-from service.problems import Refusal, from_validation
+from service.problems import Refusal, validated
 from service.schemas.columns import ColumnsRequest
 from underskin.errors import ErrorCode, InvalidInput, wrong_type
 from underskin.prediction.columns import CsvError, from_csv
@@ -21,10 +20,7 @@ def parse(kind: type[RequestKind], body: bytes, content_type: str) -> RequestKin
         if _media_type(content_type) == "text/csv"
         else json_document(body, content_type, " or text/csv")
     )
-    try:
-        return kind.model_validate(fields)
-    except ValidationError as error:
-        raise from_validation(error) from None
+    return validated(kind, fields)
 
 
 def json_document(body: bytes, content_type: str, also: str = "") -> Any:

@@ -1,16 +1,17 @@
 """Endpoints that answer in columns, as JSON or CSV, and what OpenAPI says of them."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
-from fastapi import Header, Request, Response
+from fastapi import APIRouter, Header, Request, Response
 
-from service.dependencies import Table
-from service.routes.columns_body import parse
+from service.dependencies import StoreToRead, Table
+from service.routes.columns_body import json_document, parse
 from service.schemas.columns import ColumnsRequest
-from service.schemas.columns_answer import Columns
+from service.schemas.columns_answer import AnswerInColumns, Columns
+from service.store import Database
 from underskin.surrogate.sigma_table import SigmaTable
 
 Accept = Annotated[str, Header(description="`text/csv` returns the columns as CSV with NaN; otherwise JSON with null.")]
@@ -22,34 +23,59 @@ _threads = asyncio.Semaphore(4)
 _Kind = TypeVar("_Kind", bound=ColumnsRequest)
 
 
-def columns_route(
-    kind: type[_Kind], answer: Callable[[SigmaTable, _Kind], Columns]
-) -> Callable[..., Awaitable[Response]]:
+def add_columns_route(
+    router: APIRouter,
+    path: str,
+    summary: str,
+    kind: type[_Kind],
+    example: dict[str, Any],
+    answer: Callable[[SigmaTable, Database, _Kind], Columns],
+    answer_kind: type[AnswerInColumns],
+) -> None:
     """An endpoint that reads a request in columns, answers it and writes it as the client accepts it."""
 
-    async def endpoint(request: Request, table: Table, accept: Accept = "application/json") -> Response:
+    async def endpoint(
+        request: Request, table: Table, store: StoreToRead, accept: Accept = "application/json"
+    ) -> Response:
         """In columns: a list has an entry a row, a single number holds for all rows. Accept: text/csv gives CSV."""
         body = await request.body()
         content_type = request.headers.get("content-type", "")
 
         def work() -> Response:
             with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
-                return respond(answer(table, parse(kind, body, content_type)), accept)
+                return respond(answer(table, store, parse(kind, body, content_type)), accept)
 
         if len(body) <= _INLINE_BYTES and b"adopted" not in body:  # that model is in the store
             return work()
-        return await in_thread(work)
+        return await _in_thread(work)
 
-    return endpoint
+    router.post(
+        path,
+        operation_id=f"{path[1:]}_columns",
+        summary=summary,
+        responses={200: {"model": answer_kind, "content": {"text/csv": {}}}},
+        openapi_extra=_columns_body(kind, example),
+    )(endpoint)
 
 
-async def in_thread(work: Callable[[], Response]) -> Response:
+async def answer_json(request: Request, answer: Callable[[Any], Response]) -> Response:
+    """What is answered to the document in a JSON body, beside the event loop."""
+    body = await request.body()
+
+    def work() -> Response:
+        with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
+            return answer(json_document(body, request.headers.get("content-type", "")))
+
+    return await _in_thread(work)
+
+
+async def _in_thread(work: Callable[[], Response]) -> Response:
     """What `work` answers, which may take long: a few at a time, beside the event loop."""
     async with _threads:
         return await asyncio.to_thread(work)
 
 
-def columns_body(kind: type[ColumnsRequest], examples: dict[str, Any]) -> dict[str, Any]:
+def _columns_body(kind: type[ColumnsRequest], examples: dict[str, Any]) -> dict[str, Any]:
     """OpenAPI's description of a body in columns."""
     schema = kind.model_json_schema()
     return {

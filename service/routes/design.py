@@ -1,13 +1,14 @@
 """A skin before it is built: transmission, spatial resolution, two-point separation."""
 
-import numpy as np
+from typing import Any
+
 from fastapi import APIRouter, Request, Response
 
 from service.dependencies import Table
-from service.routes.columns_body import json_document
-from service.routes.columns_endpoint import in_thread
+from service.problems import validated
+from service.routes.columns_endpoint import answer_json
 from service.schemas.design import DesignAnswer, DesignRequest
-from service.usecases.design import design_answer, design_of, read_design
+from service.usecases.design import design_answer, design_of
 
 router = APIRouter(prefix="/v1", tags=["design"])
 
@@ -39,13 +40,10 @@ async def post(request: Request, table: Table) -> Response:
 
     Loads add, as on a linear layer.
     """
-    body = await request.body()
-    content_type = request.headers.get("content-type", "")
 
-    def work() -> Response:
-        asked = read_design(json_document(body, content_type))
-        with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
-            answer = design_answer(table, asked, design_of(table, asked))
+    def answer(document: Any) -> Response:
+        asked = validated(DesignRequest, document)
+        answer = design_answer(table, asked, design_of(table, asked))
         return Response(answer.model_dump_json(), media_type="application/json")
 
-    return await in_thread(work)
+    return await answer_json(request, answer)

@@ -8,8 +8,7 @@ from fastapi import Depends, Header, Request
 from sqlalchemy import Connection
 
 from service.dependencies import sender
-from service.store import answers
-from service.store.engine import Database
+from service.store import Database, answers
 
 
 class Idempotency:

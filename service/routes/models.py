@@ -13,7 +13,7 @@ from service.routes.idempotency import Idempotent
 from service.schemas import diagnoses as answers
 from service.schemas.campaigns import ReasonText
 from service.store import models, skins
-from service.usecases import models as usecase
+from service.usecases import adopted_models as usecase
 
 router = APIRouter(prefix="/v1", tags=["skins"], route_class=JsonRoute)
 

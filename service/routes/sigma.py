@@ -1,13 +1,13 @@
 """σ: one point (GET) or columns of points (POST)."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 from orjson import dumps, loads
 
 from service.dependencies import Table
 from service.middleware.asgi_middleware import HotRoute, are_numbers
-from service.routes.columns_endpoint import Accept, columns_body, columns_route, respond
+from service.routes.columns_endpoint import Accept, add_columns_route, respond
 from service.schemas.sigma import OneSigma, SigmaAnswer, SigmaColumns, SigmaQuery
 from service.usecases.sigma import sigma
 from underskin.surrogate.sigma_table import SigmaTable
@@ -44,17 +44,9 @@ async def sigma_one(
     point: Annotated[SigmaQuery, Query()], table: Table, accept: Accept = "application/json"
 ) -> Response:
     """One point; Accept: text/csv gives one row."""
-    return respond(sigma(table, SigmaColumns(**point.model_dump())), accept, one=True)
+    return respond(sigma(table, None, SigmaColumns(**point.model_dump())), accept, one=True)
 
 
 EXAMPLE = {"a_over_h": [0.3, 0.6], "rt_over_h": 0.6, "load_parameter": [0.0, 0.01]}
 
-_ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": SigmaAnswer, "content": {"text/csv": {}}}}
-
-router.post(
-    "/sigma",
-    operation_id="sigma_columns",
-    summary="σ at many points",
-    responses=_ANSWER,
-    openapi_extra=columns_body(SigmaColumns, EXAMPLE),
-)(columns_route(SigmaColumns, sigma))
+add_columns_route(router, "/sigma", "σ at many points", SigmaColumns, EXAMPLE, sigma, SigmaAnswer)

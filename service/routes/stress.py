@@ -2,11 +2,9 @@
 
 from typing import Any
 
-import numpy as np
 from fastapi import APIRouter, Request, Response
 
-from service.routes.columns_body import json_document
-from service.routes.columns_endpoint import Accept, in_thread, respond
+from service.routes.columns_endpoint import Accept, answer_json, respond
 from service.schemas.stress import StressAnswer
 from service.usecases import stress as usecase
 from service.usecases.table_loader import influence_table
@@ -42,12 +40,9 @@ _ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": StressAnswer, "conten
 )
 async def stress(request: Request, accept: Accept = "application/json") -> Response:
     """Linear superposition over all loads: off-centre, several, sheared, ν < 0.5, a yielding glue line."""
-    body = await request.body()
-    content_type = request.headers.get("content-type", "")
 
-    def work() -> Response:
-        asked = read_request(json_document(body, content_type))
-        with np.errstate(all="ignore"):  # what overflows is out of reach
-            return respond(usecase.stress(influence_table(request.app.state.settings.tables), asked), accept)
+    def answer(document: Any) -> Response:
+        asked = read_request(document)
+        return respond(usecase.stress(influence_table(request.app.state.settings.tables), asked), accept)
 
-    return await in_thread(work)
+    return await answer_json(request, answer)

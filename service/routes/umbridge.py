@@ -11,20 +11,7 @@ from service.dependencies import Table
 from service.middleware.asgi_middleware import HotRoute, are_numbers
 from service.middleware.unique_keys import JsonRoute
 from service.problems import Refusal
-from service.schemas.umbridge import (
-    Derivative,
-    Evaluation,
-    GradientRequest,
-    HessianRequest,
-    Info,
-    InputSizes,
-    JacobianRequest,
-    ModelInfo,
-    ModelRequest,
-    OutputSizes,
-    Values,
-    Vector,
-)
+from service.schemas import umbridge as models
 from service.usecases.umbridge_models import MODELS, UmbridgeModel
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
@@ -33,56 +20,56 @@ router = APIRouter(prefix="/umbridge", tags=["umbridge"], route_class=JsonRoute)
 
 
 @router.get("/Info", operation_id="umbridge_info", summary="Protocol and models")
-async def info() -> Info:
+async def info() -> models.Info:
     """Version of the protocol, and the models' names."""
-    return Info(protocolVersion=1.0, models=list(MODELS))
+    return models.Info(protocolVersion=1.0, models=list(MODELS))
 
 
 @router.post("/ModelInfo", operation_id="umbridge_model_info", summary="What a model supports")
-async def model_info(request: ModelRequest) -> ModelInfo:
+async def model_info(request: models.ModelRequest) -> models.ModelInfo:
     """Values and first derivatives."""
     _model(request)
-    return ModelInfo(support={"Evaluate": True, "Gradient": True, "ApplyJacobian": True, "ApplyHessian": False})
+    return models.ModelInfo(support={"Evaluate": True, "Gradient": True, "ApplyJacobian": True, "ApplyHessian": False})
 
 
 @router.post("/InputSizes", operation_id="umbridge_input_sizes", summary="Lengths of the inputs")
-async def input_sizes(request: ModelRequest) -> InputSizes:
+async def input_sizes(request: models.ModelRequest) -> models.InputSizes:
     """One vector."""
-    return InputSizes(inputSizes=[len(_model(request).inputs)])
+    return models.InputSizes(inputSizes=[len(_model(request).inputs)])
 
 
 @router.post("/OutputSizes", operation_id="umbridge_output_sizes", summary="Lengths of the outputs")
-async def output_sizes(request: ModelRequest) -> OutputSizes:
+async def output_sizes(request: models.ModelRequest) -> models.OutputSizes:
     """One number."""
     _model(request)
-    return OutputSizes(outputSizes=[1])
+    return models.OutputSizes(outputSizes=[1])
 
 
 @router.post("/Evaluate", operation_id="umbridge_evaluate", summary="A model's value")
-async def evaluate(request: Evaluation, table: Table) -> Values:
+async def evaluate(request: models.Evaluation, table: Table) -> models.Values:
     """σ or the FRF [pC/N] at one point."""
     model = _model(request)
-    return Values(output=[[model.value(table, _point(model, request))]])
+    return models.Values(output=[[model.value(table, _point(model, request))]])
 
 
 @router.post("/Gradient", operation_id="umbridge_gradient", summary="Gradient of a model")
-async def gradient(request: GradientRequest, table: Table) -> Vector:
+async def gradient(request: models.GradientRequest, table: Table) -> models.Vector:
     """sens · ∂output/∂input."""
     slopes = _slopes(table, request)
     _require(len(request.sens) == 1, "sens must have length 1")
-    return Vector(output=_finite_product(slopes, np.broadcast_to(request.sens, slopes.shape)).tolist())
+    return models.Vector(output=_finite_product(slopes, np.broadcast_to(request.sens, slopes.shape)).tolist())
 
 
 @router.post("/ApplyJacobian", operation_id="umbridge_apply_jacobian", summary="Derivative along a direction")
-async def apply_jacobian(request: JacobianRequest, table: Table) -> Vector:
+async def apply_jacobian(request: models.JacobianRequest, table: Table) -> models.Vector:
     """∂output/∂input · vec."""
     slopes = _slopes(table, request)
     _require(len(request.vec) == slopes.size, f"vec must have length {slopes.size}")
-    return Vector(output=[float(_finite_product(slopes, np.array(request.vec)).sum())])
+    return models.Vector(output=[float(_finite_product(slopes, np.array(request.vec)).sum())])
 
 
 @router.post("/ApplyHessian", operation_id="umbridge_apply_hessian", summary="Not supported")
-async def apply_hessian(request: HessianRequest) -> Vector:
+async def apply_hessian(request: models.HessianRequest) -> models.Vector:
     """Always refused, as the protocol says of models without second derivatives."""
     _model(request)
     raise Refusal(400, "ApplyHessian is not supported by this model.", title="Unsupported feature")
@@ -106,20 +93,20 @@ def hot_route(table: SigmaTable) -> HotRoute:
     return one
 
 
-def _model(request: ModelRequest) -> UmbridgeModel:
+def _model(request: models.ModelRequest) -> UmbridgeModel:
     if request.name not in MODELS:
         raise Refusal(400, f"There is no model {request.name!r}; there are {list(MODELS)}.", title="Model not found")
     return MODELS[request.name]
 
 
-def _point(model: UmbridgeModel, request: Evaluation) -> list[float]:
+def _point(model: UmbridgeModel, request: models.Evaluation) -> list[float]:
     names = ", ".join(model.inputs)
     _require(len(request.input) == 1, f"input must be one vector: [[{names}]]")
     _require(len(request.input[0]) == len(model.inputs), f"the input vector must be [{names}]")
     return request.input[0]
 
 
-def _slopes(table: SigmaTable, request: Derivative) -> Floats:
+def _slopes(table: SigmaTable, request: models.Derivative) -> Floats:
     model = _model(request)
     return model.gradient(table, _point(model, request))
 

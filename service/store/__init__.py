@@ -5,10 +5,21 @@ from pathlib import Path
 from sqlalchemy.exc import DBAPIError
 
 from service.store import migrate
-from service.store.engine import Database, database
-from service.store.errors import StoreError
+from service.store.engine import Database, StorageFull, database
+from service.store.errors import Conflict, Missing, StoreError, StoreMoved
+from service.store.tables import AnyRow
 
-__all__ = ["Database", "StoreError", "database", "open_store"]
+__all__ = [
+    "AnyRow",
+    "Conflict",
+    "Database",
+    "Missing",
+    "StorageFull",
+    "StoreError",
+    "StoreMoved",
+    "database",
+    "open_store",
+]
 
 
 def open_store(database_url: str, folder: Path) -> Database:

@@ -1,12 +1,12 @@
 """What was answered to requests with an Idempotency-Key, kept in the transaction that kept what they brought."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
-from sqlalchemy import Connection, select
-from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy import ColumnElement, Connection, select
 
 from service.store.codec import compressed, decompressed
+from service.store.engine import upsert
 from service.store.tables import answers
 from service.store.times import now
 
@@ -26,10 +26,7 @@ class OtherRequest(ValueError):
 
 def replayed(connection: Connection, request: KnownRequest) -> Any | None:
     """The answer given before; None where there is none. Raises OtherRequest."""
-    query = select(answers.c.request_sha256, answers.c.answer).where(
-        answers.c.sender == request.sender, answers.c.idempotency_key == request.idempotency_key
-    )
-    row = connection.execute(query).first()
+    row = connection.execute(select(answers.c.request_sha256, answers.c.answer).where(_is(request))).first()
     if row is None:
         return None
     if row.request_sha256 != request.request_sha256:
@@ -42,19 +39,14 @@ def claim(connection: Connection, request: KnownRequest) -> bool:
 
     A second request with the same key waits here for the first one's transaction.
     """
-    dialect = sqlite if connection.dialect.name == "sqlite" else postgresql
-    row = {
-        "sender": request.sender,
-        "idempotency_key": request.idempotency_key,
-        "request_sha256": request.request_sha256,
-        "answer": b"",
-        "answered_at": now(),
-    }
-    claimed = dialect.insert(answers).on_conflict_do_nothing().returning(answers.c.idempotency_key)
-    return connection.execute(claimed, row).first() is not None
+    claimed = upsert(connection, answers).on_conflict_do_nothing().returning(answers.c.idempotency_key)
+    return connection.execute(claimed, {**asdict(request), "answer": b"", "answered_at": now()}).first() is not None
 
 
 def keep(connection: Connection, request: KnownRequest, answer: Any) -> None:
     """Fill in the answer of a claimed key."""
-    this = (answers.c.sender == request.sender) & (answers.c.idempotency_key == request.idempotency_key)
-    connection.execute(answers.update().where(this).values(answer=compressed(answer)))
+    connection.execute(answers.update().where(_is(request)).values(answer=compressed(answer)))
+
+
+def _is(request: KnownRequest) -> ColumnElement[bool]:
+    return (answers.c.sender == request.sender) & (answers.c.idempotency_key == request.idempotency_key)

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from sqlalchemy import Connection, Select, func, insert, select, update
+from sqlalchemy import Connection, func, insert, select, update
 
 from service.store import codec, digests, skins
 from service.store.engine import Database
@@ -96,9 +96,10 @@ def rows_of(number: int, stored: Sequence[Recording]) -> list[dict[str, Any]]:
     ]
 
 
-def find(connection: Connection, campaign_id: str) -> AnyRow:
-    """The row of a campaign; raises Missing."""
-    row = connection.execute(select(campaigns).where(campaigns.c.id == campaign_id)).first()
+def find(connection: Connection, campaign_id: str, *, lock: bool = False) -> AnyRow:
+    """The row of a campaign, where asked locked until the transaction ends; raises Missing."""
+    query = select(campaigns).where(campaigns.c.id == campaign_id)
+    row = connection.execute(query.with_for_update() if lock else query).first()
     if row is None:
         raise Missing(f"There is no campaign {campaign_id!r}.")
     return row
@@ -106,10 +107,29 @@ def find(connection: Connection, campaign_id: str) -> AnyRow:
 
 def listed(connection: Connection, filters: CampaignFilters, before: int | None, limit: int) -> Sequence[AnyRow]:
     """Rows of campaigns, the latest arrival first, those that arrived before the number `before`."""
-    query = _filtered(select(campaigns), filters)
+    query = select(campaigns)
+    if filters.skin is not None:
+        query = query.where(campaigns.c.skin_id.in_(skins.members(skins.root_of(filters.skin))))
+    if filters.state == "current":
+        query = query.where(CURRENT)
+    if filters.state == "corrected":
+        query = query.where(campaigns.c.corrected_by.is_not(None), campaigns.c.withdrawn_at.is_(None))
+    if filters.state == "withdrawn":
+        query = query.where(campaigns.c.withdrawn_at.is_not(None))
+    if filters.name_contains is not None:
+        query = query.where(func.lower(campaigns.c.name).contains(filters.name_contains.lower(), autoescape=True))
+    if filters.recorded_from is not None:
+        query = query.where(campaigns.c.recorded_at >= filters.recorded_from)
+    if filters.recorded_to is not None:
+        query = query.where(campaigns.c.recorded_at < filters.recorded_to)
     if before is not None:
         query = query.where(campaigns.c.number < before)
     return connection.execute(query.order_by(campaigns.c.number.desc()).limit(limit)).all()
+
+
+def latest(connection: Connection, root: str) -> AnyRow | None:
+    """The row of a skin's current campaign that arrived last; None where none is current."""
+    return next(iter(listed(connection, CampaignFilters(skin=root, state="current"), None, 1)), None)
 
 
 def state(row: AnyRow) -> State:
@@ -117,6 +137,13 @@ def state(row: AnyRow) -> State:
     if row.withdrawn_at is not None:
         return "withdrawn"
     return "current" if row.corrected_by is None else "corrected"
+
+
+def unused(row: AnyRow) -> str | None:
+    """Why figures do not use it: withdrawn or corrected; None where it is current."""
+    if row.withdrawn_at is not None:
+        return f"withdrawn: {row.withdraw_reason}"
+    return None if row.corrected_by is None else f"corrected by {row.corrected_by}"
 
 
 def recordings_of(connection: Connection, number: int) -> Sequence[AnyRow]:
@@ -185,10 +212,7 @@ def of_skin(connection: Connection, root: str) -> Iterator[AnyRow]:
 
 def _changeable(connection: Connection, campaign_id: str) -> AnyRow:
     """The row, locked until the transaction ends; raises Missing, or Conflict where it is no longer current."""
-    query = select(campaigns).where(campaigns.c.id == campaign_id).with_for_update()
-    row = connection.execute(query).first()
-    if row is None:
-        raise Missing(f"There is no campaign {campaign_id!r}.")
+    row = find(connection, campaign_id, lock=True)
     if row.withdrawn_at is not None:
         raise Conflict(f"Campaign {campaign_id!r} was withdrawn: {row.withdraw_reason}")
     if row.corrected_by is not None:
@@ -199,21 +223,3 @@ def _changeable(connection: Connection, campaign_id: str) -> AnyRow:
 def _change(connection: Connection, number: int, **values: Any) -> None:
     values["revision"] = campaigns.c.revision + 1
     connection.execute(update(campaigns).where(campaigns.c.number == number).values(**values))
-
-
-def _filtered(query: Select[Any], filters: CampaignFilters) -> Select[Any]:
-    if filters.skin is not None:
-        query = query.where(campaigns.c.skin_id.in_(skins.members(skins.root_of(filters.skin))))
-    if filters.state == "current":
-        query = query.where(CURRENT)
-    if filters.state == "corrected":
-        query = query.where(campaigns.c.corrected_by.is_not(None), campaigns.c.withdrawn_at.is_(None))
-    if filters.state == "withdrawn":
-        query = query.where(campaigns.c.withdrawn_at.is_not(None))
-    if filters.name_contains is not None:
-        query = query.where(func.lower(campaigns.c.name).contains(filters.name_contains.lower(), autoescape=True))
-    if filters.recorded_from is not None:
-        query = query.where(campaigns.c.recorded_at >= filters.recorded_from)
-    if filters.recorded_to is not None:
-        query = query.where(campaigns.c.recorded_at < filters.recorded_to)
-    return query

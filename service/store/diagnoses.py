@@ -57,11 +57,8 @@ def ask(connection: Connection, campaign_id: str, table_sha256: str, version: st
 
     Raises Missing, and Conflict where the campaign is not current. One that failed or was cancelled is asked anew.
     """
-    query = select(campaigns).where(campaigns.c.id == campaign_id).with_for_update()
-    campaign = connection.execute(query).first()
-    if campaign is None:
-        raise Missing(f"There is no campaign {campaign_id!r}.")
-    why = _unused(campaign)
+    campaign = kept_campaigns.find(connection, campaign_id, lock=True)
+    why = kept_campaigns.unused(campaign)
     if why is not None:
         raise Conflict(f"Campaign {campaign_id!r} is not diagnosed: it was {why}.")
     basis = {
@@ -123,7 +120,8 @@ def listed(connection: Connection, filters: DiagnosisFilters, before: int | None
 
 def outdated(row: AnyRow) -> str | None:
     """Why a diagnosis is not of its campaign as it is now; None where it is."""
-    return _unused(row) or ("changed: recordings were excluded since" if row.excluded != row.excluded_now else None)
+    changed = "changed: recordings were excluded since" if row.excluded != row.excluded_now else None
+    return kept_campaigns.unused(row) or changed
 
 
 def cancel(connection: Connection, diagnosis_id: str) -> None:
@@ -189,12 +187,6 @@ def campaign_of(connection: Connection, row: AnyRow) -> tuple[Campaign, list[Exc
     excluded = sorted(kept_campaigns.excluded_of(connection, row.campaign), key=lambda left: left.at)[: row.excluded]
     names = {left.recording for left in excluded}
     return replace(whole, recordings=tuple(entry for entry in whole.recordings if entry.id not in names)), excluded
-
-
-def _unused(campaign: AnyRow) -> str | None:
-    if campaign.withdrawn_at is not None:
-        return f"withdrawn: {campaign.withdraw_reason}"
-    return None if campaign.corrected_by is None else f"corrected by {campaign.corrected_by}"
 
 
 def _end(connection: Connection, number: int, server: str, **values: Any) -> bool:

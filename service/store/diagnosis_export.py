@@ -23,12 +23,8 @@ Number = Annotated[float, Field(allow_inf_nan=False, strict=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=False)]
 
 _ENDED = ("done", "failed", "cancelled")
-_DIAGNOSIS = (
-    "id", "excluded", "table_sha256", "version", "state", "progress", "asked_at", "asked_from", "started_at",
-    "ended_at", "reason", "verdict", "probability",
-)  # fmt: skip
-_WITHDRAWAL = ("withdrawn_at", "withdrawn_from", "withdraw_reason")
-_MODEL = ("id", "skin_id", "version", "adopted_at", "adopted_from", *_WITHDRAWAL)
+_DIAGNOSES = select(diagnoses, campaigns.c.id.label("campaign_id")).join(campaigns)
+_MODELS = select(models, diagnoses.c.id.label("diagnosis_id")).join(diagnoses)
 
 
 class _ExportedModel(BaseModel):
@@ -76,7 +72,6 @@ class DiagnosisRow(_ExportedModel):
     """A row of diagnoses."""
 
     id: Annotated[str, StringConstraints(pattern=r"^d-[0-9a-f]{16}$")]
-    campaign_id: Id
     excluded: int = Field(ge=0)
     table_sha256: Text
     version: Text
@@ -89,6 +84,7 @@ class DiagnosisRow(_ExportedModel):
     reason: Text | None
     verdict: Text | None
     probability: Share | None
+    campaign_id: Id
     report: dict[str, Any] | None
 
 
@@ -98,12 +94,12 @@ class ModelRow(_ExportedModel):
     id: Annotated[str, StringConstraints(pattern=r"^m-[0-9a-f]{16}$")]
     skin_id: Id
     version: int = Field(ge=1)
-    diagnosis_id: Id
     adopted_at: Time
     adopted_from: Text | None
     withdrawn_at: Time | None = None  # which older files do not have, nor the next two
     withdrawn_from: Text | None = None
     withdraw_reason: Text | None = None
+    diagnosis_id: Id
 
 
 @dataclass(frozen=True)
@@ -117,10 +113,9 @@ class Checked:
 def exported(connection: Connection, root: str) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Diagnoses and models of a skin and of those joined to it, as an export has them."""
     of_skin = skins.members(root)
-    query = select(diagnoses, campaigns.c.id.label("campaign_id")).join(campaigns)
-    query = query.where(campaigns.c.skin_id.in_(of_skin), diagnoses.c.state.in_(_ENDED))
+    query = _DIAGNOSES.where(campaigns.c.skin_id.in_(of_skin), diagnoses.c.state.in_(_ENDED))
     entries = [_diagnosis(row) for row in connection.execute(query.order_by(diagnoses.c.number))]
-    query = select(models, diagnoses.c.id.label("diagnosis_id")).join(diagnoses).where(models.c.skin_id.in_(of_skin))
+    query = _MODELS.where(models.c.skin_id.in_(of_skin))
     return entries, [_model(row) for row in connection.execute(query.order_by(models.c.number))]
 
 
@@ -160,15 +155,12 @@ def clashes(connection: Connection, file: Checked) -> list[str]:
     """Which diagnoses and versions of models are there already and differ."""
     sentences = []
     for row in file.diagnoses:
-        there = connection.execute(
-            select(diagnoses, campaigns.c.id.label("campaign_id")).join(campaigns).where(diagnoses.c.id == row.id)
-        ).first()
+        there = connection.execute(_DIAGNOSES.where(diagnoses.c.id == row.id)).first()
         if there is not None and _diagnosis(there) != row.model_dump():
             sentences.append(f"Diagnosis {row.id!r} is there already and differs")
     for model in file.models:
         same = (models.c.id == model.id) | ((models.c.skin_id == model.skin_id) & (models.c.version == model.version))
-        query = select(models, diagnoses.c.id.label("diagnosis_id")).join(diagnoses).where(same)
-        if any(_model(there) != model.model_dump() for there in connection.execute(query)):
+        if any(_model(there) != model.model_dump() for there in connection.execute(_MODELS.where(same))):
             sentences.append(f"Model {model.version} of skin {model.skin_id!r} is there already and differs")
     return sentences
 
@@ -191,9 +183,9 @@ def add(store: Database, file: Checked) -> None:
 
 
 def _diagnosis(row: AnyRow) -> dict[str, Any]:
-    report = None if row.report is None else decompressed(row.report)
-    return {name: getattr(row, name) for name in _DIAGNOSIS} | {"campaign_id": row.campaign_id, "report": report}
+    values = {name: getattr(row, name) for name in DiagnosisRow.model_fields}
+    return values | {"report": None if row.report is None else decompressed(row.report)}
 
 
 def _model(row: AnyRow) -> dict[str, Any]:
-    return {name: getattr(row, name) for name in _MODEL} | {"diagnosis_id": row.diagnosis_id}
+    return {name: getattr(row, name) for name in ModelRow.model_fields}

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import orjson
-from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url, text
+from sqlalchemy import URL, Connection, Engine, Table, create_engine, event, make_url, text
+from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.exc import ArgumentError, DBAPIError
 
 from service.store.errors import StoreError
@@ -88,16 +89,18 @@ class Database:
     @contextmanager
     def without_writers(self) -> Iterator[None]:
         """While the block lasts nobody writes, in this process or another: what is under way ends, the others wait."""
-        if self.is_sqlite:
-            with self._locked_file():
-                yield
-            return
+        with self._locked_file() if self.is_sqlite else self.pg_lock(_PG_WRITING):
+            yield
+
+    @contextmanager
+    def pg_lock(self, number: int) -> Iterator[None]:
+        """A lock of PostgreSQL that processes take by its number, one at a time."""
         with self.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
-            connection.execute(text("SELECT pg_advisory_lock(:number)"), {"number": _PG_WRITING})
+            connection.execute(text("SELECT pg_advisory_lock(:number)"), {"number": number})
             try:
                 yield
             finally:
-                connection.execute(text("SELECT pg_advisory_unlock(:number)"), {"number": _PG_WRITING})
+                connection.execute(text("SELECT pg_advisory_unlock(:number)"), {"number": number})
 
     @contextmanager
     def _locked_file(self) -> Iterator[None]:
@@ -135,6 +138,11 @@ def is_full(error: BaseException) -> bool:
         code = getattr(original, "sqlite_errorcode", 0) & 0xFF
         return code == sqlite3.SQLITE_FULL or getattr(original, "sqlstate", None) == _PG_DISK_FULL
     return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
+def upsert(connection: Connection, table: Table) -> sqlite.Insert | postgresql.Insert:
+    """An insert that may say what to do where the row is there already, as each database has its own."""
+    return (sqlite if connection.dialect.name == "sqlite" else postgresql).insert(table)
 
 
 def _engine(url: URL, files: SqliteFiles | None) -> Engine:

@@ -3,34 +3,36 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, delete, insert, select
+from sqlalchemy import ColumnElement, Connection, Table, delete, insert, select
 
 from service.schemas.campaign_d33 import ANSWER_VERSION
 from service.store import skins
+from service.store.campaigns import CURRENT
 from service.store.codec import compressed, decompressed
 from service.store.tables import AnyRow, adopted_inversions, campaigns, inversions, sensor_d33
 
 
 def find(connection: Connection, campaign: AnyRow, table_sha256: str) -> Any | None:
     """The answer kept for a campaign as it is now, with this table, by this software; None where there is none."""
-    query = select(inversions.c.document).where(*_now(campaign, table_sha256))
+    query = select(inversions.c.document).where(_now(inversions, campaign, table_sha256))
     blob = connection.execute(query).scalar()
     return None if blob is None else decompressed(blob)
 
 
 def find_with_numbers(connection: Connection, campaign: AnyRow, table_sha256: str) -> tuple[Any, Any] | None:
     """The same, with the numbers that the figures show; None where either is missing."""
-    query = select(inversions.c.document, inversions.c.numbers).where(*_now(campaign, table_sha256))
+    query = select(inversions.c.document, inversions.c.numbers).where(_now(inversions, campaign, table_sha256))
     row = connection.execute(query.where(inversions.c.numbers.is_not(None))).first()
     return None if row is None else (decompressed(row.document), decompressed(row.numbers))
 
 
-def _now(campaign: AnyRow, table_sha256: str) -> tuple[ColumnElement[bool], ...]:
+def _now(table: Table, campaign: Any, table_sha256: str) -> ColumnElement[bool]:
+    """What was derived from a campaign, a row or the columns of the table of campaigns, as it is now."""
     return (
-        inversions.c.campaign == campaign.number,
-        inversions.c.revision == campaign.revision,
-        inversions.c.table_sha256 == table_sha256,
-        inversions.c.answer_version == ANSWER_VERSION,
+        (table.c.campaign == campaign.number)
+        & (table.c.revision == campaign.revision)
+        & (table.c.table_sha256 == table_sha256)
+        & (table.c.answer_version == ANSWER_VERSION)
     )
 
 
@@ -44,16 +46,10 @@ def keep(
 ) -> None:
     """Keep an answer, the numbers of its figures, and d33 with its standard uncertainty [pC/N] by sensor, unless the
     campaign changed since."""
-    # The id too: after a restore, a number may be another campaign's.
-    same = (campaigns.c.number == campaign.number) & (campaigns.c.id == campaign.id)
-    query = select(campaigns.c.revision).where(same).with_for_update()
-    if connection.execute(query).scalar() != campaign.revision:
-        return
-    for table in (inversions, sensor_d33):
-        connection.execute(delete(table).where(table.c.campaign == campaign.number))
-    basis = {"revision": campaign.revision, "table_sha256": table_sha256, "answer_version": ANSWER_VERSION}
     derived = {"document": compressed(document), "numbers": compressed(numbers)}
-    connection.execute(insert(inversions), {"campaign": campaign.number, **basis, **derived})
+    if not _replaced(connection, inversions, campaign, table_sha256, derived):
+        return
+    connection.execute(delete(sensor_d33).where(sensor_d33.c.campaign == campaign.number))
     values = [
         {"campaign": campaign.number, "sensor": name, "d33_pc_per_n": value, "d33_uncertainty_pc_per_n": uncertainty}
         for name, (value, uncertainty) in sensors.items()
@@ -64,34 +60,37 @@ def keep(
 
 def find_adopted(connection: Connection, campaign: AnyRow, model_id: str, table_sha256: str) -> Any | None:
     """The answer kept for a campaign as it is now, with this model and table; None where there is none."""
-    query = select(adopted_inversions.c.document).where(
-        adopted_inversions.c.campaign == campaign.number,
-        adopted_inversions.c.model_id == model_id,
-        adopted_inversions.c.revision == campaign.revision,
-        adopted_inversions.c.table_sha256 == table_sha256,
-        adopted_inversions.c.answer_version == ANSWER_VERSION,
-    )
+    now = _now(adopted_inversions, campaign, table_sha256)
+    query = select(adopted_inversions.c.document).where(now, adopted_inversions.c.model_id == model_id)
     blob = connection.execute(query).scalar()
     return None if blob is None else decompressed(blob)
 
 
 def keep_adopted(connection: Connection, campaign: AnyRow, model_id: str, table_sha256: str, document: Any) -> None:
     """Keep an answer under an adopted model, unless the campaign changed since."""
+    derived = {"model_id": model_id, "document": compressed(document)}
+    _replaced(connection, adopted_inversions, campaign, table_sha256, derived)
+
+
+def _replaced(
+    connection: Connection, table: Table, campaign: AnyRow, table_sha256: str, derived: Mapping[str, Any]
+) -> bool:
+    """Whether a campaign's row of the table was replaced: not where the campaign changed since."""
     # The id too: after a restore, a number may be another campaign's.
     same = (campaigns.c.number == campaign.number) & (campaigns.c.id == campaign.id)
     query = select(campaigns.c.revision).where(same).with_for_update()
     if connection.execute(query).scalar() != campaign.revision:
-        return
-    connection.execute(delete(adopted_inversions).where(adopted_inversions.c.campaign == campaign.number))
+        return False
+    connection.execute(delete(table).where(table.c.campaign == campaign.number))
     basis = {"revision": campaign.revision, "table_sha256": table_sha256, "answer_version": ANSWER_VERSION}
-    row = {"campaign": campaign.number, "model_id": model_id, **basis, "document": compressed(document)}
-    connection.execute(insert(adopted_inversions), row)
+    connection.execute(insert(table), {"campaign": campaign.number, **basis, **derived})
+    return True
 
 
 def missing_of_skin(connection: Connection, root: str, table_sha256: str) -> Sequence[AnyRow]:
     """Rows of the skin's current campaigns whose d33 is not kept as they are now."""
     query = select(campaigns).outerjoin(inversions, fresh(table_sha256))
-    query = query.where(inversions.c.campaign.is_(None), *_current(root))
+    query = query.where(inversions.c.campaign.is_(None), _current(root))
     return connection.execute(query.order_by(campaigns.c.number)).all()
 
 
@@ -108,21 +107,15 @@ def history(connection: Connection, root: str, table_sha256: str) -> Sequence[An
         )
         .join(inversions, fresh(table_sha256))
         .join(sensor_d33, sensor_d33.c.campaign == campaigns.c.number)
-        .where(*_current(root))
+        .where(_current(root))
     )
     return connection.execute(query.order_by(campaigns.c.number, sensor_d33.c.sensor)).all()
 
 
 def fresh(table_sha256: str) -> ColumnElement[bool]:
     """Joins a campaign with what was derived from it as it is now, with this table, by this software."""
-    return (
-        (inversions.c.campaign == campaigns.c.number)
-        & (inversions.c.revision == campaigns.c.revision)
-        & (inversions.c.table_sha256 == table_sha256)
-        & (inversions.c.answer_version == ANSWER_VERSION)
-    )
+    return _now(inversions, campaigns.c, table_sha256)
 
 
-def _current(root: str) -> tuple[Any, ...]:
-    current = (campaigns.c.withdrawn_at.is_(None), campaigns.c.corrected_by.is_(None))
-    return (campaigns.c.skin_id.in_(skins.members(root)), *current)
+def _current(root: str) -> ColumnElement[bool]:
+    return campaigns.c.skin_id.in_(skins.members(root)) & CURRENT

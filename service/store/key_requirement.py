@@ -1,8 +1,8 @@
 """Whether requests need a key: kept in the store from the first key on, and lifted by `underskin key open` alone."""
 
 from sqlalchemy import Connection, inspect, select
-from sqlalchemy.dialects import postgresql, sqlite
 
+from service.store.engine import upsert
 from service.store.tables import AnyRow, key_requirement
 from service.store.times import now
 
@@ -40,7 +40,5 @@ def _replace(connection: Connection, *, lifted: bool) -> None:
     """Write the only row, whether or not another transaction writes it at the same time."""
     time = now()
     row = {"number": _ONLY, "needed_since": time, "lifted_at": time if lifted else None}
-    dialect = sqlite if connection.dialect.name == "sqlite" else postgresql
-    connection.execute(
-        dialect.insert(key_requirement).values(row).on_conflict_do_update(index_elements=["number"], set_=row)
-    )
+    written = upsert(connection, key_requirement).values(row)
+    connection.execute(written.on_conflict_do_update(index_elements=["number"], set_=row))

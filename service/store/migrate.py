@@ -12,17 +12,8 @@ from service.store import backup
 from service.store.engine import Database
 from service.store.errors import StoreError
 
-VERSIONS = (
-    "0001",
-    "0002",
-    "0003",
-    "0004",
-    "0005",
-    "0006",
-    "0007",
-    "0008",
-)  # oldest first; one file each in migrations/versions
 SCRIPTS = Path(__file__).parent / "migrations"
+VERSIONS = sorted(file.name[:4] for file in (SCRIPTS / "versions").glob("[0-9]*.py"))  # oldest first
 _LOCK = 7236411  # any number, the same for all servers of a database
 
 
@@ -88,12 +79,8 @@ def _one_at_a_time(database: Database, folder: Path) -> Iterator[None]:
             fcntl.flock(lock, fcntl.LOCK_EX)
             yield
     else:
-        with database.engine.connect() as connection:
-            connection.execute(text("SELECT pg_advisory_lock(:number)"), {"number": _LOCK})
-            try:
-                yield
-            finally:
-                connection.execute(text("SELECT pg_advisory_unlock(:number)"), {"number": _LOCK})
+        with database.pg_lock(_LOCK):
+            yield
 
 
 def _stamp() -> str:

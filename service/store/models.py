@@ -13,17 +13,7 @@ from service.store.tables import AnyRow, diagnoses, models
 from service.store.tables import skins as skin_rows
 from service.store.times import now
 
-_OWN = (
-    models.c.number.label("model_number"),
-    models.c.id.label("model_id"),
-    models.c.version.label("model_version"),
-    models.c.skin_id.label("model_skin"),
-    models.c.adopted_at,
-    models.c.adopted_from,
-    models.c.withdrawn_at.label("model_withdrawn_at"),
-    models.c.withdrawn_from.label("model_withdrawn_from"),
-    models.c.withdraw_reason.label("model_withdraw_reason"),
-)
+_OWN = [column.label(f"model_{column.name}") for column in models.c]  # beside what is said of the diagnosis
 
 
 def adopt(connection: Connection, root: str, diagnosis: AnyRow, adopted_from: str | None) -> AnyRow:

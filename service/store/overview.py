@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from statistics import median
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, func, select
+from sqlalchemy import Connection, func, select
 
 from service.store import campaigns as kept
 from service.store import inversions
@@ -70,11 +70,7 @@ def _recent(connection: Connection, roots: Sequence[str]) -> Sequence[AnyRow]:
     """The last few current campaigns of each skin, the oldest first."""
     time = func.coalesce(campaigns.c.recorded_at, campaigns.c.received_at)
     place = func.row_number().over(partition_by=skins.c.root_id, order_by=(time.desc(), campaigns.c.number.desc()))
-    columns = [
-        column
-        for column in campaigns.c
-        if column.name in ("id", "number", "name", "recordings", "excluded", "revision")
-    ]
+    columns = [campaigns.c[name] for name in _OF_CAMPAIGNS]
     ranked = (
         select(skins.c.root_id, time.label("time"), place.label("place"), *columns)
         .join(skins, skins.c.id == campaigns.c.skin_id)
@@ -106,6 +102,9 @@ def _of_array(answer: Any | None) -> float | None:
 
 def latest_diagnoses(connection: Connection, numbers: Sequence[int]) -> dict[int, AnyRow]:
     """The latest diagnosis of each of these campaigns that has one."""
-    columns: list[ColumnElement[Any]] = [column for column in diagnoses.c if column.name in _OF_DIAGNOSES]
-    query = select(*columns).where(diagnoses.c.campaign.in_(numbers)).order_by(diagnoses.c.number)
+    query = (
+        select(*(diagnoses.c[name] for name in _OF_DIAGNOSES))
+        .where(diagnoses.c.campaign.in_(numbers))
+        .order_by(diagnoses.c.number)
+    )
     return {row.campaign: row for row in connection.execute(query)}

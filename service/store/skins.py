@@ -4,9 +4,9 @@ import secrets
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import Connection, ScalarSelect, Select, exists, func, insert, select, update
-from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy import Connection, ScalarSelect, Select, func, insert, select, update
 
+from service.store.engine import upsert
 from service.store.errors import Missing
 from service.store.tables import AnyRow, campaigns, rigs, skins
 from service.store.times import now
@@ -25,9 +25,8 @@ def require_usable(field: str, skin_id: str) -> None:
 def require(connection: Connection, skin_id: str | None) -> str:
     """`skin_id`, or a new one where there is none; the skin is there afterwards."""
     skin_id = skin_id or f"skin-{secrets.token_hex(6)}"
-    dialect = sqlite if connection.dialect.name == "sqlite" else postgresql
     row = {"id": skin_id, "root_id": skin_id, "created_at": now()}
-    connection.execute(dialect.insert(skins).on_conflict_do_nothing(), row)
+    connection.execute(upsert(connection, skins).on_conflict_do_nothing(), row)
     return skin_id
 
 
@@ -108,8 +107,3 @@ def rig_of(connection: Connection, skin_id: str) -> str | None:
     query = select(rigs.c.document).where(rigs.c.skin_id.in_(members(root_of(skin_id))))
     document: str | None = connection.execute(query.order_by(rigs.c.number.desc()).limit(1)).scalar()
     return document
-
-
-def is_known(connection: Connection, skin_id: str) -> bool:
-    """Whether there is such a skin."""
-    return bool(connection.execute(select(exists().where(skins.c.id == skin_id))).scalar())

@@ -112,12 +112,10 @@ inversions = Table(
     Column("revision", Integer, nullable=False),
     Column("table_sha256", String, nullable=False),
     Column("document", LargeBinary, nullable=False),  # the answer of /v1/campaigns/{id}/d33, compressed JSON
-    Column(
-        "answer_version", Integer, nullable=False, server_default="0"
-    ),  # service.schemas.campaign_d33.ANSWER_VERSION
-    Column(
-        "numbers", LargeBinary
-    ),  # service.usecases.figure_data, compressed JSON; null where an earlier underskin kept it
+    # service.schemas.campaign_d33.ANSWER_VERSION
+    Column("answer_version", Integer, nullable=False, server_default="0"),
+    # service.usecases.figure_data, compressed JSON; null where an earlier underskin kept it
+    Column("numbers", LargeBinary),
 )
 
 sensor_d33 = Table(

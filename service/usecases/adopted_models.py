@@ -1,4 +1,4 @@
-"""A skin's adopted model: from the store to rows of a request."""
+"""A skin's adopted model: adopted, shown with its evidence, and from the store to rows of a request."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from service.problems import Refusal
+from service.schemas.diagnoses import ModelEntry, ModelVersion
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS, PressedSkinColumns
-from service.store import diagnoses, models, skins
-from service.store.engine import Database
-from service.store.errors import Conflict
-from service.store.tables import AnyRow
+from service.store import AnyRow, Conflict, Database, diagnoses, models, skins
 from underskin.errors import conflicting, out_of_range, required
 from underskin.physics.charge_response import gain
 from underskin.prediction.answers import pressed
@@ -67,6 +65,37 @@ def of_row(connection: Connection, row: AnyRow) -> "AdoptedModel":
             _known.clear()
         _known[row.id] = adopted(report, campaign)
     return _known[row.id]
+
+
+def adopt(connection: Connection, skin_id: str, diagnosis_id: str, sender: str | None) -> AnyRow:
+    """Make a diagnosis the model of a skin; raises Conflict, Missing, and InvalidInput where it cannot serve."""
+    root = skins.require_root(connection, skin_id)
+    diagnosis = diagnoses.find(connection, diagnosis_id)
+    if diagnosis.state != "done":
+        raise Conflict(f"Diagnosis {diagnosis.id!r} has no report: its state is {diagnosis.state}.")
+    of_row(connection, diagnosis)  # which refuses what cannot serve
+    return models.adopt(connection, root, diagnosis, sender)
+
+
+def version(row: AnyRow) -> ModelVersion:
+    """A model without its evidence."""
+    own = [name for name in ModelVersion.model_fields if name not in ("diagnosis_id", "campaign_id")]
+    values = {name: getattr(row, f"model_{name}") for name in own}
+    return ModelVersion(**values, diagnosis_id=row.id, campaign_id=row.campaign_id)
+
+
+def entry(connection: Connection, row: AnyRow) -> ModelEntry:
+    """A model with the evidence of its diagnosis."""
+    report = diagnoses.report_of(connection, row.number)
+    assert report is not None
+    model = of_row(connection, row)
+    return ModelEntry(
+        **version(row).model_dump(),
+        outdated=diagnoses.outdated(row),
+        **{name: report[name] for name in ("mechanisms", "probability", "statement", "fit", "provenance")},
+        needs=list(model.needs),
+        depends_on_frequency=bool(model.of_lines),
+    )
 
 
 def model_asked_for(store: Database, request: PressedSkinColumns) -> ModelInForce:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from service.schemas.campaign_d33 import D33Value
 from underskin import InvalidInput
 from underskin.units import to_lab
 
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 def of_inversion(inversion: "Inversion") -> dict[str, Any]:
     """The fields of `D33` that come from an inversion."""
     zone, cells, array = inversion.zone, inversion.cells, inversion.campaign_d33
-    names = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
     flags = _flags(inversion)
     radii = to_lab("indenter_radius_mm", cells.indenter_radius).tolist()
     return {
@@ -30,14 +30,14 @@ def of_inversion(inversion: "Inversion") -> dict[str, Any]:
             "chosen_by_user": zone.chosen_by_user,
             "left_out_hz": [float(line) for line in zone.left_out_hz],
         },
-        "array": None if array is None else dict(zip(names, _columns(array)[0], strict=True)),
+        "array": None if array is None else _d33(array)[0],
         "sensor_spread_percent": _scatter(inversion.spread, 100.0),
         "gain_scatter_percent": _scatter(inversion.gain, 100.0),
         "position_scatter_mm": _scatter(inversion.position, 1e3),
         "declared_percent": _finite(inversion.declared_percent),
         "sensors": [
-            {"sensor": name, "flags": flags.get(name, []), **dict(zip(names, row, strict=True))}
-            for name, row in zip(inversion.sensor_ids, _columns(inversion.sensors), strict=True)
+            {"sensor": name, "flags": flags.get(name, []), **d33}
+            for name, d33 in zip(inversion.sensor_ids, _d33(inversion.sensors), strict=True)
         ],
         "cells": [
             {
@@ -45,10 +45,10 @@ def of_inversion(inversion: "Inversion") -> dict[str, Any]:
                 "indenter_radius_mm": round(radius, 9),
                 "preload_n": preload,
                 "recordings": count,
-                **dict(zip(names, row, strict=True)),
+                **d33,
             }
-            for sensor, radius, preload, count, row in zip(
-                cells.sensor.tolist(), radii, cells.preload.tolist(), cells.recordings.tolist(), _columns(cells.d33),
+            for sensor, radius, preload, count, d33 in zip(
+                cells.sensor.tolist(), radii, cells.preload.tolist(), cells.recordings.tolist(), _d33(cells.d33),
                 strict=True,
             )
         ],
@@ -75,11 +75,9 @@ def of_moduli(recordings: Sequence["RecordingModulus"]) -> tuple[list[dict[str, 
     return moduli, left_out
 
 
-def _columns(estimate: "Estimate") -> list[list[float | None]]:
-    """Value, uncertainty, low and high [pC/N] of each entry."""
-    parts = (estimate.value, estimate.uncertainty, estimate.low, estimate.high)
-    columns = np.stack([np.atleast_1d(to_lab("d33_pc_per_n", part)) for part in parts], axis=-1)
-    return [[_finite(value) for value in row] for row in columns.tolist()]
+def _d33(estimate: "Estimate") -> list[dict[str, float | None]]:
+    """The fields of `D33Value` of each entry."""
+    return [dict(zip(D33Value.model_fields, map(_finite, row), strict=True)) for row in estimate.d33_rows()]
 
 
 def _scatter(estimate: "Estimate | None", factor: float) -> dict[str, float] | None:

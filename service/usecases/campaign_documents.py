@@ -6,9 +6,7 @@ from typing import Any
 
 import orjson
 
-from service.store import campaigns, codec
-from service.store.engine import Database
-from service.store.tables import AnyRow
+from service.store import AnyRow, Database, campaigns, codec
 from underskin.recordings.campaign import to_dict
 from underskin.recordings.readers import hdf5_file
 

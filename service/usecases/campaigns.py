@@ -5,9 +5,7 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service.schemas.campaigns import CampaignDetail, CampaignEntry, RecordingEntry, RecordingResult
-from service.store import campaigns
-from service.store.engine import Database
-from service.store.tables import AnyRow
+from service.store import AnyRow, Database, campaigns
 from service.usecases import d33_cache
 from underskin.surrogate.sigma_table import SigmaTable
 

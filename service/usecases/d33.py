@@ -57,7 +57,7 @@ def _by_adopted_model(table: SigmaTable, store: Database, request: D33Columns) -
         pressed.require_lines("frf_im_pc_per_n")
         measured = _plateau(request, lambda line: pressed.level[:, None] / pressed.response(line))
     else:
-        measured = _checked(_given(request))
+        measured = answers.measured(_given(request))
         pressed = press(model_in_force, table, request, _rows(request, given | measured))
         pressed.require_lines("frequency_hz")
     value = measured["frf_pc_per_n"] / pressed.level
@@ -80,13 +80,6 @@ def _given(request: D33Columns) -> dict[str, Floats]:
             raise conflicting(name, "given", "goes with lines; leave it out, or leave out frf_pc_per_n")
     sent = ("frf_pc_per_n", "frf_uncertainty_pc_per_n")
     return {name: request.column(name) for name in sent if getattr(request, name) is not None}
-
-
-def _checked(measured: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Plateau values that were sent, the uncertainty NaN where none was; raises InvalidInput."""
-    name = "frf_uncertainty_pc_per_n"
-    unsure = non_negative(name, measured[name]) if name in measured else np.full((), np.nan)
-    return {"frf_pc_per_n": finite("frf_pc_per_n", measured["frf_pc_per_n"]), name: unsure}
 
 
 def _require_lines(request: D33Columns) -> None:

@@ -9,10 +9,7 @@ import orjson
 
 from service.problems import Refusal
 from service.schemas.campaign_d33 import D33
-from service.store import campaigns, inversions
-from service.store.engine import Database, StorageFull
-from service.store.errors import Conflict, StoreMoved
-from service.store.tables import AnyRow
+from service.store import AnyRow, Conflict, Database, StorageFull, StoreMoved, campaigns, inversions
 from service.usecases import figure_data
 from service.usecases.adopted_models import ModelInForce, model_in_force
 from service.usecases.campaign_d33 import of_inversion, of_moduli
@@ -27,6 +24,7 @@ logger = logging.getLogger("underskin")
 
 BandHz = tuple[float, float]
 
+_PAPER = {"model": "paper", "model_id": None, "model_percent": None}
 _NOTHING: dict[str, Any] = dict.fromkeys(
     ("band", "array", "sensor_spread_percent", "gain_scatter_percent", "position_scatter_mm", "declared_percent")
 )
@@ -105,8 +103,7 @@ def _derive_adopted(store: Database, table: SigmaTable, row: AnyRow) -> None:
 
 def foreseen(table: SigmaTable, campaign: Campaign) -> list[str]:
     """The findings of a campaign that is not kept yet."""
-    model = {"model": "paper", "model_id": None, "model_percent": None}
-    document = {"campaign_id": campaign.name, "table_sha256": table.sha256, **model}
+    document = {"campaign_id": campaign.name, "table_sha256": table.sha256, **_PAPER}
     findings: list[str] = _computed(document, campaign, table, None, [])[0]["findings"]
     return findings
 
@@ -125,8 +122,7 @@ def _derived(
     with store.reading() as connection:
         campaign = campaigns.load(connection, row, with_excluded=False)
         excluded = campaigns.excluded_of(connection, row.number)
-    model = {"model": "paper", "model_id": None, "model_percent": None}
-    document = {"campaign_id": row.id, "table_sha256": table.sha256, **model}
+    document = {"campaign_id": row.id, "table_sha256": table.sha256, **_PAPER}
     left_out = [(left.recording, left.reason) for left in excluded]
     document, inversion, failed = _computed(document, campaign, table, band_hz, left_out)
     numbers = figure_data.numbers(campaign, inversion, spreads)

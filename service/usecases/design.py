@@ -3,23 +3,13 @@
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
-from service.problems import from_validation
 from service.schemas.design import DesignAnswer, DesignRequest, ResponseAnswer, SweepAnswer
 from underskin import Indenter, Skin
 from underskin.errors import out_of_range
 from underskin.prediction.skin_design import Design, design
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import checked, to_lab
-
-
-def read_design(document: Any) -> DesignRequest:
-    """The request that a document makes; raises Refusal with all that is wrong."""
-    try:
-        return DesignRequest.model_validate(document)
-    except ValidationError as error:
-        raise from_validation(error) from None
 
 
 def design_of(table: SigmaTable, asked: DesignRequest) -> Design:

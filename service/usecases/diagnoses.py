@@ -5,8 +5,7 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service.schemas.diagnoses import DiagnosisEntry
-from service.store import diagnoses
-from service.store.tables import AnyRow
+from service.store import AnyRow, diagnoses
 from underskin import __version__
 from underskin.surrogate.sigma_table import SigmaTable
 

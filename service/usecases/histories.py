@@ -7,9 +7,7 @@ from sqlalchemy import Connection
 
 from service.ingest import repeats
 from service.schemas import skins as models
-from service.store import campaigns, inversions, skins
-from service.store.engine import Database
-from service.store.tables import AnyRow
+from service.store import AnyRow, Database, campaigns, inversions, skins
 from service.usecases import adopted_models, d33_cache
 from underskin import InvalidInput
 from underskin.inversion.trend import FEWEST, SIGNIFICANT, Trend, holm, trend
@@ -159,7 +157,8 @@ def _left_out(
             repeat = repeated[row.id]
             whole.append(models.LeftOutCampaign(campaign_id=row.id, reason=repeat.words, repeats=repeat.campaign_id))
             continue
-        reason = unfit.get(row.id) or _why_unused(row, row.id in used)
+        not_told = None if row.id in used else "no d33 of it is kept; its /d33 says why"
+        reason = unfit.get(row.id) or campaigns.unused(row) or not_told
         if reason is not None:
             whole.append(models.LeftOutCampaign(campaign_id=row.id, reason=reason))
         elif row.excluded:
@@ -168,13 +167,3 @@ def _left_out(
                 for left in campaigns.excluded_of(connection, row.number)
             ]
     return whole, single
-
-
-def _why_unused(row: AnyRow, is_used: bool) -> str | None:
-    match campaigns.state(row):
-        case "withdrawn":
-            return f"withdrawn: {row.withdraw_reason}"
-        case "corrected":
-            return f"corrected by {row.corrected_by}"
-        case _:
-            return None if is_used else "no d33 of it is kept; its /d33 says why"

@@ -7,8 +7,8 @@ from underskin.prediction.columns import rows
 from underskin.surrogate.sigma_table import SigmaTable
 
 
-def sigma(table: SigmaTable, request: SigmaColumns) -> Columns:
-    """σ for each row."""
+def sigma(table: SigmaTable, _: object, request: SigmaColumns) -> Columns:
+    """σ for each row; the store, from which other answers take adopted models, is not used."""
     columns = {name: request.column(name) for name in ("a_over_h", "rt_over_h", "load_parameter")}
     count = rows(columns)
     answer = answers.sigma(table, columns, request.model)

@@ -5,9 +5,7 @@ from sqlalchemy import Connection
 
 from service.problems import Refusal
 from service.schemas.skins import SkinDetail
-from service.store import skins
-from service.store.engine import Database
-from service.store.errors import Missing
+from service.store import Database, Missing, skins
 from service.usecases import histories
 from underskin.errors import conflicting
 

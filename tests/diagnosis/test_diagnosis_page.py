@@ -105,13 +105,8 @@ def test_it_says_all_that_the_report_says(text: str, document: dict[str, Any]) -
     assert tags.text.index(first) < tags.text.index("Where")
     headings = re.findall(r"<h2>(.*?)</h2>", text)
     assert headings == [
-        "Where",
-        "What",
-        "How much better",
-        "Look at these recordings",
-        "What to measure next",
-        "Made with",
-    ]
+        "Where", "What", "How much better", "Look at these recordings", "What to measure next", "Made with",
+    ]  # fmt: skip
     wanted = [document["location"]["statement"], *(readable(entry["statement"]) for entry in document["findings"])]
     wanted += [entry["why_not"] for entry in document["alternatives"]]
     wanted += [readable(entry["reason"]) for entry in document["not_identifiable"]]

@@ -30,16 +30,6 @@ def test_limits_named_in_the_paper() -> None:
     assert half_space.delta(0.0) == 1.0
 
 
-def test_stress_field_agrees_with_gamma_and_changes_sign_with_the_force() -> None:
-    h, force, r = 2.5e-3, 1.5, 1.8e-3
-    normal = half_space.stress(r, h, force)
-    assert normal == pytest.approx(-1.5 / np.pi * force / h**2 * half_space.gamma_n(r / h, 0.0), rel=1e-12)
-    outward = half_space.stress(r, h, 0.0, force_x=force)
-    assert outward == pytest.approx(1.5 / np.pi * force / h**2 * half_space.gamma_t(r / h, 0.0), rel=1e-12)
-    assert half_space.stress(r, h, 0.0, force_x=force, azimuth=np.pi) == pytest.approx(-outward)
-    assert half_space.stress(r, h, 0.0, force_y=force, azimuth=np.pi / 2) == pytest.approx(outward)
-
-
 def test_the_plane_at_depth_carries_the_whole_force() -> None:
     """2π ∫ T3 r dr = −F: with ρ large, σ (3/2) ρ² → 1."""
     assert 1.5 * 10.0**2 * half_space.sigma(0.5, 10.0) == pytest.approx(1.0, abs=2e-3)

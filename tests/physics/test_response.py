@@ -6,10 +6,10 @@ import pytest
 from underskin.physics import charge_response
 
 
-def test_frf_is_charge_over_force_and_d33_inverts_it() -> None:
-    d33, sigma, rho, force = 14e-12, np.array([0.93, 0.5]), 0.6, 2.0
+def test_frf_is_the_paper_s_and_d33_inverts_it() -> None:
+    d33, sigma, rho = 14e-12, np.array([0.93, 0.5]), 0.6
     frf = charge_response.frf(d33, sigma, rho)
-    assert charge_response.charge(force, d33, sigma, rho) == pytest.approx(force * frf, rel=1e-15)
+    assert frf == pytest.approx(d33 * 1.5 * rho**2 * sigma, rel=1e-15)
     value, uncertainty = charge_response.d33(frf, 0.02 * frf, sigma, 0.0, rho)
     assert value == pytest.approx([d33, d33], rel=1e-14)
     assert uncertainty == pytest.approx(0.02 * value, rel=1e-14)
@@ -29,5 +29,5 @@ def test_a_wide_sensor_collects_d33_times_the_force() -> None:
 
 def test_mean_stress_is_the_charge_over_d33_and_area() -> None:
     h, rt, force, sigma, d33 = 2.5e-3, 1.5e-3, 2.0, 0.9, 14e-12
-    charge = charge_response.charge(force, d33, sigma, rt / h)
+    charge = force * charge_response.frf(d33, sigma, rt / h)
     assert charge_response.mean_stress(force, sigma, h) == pytest.approx(charge / d33 / (np.pi * rt**2), rel=1e-14)

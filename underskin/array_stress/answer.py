@@ -6,15 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.array_stress.load_integration import (
-    Load,
-    array_stress,
-    charge,
-    combined,
-    contact_load,
-    map_points,
-    pressure_map_loads,
-)
+from underskin.array_stress import load_integration as integration
+from underskin.array_stress.load_integration import Load, charge
 from underskin.array_stress.request import LoadCase
 from underskin.array_stress.validation import findings, refuse_beside_skin, refuse_coarse, refuse_many, refuse_overlap
 from underskin.errors import Mention, Requirement, out_of_range
@@ -63,7 +56,7 @@ def answer(table: InfluenceTable, request: LoadCase) -> ArrayStress:
     sensors = to_si("x_mm", [[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
     pressures = _pressures(request, thickness)
     loads = [_contacts_load(request, pressures, thickness)] if request.contacts else _map_loads(request, thickness)
-    total = array_stress(influence, thickness, sensors, loads)
+    total = integration.array_stress(influence, thickness, sensors, loads)
     inside = total.inside & np.isfinite(total.stress)
     stress, error = (np.where(inside, values, np.nan) for values in (total.stress, total.error))
     columns = {
@@ -125,9 +118,9 @@ def _contacts_load(request: LoadCase, pressures: list[SpherePressure], thickness
     radii = np.array([pressure.radius for pressure in pressures])
     refuse_beside_skin(request, positions, radii[:, None], "contacts[{}]".format)
     refuse_overlap(positions, radii)
-    load = combined(
+    load = integration.combined(
         [
-            contact_load(place, (*contact.tangential_force_n, contact.normal_force_n), pressure, thickness)
+            integration.contact_load(place, (*contact.tangential_force_n, contact.normal_force_n), pressure, thickness)
             for place, contact, pressure in zip(positions, request.contacts, pressures, strict=True)
         ]
     )
@@ -149,5 +142,5 @@ def _map_loads(request: LoadCase, thickness: float) -> Iterable[Load]:
         half,
         lambda cell: f"pressure_map.pressure_mpa[{row[cell]}][{column[cell]}]",
     )
-    refuse_many(request, map_points(x, y, pressure, thickness))
-    return pressure_map_loads(x, y, pressure, thickness)
+    refuse_many(request, integration.map_points(x, y, pressure, thickness))
+    return integration.pressure_map_loads(x, y, pressure, thickness)

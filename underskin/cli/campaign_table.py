@@ -5,7 +5,6 @@ import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
@@ -15,7 +14,6 @@ from underskin.cli.columns import PIPED_WIDTH
 from underskin.errors import InvalidInput
 from underskin.findings.formatting import significant
 from underskin.inversion.invert import Inversion
-from underskin.inversion.mixed_model import Estimate
 from underskin.recordings import plausibility
 from underskin.recordings.elastomer import RecordingModulus
 from underskin.recordings.reading import Reading
@@ -104,13 +102,13 @@ def write_csv(everything: Iterable[InvertedFile]) -> None:
 def _rows(inversion: Inversion) -> list[list[str]]:
     rows, cells = [], inversion.cells
     if inversion.campaign_d33 is not None:
-        rows.append(["array", "", "", "", "", *_full(_in_lab(inversion.campaign_d33)[0]), ""])
-    for name, numbers in zip(inversion.sensor_ids, _in_lab(inversion.sensors), strict=True):
+        rows.append(["array", "", "", "", "", *_full(inversion.campaign_d33.d33_rows()[0]), ""])
+    for name, numbers in zip(inversion.sensor_ids, inversion.sensors.d33_rows(), strict=True):
         codes = " ".join(flag.code for flag in inversion.flags if flag.sensor == name)
         rows.append(["sensor", name, "", "", "", *_full(numbers), codes])
     radii = to_lab("indenter_radius_mm", cells.indenter_radius).round(9)
     conditions = zip(cells.sensor, radii.tolist(), cells.preload.tolist(), cells.recordings.tolist(), strict=True)
-    for (sensor, radius, preload, count), numbers in zip(conditions, _in_lab(cells.d33), strict=True):
+    for (sensor, radius, preload, count), numbers in zip(conditions, cells.d33.d33_rows(), strict=True):
         where = [inversion.sensor_ids[sensor], repr(radius), repr(preload), str(count)]
         rows.append(["cell", *where, *_full(numbers), ""])
     return rows
@@ -120,18 +118,11 @@ def _full(numbers: Sequence[float]) -> list[str]:
     return ["NaN" if number != number else repr(number) for number in numbers]
 
 
-def _in_lab(estimate: Estimate) -> list[list[float]]:
-    """Value, uncertainty, low and high [pC/N] of each entry."""
-    parts = (estimate.value, estimate.uncertainty, estimate.low, estimate.high)
-    columns = [to_lab("d33_pc_per_n", np.atleast_1d(part)).tolist() for part in parts]
-    return [list(row) for row in zip(*columns, strict=True)]
-
-
 def _array(inversion: Inversion) -> Table:
     listed = Table.grid(padding=(0, 2))
     zone = inversion.zone
     if inversion.campaign_d33 is not None:
-        value, uncertainty, low, high = _in_lab(inversion.campaign_d33)[0]
+        value, uncertainty, low, high = inversion.campaign_d33.d33_rows()[0]
         ends = f"{significant(low, 4)} to {significant(high, 4)}"
         listed.add_row(
             "d33 of the array", f"{significant(value, 4)} ± {significant(uncertainty, 2)} pC/N (95 %: {ends})"
@@ -152,7 +143,7 @@ def _array(inversion: Inversion) -> Table:
 
 def _sensors(inversion: Inversion) -> Table:
     table = _table("sensor", "d33\npC/N", "±\npC/N", "95 % from\npC/N", "to\npC/N", remark="stands out")
-    for name, numbers in zip(inversion.sensor_ids, _in_lab(inversion.sensors), strict=True):
+    for name, numbers in zip(inversion.sensor_ids, inversion.sensors.d33_rows(), strict=True):
         reasons = "; ".join(flag.reason for flag in inversion.flags if flag.sensor == name)
         table.add_row(Text(name), *_short(numbers), Text(reasons))
     return table

@@ -19,23 +19,13 @@ import numpy as np
 import orjson
 from numpy.typing import ArrayLike
 
-from underskin.client.answers import (
-    Adopted,
-    D33Answer,
-    FindingAnswer,
-    FrfAnswer,
-    ServiceAnswer,
-    SigmaAnswer,
-    StressAnswer,
-    TableAxis,
-    TableEntry,
-)
+from underskin.client import answers
 from underskin.client.campaigns import Campaigns, Skins
 from underskin.client.diagnoses import Diagnoses
 from underskin.client.http_session import Session
 from underskin.units import Floats
 
-_Answer = TypeVar("_Answer", bound=ServiceAnswer)
+_Answer = TypeVar("_Answer", bound=answers.ServiceAnswer)
 
 
 class Client:
@@ -68,9 +58,9 @@ class Client:
         rt_over_h: ArrayLike,
         load_parameter: ArrayLike = 0.0,
         model: Literal["layer", "half_space"] = "layer",
-    ) -> SigmaAnswer:
+    ) -> answers.SigmaAnswer:
         """σ(a/h, rT/h, L) of the layer on a rigid base, or of the half space."""
-        return self._columns("sigma", SigmaAnswer, locals())
+        return self._columns("sigma", answers.SigmaAnswer, locals())
 
     def frf(
         self,
@@ -84,13 +74,13 @@ class Client:
         poisson_ratio: ArrayLike = 0.5,
         frequency_hz: ArrayLike | None = None,
         units_checked: bool = False,
-        adopted: Adopted | None = None,
-    ) -> FrfAnswer:
+        adopted: answers.Adopted | None = None,
+    ) -> answers.FrfAnswer:
         """The FRF of a skin under a sphere; `frequency_hz` (a list for all rows) adds spectra.
 
         `units_checked` accepts unusual magnitudes; `adopted` uses the adopted model of the skin.
         """
-        return self._columns("frf", FrfAnswer, locals())
+        return self._columns("frf", answers.FrfAnswer, locals())
 
     def d33(
         self,
@@ -108,31 +98,31 @@ class Client:
         frf_im_pc_per_n: ArrayLike | None = None,
         band_hz: tuple[float, float] | None = None,
         units_checked: bool = False,
-        adopted: Adopted | None = None,
-    ) -> D33Answer:
+        adopted: answers.Adopted | None = None,
+    ) -> answers.D33Answer:
         """d33 from plateau values `frf_pc_per_n`, or from lines averaged over a band.
 
         For lines give `frequency_hz` (for all rows), `frf_re_pc_per_n` and, if measured, `frf_im_pc_per_n` (rows ×
         lines), and `band_hz`. `units_checked` accepts unusual magnitudes; `adopted` uses the adopted model of
         the skin.
         """
-        return self._columns("d33", D33Answer, locals())
+        return self._columns("d33", answers.D33Answer, locals())
 
-    def stress(self, request: Mapping[str, Any]) -> StressAnswer:
+    def stress(self, request: Mapping[str, Any]) -> answers.StressAnswer:
         """Charge on every sensor of an array; `request` is the document that `POST /v1/stress` takes."""
         document = self._request("POST", "/v1/stress", request)
-        values = {field.name: _field(field.name, document, single=False) for field in fields(StressAnswer)}
-        return StressAnswer(**values | {"sensor": tuple(document["sensor"])})
+        values = {field.name: _field(field.name, document, single=False) for field in fields(answers.StressAnswer)}
+        return answers.StressAnswer(**values | {"sensor": tuple(document["sensor"])})
 
     def design(self, **fields: float) -> dict[str, Any]:
         """Sensitivity and spatial resolution of a skin's design; `fields` as `POST /v1/design` takes them."""
         return self._request("POST", "/v1/design", fields)
 
-    def tables(self) -> tuple[TableEntry, ...]:
+    def tables(self) -> tuple[answers.TableEntry, ...]:
         """The tables of the service: σ and influence, which answers are computed from, and contact, reference data."""
         document = self._request("GET", "/v1/tables")
         return tuple(
-            TableEntry(**{**entry, "axes": tuple(TableAxis(**axis) for axis in entry["axes"])})
+            answers.TableEntry(**{**entry, "axes": tuple(answers.TableAxis(**axis) for axis in entry["axes"])})
             for entry in document["tables"]
         )
 
@@ -156,7 +146,8 @@ class Client:
         return kind(**{field.name: _field(field.name, document, single) for field in fields(kind)})
 
     def _request(self, method: str, path: str, body: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        content = None if body is None else orjson.dumps(body, _number, orjson.OPT_SERIALIZE_NUMPY)
+        # orjson does not take a single number as an array
+        content = None if body is None else orjson.dumps(body, float, orjson.OPT_SERIALIZE_NUMPY)
         return self._session.json(method, path, content=content, headers={"Content-Type": "application/json"})
 
 
@@ -170,11 +161,6 @@ def _array(value: Any) -> Floats:
     return np.asarray(value, dtype=float, order="C")
 
 
-def _number(array: Floats) -> float:
-    """A single number, which orjson does not take as an array."""
-    return float(array)
-
-
 def _shared(name: str, value: Any) -> Any:
     """A value that is not a column, as the interface has it."""
     if isinstance(value, bool | str):
@@ -186,7 +172,7 @@ def _field(name: str, document: Mapping[str, Any], single: bool) -> Any:
     """A field of the answer: an array, without its rows' axis where single numbers were given."""
     value = document.get(name)
     if name == "findings":
-        return tuple(FindingAnswer(**finding) for finding in value or ())
+        return tuple(answers.FindingAnswer(**finding) for finding in value or ())
     if not isinstance(value, list):
         return value
     array = np.array(value) if name in ("status", "sensor") else np.array(value, dtype=float)  # None becomes NaN

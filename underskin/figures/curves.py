@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import plotly.graph_objects as go
 
-from underskin.figures.style import COLOURS, DASHES, label, styled
+from underskin.figures.style import label, line, styled
 from underskin.units import Floats
 
 _MOST_SAMPLES = 400  # of one curve
@@ -32,11 +32,7 @@ def force_curves(curves: Sequence[ForceCurve]) -> go.Figure:
             y=curve.force_n[chosen].astype(np.float32),
             mode="lines",
             name=label(curve.name),
-            line={
-                "color": COLOURS[number % len(COLOURS)],
-                "width": 1.4,
-                "dash": DASHES[number // len(COLOURS) % len(DASHES)],
-            },
+            line=line(number, 1.4),
             hovertemplate=f"{label(curve.name)}<br>%{{x:.4g}} mm: %{{y:.4g}} N<extra></extra>",
         )
     figure.update_xaxes(title="displacement [mm]")

@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
 
-from underskin.figures.style import COLOURS, DASHES, ZONE, label, styled
+from underskin.figures.style import DASHES, ZONE, label, line, styled
 from underskin.recordings.frf.summary import FrfLines, FrfSpread
 from underskin.units import Floats
 
@@ -40,9 +40,9 @@ def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | No
             "showlegend": False,
             "legendgroup": str(number),
         }
-        line = {"color": colour, "width": 1.5, "dash": dash}
         parts = (middle, spread.phase_deg[1], spread.coherence[0])
-        traces += [band, *_lines(name, str(number), spread.frequency_hz, parts, line)]
+        look = {"color": colour, "width": 1.5, "dash": dash}
+        traces += [band, *_lines(name, str(number), spread.frequency_hz, parts, look)]
     return _finished(traces, zone_hz, "FRF: median and range of the recordings alike")
 
 
@@ -50,18 +50,13 @@ def frf_recordings(recordings: Sequence[FrfLines], zone_hz: tuple[float, float] 
     """Each recording's lines."""
     traces: list[PlotlyTrace] = []
     for number, entry in enumerate(recordings):
-        line = {
-            "color": COLOURS[number % len(COLOURS)],
-            "width": 1.2,
-            "dash": DASHES[number // len(COLOURS) % len(DASHES)],
-        }
         parts = (entry.magnitude_pc_per_n, entry.phase_deg, entry.coherence)
-        traces += _lines(label(entry.name), str(number), entry.frequency_hz, parts, line)
+        traces += _lines(label(entry.name), str(number), entry.frequency_hz, parts, line(number, 1.2))
     return _finished(traces, zone_hz, "FRF of each recording")
 
 
 def _lines(
-    name: str, group: str, frequency_hz: Floats, parts: Sequence[Floats], line: dict[str, Any]
+    name: str, group: str, frequency_hz: Floats, parts: Sequence[Floats], look: dict[str, Any]
 ) -> Iterator[PlotlyTrace]:
     """Magnitude, phase and coherence in three panels, without those that were not recorded.
 
@@ -79,7 +74,7 @@ def _lines(
                 "name": name,
                 "legendgroup": group,
                 "showlegend": axis == "",
-                "line": line,
+                "line": look,
                 "hovertemplate": f"{name}<br>%{{x:.4g}} Hz: %{{y:.5g}}{unit}<extra></extra>",
             }
 

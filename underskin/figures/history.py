@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
-from underskin.figures.style import COLOURS, DASHES, MARKERS, label, styled
+from underskin.figures.style import COLOURS, MARKERS, label, line, styled
 
 _DAY = timedelta(days=1)
 
@@ -28,14 +28,13 @@ def d33_history(sensors: Sequence[SensorPoints]) -> go.Figure:
     """A line for each sensor, with standard uncertainties."""
     figure = go.Figure()
     for number, entry in enumerate(sensors):
-        colour = COLOURS[number % len(COLOURS)]
         figure.add_scatter(
             x=list(entry.times),
             y=list(entry.d33_pc_per_n),
             error_y={"type": "data", "array": list(entry.d33_uncertainty_pc_per_n), "thickness": 1, "width": 3},
             mode="lines+markers",
             name=label(entry.sensor),
-            line={"color": colour, "width": 1.5, "dash": DASHES[number // len(COLOURS) % len(DASHES)]},
+            line=line(number, 1.5),
             marker={"symbol": MARKERS[number % len(MARKERS)], "size": 8},
             hovertemplate=f"{label(entry.sensor)}, %{{x|%d %b %Y %H:%M}} UTC<br>d33 %{{y:.5g}} "
             f"± %{{error_y.array:.3g}} pC/N<br>{label(entry.trend)}<extra></extra>",

@@ -1,6 +1,7 @@
 """Common style of all figures: the colours of Okabe and Ito, and Cividis, which colour-blind readers can tell apart."""
 
 from html import escape
+from typing import Any
 
 import plotly.graph_objects as go
 
@@ -43,6 +44,15 @@ _TEMPLATE = go.layout.Template(
 def styled(figure: go.Figure, title: str, height: int = 420) -> go.Figure:
     """The figure with its title in the common style; `height` in pixels."""
     return figure.update_layout(template=_TEMPLATE, title=title, height=height)
+
+
+def line(number: int, width: float) -> dict[str, Any]:
+    """How one of many lines is drawn: its dash changes where the colours are used up."""
+    return {
+        "color": COLOURS[number % len(COLOURS)],
+        "width": width,
+        "dash": DASHES[number // len(COLOURS) % len(DASHES)],
+    }
 
 
 def label(text: str) -> str:

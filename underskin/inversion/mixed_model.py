@@ -21,7 +21,7 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import t as student
 
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER, POSITION_RANGE, USUAL_GAIN
-from underskin.units import Floats
+from underskin.units import Floats, to_lab
 
 GAINS = np.geomspace(2e-3, 0.8, 36)
 SPREADS = np.concatenate([[0.0], np.geomspace(2e-3, 1.5, 36)])
@@ -39,6 +39,12 @@ class Estimate:
     uncertainty: Floats
     low: Floats
     high: Floats
+
+    def d33_rows(self) -> list[list[float]]:
+        """Value, uncertainty, low and high of each d33 [pC/N]."""
+        parts = [np.atleast_1d(part) for part in (self.value, self.uncertainty, self.low, self.high)]
+        rows: list[list[float]] = to_lab("d33_pc_per_n", np.column_stack(parts)).tolist()
+        return rows
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,9 @@ from scipy.stats import t as student
 from underskin.findings import english
 from underskin.findings.codes import Reason
 from underskin.units import Floats
+
+if TYPE_CHECKING:
+    from underskin.inversion.invert import RecordingD33
 
 _DEAD = 0.05  # of the array's d33
 _LEAST_PILOT = 1e-3  # of the array's d33: a dead sensor may give exact zeros
@@ -45,19 +48,6 @@ class Flag:
     def sentence(self) -> str:
         """Sensor and reason in words."""
         return f"sensor {self.sensor}: {self.reason}"
-
-
-class Measured(Protocol):
-    """The columns of recordings that are looked at."""
-
-    @property
-    def d33(self) -> Floats: ...  # noqa: D102
-    @property
-    def line_scatter(self) -> Floats: ...  # noqa: D102
-    @property
-    def indenter_radius(self) -> Floats: ...  # noqa: D102
-    @property
-    def preload(self) -> Floats: ...  # noqa: D102
 
 
 def typical_size(d33: Floats) -> float:
@@ -121,7 +111,7 @@ def population_flags(
 def scatter_flags(
     ids: tuple[str, ...],
     sensor: NDArray[np.intp],
-    rows: Measured,
+    rows: "RecordingD33",
     good: NDArray[np.intp],
     pilot: Floats,
     expected: Floats,

@@ -215,6 +215,7 @@ class Mechanism:
     kinds: ClassVar[tuple[Kind, ...]] = ("frf",)
     axes: ClassVar[tuple[str, ...]]
     needs: ClassVar[str] = "nothing beyond the recordings themselves"
+    parameters_stated: ClassVar[tuple[Parameter, ...]] = ()  # those that are the same for all campaigns and kinds
     # Fields of a recording without which it cannot be predicted, of NEEDED_FIELDS; they tell contacts apart.
     needs_fields: ClassVar[tuple[str, ...]] = ()
     # What a model prepares for it: the contacts' stiffness, the neighbours' charge, room for an offset [m] and for a
@@ -226,8 +227,7 @@ class Mechanism:
     moves_predictions: ClassVar[bool] = True  # False: it acts on the covariance alone
     needs_history: ClassVar[bool] = False  # a curve without its beginning cannot be predicted
     imitated_by_seating: ClassVar[bool] = False  # a platen that seats bends the beginning of a compression alike
-    # Axes over which its figure is drawn, keys of PANELS in docs/mechanisms/signatures.py; empty: the first two of
-    # `axes` that have a panel.
+    # Axes of its figure, keys of PANELS in docs/mechanisms/signatures.py; empty: the first two of `axes` with a panel.
     figure: ClassVar[tuple[str, ...]] = ()
 
     @property
@@ -237,7 +237,7 @@ class Mechanism:
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """Its parameters for recordings of one kind; bounds may depend on the campaign."""
-        return ()
+        return self.parameters_stated
 
     def parameters_beside(
         self, others: Collection[Mechanism], conditions: Conditions, kind: Kind

@@ -68,24 +68,6 @@ def frf(d33: ArrayLike, sigma: ArrayLike, rt_over_h: ArrayLike) -> Floats:
     return np.asarray(d33, dtype=float) * gain(sigma, rt_over_h)
 
 
-def charge(preload: ArrayLike, d33: ArrayLike, sigma: ArrayLike, rt_over_h: ArrayLike) -> Floats:
-    """Charge Q = d33 (3/2) ρ² σ F (equation 15).
-
-    Parameters
-    ----------
-    preload : array_like
-        Force F [N].
-    d33, sigma, rt_over_h : array_like
-        As in `frf`.
-
-    Returns
-    -------
-    ndarray
-        [C], of the broadcast shape.
-    """
-    return frf(d33, sigma, rt_over_h) * np.asarray(preload, dtype=float)
-
-
 def mean_stress(preload: ArrayLike, sigma: ArrayLike, thickness: ArrayLike) -> Floats:
     """Static mean stress on the sensor, T0 = 3 F σ/(2 π h²), positive in compression.
 

@@ -17,43 +17,8 @@ DOMAIN_END = 10.0
 REL_ERROR = 1e-10
 
 
-def stress(
-    r: ArrayLike,
-    depth: ArrayLike,
-    normal_force: ArrayLike,
-    force_x: ArrayLike = 0.0,
-    force_y: ArrayLike = 0.0,
-    azimuth: ArrayLike = 0.0,
-) -> Floats:
-    """Normal stress T3 at depth h under a point force, tension positive (equation 4).
-
-    T3 = (3/2π) h²/(r² + h²)^(5/2) · [(F1 cos β + F2 sin β) r − F3 h]
-
-    Parameters
-    ----------
-    r : array_like
-        Lateral distance [m].
-    depth : array_like
-        h [m].
-    normal_force : array_like
-        F3 [N], positive into the skin.
-    force_x, force_y : array_like
-        F1, F2 [N].
-    azimuth : array_like
-        β [rad], direction of the load seen from the sensor.
-
-    Returns
-    -------
-    ndarray
-        [Pa], of the broadcast shape.
-    """
-    r_, h = np.asarray(r, dtype=float), np.asarray(depth, dtype=float)
-    outward = np.asarray(force_x) * np.cos(azimuth) + np.asarray(force_y) * np.sin(azimuth)
-    return 1.5 / np.pi * h**2 / (r_**2 + h**2) ** 2.5 * (outward * r_ - np.asarray(normal_force) * h)
-
-
 def gamma_n(offset: ArrayLike, rho: ArrayLike) -> Floats:
-    """Stress factor γ_n of a normal point force, averaged over the sensor's disc (equation 6).
+    """Stress factor γ_n of a normal point force, T3 = −(3/2πh²) F3 γ_n, averaged over the sensor's disc (equation 6).
 
     Parameters
     ----------

@@ -16,6 +16,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, checked, finite, non_negative, to_lab, to_si
 
 SigmaModelName = Literal["layer", "half_space"]
+_SKIN = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio")
 _FRF_UNCERTAINTY = "frf_uncertainty_pc_per_n"
 
 
@@ -86,27 +87,27 @@ def d33(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> 
         Names the field and the row of a value that cannot be used.
     """
     reached = pressed(table, given, units_checked)
-    measured = {"frf_pc_per_n": finite("frf_pc_per_n", given["frf_pc_per_n"]), _FRF_UNCERTAINTY: np.full((), np.nan)}
-    if _FRF_UNCERTAINTY in given:
-        measured[_FRF_UNCERTAINTY] = non_negative(_FRF_UNCERTAINTY, given[_FRF_UNCERTAINTY])
-    value, uncertainty = reached.d33(*(to_si(name, values) for name, values in measured.items()))
+    plateau = measured(given)
+    value, uncertainty = reached.d33(*(to_si(name, values) for name, values in plateau.items()))
     results = {
         "d33_pc_per_n": to_lab("d33_pc_per_n", value),
         "d33_uncertainty_pc_per_n": to_lab("d33_uncertainty_pc_per_n", uncertainty),
     }
-    answer = _skin_answer(table, reached, {**measured, **lab_columns(reached), **results}, results["d33_pc_per_n"])
-    return replace(answer, findings=plausibility.of_rows(measured["frf_pc_per_n"], results["d33_pc_per_n"]))
+    answer = _skin_answer(table, reached, {**plateau, **lab_columns(reached), **results}, results["d33_pc_per_n"])
+    return replace(answer, findings=plausibility.of_rows(plateau["frf_pc_per_n"], results["d33_pc_per_n"]))
+
+
+def measured(given: Mapping[str, Floats]) -> dict[str, Floats]:
+    """The measured plateau and its uncertainty, NaN where none is given; raises InvalidInput."""
+    unsure = np.full((), np.nan)
+    if _FRF_UNCERTAINTY in given:
+        unsure = non_negative(_FRF_UNCERTAINTY, given[_FRF_UNCERTAINTY])
+    return {"frf_pc_per_n": finite("frf_pc_per_n", given["frf_pc_per_n"]), _FRF_UNCERTAINTY: unsure}
 
 
 def pressed(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Transmission:
     """What reaches the sensor of a skin described in lab units; raises InvalidInput."""
-    skin = Skin.from_lab(
-        thickness_mm=given["thickness_mm"],
-        youngs_modulus_mpa=given["youngs_modulus_mpa"],
-        sensor_radius_mm=given["sensor_radius_mm"],
-        poisson_ratio=given["poisson_ratio"],
-        units_checked=units_checked,
-    )
+    skin = Skin.from_lab(**{name: given[name] for name in _SKIN}, units_checked=units_checked)
     indenter = Indenter.from_lab(indenter_radius_mm=given["indenter_radius_mm"], units_checked=units_checked)
     return transmission(table, skin, indenter, checked("preload_n", given["preload_n"], units_checked=units_checked))
 

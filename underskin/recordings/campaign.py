@@ -145,9 +145,7 @@ def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
         if recording is not None and not refused:
             good[recording.id] = recording
         label = recording.id if recording is not None else _label(entry, index)
-        problems += [
-            RecordingProblem(label, _place(error), error.value, error.allowed, error.code) for error in refused
-        ]
+        problems += [RecordingProblem(label, error.place, error.value, error.allowed, error.code) for error in refused]
     if not good and all(problem.field.startswith("skin.") for problem in problems):
         raise problems[0].as_error(problems[0].field)
     return Campaign(name, skin, tuple(good.values()), units_checked), problems
@@ -253,7 +251,3 @@ def _unequal_lengths(recording: Recording) -> list[InvalidInput]:
 def _label(entry: Any, index: int) -> str:
     called = entry.get("id") if isinstance(entry, Mapping) else None
     return shown(called) if isinstance(called, str) and called else f"recordings[{index}]"
-
-
-def _place(error: InvalidInput) -> str:
-    return error.field if error.index is None else f"{error.field}[{error.index}]"

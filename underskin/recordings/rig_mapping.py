@@ -110,7 +110,7 @@ class _MappedBlock:
             values |= {"frf_re_pc_per_n": frf.real, "frf_im_pc_per_n": frf.imag}
         if any(np.iscomplexobj(column) for column in values.values()):
             only = Requirement("a channel of complex numbers can only be ", Mention(COMPLEX_FRF))
-            raise FileError(self.file, "", only)
+            raise self._error("", only)
         columns: dict[str, Any] = {field: np.asarray(column, dtype=float) for field, column in values.items()}
         columns = self._without_instrument(columns)
         self._require_known_sign(columns)
@@ -126,7 +126,7 @@ class _MappedBlock:
         assert channel is not None
         place = f"channel {channel.name!r}"
         if len(channel.values) == 0:
-            raise FileError(self.file, place, "holds no values")
+            raise self._error(place, "holds no values")
         if field == "coherence":
             return channel.values
         target = "frf_re_pc_per_n" if field == COMPLEX_FRF else field
@@ -138,20 +138,16 @@ class _MappedBlock:
         """The rig's unit, unless the file's label contradicts it unacknowledged; the label where the rig says none."""
         if mapping.labelled is not None:
             if mapping.labelled != channel.unit:
-                raise FileError(
-                    self.file, place, f"is labelled {channel.unit!r}, not {mapping.labelled!r} as the rig says"
-                )
+                raise self._error(place, f"is labelled {channel.unit!r}, not {mapping.labelled!r} as the rig says")
             self.warnings.append(f"{place} is labelled {channel.unit!r}; the rig description says {mapping.unit!r}")
             return mapping.unit or ""
         if mapping.unit and channel.unit and unit(mapping.unit) != unit(channel.unit):
             reason = f"is labelled {channel.unit!r}, but the rig description says {mapping.unit!r}"
-            raise FileError(self.file, place, f"{reason}: if the label is wrong, add labelled: {channel.unit}")
+            raise self._error(place, f"{reason}: if the label is wrong, add labelled: {channel.unit}")
         label = mapping.unit or channel.unit
         if not label:
-            raise FileError(
-                self.file,
-                place,
-                "has no unit in the file: say it, as `unit` of the rig description or as its true unit",
+            raise self._error(
+                place, "has no unit in the file: say it, as `unit` of the rig description or as its true unit"
             )
         return label
 
@@ -162,9 +158,7 @@ class _MappedBlock:
         signal, _, quantity = mapping.sensitivity_unit.rpartition("/")
         given, divided = unit(label), unit(signal)
         if given is None or divided is None or given.dimension != divided.dimension:
-            raise FileError(
-                self.file, place, f"its unit {label!r} is not of the sensitivity's {mapping.sensitivity_unit!r}"
-            )
+            raise self._error(place, f"its unit {label!r} is not of the sensitivity's {mapping.sensitivity_unit!r}")
         return given.to_si / divided.to_si / mapping.sensitivity * _factor(quantity, field, self.file, place)
 
     def _without_instrument(self, columns: Mapping[str, Any]) -> dict[str, Any]:
@@ -175,7 +169,7 @@ class _MappedBlock:
         if len(columns["displacement_mm"]) != len(columns["force_n"]):
             both = (Mention("displacement_mm"), " and ", Mention("force_n"))
             reason = Requirement(*both, " differ in length: no stiffness can be applied")
-            raise FileError(self.file, "", reason)
+            raise self._error("", reason)
         return {**columns, "displacement_mm": columns["displacement_mm"] - columns["force_n"] / stiffness}
 
     def _require_known_sign(self, columns: Mapping[str, Any]) -> None:
@@ -188,7 +182,7 @@ class _MappedBlock:
         if together < 0:
             reason = "force falls as the displacement grows, and compression is positive here"
             how = (Mention("displacement_mm"), " and ", Mention("force_n"))
-            raise FileError(self.file, "channels", Requirement(f"{reason}: say sign: 1 or sign: -1 for ", *how))
+            raise self._error("channels", Requirement(f"{reason}: say sign: 1 or sign: -1 for ", *how))
 
     def _frf(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """Without the line at 0 Hz; time series with their sample rate."""
@@ -208,8 +202,11 @@ class _MappedBlock:
             step = (time[-1] - time[0]) / max(len(time) - 1, 1)
             jitter = np.abs(time - (time[0] + step * np.arange(len(time)))).max()
         if not (step > 0 and jitter <= _SAMPLING_JITTER * step):
-            raise FileError(self.file, "time_s", f"samples are not evenly spaced (step {shown(step)} s)")
+            raise self._error("time_s", f"samples are not evenly spaced (step {shown(step)} s)")
         return float(1 / step)
+
+    def _error(self, place: str, reason: str | Requirement) -> FileError:
+        return FileError(self.file, place, reason)
 
 
 def _centred(column: Floats) -> Floats:

@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 import orjson
 
-from underskin.errors import FileError
+from underskin.errors import FileError, damage_said
 from underskin.recordings.readers.hdf5_damage import damage
 from underskin.recordings.readers.hdf5_file import MAGIC
 from underskin.recordings.readers.hdf5_links import refuse_outside
@@ -131,19 +131,14 @@ def _campaigns(stream: BinaryIO, names: str) -> dict[str, Any]:
 
 @contextmanager
 def _opened(stream: BinaryIO) -> Iterator[Any]:
-    try:
-        with h5py.File(stream, "r") as source:
-            refuse_outside(source, "")
-            schema = str(source.attrs.get("schema"))
-            if schema.startswith(_ANY_SCHEMA) and schema != SCHEMA:
-                raise FileError("", "/", f"is an export of another underskin: {schema}; this one reads {SCHEMA}")
-            if schema != SCHEMA:
-                raise FileError("", "/", f"is no export of a skin: it needs the attribute schema = {SCHEMA}")
-            yield source
-    except (MemoryError, FileError):
-        raise
-    except Exception as error:
-        raise FileError("", "", f"the export {damage(error)}") from None
+    with damage_said("", "", lambda error: f"the export {damage(error)}"), h5py.File(stream, "r") as source:
+        refuse_outside(source, "")
+        schema = str(source.attrs.get("schema"))
+        if schema.startswith(_ANY_SCHEMA) and schema != SCHEMA:
+            raise FileError("", "/", f"is an export of another underskin: {schema}; this one reads {SCHEMA}")
+        if schema != SCHEMA:
+            raise FileError("", "/", f"is no export of a skin: it needs the attribute schema = {SCHEMA}")
+        yield source
 
 
 def _campaign(group: Any) -> dict[str, Any]:

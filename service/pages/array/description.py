@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from fastapi import Request
 
+from service.pages.shared.figures import Drawn, drawn
 from service.pages.shared.form_errors import in_form_words
 from service.pages.shared.skin_fields import FIELDS, UNITS
 from service.pages.shared.skin_values import start
 from service.pages.shared.typed_numbers import number
-from service.store import campaigns, skins
-from service.store.engine import Database
+from service.store import Database, campaigns, skins
 from service.usecases.table_loader import influence_table
 from underskin.array_stress.answer import ArrayStress, answer
 from underskin.array_stress.request import read_request
@@ -88,6 +88,15 @@ def charge_columns(answer: ArrayStress) -> dict[str, list[Any]]:
     return {"sensor": list(answer.sensors), **{name: column.tolist() for name, column in answer.columns.items()}}
 
 
+def charge_figure(answer: ArrayStress, loads_mm: Sequence[tuple[float, float]], numbers: str) -> Drawn:
+    """Each sensor coloured by its charge, with the loads where they have positions."""
+    from underskin.figures import loaded_array
+
+    x, y, charge, error = (answer.columns[name] for name in ("x_mm", "y_mm", "charge_pc", "charge_error_pc"))
+    figure = loaded_array(answer.sensors, x, y, charge, error, loads_mm)
+    return drawn("charge", figure, "Each sensor where it lies, coloured by its charge.", numbers)
+
+
 def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:
     columns, rows, pitch = values["columns"], values["rows"], values["pitch_mm"]
     for name in ("columns", "rows"):
@@ -106,8 +115,8 @@ def _latest(store: Database, skin_id: str) -> Mapping[str, Any]:
     """The skin as its latest campaign declares it."""
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
-        latest = campaigns.listed(connection, campaigns.CampaignFilters(skin=root, state="current"), None, 1)
-    skin: dict[str, Any] = latest[0].about["skin"] if latest else {"sensors": []}
+        latest = campaigns.latest(connection, root)
+    skin: dict[str, Any] = {"sensors": []} if latest is None else latest.about["skin"]
     if not skin["sensors"]:
         raise InvalidInput("skin", skin_id, "must have a current campaign that names its sensors")
     return skin

@@ -6,9 +6,9 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request, Response
 
 from service.dependencies import Store, Table
-from service.pages.array.description import Described, answered, charge_columns, described, refused
+from service.pages.array.description import Described, answered, charge_columns, charge_figure, described, refused
 from service.pages.shared import same_request
-from service.pages.shared.figures import csv_answer, drawn
+from service.pages.shared.figures import Drawn, csv_answer
 from service.pages.shared.html import page
 from service.pages.shared.typed_numbers import numbers
 from underskin.array_stress.answer import ArrayStress
@@ -55,20 +55,10 @@ def charge_csv(request: Request, store: Store, table: Table, skin: SkinQuery = N
     return csv_answer("charge", charge_columns(answer))
 
 
-def _figure(request: Request, document: Mapping[str, Any], answer: ArrayStress) -> Any:
-    from underskin.figures import loaded_array
-
-    columns = answer.columns
-    figure = loaded_array(
-        answer.sensors,
-        columns["x_mm"],
-        columns["y_mm"],
-        columns["charge_pc"],
-        columns["charge_error_pc"],
-        [(load["x_mm"], load["y_mm"]) for load in document["contacts"]],
-    )
+def _figure(request: Request, document: Mapping[str, Any], answer: ArrayStress) -> Drawn:
+    places = [(load["x_mm"], load["y_mm"]) for load in document["contacts"]]
     query = f"?{request.url.query}" if request.url.query else ""
-    return drawn("charge", figure, "Each sensor where it lies, coloured by its charge.", f"/loads/charge.csv{query}")
+    return charge_figure(answer, places, f"/loads/charge.csv{query}")
 
 
 def _document(array: Described, loads: str) -> dict[str, Any]:

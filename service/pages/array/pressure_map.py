@@ -14,13 +14,13 @@ from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import Store
 from service.ingest.reading import READING_SLOTS
-from service.ingest.uploads import Upload, received
+from service.ingest.uploads import received
 from service.pages.array import description
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_text, drawn
 from service.pages.shared.forms import TOKEN, require_own
 from service.pages.shared.html import page
-from service.store.engine import Database
+from service.store import Database
 from underskin.array_stress import pressure_map
 from underskin.array_stress.answer import ArrayStress
 from underskin.errors import UnderskinError, out_of_range
@@ -46,13 +46,12 @@ def view(request: Request, store: Store, skin: Annotated[str | None, Query()] = 
 async def send(request: Request, store: Store) -> Response:
     """With the map that was sent as a file, or else as text."""
     async with received(request, request.app.state.uploads, _LARGEST_BODY_BYTES) as sent:
-        fields = {one.field or "": _start(one, _LONGEST_FIELD) for one in sent if one.field not in (_MAP, _FILE)}
-        given = {name: value.decode("utf-8", "replace").strip() for name, value in fields.items()}
+        given = {one.field or "": one.text(_LONGEST_FIELD) for one in sent if one.field not in (_MAP, _FILE)}
         require_own(request, given.get(TOKEN, ""))
         file = next((one for one in sent if one.field == _FILE and one.label), None)
         typed = next((one for one in sent if one.field == _MAP), None)
         chosen = file or typed
-        content = b"" if chosen is None else _start(chosen, _LARGEST_BYTES + 1)
+        content = b"" if chosen is None else chosen.start(_LARGEST_BYTES + 1)
     name = "the map" if file is None or not file.label else file.label
     async with READING_SLOTS:
         return await run_in_threadpool(_shown, request, store, given, content, name)
@@ -86,25 +85,17 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
 
 
 def _figures(document: Mapping[str, Any], answer: ArrayStress) -> list[Drawn]:
-    from underskin.figures import loaded_array, pressure_on_array
+    from underskin.figures import pressure_on_array
 
     columns, held = answer.columns, document["pressure_map"]
     places = list(zip(columns["x_mm"].tolist(), columns["y_mm"].tolist(), strict=True))
     pressed = pressure_on_array(held["x_mm"], held["y_mm"], held["pressure_mpa"], places, document["sensor_radius_mm"])
-    charge = loaded_array(
-        answer.sensors, columns["x_mm"], columns["y_mm"], columns["charge_pc"], columns["charge_error_pc"], []
-    )
     as_map = {"y_mm \\ x_mm": held["y_mm"]} | {
         f"{x!r}": column for x, column in zip(held["x_mm"], zip(*held["pressure_mpa"], strict=True), strict=True)
     }
     return [
         drawn("pressure", pressed, "The map as it was read, and the sensors' outlines.", _csv(as_map)),
-        drawn(
-            "charge",
-            charge,
-            "Each sensor where it lies, coloured by its charge.",
-            _csv(description.charge_columns(answer)),
-        ),
+        description.charge_figure(answer, [], _csv(description.charge_columns(answer))),
     ]
 
 
@@ -115,11 +106,6 @@ def _csv(columns: Mapping[str, Any]) -> str:
 def _inside(media_type: str, content: bytes) -> str:
     """An address that holds what it leads to."""
     return f"data:{media_type};base64,{base64.b64encode(content).decode()}"
-
-
-def _start(part: Upload, most: int) -> bytes:
-    with part.path.open("rb") as file:
-        return file.read(most)
 
 
 def _text(content: bytes) -> str:

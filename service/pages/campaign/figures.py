@@ -6,12 +6,10 @@ from threading import Lock
 from typing import Any
 from urllib.parse import quote
 
-from service.pages.shared.figures import Drawn, drawn
-from service.store import campaigns
-from service.store.engine import Database
-from service.store.tables import AnyRow
+from service.pages.shared.figures import Drawn, drawn, drawn_curves
+from service.store import AnyRow, Database, campaigns
 from service.usecases.figure_data import MOST_SINGLE, measured, spreads, spreads_of
-from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
+from underskin.recordings.campaign import Campaign, FrfRecording
 
 _D33 = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
 _AGAINST_PRELOAD = (
@@ -140,12 +138,4 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any]) -> 
 
 
 def _curves(row: AnyRow, campaign: Campaign) -> list[Drawn]:
-    from underskin.figures import ForceCurve, force_curves
-
-    kinds = (IndentationRecording, CompressionRecording)
-    chosen = [recording for recording in campaign.recordings if isinstance(recording, kinds)]
-    if not chosen:
-        return []
-    figure = force_curves([ForceCurve(one.id, one.displacement_mm, one.force_n) for one in chosen[:_MOST_CURVES]])
-    about = f"Force against displacement of {min(len(chosen), _MOST_CURVES)} of {len(chosen)} recordings."
-    return [drawn("curves", figure, about, f"/campaigns/{row.id}/curves.csv")]
+    return drawn_curves(campaign.recordings, _MOST_CURVES, " recordings", f"/campaigns/{row.id}/curves.csv")

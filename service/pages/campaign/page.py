@@ -8,12 +8,10 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from service.dependencies import WRITE, CampaignId, Store, Table
 from service.pages.campaign.figures import band_query, figures
 from service.pages.shared import same_request, verdicts
-from service.pages.shared.figures import csv_answer
+from service.pages.shared.figures import csv_answer, csv_of_rows
 from service.pages.shared.forms import Form, reason, see
 from service.pages.shared.html import page
-from service.store import campaigns, diagnoses
-from service.store.engine import Database
-from service.store.tables import AnyRow
+from service.store import AnyRow, Database, campaigns, diagnoses
 from service.usecases import d33_cache
 from service.usecases.campaigns import exclude as exclude_recording
 from service.usecases.figure_data import frf_columns
@@ -101,8 +99,7 @@ def d33_csv(campaign_id: CampaignId, store: Store, table: Table, band: BandOfQue
     answer = d33_cache.answer(store, table, row, band)
     values = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
     names = ("sensor", "indenter_radius_mm", "preload_n", "recordings", *values)
-    entries = [*answer["sensors"], *answer["cells"]]
-    return csv_answer("d33", {name: [entry.get(name) for entry in entries] for name in names})
+    return csv_of_rows("d33", names, [*answer["sensors"], *answer["cells"]])
 
 
 @router.get("/curves.csv")

@@ -15,11 +15,9 @@ from service.pages.shared.figures import Drawn, csv_answer, drawn, drawn_before
 from service.pages.shared.forms import OWN_FORM, see
 from service.pages.shared.html import page, render
 from service.problems import Refusal
-from service.store import campaigns, diagnoses, models, skins
-from service.store.engine import Database
-from service.store.tables import AnyRow
+from service.store import AnyRow, Database, campaigns, diagnoses, models, skins
 from service.usecases import diagnoses as usecase
-from service.usecases.models import adopt as adopt_model
+from service.usecases.adopted_models import adopt as adopt_model
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -123,7 +121,7 @@ def adopt(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response
     with store.writing() as connection:
         skin = diagnoses.find(connection, diagnosis_id).skin_id
         model = adopt_model(connection, skin, diagnosis_id, sender(request))
-    return see(f"/skins/{quote(model.model_skin, safe='')}?model=adopted")
+    return see(f"/skins/{quote(model.model_skin_id, safe='')}?model=adopted")
 
 
 def _not_adopted(report: Mapping[str, Any]) -> str | None:

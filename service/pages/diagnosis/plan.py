@@ -14,9 +14,7 @@ from service.pages.shared.form_errors import in_form_words
 from service.pages.shared.html import page
 from service.pages.shared.typed_numbers import number
 from service.problems import Refusal
-from service.store import campaigns, diagnoses
-from service.store.engine import Database
-from service.store.tables import AnyRow
+from service.store import AnyRow, Database, campaigns, diagnoses
 from underskin.errors import UnderskinError, out_of_range, required
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ from service.pages.shared.typed_numbers import number
 from service.problems import Refusal
 from service.schemas.columns_answer import Columns
 from service.schemas.d33 import D33Columns
-from service.store.engine import Database
-from service.store.errors import Conflict
+from service.store import Conflict, Database
 from service.usecases.adopted_models import model_in_force
 from service.usecases.d33 import d33
 from underskin.errors import UnderskinError, required

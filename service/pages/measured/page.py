@@ -21,7 +21,7 @@ from service.pages.shared.typed_numbers import number, numbers
 from service.problems import first_refused
 from service.schemas.columns_answer import Columns
 from service.schemas.d33 import D33Columns
-from service.store.engine import Database
+from service.store import Database
 from service.usecases.d33 import d33
 from underskin.errors import InvalidInput, UnderskinError, too_few, wrong_type
 from underskin.surrogate.sigma_table import SigmaTable

@@ -1,42 +1,25 @@
 """The model of a skin, as pages head it: what it adds, since when and until when, and d33 by it beside the paper's."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import Connection
 
 from service.pages.shared.verdicts import mechanisms_of
 from service.problems import Refusal
-from service.store import diagnoses
-from service.store.engine import Database
-from service.store.errors import Conflict
-from service.store.tables import AnyRow
+from service.schemas.diagnoses import ModelVersion
+from service.store import AnyRow, Conflict, Database, diagnoses
 from service.usecases import adopted_models, d33_cache
 from underskin import InvalidInput
 from underskin.diagnosis.data.names import in_words
 from underskin.surrogate.sigma_table import SigmaTable
 
 
-@dataclass(frozen=True)
-class ModelWithdrawal:
-    """When a model was withdrawn, by whom (name of the API key), and why."""
-
-    at: str
-    sender: str | None
-    reason: str
-
-
-@dataclass(frozen=True)
-class AdoptedVersion:
+class AdoptedVersion(ModelVersion):
     """A model that was adopted; `outdated`: why it serves no figures, None where it does."""
 
-    diagnosis_id: str
-    version: int
-    at: str
     mechanisms: str
     outdated: str | None
-    withdrawn: ModelWithdrawal | None
 
 
 def of_rows(connection: Connection, rows: Sequence[AnyRow]) -> list[AdoptedVersion]:
@@ -44,21 +27,12 @@ def of_rows(connection: Connection, rows: Sequence[AnyRow]) -> list[AdoptedVersi
     reports = diagnoses.reports_of(connection, [row.number for row in rows])
     return [
         AdoptedVersion(
-            row.id,
-            row.model_version,
-            row.adopted_at,
-            in_words(mechanisms_of(reports[row.number])),
-            diagnoses.outdated(row),
-            _withdrawal(row),
+            **adopted_models.version(row).model_dump(),
+            mechanisms=in_words(mechanisms_of(reports[row.number])),
+            outdated=diagnoses.outdated(row),
         )
         for row in rows
     ]
-
-
-def _withdrawal(row: AnyRow) -> ModelWithdrawal | None:
-    if row.model_withdrawn_at is None:
-        return None
-    return ModelWithdrawal(row.model_withdrawn_at, row.model_withdrawn_from, row.model_withdraw_reason)
 
 
 def answer_by_it(

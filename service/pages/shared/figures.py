@@ -1,6 +1,6 @@
 """A plotly figure in a page: its JSON, its words, and where its numbers are."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -12,6 +12,7 @@ from markupsafe import Markup
 from service.pages.shared.assets import LIBRARY, gzipped
 from service.pages.shared.formats import json_inside
 from underskin.prediction.columns import to_csv
+from underskin.recordings.campaign import FrfRecording, Recording
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -54,10 +55,27 @@ def drawn_before(name: str, text: str, about: str, numbers: str | None = None) -
     return Drawn(name, layout["title"]["text"], layout["height"], json_inside(text), numbers, about)
 
 
+def drawn_curves(recordings: Iterable[Recording], most: int, noun: str = "", numbers: str | None = None) -> list[Drawn]:
+    """The first recordings of curves in one figure; none where there are none. `noun`: what they are called."""
+    from underskin.figures import ForceCurve, force_curves
+
+    chosen = [one for one in recordings if not isinstance(one, FrfRecording)]
+    if not chosen:
+        return []
+    figure = force_curves([ForceCurve(one.id, one.displacement_mm, one.force_n) for one in chosen[:most]])
+    about = f"Force against displacement of {min(len(chosen), most)} of {len(chosen)}{noun}."
+    return [drawn("curves", figure, about, numbers)]
+
+
 def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> Response:
     """Columns as a CSV file to be saved."""
     headers = {"Content-Disposition": f'attachment; filename="{name}.csv"', "X-Content-Type-Options": "nosniff"}
     return Response(csv_text(columns), headers=headers, media_type="text/csv; charset=utf-8")
+
+
+def csv_of_rows(name: str, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> Response:
+    """Rows as a CSV file of these columns; a cell is NaN where a row lacks it."""
+    return csv_answer(name, {column: [row.get(column) for row in rows] for column in names})
 
 
 def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:

@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from service.store import campaigns, overview, skins
-from service.store.engine import Database
+from service.store import Database, campaigns, overview, skins
 from underskin.surrogate.sigma_table import SigmaTable
 
 PROTOTYPE = {
@@ -34,21 +33,19 @@ def start(
         return dict(PROTOTYPE), []
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
-        latest = campaigns.listed(connection, campaigns.CampaignFilters(skin=root, state="current"), None, 1)
-        if not latest:
+        latest = campaigns.latest(connection, root)
+        if latest is None:
             return dict(PROTOTYPE), ["The skin has no campaign in use: all values are those of the paper's prototype"]
-        recordings = campaigns.recordings_of(connection, latest[0].number)
-        measured = overview.medians(connection, [latest[0].number], table.sha256).get(latest[0].number)
-    described = latest[0].about["skin"]
+        recordings = campaigns.recordings_of(connection, latest.number)
+        measured = overview.medians(connection, [latest.number], table.sha256).get(latest.number)
+    described = latest.about["skin"]
     known = {name: float(described[name]) for name in PROTOTYPE if described.get(name) is not None}
     known |= _pressed([entry.scalars for entry in recordings if "preload_n" in entry.scalars])
     known |= _pitch(described["sensors"])
     taken = []
     if "d33_pc_per_n" not in known and measured is not None and measured > 0:
         known["d33_pc_per_n"] = float(f"{measured:.4g}")
-        sentence = (
-            f"d33 {measured:.4g} pC/N is the median of the sensors in {latest[0].name[:60]}, by the paper's model"
-        )
+        sentence = f"d33 {measured:.4g} pC/N is the median of the sensors in {latest.name[:60]}, by the paper's model"
         taken += [f"{sentence}; the skin declares none"] if "d33_pc_per_n" in words else []
     lacking = [name for name in words if name in PROTOTYPE and name not in known]
     sentence = ", ".join(f"{words[name][0]} {PROTOTYPE[name]:g} {words[name][1]}".strip() for name in lacking)

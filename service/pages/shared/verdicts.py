@@ -6,8 +6,7 @@ from typing import Any, Literal
 
 from sqlalchemy import Connection
 
-from service.store import diagnoses
-from service.store.tables import AnyRow
+from service.store import AnyRow, diagnoses
 from underskin.diagnosis.data.names import EXPLAINED, in_words
 from underskin.findings.formatting import in_percent
 

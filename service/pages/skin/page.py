@@ -5,20 +5,18 @@ from statistics import median
 from typing import Annotated, Any, Literal
 from urllib.parse import quote
 
+import numpy as np
 from fastapi import APIRouter, Query, Request, Response
-from sqlalchemy import Connection
 from starlette.background import BackgroundTask
 
 from service.dependencies import WRITE, SkinId, Store, Table, number_of_cursor, sender
 from service.pages.shared import same_request, verdicts
-from service.pages.shared.adoption import AdoptedVersion, answer_by_it, change_percent, of_rows
-from service.pages.shared.figures import Drawn, csv_answer, drawn
+from service.pages.shared.adoption import answer_by_it, change_percent, of_rows
+from service.pages.shared.figures import Drawn, csv_of_rows, drawn
 from service.pages.shared.forms import Form, reason, see
 from service.pages.shared.html import page
 from service.schemas.skins import History, SensorHistory
-from service.store import campaigns, inversions, models, overview, skins
-from service.store.engine import Database
-from service.store.tables import AnyRow
+from service.store import AnyRow, Database, campaigns, inversions, models, overview, skins
 from service.usecases import d33_cache, histories
 from service.usecases.adopted_models import model_in_force
 from underskin.surrogate.sigma_table import SigmaTable
@@ -50,16 +48,17 @@ def skin(
     with store.reading() as connection:
         filters = campaigns.CampaignFilters(skin=root, state=None)
         rows = campaigns.listed(connection, filters, number_of_cursor(before), _ON_A_PAGE + 1)
-        latest = campaigns.listed(connection, campaigns.CampaignFilters(skin=root, state="current"), None, 1)
+        last = campaigns.latest(connection, root)
         numbers = [row.number for row in rows]
         medians = overview.medians(connection, numbers, table.sha256)
         diagnosed = overview.latest_diagnoses(connection, numbers)
-        last_model = _last_model(connection, root)
-        model = last_model if last_model is not None and last_model.withdrawn is None else None
+        model_row = models.last(connection, root)
+        last_model = None if model_row is None else of_rows(connection, [model_row])[0]
+        model = last_model if last_model is not None and last_model.withdrawn_at is None else None
         adopted = [] if model is None else [model.diagnosis_id]
         verdict = verdicts.of_rows(connection, list(diagnosed.values()), adopted)
+        verdict_of = {number: verdict[row.id] for number, row in diagnosed.items()}
     serves = model is not None and model.outdated is None
-    last = latest[0] if latest else None
     answer = None if last is None else d33_cache.answer(store, table, last, None)
     by_model, why_not = (None, None) if last is None or not serves else answer_by_it(store, table, root, last)
     by = (by or ("paper" if by_model is None else "adopted")) if serves else "paper"
@@ -80,7 +79,7 @@ def skin(
         answer=answer,
         described=None if last is None else last.about["skin"],
         rows=[
-            (row, campaigns.state(row), medians.get(row.number), _verdict(verdict, diagnosed.get(row.number)))
+            (row, campaigns.state(row), medians.get(row.number), verdict_of.get(row.number))
             for row in rows[:_ON_A_PAGE]
         ],
         following=rows[_ON_A_PAGE - 1].number if len(rows) > _ON_A_PAGE else None,
@@ -121,9 +120,9 @@ def map_csv(skin_id: SkinId, store: Store, table: Table, by: Annotated[By, Query
     root, _ = _completed(store, table, skin_id)
     trends = {entry.sensor: entry.trend for entry in _history_by(store, table, root, by).sensors}
     with store.reading() as connection:
-        latest = campaigns.listed(connection, campaigns.CampaignFilters(skin=root, state="current"), None, 1)
-    columns: dict[str, list[Any]] = {name: [] for name in (*_MAP_COLUMNS, *_TREND_COLUMNS)}
-    for row in latest:
+        row = campaigns.latest(connection, root)
+    rows: list[dict[str, Any]] = []
+    if row is not None:
         answer = (
             d33_cache.answer(store, table, row, None)
             if by == "paper"
@@ -131,17 +130,16 @@ def map_csv(skin_id: SkinId, store: Store, table: Table, by: Annotated[By, Query
         )
         places = {entry["id"]: entry for entry in row.about["skin"]["sensors"]}
         for entry in answer["sensors"]:
-            values = {**entry, **places[entry["sensor"]]}
             line = trends.get(entry["sensor"])
-            for name in _TREND_COLUMNS:
-                values[name] = None if line is None else getattr(line, name)
-            for name in (*_MAP_COLUMNS, *_TREND_COLUMNS):
-                columns[name].append(values[name])
-    return csv_answer("map", columns)
+            rows.append({**entry, **places[entry["sensor"]], **({} if line is None else line.model_dump())})
+    return csv_of_rows("map", (*_MAP_COLUMNS, *_TREND_COLUMNS), rows)
 
 
 _MAP_COLUMNS = (
     "sensor", "x_mm", "y_mm", "d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n",
+)  # fmt: skip
+_HISTORY_COLUMNS = (
+    "sensor", "campaign_id", "time", "time_is", "d33_pc_per_n", "d33_uncertainty_pc_per_n", "model", "model_id",
 )  # fmt: skip
 _TREND_COLUMNS = ("slope_pc_per_n_per_year", "slope_uncertainty_pc_per_n_per_year")
 
@@ -153,29 +151,12 @@ def history_csv(
     """d33 of every sensor in every current campaign, and the model that each value rests on."""
     root, _ = _completed(store, table, skin_id)
     history = _history_by(store, table, root, by)
-    points = [(entry.sensor, point) for entry in history.sensors for point in entry.points]
-    return csv_answer(
-        "history",
-        {
-            "sensor": [name for name, _ in points],
-            "campaign_id": [point.campaign_id for _, point in points],
-            "time": [point.time for _, point in points],
-            "time_is": [point.time_is for _, point in points],
-            "d33_pc_per_n": [point.d33_pc_per_n for _, point in points],
-            "d33_uncertainty_pc_per_n": [point.d33_uncertainty_pc_per_n for _, point in points],
-            "model": [point.model for _, point in points],
-            "model_id": [point.model_id or "" for _, point in points],
-        },
-    )
-
-
-def _last_model(connection: Connection, root: str) -> AdoptedVersion | None:
-    row = models.last(connection, root)
-    return None if row is None else of_rows(connection, [row])[0]
-
-
-def _verdict(verdict: Mapping[str, verdicts.VerdictSummary], row: AnyRow | None) -> verdicts.VerdictSummary | None:
-    return None if row is None else verdict[row.id]
+    points = [
+        {"sensor": entry.sensor, **point.model_dump(), "model_id": point.model_id or ""}
+        for entry in history.sensors
+        for point in entry.points
+    ]
+    return csv_of_rows("history", _HISTORY_COLUMNS, points)
 
 
 def _array(answer: Mapping[str, Any]) -> float | None:
@@ -220,8 +201,8 @@ def _map(root: str, row: AnyRow, answer: Mapping[str, Any], history: History, sh
         names,
         [places[name]["x_mm"] for name in names],
         [places[name]["y_mm"] for name in names],
-        _floats(values),
-        _floats(uncertainties),
+        np.array(values, dtype=float),
+        np.array(uncertainties, dtype=float),
         ["; ".join(flag["reason"] for flag in entry["flags"]) for entry in entries],
         quantity,
     )
@@ -276,7 +257,3 @@ def trend_in_words(entry: SensorHistory) -> str:
         return f"no trend: {entry.no_trend}"
     slope = f"{line.slope_pc_per_n_per_year:+.2g} ± {line.slope_uncertainty_pc_per_n_per_year:.1g} pC/N a year"
     return slope if line.significant else f"no significant trend ({slope})"
-
-
-def _floats(values: Sequence[float | None]) -> list[float]:
-    return [float("nan") if value is None else value for value in values]

@@ -11,7 +11,7 @@ from service.dependencies import WRITE, Store, Table, sender
 from service.ingest.accept import IngestOptions, accept
 from service.ingest.uploads import Upload
 from service.pages.shared.forms import OWN_FORM, see
-from service.store import campaigns, skins
+from service.store import campaigns
 from service.usecases import d33_cache
 
 router = APIRouter()
@@ -40,10 +40,7 @@ async def load(request: Request, store: Store, table: Table) -> Response:
 
 def _withdrawn(connection: Connection) -> int | None:
     """How many campaigns the skin had, all of which were withdrawn; None where one is in use."""
-    if not skins.is_known(connection, SKIN):
-        return 0
-    filters = campaigns.CampaignFilters(skin=skins.require_root(connection, SKIN))
-    rows = campaigns.listed(connection, filters, None, _MOST)
+    rows = campaigns.listed(connection, campaigns.CampaignFilters(skin=SKIN), None, _MOST)
     return None if any(campaigns.state(row) == "current" for row in rows) else len(rows)
 
 

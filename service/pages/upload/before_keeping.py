@@ -10,8 +10,7 @@ from fastapi import Request
 
 from service.ingest import repeats
 from service.ingest.reading import InspectedFile, checked
-from service.store import campaigns, skins
-from service.store.engine import Database
+from service.store import Database, campaigns, skins
 from service.usecases import d33_cache
 from underskin.recordings.campaign import Campaign
 

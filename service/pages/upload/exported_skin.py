@@ -12,8 +12,7 @@ from service.pages.upload.file_summary import FileSummary
 from service.pages.upload.keep import field_errors
 from service.pages.upload.pending_uploads import PendingUpload
 from service.pages.upload.skin_summary import MOST_LISTED, skin_summary
-from service.store.engine import Database
-from service.store.errors import Conflict
+from service.store import Conflict, Database
 from underskin import InvalidInput
 from underskin.recordings.skin_export import is_export
 

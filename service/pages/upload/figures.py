@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 
 from service.ingest.reading import InspectedFile
-from service.pages.shared.figures import Drawn, drawn
+from service.pages.shared.figures import Drawn, drawn, drawn_curves
 from service.usecases.figure_data import frf_columns, measured
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.campaign import Campaign
 
 _MOST_TRACES = 8
 _MOST_FRF = 12
@@ -17,7 +17,8 @@ _MOST_CURVES = 12
 def figures(look: InspectedFile, place: str) -> list[Drawn]:
     """What there is to see; `place`: the address of the upload's file, under which its numbers are."""
     campaigns = _campaigns(look)
-    return [*_traces(look, place), *_frf(campaigns, place), *_curves(campaigns)]
+    recordings = [recording for campaign in campaigns for recording in campaign.recordings]
+    return [*_traces(look, place), *_frf(campaigns, place), *drawn_curves(recordings, _MOST_CURVES)]
 
 
 def trace_columns(look: InspectedFile) -> dict[str, list[Any]]:
@@ -82,16 +83,3 @@ def _frf(campaigns: list[Campaign], place: str) -> list[Drawn]:
     )
     about = f"Magnitude, phase and coherence{some}."
     return [drawn("frf", frf_recordings(lines, None), about, f"{place}frf.csv")]
-
-
-def _curves(campaigns: list[Campaign]) -> list[Drawn]:
-    from underskin.figures import ForceCurve, force_curves
-
-    kinds = (IndentationRecording, CompressionRecording)
-    chosen = [one for campaign in campaigns for one in campaign.recordings if isinstance(one, kinds)]
-    if not chosen:
-        return []
-    figure = force_curves([ForceCurve(one.id, one.displacement_mm, one.force_n) for one in chosen[:_MOST_CURVES]])
-    return [
-        drawn("curves", figure, f"Force against displacement of {min(len(chosen), _MOST_CURVES)} of {len(chosen)}.")
-    ]

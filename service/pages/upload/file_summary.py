@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from service.ingest.reading import CheckedCampaign, InspectedFile, checked
+from service.ingest.reading import InspectedFile, checked
 from service.ingest.uploads import Upload
 from underskin import InvalidInput
 from underskin.recordings.campaign import CompressionRecording, FrfRecording, Recording
@@ -76,18 +76,14 @@ def seen(upload: Upload, look: InspectedFile, known: Sequence[str]) -> FileSumma
         recordings=len(recordings),
         listed=[_recording(recording) for recording in recordings[:MOST_LISTED]],
         refused=[entry for one in arrived for entry in one.refused],
-        errors=[error for one in arrived for error in _own_errors(one)],
+        # Not that all recordings of a campaign were refused, which are listed
+        errors=[error for one in arrived if not one.refused for error in one.errors],
         notes=[note for one in arrived for note in one.notes],
         campaigns=[campaign.name for campaign in campaigns],
         skin=next(iter(skins)) if len(skins) == 1 else None,
         known=known,
         **about,
     )
-
-
-def _own_errors(one: CheckedCampaign) -> list[dict[str, Any]]:
-    """Those of the file, not that all its recordings were refused, which are listed."""
-    return [] if one.refused else one.errors
 
 
 def _about(contents: Contents) -> dict[str, Any]:

@@ -9,11 +9,11 @@ from fastapi import Request
 
 from service.dependencies import sender
 from service.ingest.accept import RIG, IngestOptions, accept
+from service.ingest.reading import error_entry
 from service.ingest.uploads import Upload
 from service.pages.upload.pending_uploads import PendingUpload
 from service.problems import Refusal
-from service.store.engine import Database
-from service.store.errors import Conflict, Missing
+from service.store import Conflict, Database, Missing
 from underskin.errors import ErrorCode, FileError, InvalidInput
 
 SKIN_FIELD, CORRECTS = "skin", "corrects"
@@ -53,18 +53,13 @@ def _rig_upload(pending: PendingUpload) -> list[Upload]:
     return [Upload(path, None, RIG, "", in_form=True)]
 
 
-def _field_error(error: InvalidInput) -> dict[str, Any]:
-    return {"code": str(error.code), "field": error.field, "value": error.value, "allowed": error.allowed}
-
-
 def field_errors(error: Exception) -> list[dict[str, Any]]:
     """What is wrong, field by field."""
     if isinstance(error, InvalidInput):
-        return [_field_error(error)]
+        return [error_entry(error.field, error.value, error.allowed, error.code)]
     if isinstance(error, Refusal) and error.errors:
         return [dict(entry) for entry in error.errors]
     if isinstance(error, FileError):
-        allowed = f"{error.place} {error.reason}".strip()
-        return [{"code": str(error.code), "field": error.file, "value": None, "allowed": allowed}]
+        return [error_entry(error.file, None, f"{error.place} {error.reason}".strip(), error.code)]
     detail = error.detail if isinstance(error, Refusal) else str(error)
-    return [{"code": str(ErrorCode.INVALID_VALUE), "field": "upload", "value": None, "allowed": detail}]
+    return [error_entry("upload", None, detail, ErrorCode.INVALID_VALUE)]

@@ -12,32 +12,19 @@ from service.auth import session
 from service.dependencies import WRITE, Store, Table
 from service.ingest.accept import RIG
 from service.ingest.reading import READING_SLOTS, InspectedFile, look, require_few
-from service.ingest.uploads import Upload, received
+from service.ingest.uploads import received
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer
 from service.pages.shared.forms import OWN_FORM, TOKEN, Form, require_own, see
 from service.pages.shared.html import page
 from service.pages.upload import before_keeping, exported_skin, rig_in_use, similar_errors
+from service.pages.upload import mapping as mappings
 from service.pages.upload.figures import figures, lines_columns, trace_columns
 from service.pages.upload.file_summary import MOST_LISTED, ChannelSummary, FileSummary, seen
 from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good
-from service.pages.upload.mapping import (
-    CHANNELS,
-    KINDS,
-    RECORDING,
-    SKIN,
-    document_of,
-    field_words,
-    guessed,
-    passed_over,
-    sensors_text,
-    what_to_do,
-)
 from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
 from service.problems import Refusal
-from service.store import campaigns, skins
-from service.store.engine import Database
-from service.store.errors import Missing
+from service.store import Database, Missing, campaigns, skins
 from service.usecases import d33_cache
 from underskin import InvalidInput
 from underskin.recordings import rig_description
@@ -76,7 +63,7 @@ async def send(request: Request, store: Store) -> Response:
     pending_uploads: PendingUploads = request.app.state.pending_uploads
     cookie = session.cookie_in(dict(request.scope["headers"]))
     async with received(request, request.app.state.uploads) as sent:
-        fields = {one.field: _short(one) for one in sent if one.label is None}
+        fields = {one.field: one.text(_LONGEST_FIELD) for one in sent if one.label is None}
         require_own(request, fields.get(TOKEN, ""))
         given = [one for one in sent if one.label and one.field != RIG]
         rig = next((one for one in sent if one.field == RIG and one.label), None)
@@ -111,13 +98,13 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
         return exported_skin.shown(request, pending)
     file = min(file, len(pending.files) - 1)
     if file not in pending.drawn:
-        _draw(pending, file, _looked(request, pending, file))
+        pending.draw(file, figures(_looked(request, pending, file), f"/upload/{pending.id}/{file}/"))
     with store.reading() as connection:
         known = [row.id for row in skins.listed(connection, None, None, _MOST_SKINS)]
         about = _latest(store, pending.skin or pending.seen[file].skin)
     channels = _channels(pending)
     stated = pending.draft or (pending.rig.document if pending.rig is not None else None)
-    document = stated or guessed(channels, pending.seen[file].properties, about)
+    document = stated or mappings.guessed(channels, pending.seen[file].properties, about)
     return page(
         request,
         "understood.html",
@@ -134,16 +121,16 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
         known=known,
         skin=pending.skin or pending.seen[file].skin or "",
         channels=channels,
-        passed_over=[] if stated else passed_over(channels),
+        passed_over=[] if stated else mappings.passed_over(channels),
         twice=_twice(pending, channels),
         document=document,
-        layout=sensors_text(document),
-        kinds=KINDS,
-        fields=CHANNELS,
-        field_words=field_words,
-        what_to_do=what_to_do,
-        skin_fields=SKIN,
-        recording_fields=RECORDING,
+        layout=mappings.sensors_text(document),
+        kinds=mappings.KINDS,
+        fields=mappings.CHANNELS,
+        field_words=mappings.field_words,
+        what_to_do=mappings.what_to_do,
+        skin_fields=mappings.SKIN,
+        recording_fields=mappings.RECORDING,
         same=same_request.files(
             request, [one.label for one in pending.seen[:_MOST_NAMED]], pending.rig_label, pending.skin or ""
         ),
@@ -156,7 +143,7 @@ async def mapping(request: Request, upload_id: str, sent: Form) -> Response:
     pending = _find(request, upload_id)
     base = pending.draft or (pending.rig.document if pending.rig is not None else {})
     pending.skin = sent.get(SKIN_FIELD, pending.skin or "").strip() or None
-    pending.draft, wrong = document_of(sent, base)
+    pending.draft, wrong = mappings.document_of(sent, base)
     try:
         rig = rig_description.from_dict(pending.draft)
     except InvalidInput as error:
@@ -248,18 +235,14 @@ def _look(request: Request, pending: PendingUpload) -> None:
     pending.seen, pending.drawn = summaries, {0: drawn}
 
 
-def _draw(pending: PendingUpload, number: int, inspected: InspectedFile) -> None:
-    pending.draw(number, figures(inspected, f"/upload/{pending.id}/{number}/"))
-
-
 def _latest(store: Database, skin: str | None) -> Mapping[str, Any]:
     """What the latest campaign of a skin says of it."""
     if skin is None:
         return {}
     with store.reading() as connection, suppress(Missing):
         root = skins.require_root(connection, skin)
-        rows = campaigns.listed(connection, campaigns.CampaignFilters(skin=root, state="current"), None, 1)
-        return dict(rows[0].about["skin"]) if rows else {}
+        row = campaigns.latest(connection, root)
+        return {} if row is None else dict(row.about["skin"])
     return {}
 
 
@@ -278,9 +261,4 @@ def _twice(pending: PendingUpload, channels: Sequence[ChannelSummary]) -> dict[s
     """Channels that the form took for what another one is already, and that."""
     names = {channel.name for channel in channels}
     used = [(str(error["value"]), error["field"].removeprefix("channels.")) for error in pending.refused]
-    return {name: field for name, field in used if name in names and field in CHANNELS}
-
-
-def _short(field: Upload) -> str:
-    with field.path.open("rb") as file:
-        return file.read(_LONGEST_FIELD).decode("utf-8", "replace").strip()
+    return {name: field for name, field in used if name in names and field in mappings.CHANNELS}

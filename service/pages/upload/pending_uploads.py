@@ -18,7 +18,7 @@ from service.ingest.uploads import Upload
 from service.pages.shared.figures import Drawn
 from service.pages.upload.file_summary import FileSummary
 from service.pages.upload.skin_summary import SkinSummary
-from service.store.errors import Missing
+from service.store import Missing
 from underskin.recordings.rig_description import RigDescription
 
 LASTS_S = 3600.0

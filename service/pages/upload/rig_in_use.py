@@ -2,16 +2,12 @@
 
 from typing import Any
 
-import orjson
-
-from service.ingest.accept import RIG
+from service.ingest.accept import kept_rig, sent_rig
 from service.ingest.uploads import Upload
 from service.pages.upload.keep import field_errors
-from service.store import campaigns, skins
-from service.store.engine import Database
+from service.store import Database, campaigns
 from underskin.errors import FileError, InvalidInput
-from underskin.recordings import rig_description
-from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription
+from underskin.recordings.rig_description import RigDescription
 
 
 def skin_of(store: Database, corrects: str | None) -> str | None:
@@ -26,13 +22,10 @@ def rig(store: Database, sent: Upload | None, skin: str | None) -> tuple[RigDesc
     """The rig description that was sent, or that is kept with the skin; and what is wrong with the one sent."""
     if sent is not None:
         try:
-            with sent.path.open("rb") as file:
-                return rig_description.parse(file.read(LARGEST_BYTES + 1), sent.label or RIG), []
+            return sent_rig(sent), []
         except (FileError, InvalidInput) as error:
             return None, field_errors(error)
-    if skin is not None:
-        with store.reading() as connection:
-            document = skins.rig_of(connection, skin)
-        if document is not None:
-            return rig_description.from_dict(orjson.loads(document)), []
-    return None, []
+    if skin is None:
+        return None, []
+    with store.reading() as connection:
+        return kept_rig(connection, skin), []

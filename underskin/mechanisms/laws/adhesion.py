@@ -1,9 +1,10 @@
 """The mechanism `adhesion`."""
 
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.recordings.conditions import Conditions
+
+_REASON = "0.04 J/m² is thermodynamic for silicone; rate effects and soft gels raise it to some J/m²"
 
 
 class Adhesion(Mechanism):
@@ -29,15 +30,11 @@ class Adhesion(Mechanism):
     order = 20
     kinds = ("frf", "indentation")
     axes = ("preload_n", "indenter_radius_mm", "position_mm", "force_n")
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The work of adhesion."""
-        reason = "0.04 J/m² is thermodynamic for silicone; rate effects and soft gels raise it to some J/m²"
-        return (
-            Parameter(
-                "work_of_adhesion", "J/m²", 1e-3, 20.0, Normal(-1.6, 1.3), "log", limit=0.0, shown=0.5, reason=reason
-            ),
-        )
+    parameters_stated = (
+        Parameter(
+            "work_of_adhesion", "J/m²", 1e-3, 20.0, Normal(-1.6, 1.3), "log", limit=0.0, shown=0.5, reason=_REASON
+        ),
+    )
 
     def on_material(self, contacts: Contacts, values: Values) -> None:
         """Make it stick."""

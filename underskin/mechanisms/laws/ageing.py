@@ -9,6 +9,9 @@ from underskin.recordings.conditions import Conditions, frf_of
 
 _SMALL = 1e-3  # below it (1 − e^(−x))/x is taken from its series
 _LEAST = 0.05  # what is left of a response before its fall slows down
+_LOSS = "poled polymers lose some to tens of percent, a decade or in the end"
+_ONSET = "run-in takes tens to ten thousands of cycles; 1000 within a factor of 7"
+_SATURATION = "from a loss that goes on by the decade to one that ends: nothing is known beforehand"
 
 
 class Ageing(Mechanism):
@@ -35,21 +38,11 @@ class Ageing(Mechanism):
     axes = ("load_cycles",)
     needs = "load_cycles of every recording, not all the same"
     needs_fields = ("load_cycles",)
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The loss, by the decade or in the end, the cycles at which it sets in, and the shape."""
-        loss_reason = "poled polymers lose some to tens of percent, a decade or in the end"
-        onset_reason = "run-in takes tens to ten thousands of cycles; 1000 within a factor of 7"
-        saturation_reason = "from a loss that goes on by the decade to one that ends: nothing is known beforehand"
-        return (
-            Parameter("loss", "-", 0.0, 0.95, Normal(0.0, 0.3), "linear", limit=0.0, shown=0.15, reason=loss_reason),
-            Parameter(
-                "onset", "cycles", 1.0, 1e6, Normal(6.9, 2.0), "log", limit=None, shown=1000.0, reason=onset_reason
-            ),
-            Parameter(
-                "saturation", "-", 0.0, 0.95, Uniform(), "linear", limit=None, shown=0.0, reason=saturation_reason
-            ),
-        )
+    parameters_stated = (
+        Parameter("loss", "-", 0.0, 0.95, Normal(0.0, 0.3), "linear", limit=0.0, shown=0.15, reason=_LOSS),
+        Parameter("onset", "cycles", 1.0, 1e6, Normal(6.9, 2.0), "log", limit=None, shown=1000.0, reason=_ONSET),
+        Parameter("saturation", "-", 0.0, 0.95, Uniform(), "linear", limit=None, shown=0.0, reason=_SATURATION),
+    )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Counts that differ are needed."""

@@ -1,10 +1,11 @@
 """The mechanism `amplifier_high_pass`."""
 
 from underskin.autodiff import Differentiated
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.recordings.conditions import Conditions
+
+_REASON = "charge amplifiers have corners of 0.01 to some Hz; 0.5 Hz within a factor of 4.5"
 
 
 class AmplifierHighPass(Mechanism):
@@ -24,11 +25,9 @@ class AmplifierHighPass(Mechanism):
     stage = Stage.LINES
     order = 30
     axes = ("frequency_hz", "phase")
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The corner frequency."""
-        reason = "charge amplifiers have corners of 0.01 to some Hz; 0.5 Hz within a factor of 4.5"
-        return (Parameter("corner", "Hz", 1e-3, 100.0, Normal(-0.7, 1.5), "log", limit=0.0, shown=1.0, reason=reason),)
+    parameters_stated = (
+        Parameter("corner", "Hz", 1e-3, 100.0, Normal(-0.7, 1.5), "log", limit=0.0, shown=1.0, reason=_REASON),
+    )
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         """1/(1 − i corner/f)."""

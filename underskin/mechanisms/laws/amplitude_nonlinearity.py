@@ -8,6 +8,7 @@ from underskin.recordings.conditions import Conditions, frf_of
 from underskin.units import Array, Floats
 
 _NODES = 6
+_REASON = "from an edge pinned by adhesion to one that moves freely: nothing is known beforehand"
 
 
 class AmplitudeNonlinearity(Mechanism):
@@ -37,11 +38,9 @@ class AmplitudeNonlinearity(Mechanism):
     axes = ("dynamic_force_n", "preload_n", "indenter_radius_mm")
     needs = "dynamic_force_n below preload_n in every recording"
     needs_fields = ("dynamic_force_n",)
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The edge's mobility."""
-        reason = "from an edge pinned by adhesion to one that moves freely: nothing is known beforehand"
-        return (Parameter("edge_mobility", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=1.0, reason=reason),)
+    parameters_stated = (
+        Parameter("edge_mobility", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=1.0, reason=_REASON),
+    )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """The contact must not open."""

@@ -6,6 +6,8 @@ from underskin.mechanisms.models.curve_state import Curve
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings.conditions import Conditions
 
+_REASON = "solid elastomers 0.48 to 0.5, filled and slightly porous ones 0.4, foams 0.3"
+
 
 class CompressibleLayer(Mechanism):
     """A skin with a Poisson ratio below 0.5."""
@@ -30,11 +32,9 @@ class CompressibleLayer(Mechanism):
     axes = ("position_mm", "preload_n", "indenter_radius_mm")
     needs = "a skin declared with poisson_ratio 0.5"
     figure = ("preload_n", "position_mm")
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The Poisson ratio."""
-        reason = "solid elastomers 0.48 to 0.5, filled and slightly porous ones 0.4, foams 0.3"
-        return (Parameter("poisson_ratio", "-", 0.30, 0.5, Uniform(), "linear", limit=0.5, shown=0.4, reason=reason),)
+    parameters_stated = (
+        Parameter("poisson_ratio", "-", 0.30, 0.5, Uniform(), "linear", limit=0.5, shown=0.4, reason=_REASON),
+    )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """A skin that is declared compressible has its ν in the base model."""

@@ -11,6 +11,8 @@ from underskin.recordings.conditions import CompressionConditions, Conditions, I
 from underskin.units import Floats
 
 _RETURN = 0.05  # of the range of displacement: smaller returns are noise
+_FRACTION = "from a few percent in a well cured silicone to most of the modulus in a gel"
+_TIME = "what a bench can see lies between seconds and an hour; 40 s within a factor of 4.5"
 
 
 class ContactCreep(Mechanism):
@@ -50,19 +52,10 @@ class ContactCreep(Mechanism):
     needs_fields = ("dwell_s",)
     needs_history = True
     figure = ("dwell_s", "time_s")
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """One Prony pair."""
-        fraction_reason = "from a few percent in a well cured silicone to most of the modulus in a gel"
-        time_reason = "what a bench can see lies between seconds and an hour; 40 s within a factor of 4.5"
-        return (
-            Parameter(
-                "relaxed_fraction", "-", 0.0, 0.9, Uniform(), "linear", limit=0.0, shown=0.4, reason=fraction_reason
-            ),
-            Parameter(
-                "relaxation_time", "s", 0.05, 5e4, Normal(3.7, 1.5), "log", limit=None, shown=40.0, reason=time_reason
-            ),
-        )
+    parameters_stated = (
+        Parameter("relaxed_fraction", "-", 0.0, 0.9, Uniform(), "linear", limit=0.0, shown=0.4, reason=_FRACTION),
+        Parameter("relaxation_time", "s", 0.05, 5e4, Normal(3.7, 1.5), "log", limit=None, shown=40.0, reason=_TIME),
+    )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Times are needed that say more than the loads: dwell_s that differ, or time_s apart from displacement."""

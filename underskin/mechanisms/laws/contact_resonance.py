@@ -3,10 +3,12 @@
 import numpy as np
 
 from underskin.autodiff import Differentiated
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.recordings.conditions import Conditions
+
+_MASS = "what sits in front of a force cell, from a bead to a shaker's table: 2 g within a factor of 6"
+_DAMPING = "silicones lose little, tan δ 0.02 to 0.3, ζ half of it: 0.05 within a factor of 2.7"
 
 
 class ContactResonance(Mechanism):
@@ -35,17 +37,10 @@ class ContactResonance(Mechanism):
     order = 10
     axes = ("frequency_hz", "phase", "preload_n", "indenter_radius_mm")
     needs_stiffness = True
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """Tip mass and damping ratio."""
-        mass_reason = "what sits in front of a force cell, from a bead to a shaker's table: 2 g within a factor of 6"
-        ratio_reason = "silicones lose little, tan δ 0.02 to 0.3, ζ half of it: 0.05 within a factor of 2.7"
-        return (
-            Parameter("tip_mass", "g", 0.01, 2000.0, Normal(0.7, 1.8), "log", limit=0.0, shown=2.0, reason=mass_reason),
-            Parameter(
-                "damping_ratio", "-", 1e-3, 1.0, Normal(-3.0, 1.0), "log", limit=None, shown=0.05, reason=ratio_reason
-            ),
-        )
+    parameters_stated = (
+        Parameter("tip_mass", "g", 0.01, 2000.0, Normal(0.7, 1.8), "log", limit=0.0, shown=2.0, reason=_MASS),
+        Parameter("damping_ratio", "-", 1e-3, 1.0, Normal(-3.0, 1.0), "log", limit=None, shown=0.05, reason=_DAMPING),
+    )
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         """The tip's transfer function."""

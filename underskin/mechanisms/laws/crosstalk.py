@@ -9,6 +9,7 @@ from underskin.recordings.conditions import Conditions
 from underskin.units import to_si
 
 _LARGEST_DISTANCE = 3.0  # thicknesses; beyond it a bonded layer transmits less than a thousandth of the stress
+_REASON = "coupling of unshielded leads is some to 20 percent"
 
 
 class Crosstalk(Mechanism):
@@ -35,11 +36,9 @@ class Crosstalk(Mechanism):
     needs_neighbours = True
     needs_fields = ("sensor",)
     figure = ("position_mm",)
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The fraction."""
-        reason = "coupling of unshielded leads is some to 20 percent"
-        return (Parameter("fraction", "-", 0.0, 0.6, Normal(0.0, 0.15), "linear", limit=0.0, shown=0.1, reason=reason),)
+    parameters_stated = (
+        Parameter("fraction", "-", 0.0, 0.6, Normal(0.0, 0.15), "linear", limit=0.0, shown=0.1, reason=_REASON),
+    )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """A neighbour under stress is needed."""

@@ -1,8 +1,11 @@
 """The mechanism `instrument_compliance`."""
 
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
+import math
+
+from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.recordings.conditions import Conditions
+
+_REASON = "robot stages 10 to 100 N/mm, testing machines 1000 to 50000; 150 within a factor of 7"
 
 
 class InstrumentCompliance(Mechanism):
@@ -20,22 +23,11 @@ class InstrumentCompliance(Mechanism):
     order = 10
     kinds = ("indentation",)
     axes = ("force_n",)
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The stage's stiffness."""
-        return (
-            Parameter(
-                name="stage_stiffness",
-                unit="N/mm",
-                low=0.01,
-                high=1e5,
-                prior=Normal(5.0, 2.0),
-                scale="log",
-                limit=float("inf"),
-                shown=20.0,
-                reason="robot stages 10 to 100 N/mm, testing machines 1000 to 50000; 150 within a factor of 7",
-            ),
-        )
+    parameters_stated = (
+        Parameter(
+            "stage_stiffness", "N/mm", 0.01, 1e5, Normal(5.0, 2.0), "log", limit=math.inf, shown=20.0, reason=_REASON
+        ),
+    )
 
     def on_curve(self, curve: Curve, values: Values) -> None:
         """Let the stage give."""

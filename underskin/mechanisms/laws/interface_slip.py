@@ -1,8 +1,11 @@
 """The mechanism `interface_slip`."""
 
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
+import math
+
+from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.recordings.conditions import Conditions
+
+_REASON = "(G_glue/G) (h/t): a tape 0.1 mm thick, 1000 times softer, has 0.02; above 50 no effect"
 
 
 class InterfaceSlip(Mechanism):
@@ -29,22 +32,11 @@ class InterfaceSlip(Mechanism):
     order = 20
     axes = ("position_mm", "preload_n", "indenter_radius_mm")
     figure = ("preload_n", "position_mm")
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The glue line's stiffness in units of the layer's own."""
-        return (
-            Parameter(
-                name="glue_stiffness",
-                unit="-",
-                low=0.01,
-                high=50.0,
-                prior=Normal(-0.3, 1.5),
-                scale="log",
-                limit=float("inf"),
-                shown=0.3,
-                reason="(G_glue/G) (h/t): a tape 0.1 mm thick, 1000 times softer, has 0.02; above 50 no effect",
-            ),
-        )
+    parameters_stated = (
+        Parameter(
+            "glue_stiffness", "-", 0.01, 50.0, Normal(-0.3, 1.5), "log", limit=math.inf, shown=0.3, reason=_REASON
+        ),
+    )
 
     def on_material(self, contacts: Contacts, values: Values) -> None:
         """Set the slip, 1/(1 + κ)."""

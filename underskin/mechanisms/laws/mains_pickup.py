@@ -49,47 +49,44 @@ class MainsPickup(Mechanism):
     needs = "a line within 3 Hz of 50 or 60 Hz"
     moves_predictions = False
     figure = ("mains",)
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The charge, and what its lines look like."""
-        return (
-            Parameter(
-                name="pickup_charge",
-                unit="pC",
-                low=1e-4,
-                high=1e3,
-                prior=Normal(-3.0, 1.5),
-                scale="log",
-                limit=0.0,
-                shown=0.05,
-                acts_on="line_variance",
-                reason="unshielded leads of some pF to mains at 230 V collect hundredths to tenths of a pC",
-            ),
-            Parameter(
-                name="pickup_width",
-                unit="Hz",
-                low=0.2,
-                high=6.0,
-                prior=Normal(0.4, 0.6),
-                scale="log",
-                limit=None,
-                shown=1.5,
-                acts_on="line_variance",
-                reason="the analyser's window and the mains' drift make lines a few Hz wide",
-            ),
-            Parameter(
-                name="pickup_harmonics",
-                unit="-",
-                low=1e-3,
-                high=10.0,
-                prior=Normal(0.0, 1.5),
-                scale="log",
-                limit=None,
-                shown=1.0,
-                acts_on="line_variance",
-                reason="the n-th harmonic has about 1/n of the charge; a sine has none, rectifiers have more",
-            ),
-        )
+    parameters_stated = (
+        Parameter(
+            name="pickup_charge",
+            unit="pC",
+            low=1e-4,
+            high=1e3,
+            prior=Normal(-3.0, 1.5),
+            scale="log",
+            limit=0.0,
+            shown=0.05,
+            acts_on="line_variance",
+            reason="unshielded leads of some pF to mains at 230 V collect hundredths to tenths of a pC",
+        ),
+        Parameter(
+            name="pickup_width",
+            unit="Hz",
+            low=0.2,
+            high=6.0,
+            prior=Normal(0.4, 0.6),
+            scale="log",
+            limit=None,
+            shown=1.5,
+            acts_on="line_variance",
+            reason="the analyser's window and the mains' drift make lines a few Hz wide",
+        ),
+        Parameter(
+            name="pickup_harmonics",
+            unit="-",
+            low=1e-3,
+            high=10.0,
+            prior=Normal(0.0, 1.5),
+            scale="log",
+            limit=None,
+            shown=1.0,
+            acts_on="line_variance",
+            reason="the n-th harmonic has about 1/n of the charge; a sine has none, rectifiers have more",
+        ),
+    )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Lines near the mains are needed."""

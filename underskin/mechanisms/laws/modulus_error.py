@@ -5,6 +5,8 @@ from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.recordings.conditions import Conditions
 
+_REASON = "E from a durometer, a data sheet or another cure is off by tens of percent"
+
 
 class ModulusError(Mechanism):
     """A declared Young's modulus that is wrong by a factor."""
@@ -27,13 +29,9 @@ class ModulusError(Mechanism):
     kinds = ("frf", "indentation", "compression")
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     needs = "a declared youngs_modulus_mpa"
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """True over declared modulus."""
-        reason = "E from a durometer, a data sheet or another cure is off by tens of percent"
-        return (
-            Parameter("modulus_factor", "-", 0.25, 4.0, Normal(0.0, 0.35), "log", limit=1.0, shown=0.7, reason=reason),
-        )
+    parameters_stated = (
+        Parameter("modulus_factor", "-", 0.25, 4.0, Normal(0.0, 0.35), "log", limit=1.0, shown=0.7, reason=_REASON),
+    )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """A declared modulus is needed."""

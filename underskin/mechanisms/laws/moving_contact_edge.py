@@ -3,11 +3,11 @@
 import numpy as np
 
 from underskin.autodiff import Differentiated
-from underskin.mechanisms.base import Kind, Mechanism, Parameter, Stage, Uniform, Values
-from underskin.recordings.conditions import Conditions
+from underskin.mechanisms.base import Mechanism, Parameter, Stage, Uniform, Values
 from underskin.units import Array, Floats
 
 _STEP = 1e-3  # of the central difference over F, relative; its error is of the order of the step's square
+_REASON = "from an edge pinned by adhesion to one that moves freely: nothing is known beforehand"
 
 
 class MovingContactEdge(Mechanism):
@@ -31,11 +31,9 @@ class MovingContactEdge(Mechanism):
     stage = Stage.LOAD_INCREMENT
     order = 10
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The mobile fraction."""
-        reason = "from an edge pinned by adhesion to one that moves freely: nothing is known beforehand"
-        return (Parameter("mobile_fraction", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=1.0, reason=reason),)
+    parameters_stated = (
+        Parameter("mobile_fraction", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=1.0, reason=_REASON),
+    )
 
     def force_nodes(self, force: Floats, dynamic_force: Floats) -> tuple[Array, Array]:
         """d(Fσ)/dF by a central difference."""

@@ -1,8 +1,9 @@
 """The mechanism `platen_friction`."""
 
-from underskin.mechanisms.base import Kind, Mechanism, Parameter, Stage, Uniform, Values
+from underskin.mechanisms.base import Mechanism, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.recordings.conditions import Conditions
+
+_REASON = "from well oiled to bonded: nothing is known beforehand"
 
 
 class PlatenFriction(Mechanism):
@@ -24,11 +25,9 @@ class PlatenFriction(Mechanism):
     kinds = ("compression",)
     axes = ("sample_height_mm", "sample_diameter_mm")
     figure = ("displacement_mm",)
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """How far the platens hold the sample."""
-        reason = "from well oiled to bonded: nothing is known beforehand"
-        return (Parameter("friction", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=0.5, reason=reason),)
+    parameters_stated = (
+        Parameter("friction", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=0.5, reason=_REASON),
+    )
 
     def on_curve(self, curve: Curve, values: Values) -> None:
         """Let the platens hold."""

@@ -3,8 +3,10 @@
 import numpy as np
 
 from underskin.autodiff import Differentiated, chain
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
-from underskin.recordings.conditions import Conditions
+from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
+
+_SLOPE = "the paper's array, 14 to 22 pC/N from 1 to 3 N, needs 5 to 6 per MPa; ceramics about -0.01"
+_SATURATION = "no saturation has been published; 1 MPa is ten times the stress of a firm touch"
 
 
 class PreloadDependentD33(Mechanism):
@@ -27,33 +29,14 @@ class PreloadDependentD33(Mechanism):
     stage = Stage.SENSOR
     order = 10
     axes = ("preload_n", "indenter_radius_mm", "position_mm", "sensor")
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The coefficient and the stress at which it saturates."""
-        return (
-            Parameter(
-                name="stress_coefficient",
-                unit="1/MPa",
-                low=-8.0,
-                high=15.0,
-                prior=Normal(0.0, 3.0),
-                scale="linear",
-                limit=0.0,
-                shown=2.0,
-                reason="the paper's array, 14 to 22 pC/N from 1 to 3 N, needs 5 to 6 per MPa; ceramics about -0.01",
-            ),
-            Parameter(
-                name="saturation_stress",
-                unit="MPa",
-                low=0.02,
-                high=20.0,
-                prior=Normal(0.0, 1.5),
-                scale="log",
-                limit=None,
-                shown=1.0,
-                reason="no saturation has been published; 1 MPa is ten times the stress of a firm touch",
-            ),
-        )
+    parameters_stated = (
+        Parameter(
+            "stress_coefficient", "1/MPa", -8.0, 15.0, Normal(0.0, 3.0), "linear", limit=0.0, shown=2.0, reason=_SLOPE
+        ),
+        Parameter(
+            "saturation_stress", "MPa", 0.02, 20.0, Normal(0.0, 1.5), "log", limit=None, shown=1.0, reason=_SATURATION
+        ),
+    )
 
     def on_d33(self, mean_stress: Differentiated, values: Values) -> Differentiated:
         """1 + β T0/(1 + |T0|/Ts)."""

@@ -3,12 +3,14 @@
 import numpy as np
 
 from underskin.autodiff import Differentiated, exp
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.recordings.conditions import Conditions
 
 _REFERENCE = 30.0  # Hz
+_EXPONENT = "tan δ of PVDF and its copolymers is 0.02 to 0.2, and n is 2/π of it"
+_STEP = "a relaxation inside the band changes d33 by some tens of percent"
+_FREQUENCY = "it must lie in or near the band of measurement to be seen; 20 Hz within a factor of 4.5"
 
 
 class SensorRelaxation(Mechanism):
@@ -27,29 +29,13 @@ class SensorRelaxation(Mechanism):
     stage = Stage.LINES
     order = 20
     axes = ("frequency_hz", "phase")
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The power law's exponent, the step and its frequency."""
-        exponent_reason = "tan δ of PVDF and its copolymers is 0.02 to 0.2, and n is 2/π of it"
-        step_reason = "a relaxation inside the band changes d33 by some tens of percent"
-        reason = "it must lie in or near the band of measurement to be seen; 20 Hz within a factor of 4.5"
-        return (
-            Parameter(
-                "exponent", "-", 0.0, 0.4, Normal(0.0, 0.08), "linear", limit=0.0, shown=0.03, reason=exponent_reason
-            ),
-            Parameter("step", "-", 0.0, 3.0, Normal(0.0, 0.4), "linear", limit=0.0, shown=0.1, reason=step_reason),
-            Parameter(
-                "step_frequency",
-                "Hz",
-                0.05,
-                3000.0,
-                Normal(3.0, 1.5),
-                "log",
-                limit=None,
-                shown=20.0,
-                reason=reason,
-            ),
-        )
+    parameters_stated = (
+        Parameter("exponent", "-", 0.0, 0.4, Normal(0.0, 0.08), "linear", limit=0.0, shown=0.03, reason=_EXPONENT),
+        Parameter("step", "-", 0.0, 3.0, Normal(0.0, 0.4), "linear", limit=0.0, shown=0.1, reason=_STEP),
+        Parameter(
+            "step_frequency", "Hz", 0.05, 3000.0, Normal(3.0, 1.5), "log", limit=None, shown=20.0, reason=_FREQUENCY
+        ),
+    )
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         """(iω/ω_ref)^(−n) (1 + s/(1 + iω/ω_s))."""

@@ -27,23 +27,20 @@ class SensorSpread(Mechanism):
     axes = ("sensor",)
     needs = "recordings of at least two sensors"
     moves_predictions = False
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The spread."""
-        return (
-            Parameter(
-                name="spread",
-                unit="-",
-                low=0.02,
-                high=0.8,
-                prior=Normal(-2.5, 0.9),
-                scale="log",
-                limit=SENSOR_SPREAD,
-                shown=0.12,
-                acts_on="gain_spread",
-                reason="poled films and printed electrodes vary by some to 30 percent; 8 % within a factor of 2.5",
-            ),
-        )
+    parameters_stated = (
+        Parameter(
+            name="spread",
+            unit="-",
+            low=0.02,
+            high=0.8,
+            prior=Normal(-2.5, 0.9),
+            scale="log",
+            limit=SENSOR_SPREAD,
+            shown=0.12,
+            acts_on="gain_spread",
+            reason="poled films and printed electrodes vary by some to 30 percent; 8 % within a factor of 2.5",
+        ),
+    )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Two sensors are needed."""

@@ -1,8 +1,9 @@
 """The mechanism `thickness_error`."""
 
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.recordings.conditions import Conditions
+
+_REASON = "a cast layer differs from its mould by shrinkage, meniscus and tilt: some to 20 percent"
 
 
 class ThicknessError(Mechanism):
@@ -20,15 +21,9 @@ class ThicknessError(Mechanism):
     order = 20
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     largest_stretch = 1.55
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """True over declared thickness."""
-        reason = "a cast layer differs from its mould by shrinkage, meniscus and tilt: some to 20 percent"
-        return (
-            Parameter(
-                "thickness_factor", "-", 0.65, 1.55, Normal(0.0, 0.12), "log", limit=1.0, shown=0.9, reason=reason
-            ),
-        )
+    parameters_stated = (
+        Parameter("thickness_factor", "-", 0.65, 1.55, Normal(0.0, 0.12), "log", limit=1.0, shown=0.9, reason=_REASON),
+    )
 
     def on_declared(self, contacts: Contacts, values: Values) -> None:
         """Scale the thickness."""

@@ -3,10 +3,11 @@
 import numpy as np
 
 from underskin.autodiff import Differentiated, exp
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.recordings.conditions import Conditions
+
+_REASON = "multiplexed converters and their filters delay by a few samples at 1 to 50 kS/s"
 
 
 class TimingDelay(Mechanism):
@@ -26,15 +27,9 @@ class TimingDelay(Mechanism):
     order = 40
     axes = ("phase", "frequency_hz")
     figure = ("phase",)
-
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The delay."""
-        reason = "multiplexed converters and their filters delay by a few samples at 1 to 50 kS/s"
-        return (
-            Parameter(
-                "delay", "µs", -5000.0, 5000.0, Normal(0.0, 300.0), "linear", limit=0.0, shown=300.0, reason=reason
-            ),
-        )
+    parameters_stated = (
+        Parameter("delay", "µs", -5000.0, 5000.0, Normal(0.0, 300.0), "linear", limit=0.0, shown=300.0, reason=_REASON),
+    )
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         """exp(−iωt0)."""

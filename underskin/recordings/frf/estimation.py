@@ -54,13 +54,6 @@ class Frf:
             return None
         return np.sqrt((1 - self.coherence) / (2 * self.averages * np.maximum(self.coherence, 1e-12)))
 
-    @property
-    def coherence_variance(self) -> Floats | None:
-        """Variance of γ²; None where n is not known."""
-        if self.coherence is None or self.averages is None:
-            return None
-        return 2 * self.coherence * (1 - self.coherence) ** 2 / self.averages
-
 
 def lines_of(recording: FrfRecording) -> Frf:
     """The FRF of a recording: its own lines, or the estimate from its time series."""
@@ -251,17 +244,7 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
 
 
 def _frf(average: Average, sample_rate: float, *, independent: bool) -> Frf:
-    return Frf(
-        frequency=average.frequency * sample_rate,
-        values=average.values,
-        coherence=average.coherence,
-        averages=average.averages,
-        defects=average.defects,
-        force_power=average.force_power,
-        charge_power=average.charge_power,
-        independent=independent,
-        passes=average.passes,
-    )
+    return Frf(**{**vars(average), "frequency": average.frequency * sample_rate}, independent=independent)
 
 
 def _same_line(frequency: float, lines: dict[float, list[tuple[Complexes, Complexes]]]) -> float:

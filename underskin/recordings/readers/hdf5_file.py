@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 import h5py
 import numpy as np
 
-from underskin.errors import ErrorCode, FileError
+from underskin.errors import ErrorCode, FileError, damage_said
 from underskin.recordings.campaign import COLUMNS, SCHEMA, Campaign, to_dict
 from underskin.recordings.readers import hdf5_links
 from underskin.recordings.readers.hdf5_damage import damage
@@ -53,14 +53,9 @@ def _write_attributes(group: Any, values: dict[str, Any]) -> None:
 def read(stream: BinaryIO, file: str) -> dict[str, Any]:
     """The campaign document of an HDF5 file; raises FileError that names the object."""
     stream.seek(0)
-    try:
-        with h5py.File(stream, "r") as source:
-            hdf5_links.refuse_outside(source, file)
-            return _document(source, file)
-    except (MemoryError, FileError):
-        raise
-    except Exception as error:
-        raise FileError(file, "", f"the HDF5 file {damage(error)}") from None
+    with damage_said(file, "", lambda error: f"the HDF5 file {damage(error)}"), h5py.File(stream, "r") as source:
+        hdf5_links.refuse_outside(source, file)
+        return _document(source, file)
 
 
 def _document(source: Any, file: str) -> dict[str, Any]:

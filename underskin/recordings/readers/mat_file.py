@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import scipy.io
 
-from underskin.errors import FileError
+from underskin.errors import damage_said
 from underskin.recordings.channels import Block, Channel, Contents, as_values
 from underskin.recordings.readers import hdf5_links
 
@@ -24,12 +24,8 @@ def read(stream: BinaryIO, file: str) -> Contents:
     stream.seek(0)
     is_73 = stream.read(len(MAGIC_73)) == MAGIC_73
     stream.seek(0)
-    try:
+    with damage_said(file, "", lambda error: f"no MATLAB file: {type(error).__name__}: {error}"):
         variables = _variables_73(stream, file) if is_73 else _variables_5(stream)
-    except (MemoryError, FileError):
-        raise
-    except Exception as error:  # both let any exception of a damaged file through
-        raise FileError(file, "", f"no MATLAB file: {type(error).__name__}: {error}") from None
     return _contents({name: value for name, value in variables.items() if not name.startswith("__")})
 
 

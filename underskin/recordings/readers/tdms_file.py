@@ -14,7 +14,7 @@ import numpy as np
 from nptdms import TdmsChannel, TdmsFile, TdmsGroup
 from nptdms.timestamp import TdmsTimestamp
 
-from underskin.errors import FileError
+from underskin.errors import FileError, damage_said
 from underskin.recordings.channels import FIRST_YEAR, Block, Channel, Contents, as_values, with_distinct_names
 
 MAGIC = b"TDSm"
@@ -26,13 +26,9 @@ def read(stream: BinaryIO, file: str) -> Contents:
     """The channels of a TDMS file; raises FileError that names the byte or channel."""
     whole, warnings = _whole_segments(stream, file)
     stream.seek(0)
-    try:
+    with damage_said(file, f"segments up to byte {whole}", lambda error: f"no TDMS: {type(error).__name__}: {error}"):
         tdms = TdmsFile.read(io.BytesIO(stream.read(whole)), raw_timestamps=True)
         blocks = tuple(_block(group, tdms.properties, file) for group in tdms.groups())
-    except (MemoryError, FileError):
-        raise
-    except Exception as error:  # npTDMS lets any exception of a damaged file through
-        raise FileError(file, f"segments up to byte {whole}", f"no TDMS: {type(error).__name__}: {error}") from None
     properties = _properties("", tdms.properties)
     for group in tdms.groups():
         properties |= _properties(f"{group.name}.", group.properties)
@@ -65,7 +61,7 @@ def _whole_segments(stream: BinaryIO, file: str) -> tuple[int, list[str]]:
 
 
 def _block(group: TdmsGroup, about_file: Mapping[str, Any], file: str) -> Block:
-    channels = [channel for channel in group.channels() if _is_numeric(channel)]
+    channels = [channel for channel in group.channels() if channel.dtype.kind in "iufc" and len(channel) > 0]
     steps = {channel.properties.get("wf_increment") for channel in channels} - {None, 0}
     step = steps.pop() if len(steps) == 1 else None
     rate = 1 / step if isinstance(step, float) and step > 0 else None
@@ -86,19 +82,10 @@ def _moment(given: Any) -> str | None:
     return moment.isoformat().replace("+00:00", "Z") if moment.year >= FIRST_YEAR else None
 
 
-def _is_numeric(channel: TdmsChannel) -> bool:
-    return channel.dtype.kind in "iufc" and len(channel) > 0
-
-
 def _channel(channel: TdmsChannel, file: str) -> Channel:
-    try:
+    with damage_said(file, f"channel {channel.path}", lambda error: f"cannot be read: {type(error).__name__}: {error}"):
         values = np.asarray(channel[:])
         return Channel(channel.name, str(channel.properties.get("unit_string", "")), as_values(values))
-    except MemoryError:
-        raise
-    except Exception as error:
-        reason = f"cannot be read: {type(error).__name__}: {error}"
-        raise FileError(file, f"channel {channel.path}", reason) from None
 
 
 def _properties(prefix: str, properties: Mapping[str, Any]) -> dict[str, str | float]:

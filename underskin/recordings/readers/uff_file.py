@@ -15,7 +15,7 @@ from typing import Any, BinaryIO
 import numpy as np
 import pyuff
 
-from underskin.errors import FileError
+from underskin.errors import FileError, damage_said
 from underskin.recordings.channels import Block, Channel, Contents, with_distinct_names
 from underskin.units import Floats
 
@@ -30,19 +30,15 @@ _END = b"-1"
 def read(stream: BinaryIO, file: str) -> Contents:
     """The functions of a universal file; raises FileError that names the dataset."""
     notes = _cut_off(stream)
-    try:
+    with damage_said(file, "", lambda error: f"no universal file: {error}"):
         universal = pyuff.UFF(f"/dev/fd/{stream.fileno()}")  # pyuff takes a path: the open file's own
         types = [int(number) for number in universal.get_set_types()]
-    except MemoryError:
-        raise
-    except Exception as error:
-        raise FileError(file, "", f"no universal file: {error}") from None
     functions = [_function(universal, index, file) for index, kind in enumerate(types) if kind == _FUNCTION]
     if not functions:
         raise FileError(file, "", f"holds no whole dataset {_FUNCTION}; its datasets: {types or 'none'}")
     if len(functions) < len(types):
         notes.append(f"datasets other than {_FUNCTION} are left out: {sorted(set(types) - {_FUNCTION})}")
-    frfs = [function for function in functions if _is_frf(function)]
+    frfs = [one for one in functions if int(one["func_type"]) == _FRF and np.iscomplexobj(one["data"])]
     if len(frfs) < 2:
         return Contents(_blocks(functions), {}, tuple(notes))
     blocks, used = _each_alone(frfs, functions)
@@ -65,22 +61,14 @@ def _cut_off(stream: BinaryIO) -> list[str]:
 
 def _function(universal: Any, index: int, file: str) -> dict[str, Any]:
     place = f"dataset {index + 1}"
-    try:
+    with damage_said(file, place, lambda error: f"cannot be read: {error}"):
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             function: dict[str, Any] = universal.read_sets(index)
         announced, stored = int(function["num_pts"]), len(function["data"])
-    except MemoryError:
-        raise
-    except Exception as error:
-        raise FileError(file, place, f"cannot be read: {error}") from None
     if stored < announced or len(function["x"]) < announced or announced < 1:
         raise FileError(file, place, f"holds {stored} of the {announced} points that it announces")
     return {**function, "x": function["x"][:announced], "data": function["data"][:announced], "number": index + 1}
-
-
-def _is_frf(function: dict[str, Any]) -> bool:
-    return int(function["func_type"]) == _FRF and np.iscomplexobj(function["data"])
 
 
 def _each_alone(
