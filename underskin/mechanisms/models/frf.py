@@ -156,7 +156,7 @@ class FrfModel:
         """How many numbers a response without derivatives takes, roughly: bounds the points that are worked out at
         once."""
         nodes, contacts, points = len(self._force), len(self.design.force), len(self.design.point_contact)
-        transforms = (_QUANTITIES * contacts + points) * len(self._sigma.wavenumber)
+        transforms = (_QUANTITIES * contacts + points) * self._sigma.wavenumbers
         return nodes * (points * _BLOCK + transforms) + len(self.design.line_frequency)
 
     def respond(self, fit: Floats, *, slopes: bool = True, place: bool = False) -> Response:

@@ -27,7 +27,7 @@ _SPACING = 0.0625  # of the profile and of the offsets; the profile turns over l
 _MIRRORED = 4  # offsets below 0, so that the curve is even
 _RADIAL, _ANGULAR = 10, 20  # quadrature over the disc
 _RHO_RATIO = 1.1  # of neighbouring rT/h in the table
-_WAVENUMBER_END, _NODES_PER_TURN = 24.0, 4  # M decays as e^(−k)
+_WAVENUMBER_END, _NODES_PER_TURN, _PANEL = 24.0, 4, 16  # M decays as e^(−k)
 
 
 @dataclass(frozen=True)
@@ -43,10 +43,7 @@ class Place:
 
 
 class OffsetSigma:
-    """σ(a/h, L^(1/3), rT/h, e/h) around one rT/h, for offsets up to `largest_offset` (in h).
-
-    Attributes: `wavenumber` (k,) in units of 1/h, at which transforms for `linear_at` are wanted.
-    """
+    """σ(a/h, L^(1/3), rT/h, e/h) around one rT/h, for offsets up to `largest_offset` (in h)."""
 
     def __init__(self, table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> None:
         """Tabulate for rT/h up to `stretch` times larger or smaller; takes hundredths to tenths of a second."""
@@ -66,9 +63,28 @@ class OffsetSigma:
         self._table = _windows(values)
         # The first coefficient over L^(1/3) is the value at L = 0, and splines sum to 1.
         self._strained = _windows(values - values[:, :1])
-        self.wavenumber, self._weight = _wavenumbers(float(offsets[-1] + rho[-1] + a[-1]))
-        bessel = j0(np.multiply.outer(self.wavenumber, offsets)) * (self._weight * self.wavenumber / 3)[:, None]
-        self._bessel = np.ascontiguousarray(self.bases[3].coefficients(bessel, 1).T)  # (functions, k)
+        self._turns = float(offsets[-1] + rho[-1] + a[-1])
+
+    @cached_property
+    def _wavenumbers(self) -> tuple[Floats, Floats]:
+        return _wavenumbers(self._turns)
+
+    @property
+    def wavenumbers(self) -> int:
+        """How many there are."""
+        return _PANEL * _panels(self._turns)
+
+    @property
+    def wavenumber(self) -> Floats:
+        """k, in units of 1/h, at which `linear_at` wants transforms."""
+        return self._wavenumbers[0]
+
+    @cached_property
+    def _bessel(self) -> Floats:
+        """J0(k e) k/3 with the weights of the integral, as functions of the offset (functions, k)."""
+        k, weight = self._wavenumbers
+        bessel = j0(np.multiply.outer(k, self.bases[3].nodes)) * (weight * k / 3)[:, None]
+        return np.ascontiguousarray(self.bases[3].coefficients(bessel, 1).T)
 
     @cached_property
     def contact_grid(self) -> CurveGrid:
@@ -164,11 +180,16 @@ def _disc_averages(along: CubicBasis, offsets: Floats, rt_over_h: float) -> Floa
     return total.reshape(len(offsets), -1) @ along.to_coefficients
 
 
+def _panels(highest: float) -> int:
+    """Panels of [0, end] that are short enough for an oscillation over this distance."""
+    turns = _WAVENUMBER_END * highest / (2 * np.pi)
+    return int(np.ceil((turns * _NODES_PER_TURN + 48) / _PANEL))
+
+
 def _wavenumbers(highest: float) -> tuple[Floats, Floats]:
     """Gauss–Legendre nodes and weights on panels of [0, end], short enough for the fastest oscillation."""
-    turns = _WAVENUMBER_END * highest / (2 * np.pi)
-    panels = int(np.ceil((turns * _NODES_PER_TURN + 48) / 16))
-    x, w = np.polynomial.legendre.leggauss(16)
+    panels = _panels(highest)
+    x, w = np.polynomial.legendre.leggauss(_PANEL)
     half = _WAVENUMBER_END / panels / 2
     k = 2 * half * np.arange(panels)[:, None] + half * (1 + x)
     return k.ravel(), np.tile(half * w, panels)
