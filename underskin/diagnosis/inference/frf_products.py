@@ -175,9 +175,9 @@ class PickupProducts:
         """The sums less what rows lose to pick-up."""
         assert levels.pickup is not None
         lost, log_determinant = self.rows.lost(levels.pickup, levels.level)
-        u, summed = self.u[:, None], self.rows.summed
-        uu, uy = sums.uu - summed(lost, u, u), sums.uy - summed(lost, u)
-        return Sums(uu, uy, sums.yy - summed(lost, self.rows.value), log_determinant)
+        y, u, summed = self.rows.value, self.u[:, None], self.rows.summed
+        uu, uy = sums.uu - summed(lost, np.abs(u) ** 2), sums.uy - summed(lost, (u.conj() * y).real)
+        return Sums(uu, uy, sums.yy - summed(lost, np.abs(y) ** 2), log_determinant)
 
     def slopes_less(self, sums: SlopeSums, levels: SeveralLevels) -> SlopeSums:
         """The sums with derivatives less what rows lose, at the first of the sets of noise levels."""
@@ -186,11 +186,9 @@ class PickupProducts:
             return sums
         lost, _ = self.rows.lost(levels.pickup[:, 0], levels.level[:, 0])
         lost, v, summed = lost[:, None], self.v, self.rows.summed
-        uv, vy = (
-            sums.uv - np.moveaxis(summed(lost, self.u[:, None], v), 1, -1),
-            sums.vy - np.moveaxis(summed(lost, v), 1, -1),
-        )
-        vv = summed(lost[:, None], v[:, :, None], v[:, None])
+        uv = sums.uv - np.moveaxis(summed(lost, (self.u[:, None].conj() * v).real), 1, -1)
+        vy = sums.vy - np.moveaxis(summed(lost, (v.conj() * self.rows.value).real), 1, -1)
+        vv = summed(lost[:, None], (v[:, :, None].conj() * v[:, None]).real)
         return SlopeSums(uv, vy, sums.vv - np.moveaxis(vv, -1, 1))
 
 

@@ -179,7 +179,9 @@ class Evaluator:
 
     def _costs(self, points: Points, products: Products, covariances: Floats) -> Floats:
         """The costs (points, sets) with covariance parameters (points, sets, parameters), where points predict."""
-        size = covariances.shape[1] * self.lines.recordings
+        pickup = self.hypotheses[0].model.pickup
+        rows = self.lines.recordings + (0 if pickup is None else len(pickup.rows))
+        size = covariances.shape[1] * rows
         at_once = max(_NUMBERS_AT_ONCE // size, 1)
         if len(points) > at_once:
             parts = [slice(first, first + at_once) for first in range(0, len(points), at_once)]
@@ -223,7 +225,7 @@ class Evaluator:
         products = at.products.values
         for _ in range(steps):
             part = Evaluated(points[moving], products[moving], cost[moving])
-            gradient, hessian = self.covariance_equations(part, mixed=self.own.shape[1] > 1)
+            gradient, hessian = self.covariance_equations(part, first_mixed=self._common)
             if held is not None:
                 hessian[:, held, :] = hessian[:, :, held] = gradient[:, held] = 0.0
             eigenvalues, vectors = np.linalg.eigh(hessian)
@@ -264,14 +266,15 @@ class Evaluator:
         np.put_along_axis(fit, self.own[points.owner], covariance[:, self._common :], axis=1)
         return replace(points, covariance=covariance, fit=fit)
 
-    def covariance_equations(self, at: Evaluated, *, mixed: bool = True) -> tuple[Floats, Floats]:
-        """Gradient and Hessian of the costs in the covariance parameters, by differences; mixed terms on request."""
+    def covariance_equations(self, at: Evaluated, *, first_mixed: int = 0) -> tuple[Floats, Floats]:
+        """Gradient and Hessian of the costs in the covariance parameters, by differences; without mixed terms of the
+        parameters before the `first_mixed`."""
         here = at.points.covariance
         count = here.shape[1]
         steps = _STEP * np.eye(count)
         # Far enough inside the bounds for the differences
         centre = np.clip(here, self._lowest + 2 * _STEP, self._highest - 2 * _STEP)
-        pairs = [(a, b) for a in range(count) for b in range(a if mixed else 0)]
+        pairs = [(a, b) for a in range(count) for b in range(first_mixed, a)]
         both = [steps[a] + steps[b] for a, b in pairs]
         shifts = np.array([np.zeros(count), *steps, *-steps, *both, *(-step for step in both)])
         costs = self.costs(at, centre[:, None] + shifts)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
+from scipy.sparse import csr_array
 from scipy.special import logsumexp
 
 from underskin.diagnosis.data.axes import recording_axes
@@ -50,10 +51,16 @@ def over_lines(problem: FittingProblem, explanation: Explanation) -> dict[str, f
     gains = {"frequency_hz": float(logsumexp(each) - np.log(len(each)) - plain)}
     if lines.recordings < _LEAST_RECORDINGS:
         return gains
-    shapes = features(normalised(np.log(lines.frequency)[:, None]), _INTERPLAY_LENGTH, _INTERPLAY_LANDMARKS)
-    moments = np.add.reduceat(shapes * (weight * relative)[:, None], lines.first)
-    products = (shapes[:, :, None] * shapes[:, None, :] * weight[:, None, None]).reshape(len(shapes), -1)
-    grams = np.add.reduceat(products, lines.first).reshape(lines.recordings, *2 * (shapes.shape[1],))
+    distinct, line = np.unique(lines.frequency, return_inverse=True)
+    shapes = features(normalised(np.log(distinct)[:, None]), _INTERPLAY_LENGTH, _INTERPLAY_LANDMARKS)
+
+    def summed(values: Array, of_lines: Floats) -> Array:
+        """Over the rows of each recording, of what distinct frequencies have (frequencies, …)."""
+        rows = csr_array((values, line, [*lines.first, len(line)]), shape=(lines.recordings, len(distinct)))
+        return rows @ of_lines.reshape(len(distinct), -1)
+
+    moments = summed(weight * relative, shapes)
+    grams = summed(weight, shapes[:, :, None] * shapes[:, None, :]).reshape(lines.recordings, *2 * (shapes.shape[1],))
     for name, column in recording_axes(lines.campaign).items():
         along = features(normalised(column), _INTERPLAY_LENGTH, _INTERPLAY_LANDMARKS)
         size = along.shape[1] * shapes.shape[1]

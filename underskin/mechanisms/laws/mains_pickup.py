@@ -100,12 +100,14 @@ class MainsPickup(Mechanism):
         away = np.abs(design.row_frequency[:, None] - _outstanding_mains(conditions) * HARMONICS)
         rows = np.flatnonzero(away.min(axis=1) < _FURTHEST_HZ)
         harmonic = HARMONICS[away[rows].argmin(axis=1)]
-        half_square, force = 0.5 * away[rows].min(axis=1) ** 2, design.row_dynamic_force[rows]
+        alike = np.column_stack([harmonic, 0.5 * away[rows].min(axis=1) ** 2, design.row_dynamic_force[rows]])
+        distinct, row = np.unique(alike, axis=0, return_inverse=True)
+        number, half_square, force = distinct.T
 
         def deviation(values: Mapping[str, Floats]) -> Floats:
             line = np.exp(-half_square / values["pickup_width"] ** 2)
-            share = np.where(harmonic == 1, 1.0, values["pickup_harmonics"] / harmonic)
-            return np.asarray(1e-12 * values["pickup_charge"] * share * line / force)
+            share = np.where(number == 1, 1.0, values["pickup_harmonics"] / number)
+            return np.asarray(1e-12 * values["pickup_charge"] * share * line / force)[..., row]
 
         return Pickup(rows, deviation)
 

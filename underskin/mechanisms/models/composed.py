@@ -34,8 +34,12 @@ class Model(Protocol):
     parameters: tuple[Parameter, ...]
     recording: NDArray[np.intp]
     sensor: NDArray[np.intp] | None
-    valid: NDArray[np.bool_]
     pickup: Pickup | None
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """(rows,) False where the contact lies beyond the tables as declared."""
+        ...
 
     def predict(self, fit: Floats) -> Prediction:
         """All rows at one point of the fit coordinates (parameters,)."""

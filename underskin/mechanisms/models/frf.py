@@ -10,6 +10,7 @@ Pick-up stands beside, as a covariance.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,7 +113,12 @@ class FrfModel:
         pickups = [mechanism.pickup(conditions, design) for mechanism in self._mechanisms]
         self.pickup: Pickup | None = together([pickup for pickup in pickups if pickup is not None])
         self._force, self._increments = _force_nodes(self._mechanisms, design)
-        self.valid = self._declared_inside(table)[design.point][design.recording]
+        self._table = table
+
+    @cached_property
+    def valid(self) -> NDArray[np.bool_]:
+        """Which rows lie inside the table as declared."""
+        return self._declared_inside(self._table)[self.design.point][self.recording]
 
     def predict(self, fit: Floats) -> Prediction:
         """The FRF on every row with its derivatives.
