@@ -48,6 +48,19 @@ def real(rows: np.ndarray) -> Floats:
         (Made(sensors=2, lines=4, preloads_n=(0.5, 2.0)), False),
         (Made(sensors=2, lines=4, preloads_n=(0.5, 2.0), offsets_mm=(0.0, 1.3)), True),
         (Made(("mains_pickup",), (0.05, 2.0, 1.0), sensors=1, lines=5, preloads_n=(0.5, 2.0), highest_hz=50.0), False),
+        (Made(("contact_resonance",), (2.0, 0.05), sensors=2, lines=6, preloads_n=(0.5,), highest_hz=900.0), False),
+        (
+            Made(
+                ("amplifier_high_pass", "mains_pickup"),
+                (0.5, 0.05, 2.0, 1.0),
+                sensors=2,
+                lines=5,
+                preloads_n=(0.5,),
+                offsets_mm=(0.7,),
+                highest_hz=50.0,
+            ),
+            True,
+        ),
     ],
 )
 def test_the_likelihood_is_that_of_the_whole_covariance_matrix(made: Made, placed: bool, table: SigmaTable) -> None:
@@ -78,11 +91,26 @@ def test_the_likelihood_is_that_of_the_whole_covariance_matrix(made: Made, place
     assert fitter.marginal(at).each[0, 0] == pytest.approx(exact - shared, abs=1e-6 * abs(exact))
 
 
-def test_the_gradient_is_that_of_the_posterior(table: SigmaTable) -> None:
+@pytest.mark.parametrize(
+    ("names", "values", "placed"),
+    [
+        (("moving_contact_edge",), (0.6,), False),
+        (("contact_resonance",), (2.0, 0.05), False),
+        (("moving_contact_edge",), (0.6,), True),
+        (("amplifier_high_pass",), (0.5,), True),
+        (("amplifier_high_pass", "mains_pickup"), (0.5, 0.05, 2.0, 1.0), False),
+    ],
+)
+def test_the_gradient_is_that_of_the_posterior(
+    names: tuple[str, ...], values: tuple[float, ...], placed: bool, table: SigmaTable
+) -> None:
     """What the model's covariance adds included, against differences."""
-    fitter, _, _ = fitted(Made(("moving_contact_edge",), (0.6,), sensors=3), table)
-    start = fitter.begin(np.array([[0.5]])).points
-    at = fitter.settle(fitter.evaluate(replace(start, fit=start.fit + np.array([0, 0.03, 0.01, 0.005]))), 2)
+    highest_hz = 50.0 if "mains_pickup" in names else 400.0
+    made = Made(names, values, sensors=3, offsets_mm=(0.9,) if placed else (0.0,), highest_hz=highest_hz)
+    fitter, start, _ = fitted(made, table, placed=placed, whole=False)
+    moved = start.points.fit + np.where(fitter.free[0], np.linspace(0.05, 0.005, start.points.fit.shape[1]), 0.0)
+    at = fitter.settle(fitter.evaluate(replace(start.points, fit=moved)), 2)
+    at = fitter.with_growth(at) if placed else at
     _, gradient = fitter.posterior_equations(at)
     for place in fitter.hypotheses[0].mean_places:
         step = np.zeros(at.points.fit.shape[1])
@@ -96,6 +124,34 @@ def test_collapsed_lines_give_the_same_posterior(table: SigmaTable) -> None:
     _, whole, _ = fitted(made, table, placed=True)
     _, collapsed, _ = fitted(made, table, placed=True, whole=False)
     assert collapsed.cost[0] == pytest.approx(whole.cost[0], abs=1e-2)
+
+
+def test_hypotheses_taken_together_are_each_alone(table: SigmaTable) -> None:
+    """Costs, equations and evidences, of sets with and without dynamics line by line."""
+    made = Made(("ageing",), (0.05, 300.0, 0.0), offsets_mm=(0.0, 0.8), sensors=2)
+    problem = FittingProblem(lines(campaign(made, table)), table)
+    requests = [Request(()), Request(("amplifier_high_pass",)), Request(("ageing",)), Request(("misalignment",))]
+    together = problem.explain(requests)
+    for request, explanation in zip(requests, together, strict=True):
+        (alone,) = problem.explain([request])
+        assert alone is not None
+        assert explanation is not None
+        assert explanation.log_evidence == pytest.approx(alone.log_evidence, abs=0.05)
+        assert explanation.point.fit == pytest.approx(alone.point.fit, abs=0.02)
+
+
+def test_what_is_left_as_hopeless_is_far_behind(table: SigmaTable) -> None:
+    made = Made(("contact_resonance",), (3.0, 0.05), sensors=2, highest_hz=1000.0, lines=20)
+    problem = FittingProblem(lines(campaign(made, table)), table)
+    requests = [Request((name,)) for name in ("contact_resonance", "adhesion", "timing_delay", "sensor_spread")]
+    together = problem.explain(requests)
+    assert together[0] is not None
+    left = [request for request, explanation in zip(requests, together, strict=True) if explanation is None]
+    assert left
+    for request in left:
+        (alone,) = problem.explain([request])
+        assert alone is not None
+        assert alone.log_evidence < together[0].log_evidence - 10.0
 
 
 def test_priors_of_scatter_integrate_to_one() -> None:

@@ -21,6 +21,7 @@ from tests.support.mechanism_campaigns import (
 from underskin.mechanisms import CATALOGUE, Mechanism, Model, Parameter, compose
 from underskin.mechanisms.base import UNITS, Kind
 from underskin.mechanisms.contract import check
+from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.registry import built_in
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.units import Floats
@@ -129,6 +130,31 @@ def test_derivatives_match_finite_differences(names: tuple[str, ...], kind: Kind
         spread = [model.sensor_spread_of(fit + sign * step)[0] for sign in (1, -1)]
         by_spread = (spread[0] - spread[1]) / (2 * step[number])
         assert by_spread == pytest.approx(model.sensor_spread_of(fit)[1][number], rel=1e-6, abs=1e-12)
+
+
+FRF_SETS = [*((name,) for name, kind in EACH if kind == "frf"), *(names for names, kind in TRIPLES if kind == "frf")]
+
+
+@pytest.mark.parametrize("names", FRF_SETS)
+def test_several_points_at_once_are_each_point_alone(names: tuple[str, ...]) -> None:
+    model = model_of(names, "frf")
+    assert isinstance(model, FrfModel)
+    random = np.random.default_rng(5)
+    fits = np.array([[entry.quantile(random.uniform(0.1, 0.9)) for entry in model.parameters] for _ in range(3)])
+    together = model.respond(fits, place=True)
+    for number, fit in enumerate(fits):
+        alone, own = model.respond(fit, place=True), together.part(number)
+        assert own.level.value == pytest.approx(alone.level.value, rel=1e-12)
+        assert own.level.slopes == pytest.approx(
+            alone.level.slopes, rel=1e-9, abs=1e-12 * np.abs(alone.level.value).max()
+        )
+        assert own.place_slopes == pytest.approx(
+            alone.place_slopes, rel=1e-9, abs=1e-6 * np.abs(alone.level.value).max()
+        )
+        if alone.lines is not None:
+            assert own.lines is not None
+            assert own.lines.value == pytest.approx(alone.lines.value, rel=1e-12)
+            assert own.lines.slopes == pytest.approx(alone.lines.slopes, rel=1e-9, abs=1e-12)
 
 
 def _away_from_first_contact(value: Floats, kind: Kind) -> Floats:

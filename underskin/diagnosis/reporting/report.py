@@ -126,7 +126,11 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         "fit": fit,
         "d33": d33,
         "next_experiment": diagnosis.next_experiment or None,
-        "provenance": dict(diagnosis.provenance),
+        # The rest was left early: hopeless, or without a gain over the smaller set that it grew from.
+        "provenance": {
+            **diagnosis.provenance,
+            "sets_of_mechanisms": {"tried": search.tried, "fitted": len(search.explanations)},
+        },
     }
 
 

@@ -59,6 +59,7 @@ class Search:
     discrepancies: tuple[tuple[Explanation, Discrepancy], ...]
     unsupported: dict[str, str]
     null_contradicted: bool = False
+    tried: int = 0  # sets, of which the explanations are those that were not left out early
 
     @property
     def supported(self) -> int:
@@ -133,6 +134,7 @@ def log_prior_beneath(size: int, supported: int) -> float:
 def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search:
     """Fit nothing, every single, then what grows from the best; what is `known` of them is taken over."""
     explanations: Explanations = {frozenset(entry.names): entry for entry in known}
+    tried = {frozenset[str]()}
     unsupported: dict[str, str] = {}
     for name in CATALOGUE:
         try:
@@ -140,7 +142,9 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
         except Unsupported as refusal:
             unsupported[name] = refusal.reason
     names = [name for name in CATALOGUE if name not in unsupported]
-    _explain(problem, explanations, [Request(()), *(Request((name,)) for name in names)])
+    singles = [Request(()), *(Request((name,)) for name in names)]
+    tried |= {frozenset(request.names) for request in singles}
+    _explain(problem, explanations, singles)
     integrated: Explanations = {}
     for size in (2, 3):
         integrated |= _integrated(explanations, frozenset(integrated), unsupported, 1)
@@ -151,9 +155,10 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
             for name in names
             if name not in parent.names
         ]
+        tried |= {frozenset(request.names) for request in requests}
         _explain(problem, explanations, requests)
     explanations |= _integrated(explanations, frozenset(integrated), unsupported, _BEST)
-    result = Search(tuple(explanations.values()), (), unsupported)
+    result = Search(tuple(explanations.values()), (), unsupported, tried=len(tried))
     best = sorted((entry for entry in result.explanations if entry.names), key=result.log_weight, reverse=True)[:2]
     processes = tuple((entry, discrepancy(problem, entry)) for entry in (explanations[frozenset()], *best))
     return replace(result, discrepancies=processes)
