@@ -1,8 +1,8 @@
 """Run the benchmarks: python -m bench [PART ...]. What was measured is written to docs/validation.md."""
 
+import argparse
 import os
 import platform
-import sys
 import time
 from importlib.metadata import version
 from pathlib import Path
@@ -20,6 +20,7 @@ from bench import (
     start,
     store,
 )
+from bench import against as against_revision
 from bench.page import keep, markdown, write
 
 PARTS = {
@@ -38,8 +39,11 @@ PARTS = {
 _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem", "dynesty")
 
 
-def main(names: list[str]) -> None:
-    """Measure the parts named, or all, and write the page with what is new in it."""
+def main(names: list[str], against: str | None) -> None:
+    """Measure the parts named, or all, and write the page with what is new in it; a diagnosis `against` a revision."""
+    if against is not None:
+        print(markdown(against_revision.measure(against)), flush=True)
+        return
     for name in names or PARTS:
         about = machine()
         print(f"{name}: {about}", flush=True)
@@ -80,4 +84,13 @@ def _processor_times() -> tuple[int, int]:
     return times[3] + times[4], sum(times)
 
 
-main(sys.argv[1:])
+parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
+parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all, if none is given")
+parser.add_argument("--against", metavar="REV", help="with diagnosis: processor time beside that of another revision")
+given = parser.parse_args()
+unknown = set(given.parts) - set(PARTS)
+if unknown:
+    parser.error(f"no such part: {', '.join(sorted(unknown))}")
+if given.against is not None and given.parts != ["diagnosis"]:
+    parser.error("--against goes with diagnosis alone")
+main(given.parts, given.against)

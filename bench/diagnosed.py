@@ -1,6 +1,7 @@
 """The campaigns on which diagnoses are measured: our rig presses two spheres on sensors of the prototype's skin."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from rig.description import parse as experiment
 from rig.recorded import campaign, record_lines
@@ -13,7 +14,14 @@ def recorded(
     effects: Effects, *, columns: int, preloads_n: Sequence[float], lines: int, position_mm: float = 0.0
 ) -> Campaign:
     """2 × `columns` × preloads recordings of `lines` lines each, beside the sensor's centre if positions scatter."""
-    document = {
+    return parse(document(effects, columns=columns, preloads_n=preloads_n, lines=lines, position_mm=position_mm))
+
+
+def document(
+    effects: Effects, *, columns: int, preloads_n: Sequence[float], lines: int, position_mm: float = 0.0
+) -> dict[str, Any]:
+    """The same as `campaign/1`."""
+    description = {
         "schema": "experiment/1",
         "name": "bench",
         "seed": 5,
@@ -36,4 +44,4 @@ def recorded(
         "noise": {"gain": 0.02, "line": 0.01, "averages": 16, "position_mm": position_mm},
         "effects": effects,
     }
-    return parse(campaign(record_lines(experiment(document))))
+    return campaign(record_lines(experiment(description)))

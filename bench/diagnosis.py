@@ -16,16 +16,17 @@ CASES: dict[str, tuple[Effects, float]] = {  # what is hidden, and the scatter o
     "two mechanisms": (_TWO, 0.0),
     "two mechanisms, places that scatter by 0.15 mm": (_TWO, 0.15),
 }
+PRELOADS_N = (0.3, 0.5, 0.7, 1, 1.3, 1.6, 2, 2.3, 2.6, 3)
 ROUNDS = 3
 _ONE = """
 import json, resource, sys, time
 from bench.diagnosed import recorded
+from bench.diagnosis import PRELOADS_N
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.surrogate.sigma_table import load_table
 
-preloads_n = 0.3, 0.5, 0.7, 1, 1.3, 1.6, 2, 2.3, 2.6, 3
 effects, position_mm = json.loads(sys.argv[1])
-hidden = recorded(effects, columns=5, preloads_n=preloads_n, lines=60, position_mm=position_mm)
+hidden = recorded(effects, columns=5, preloads_n=PRELOADS_N, lines=60, position_mm=position_mm)
 assert len(hidden.recordings) == 100
 start = time.process_time()
 verdict = diagnosis_report(hidden, load_table())["verdict"]

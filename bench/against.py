@@ -1,0 +1,90 @@
+"""A whole diagnosis by this tree and by another revision, in turns on one core: processor time of both."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+
+from bench.diagnosed import document
+from bench.diagnosis import CASES, PRELOADS_N
+from bench.figures import Figure
+
+ROUNDS = 3
+_FASTER = 5.0
+_OTHERS = """
+import json, sys, time
+try:
+    from underskin.diagnosis.pipeline import diagnosis_report
+    from underskin.surrogate.sigma_table import load_table
+except ImportError:  # the layout before the library had wings
+    from underskin.diagnosis.diagnose import diagnosis_report
+    from underskin.surrogate import load_table
+from underskin.recordings.campaign import parse
+
+table = load_table()
+for file in sys.argv[1:]:
+    with open(file) as text:
+        campaign = parse(json.load(text))
+    start = time.process_time()
+    diagnosis_report(campaign, table)
+    print(time.process_time() - start, flush=True)
+"""
+
+
+def measure(revision: str) -> list[Figure]:
+    """Medians over the open campaigns, where there are any, and over those of `bench diagnosis`, and their ratios."""
+    root = Path(__file__).parents[1]
+    folder = os.environ.get("UNDERSKIN_CAMPAIGNS")
+    sets = {"open campaigns": sorted((Path(folder) / "open").glob("*.json")) if folder else []}
+    figures = []
+    with tempfile.TemporaryDirectory() as temporary, _worktree(root, revision, Path(temporary) / "tree") as other:
+        sets["campaigns of 100 recordings × 60 lines"] = _written(Path(temporary))
+        for name, files in sets.items():
+            if not files:
+                continue
+            rounds = [(_seconds(root, files), _seconds(other, files)) for _ in range(ROUNDS)]
+            ours, theirs = (median(map(median, zip(*times, strict=True))) for times in zip(*rounds, strict=True))
+            figures += [
+                Figure(f"{len(files)} {name}, median", ours, "s"),
+                Figure(f"the same by {revision}", theirs, "s"),
+                Figure(f"{len(files)} {name}: time of {revision}", theirs / ours, "× ours", _FASTER),
+            ]
+    return figures
+
+
+@contextmanager
+def _worktree(root: Path, revision: str, folder: Path) -> Iterator[Path]:
+    subprocess.run(["git", "-C", root, "worktree", "add", "--quiet", "--detach", folder, revision], check=True)
+    try:
+        yield folder
+    finally:
+        subprocess.run(["git", "-C", root, "worktree", "remove", "--force", folder], check=True)
+
+
+def _written(folder: Path) -> list[Path]:
+    """The campaigns of `bench diagnosis` as files."""
+    files = []
+    for number, (effects, position_mm) in enumerate(CASES.values()):
+        hidden = document(effects, columns=5, preloads_n=PRELOADS_N, lines=60, position_mm=position_mm)
+        files.append(folder / f"{number}.json")
+        files[-1].write_text(json.dumps(hidden))
+    return files
+
+
+def _seconds(tree: Path, files: Sequence[Path]) -> list[float]:
+    """Processor time of each campaign's diagnosis, all in one process."""
+    one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "UNDERSKIN_TABLES": str(tree / "tables")}
+    run = subprocess.run(
+        [sys.executable, "-c", _OTHERS, *map(str, files)],
+        cwd=tree,
+        env={**os.environ, **one_thread, "PYTHONPATH": str(tree)},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    return [float(line) for line in run.stdout.split()]
