@@ -11,7 +11,7 @@ from service import pages
 from service.auth.access_control import AccessControl
 from service.dependencies import authorised
 from service.ingest.uploads import UploadFolder
-from service.jobs import JobSettings, Planner, Runner
+from service.jobs import JobSettings, Planner, Runner, WorkerProcesses
 from service.middleware import request_log
 from service.middleware.asgi_middleware import AsgiMiddleware
 from service.middleware.error_handlers import install_handlers
@@ -73,8 +73,9 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     api.state.access = access
     api.state.store = store
     job_settings = job_settings_of(settings, table)
-    api.state.runner = Runner(store, job_settings)
-    api.state.planner = Planner(store, job_settings)
+    processes = WorkerProcesses(job_settings.table)
+    api.state.runner = Runner(store, job_settings, processes)
+    api.state.planner = Planner(store, job_settings, processes)
     install_handlers(api, problem_page, _methods)
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"]), Depends(known_query)])
     for noun in (sigma, frf, d33, stress, design, tables, campaigns, diagnoses, exports, skins, models):

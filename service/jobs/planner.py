@@ -3,14 +3,13 @@
 Plans are not stored: a server remembers the latest ones, and plans again after a restart.
 """
 
-import tempfile
 import threading
 import time
 from collections import OrderedDict
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from service.jobs.process import Worker
+from service.jobs.process import Worker, WorkerProcesses
 from service.jobs.runner import JobSettings, logger
 from service.problems import Refusal
 from service.store import AnyRow, Database, diagnoses
@@ -43,9 +42,10 @@ class Planned:
 class Planner:
     """Plans next experiments one after another, until `stop`, and remembers the latest."""
 
-    def __init__(self, store: Database, job_settings: JobSettings) -> None:
+    def __init__(self, store: Database, job_settings: JobSettings, processes: WorkerProcesses) -> None:
         self._store = store
         self._job_settings = job_settings
+        self._processes = processes
         self._known: OrderedDict[tuple[str, str], Planned] = OrderedDict()
         self._lock = threading.Lock()
         self._turn = threading.Lock()
@@ -102,7 +102,7 @@ class Planner:
             campaign, _ = diagnoses.campaign_of(connection, row)
         content = json_file.write(campaign)
         job = self._job_settings.job(content, limits=asdict(limits))
-        with tempfile.TemporaryFile() as stderr, Worker(job, content, stderr) as worker:
+        with Worker(job, content, self._processes.take()) as worker:
             with self._lock:
                 self._worker = worker
             while not (worker.ended or self._ending.is_set()):

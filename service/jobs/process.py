@@ -1,10 +1,13 @@
-"""The runner's end of a worker process (worker.py)."""
+"""The server's end of worker processes (worker.py): one is kept ready, so that a job does not wait for it to load."""
 
 import os
 import subprocess
 import sys
+import tempfile
 import threading
 from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Self
 
@@ -17,13 +20,83 @@ _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 _LAST_WORDS = 2000
 
 
+@dataclass(frozen=True)
+class WorkerProcess:
+    """A process that waits for a job, and the file that it writes its errors to."""
+
+    process: "subprocess.Popen[bytes]"
+    stderr: BinaryIO
+
+    @classmethod
+    def started(cls, table: Path) -> Self:
+        """A new one, which loads this table."""
+        stderr = tempfile.TemporaryFile()  # noqa: SIM115 (closed by `end`)
+        environment = {key: os.environ[key] for key in _INHERITED if key in os.environ} | _ONE_THREAD
+        environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))  # the packages of this process
+        process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "service.jobs.worker", str(table)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=stderr,
+            env=environment,
+        )
+        return cls(process, stderr)
+
+    def end(self) -> None:
+        """Kill it, whatever it does, and close what is shared with it."""
+        self.process.kill()
+        self.process.wait()
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        for file in (self.process.stdin, self.process.stdout, self.stderr):
+            with suppress(OSError):  # what it had not read is lost with it
+                file.close()
+
+
+class WorkerProcesses:
+    """Worker processes for jobs; once `keep_ready` was called, one more waits for the next job, until `stop`."""
+
+    def __init__(self, table: Path) -> None:
+        self._table = table
+        self._ready: WorkerProcess | None = None
+        self._keeps = False
+        self._lock = threading.Lock()
+
+    def keep_ready(self) -> None:
+        """See to it that one is ready, from now on."""
+        with self._lock:
+            self._keeps = True
+            self._start()
+
+    def take(self) -> WorkerProcess:
+        """The one that is ready, or a new one."""
+        with self._lock:
+            ready, self._ready = self._ready, None
+            if ready is not None and ready.process.poll() is not None:
+                ready.end()
+                ready = None
+            taken = ready or WorkerProcess.started(self._table)
+            if self._keeps:
+                self._start()
+            return taken
+
+    def stop(self) -> None:
+        """End the one that is ready."""
+        with self._lock:
+            self._keeps = False
+            if self._ready is not None:
+                self._ready.end()
+                self._ready = None
+
+    def _start(self) -> None:
+        if self._ready is None:
+            self._ready = WorkerProcess.started(self._table)
+
+
 class Worker:
-    """A running worker that writes its errors to `stderr`, a file that can be read. `news` is set when it has ended.
+    """A worker at its job. `news` is set when it has ended. Leaving the block ends it in any case."""
 
-    Leaving the block ends it in any case.
-    """
-
-    def __init__(self, job: Job, campaign: bytes, stderr: BinaryIO) -> None:
+    def __init__(self, job: Job, campaign: bytes, worker: WorkerProcess) -> None:
         self.progress = 0.0
         self.report: dict[str, Any] | None = None
         self.figures: dict[str, str] | None = None
@@ -31,16 +104,7 @@ class Worker:
         self.error: str | None = None
         self.news = threading.Event()
         self.ended = False
-        self._stderr = stderr
-        environment = {key: os.environ[key] for key in _INHERITED if key in os.environ} | _ONE_THREAD
-        environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))  # the packages of this process
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "service.jobs.worker"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._stderr,
-            env=environment,
-        )
+        self._worker, self._process, self._stderr = worker, worker.process, worker.stderr
         threading.Thread(target=self._send, args=(job, campaign), daemon=True).start()
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
@@ -53,9 +117,7 @@ class Worker:
     ) -> None:
         self._process.kill()
         self._listener.join()
-        assert self._process.stdin is not None
-        with suppress(OSError):  # what it had not read is lost with it
-            self._process.stdin.close()
+        self._worker.end()
 
     @property
     def failure(self) -> str:

@@ -2,7 +2,6 @@
 
 import logging
 import secrets
-import tempfile
 import threading
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.jobs.process import Worker
+from service.jobs.process import Worker, WorkerProcesses
 from service.jobs.worker import Job
 from service.log import LastingFailure
 from service.store import AnyRow, Database, StorageFull, StoreMoved, diagnoses
@@ -38,15 +37,16 @@ class JobSettings:
         self, campaign: bytes, excluded: tuple[tuple[str, str], ...] = (), limits: dict[str, Any] | None = None
     ) -> Job:
         """A worker's, on a campaign."""
-        return Job(len(campaign), str(self.table), self.table_sha256, self.memory_bytes, excluded, limits)
+        return Job(len(campaign), self.table_sha256, self.memory_bytes, excluded, limits)
 
 
 class Runner:
     """Runs the queue in threads of the server's process, between `start` and `stop`."""
 
-    def __init__(self, store: Database, job_settings: JobSettings) -> None:
+    def __init__(self, store: Database, job_settings: JobSettings, processes: WorkerProcesses) -> None:
         self._store = store
         self._job_settings = job_settings
+        self._processes = processes
         self._server = secrets.token_hex(8)
         self._ending = threading.Event()
         self._stirred = threading.Event()
@@ -75,6 +75,7 @@ class Runner:
         for thread in (self._dispatcher, *self._jobs):
             if thread.ident is not None:
                 thread.join(_JOIN_S)
+        self._processes.stop()
 
     def _dispatch(self) -> None:
         while not self._ending.is_set():
@@ -87,7 +88,8 @@ class Runner:
                     thread.start()
             except _STORE_FAILED as error:
                 self._failure.log("no diagnosis can be claimed", error)
-            self._stirred.wait(_POLL_S)
+            if not self._stirred.wait(_POLL_S):
+                self._processes.keep_ready()  # now that nothing else is going on
 
     def _claim(self) -> AnyRow | None:
         with self._store.writing() as connection:
@@ -116,7 +118,7 @@ class Runner:
         content = json_file.write(campaign)
         left_out = tuple((left.recording, left.reason) for left in excluded)
         job = self._job_settings.job(content, left_out)
-        with tempfile.TemporaryFile() as stderr, Worker(job, content, stderr) as worker:
+        with Worker(job, content, self._processes.take()) as worker:
             with self._lock:
                 self._jobs[threading.current_thread()] = worker
             while not worker.ended and not self._ending.is_set():

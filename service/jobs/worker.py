@@ -1,6 +1,9 @@
 """The worker process: one campaign in, its report or next experiment out, at the lowest priority and within a limit on
 memory.
 
+It is started ahead of its job, and has loaded the program and the table (its argument) when that comes. Its name in a
+list of processes says which: `underskin-ready`, then `underskin-works`.
+
 Standard input: a line of JSON (`Job`), then the campaign (`campaign/1`), then nothing until the runner ends: a worker
 whose runner is gone ends too. Standard output: a line of JSON for each progress, then one with the report and one with
 its figures, or one with the plan where the job has limits of a rig, or one with the error.
@@ -13,22 +16,24 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import orjson
+
+if TYPE_CHECKING:
+    from underskin.surrogate.sigma_table import SigmaTable
 
 _NICENESS = 10
 
 
 @dataclass(frozen=True)
 class Job:
-    """What a worker needs beside the campaign: where its bytes end, the table to use, what was left out and why.
+    """What a worker needs beside the campaign: where its bytes end, the table's hash, what was left out and why.
 
     With `limits` (of `RigLimits`, by name) it plans the next experiment within them, and makes no report.
     """
 
     campaign_bytes: int
-    table: str
     table_sha256: str
     memory_bytes: int
     excluded: tuple[tuple[str, str], ...]
@@ -48,20 +53,41 @@ def main() -> None:
         answers.write(orjson.dumps(message, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_APPEND_NEWLINE))
 
     os.nice(_NICENESS)
-    job = Job(**orjson.loads(sys.stdin.buffer.readline()))
-    campaign = sys.stdin.buffer.read(job.campaign_bytes)
-    threading.Thread(target=_end_with_the_runner, args=(sys.stdin.buffer,), daemon=True).start()
+    _be_called("underskin-ready")
+    from underskin.diagnosis.reporting import figures  # noqa: F401 (with all that a diagnosis needs)
     from underskin.errors import UnderskinError
+    from underskin.surrogate.sigma_table import load_table
 
     try:
-        _work(job, campaign, say)
+        table = load_table(Path(sys.argv[1]))
+        problem = ""
+    except UnderskinError as error:
+        problem = str(error)
+    line = sys.stdin.buffer.readline()
+    if not line:
+        return  # the server ended before there was a job
+    job = Job(**orjson.loads(line))
+    _be_called("underskin-works")
+    campaign = sys.stdin.buffer.read(job.campaign_bytes)
+    threading.Thread(target=_end_with_the_runner, args=(sys.stdin.buffer,), daemon=True).start()
+    if problem:
+        say({"error": problem})
+        return
+    try:
+        _work(job, campaign, table, say)
     except UnderskinError as error:
         say({"error": str(error)})
     except MemoryError:
         say({"error": f"it takes more than {job.memory_bytes / 1e6:g} MB of memory (UNDERSKIN_DIAGNOSIS_MEMORY_MB)"})
 
 
-def _work(job: Job, campaign: bytes, say: Callable[[dict[str, Any]], None]) -> None:
+def _be_called(name: str) -> None:
+    """Of this process, in lists of processes; at most 15 characters."""
+    with suppress(OSError):
+        Path("/proc/self/comm").write_text(name)
+
+
+def _work(job: Job, campaign: bytes, table: "SigmaTable", say: Callable[[dict[str, Any]], None]) -> None:
     """The report, with what was left out of it among the findings; then the figures, without which it is kept too."""
     from underskin.diagnosis.pipeline import diagnose
     from underskin.diagnosis.planning.rig_limits import RigLimits
@@ -72,11 +98,9 @@ def _work(job: Job, campaign: bytes, say: Callable[[dict[str, Any]], None]) -> N
     from underskin.findings.finding import Finding
     from underskin.parallel import limit_process
     from underskin.recordings.campaign import parse
-    from underskin.surrogate.sigma_table import load_table
 
-    table = load_table(Path(job.table))
     if table.sha256 != job.table_sha256:
-        raise TableError(f"{job.table} changed since the server started: restart it")
+        raise TableError(f"{sys.argv[1]} changed since the server started: restart it")
     limit_process(job.memory_bytes)
     limits = RigLimits(**job.limits or {})
     diagnosis = diagnose(parse(orjson.loads(campaign)), table, lambda share: say({"progress": share}), limits)

@@ -27,26 +27,26 @@ def file_place(tmp_path: Path) -> Place:
     return Place(folder)
 
 
-def workers_of(server: Server) -> list[int]:
-    """Process ids of the worker processes of a server."""
+def workers_of(server: Server, name: str = "underskin-works") -> list[int]:
+    """Process ids of the worker processes of a server that are at a job, or of those that are ready for one."""
     found = []
     for entry in Path("/proc").iterdir():
         with suppress(OSError):
-            if entry.name.isdigit() and b"service.jobs.worker" in (entry / "cmdline").read_bytes():
+            if entry.name.isdigit() and (entry / "comm").read_text().strip() == name:
                 fields = (entry / "stat").read_text().rpartition(")")[2].split()
                 if fields[0] != "Z" and int(fields[1]) == server.process.pid:
                     found.append(int(entry.name))
     return found
 
 
-def await_workers(server: Server, count: int) -> list[int]:
+def await_workers(server: Server, count: int, name: str = "underskin-works") -> list[int]:
     deadline = time.monotonic() + 60
     while time.monotonic() < deadline:
-        pids = workers_of(server)
+        pids = workers_of(server, name)
         if len(pids) == count:
             return pids
         time.sleep(0.02)
-    raise AssertionError(f"{len(workers_of(server))} workers")
+    raise AssertionError(f"{len(workers_of(server, name))} processes {name}")
 
 
 def is_gone(pid: int) -> bool:
@@ -126,6 +126,21 @@ def test_cancelled_while_it_runs_and_while_it_waits(file_place: Place) -> None:
         assert again["id"] != first
         assert client.diagnoses.wait(again["id"])["report"] == report()
         assert found(server, first)["state"] == found(server, second)["state"] == "cancelled"
+
+
+def test_a_worker_is_kept_ready_for_the_next_job(file_place: Place) -> None:
+    with running(file_place, **ONE) as server:
+        (ready,) = await_workers(server, 1, "underskin-ready")
+        diagnosis_id = asked(server, sent(server, resonant("array")))
+        assert await_workers(server, 1) == [ready]
+        (after,) = await_workers(server, 1, "underskin-ready")
+        assert awaited(server, diagnosis_id)["state"] == "done"
+        os.kill(after, signal.SIGKILL)
+        assert is_gone(after)
+        again = asked(server, sent(server, resonant("again")))
+        assert awaited(server, again)["state"] == "done"
+        (last,) = await_workers(server, 1, "underskin-ready")
+    assert is_gone(last)
 
 
 def test_a_worker_that_dies_is_told(file_place: Place) -> None:

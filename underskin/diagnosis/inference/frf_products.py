@@ -13,8 +13,8 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.pickup_rows import PickupRows
 from underskin.diagnosis.inference.sums import SlopeSums, Sums
 from underskin.diagnosis.noise.noise_levels import SeveralLevels
-from underskin.mechanisms.models.frf import Response
 from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.models.response import Response
 from underskin.units import Array, Floats
 
 

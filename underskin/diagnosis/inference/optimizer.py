@@ -153,40 +153,50 @@ class Fitter(Evaluator):
         for _ in range(_MOST_ITERATIONS):
             part = best[moving]
             step, slope = self._step(part, damping[moving])
-            grown = self.grown(part)
-            resting = (slope < _CONVERGED) & grown
-            going = np.ones(len(part), dtype=bool)
             if target is not None:
-                going = part.cost - _PROMISED * slope - _MARGIN < target(best)[moving]
-            resting &= going
+                promising = part.cost - _PROMISED * slope - _MARGIN < target(best)[moving]
+                moving, part, step, slope = moving[promising], part[promising], step[promising], slope[promising]
+            resting = (slope < _CONVERGED) & self.grown(part)
+            going = np.ones(len(part), dtype=bool)
             if resting.any():
                 settled = self.settle(part[resting], settling)
                 going[resting] = part.cost[resting] - settled.cost >= _CONVERGED
                 best = self.replaced(best, moving[resting], settled)
-            tried_at = np.flatnonzero(going & ~resting)
-            if len(tried_at):
-                there = part[tried_at]
-                owner = there.points.owner
-                fit = np.clip(there.points.fit + step[tried_at], self.low[owner], self.high[owner])
-                tried = self.settle(self.evaluate(replace(there.points, fit=fit)), settling)
-                tried = replace(tried, growth=there.growth)
-                gained = there.cost - tried.cost
-                better = gained > 0
-                number = moving[tried_at]
-                best = self.replaced(best, number[better], tried[better])
-                stuck = ~better & ((damping[number] > 1e4) | (np.abs(step[tried_at]).max(axis=1) < 1e-7))
-                blind = ~better & ~stuck & ~grown[tried_at]
-                if blind.any():
-                    best = self.replaced(best, number[blind], self.with_growth(best[number[blind]]))
-                failed = ~better & ~stuck & ~blind
-                damping[number[better]] = np.maximum(damping[number[better]] / 10, 1e-6)
-                damping[number[failed]] = np.maximum(damping[number[failed]] * 10, 1e-2)
-                idle = failed & (gained > -_CONVERGED) & (damping[number] > 1)
-                going[tried_at] = ~(stuck | idle | (better & (gained < _CONVERGED)))
+            stepping = ~resting
+            if stepping.any():
+                number = moving[stepping]
+                after, damping[number], going[stepping] = self._moved_on(
+                    part[stepping], step[stepping], damping[number], settling
+                )
+                best = self.replaced(best, number, after)
             moving = moving[going]
             if not len(moving):
                 break
         return best
+
+    def _moved_on(
+        self, at: Evaluated, step: Floats, damping: Floats, settling: int
+    ) -> tuple[Evaluated, Floats, NDArray[np.bool_]]:
+        """The points after steps, where these gain; their damping; and which of them are to go on.
+
+        A point that gains nothing learns first how the position's slopes change, then tries shorter steps.
+        """
+        owner = at.points.owner
+        fit = np.clip(at.points.fit + step, self.low[owner], self.high[owner])
+        tried = self.settle(self.evaluate(replace(at.points, fit=fit)), settling)
+        gained = at.cost - tried.cost
+        better = gained > 0
+        after = self.replaced(at, np.flatnonzero(better), replace(tried, growth=at.growth)[better])
+        stuck = ~better & ((damping > 1e4) | (np.abs(step).max(axis=1) < 1e-7))
+        blind = np.flatnonzero(~better & ~stuck & ~self.grown(at))
+        if len(blind):
+            after = self.replaced(after, blind, self.with_growth(at[blind]))
+        failed = ~better & ~stuck
+        failed[blind] = False
+        damping = np.where(better, np.maximum(damping / 10, 1e-6), damping)
+        damping = np.where(failed, np.maximum(damping * 10, 1e-2), damping)
+        idle = failed & (gained > -_CONVERGED) & (damping > 1)
+        return after, damping, ~(stuck | idle | (better & (gained < _CONVERGED)))
 
     def grown(self, at: Evaluated) -> NDArray[np.bool_]:
         """Which points know how the position's slopes change, or have no use for it."""

@@ -9,7 +9,6 @@ Pick-up stands beside, as a covariance.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +24,7 @@ from underskin.mechanisms.models.frf_design import FrfDesign, Indices, largest_o
 from underskin.mechanisms.models.nuisances import FRF_NUISANCES
 from underskin.mechanisms.models.off_centre_response import PROFILE_END, offset_sigma
 from underskin.mechanisms.models.pickup import Pickup, together
+from underskin.mechanisms.models.response import Response, joined
 from underskin.mechanisms.models.sigma_curves import SigmaOfContacts, layer_of
 from underskin.recordings.conditions import Conditions
 from underskin.surrogate.sigma_table import SigmaTable
@@ -33,46 +33,6 @@ from underskin.units import Array, Floats, to_si
 _NUISANCE_STRETCH = 1.06  # the thickness' bounds
 _QUANTITIES, _BLOCK = 6, 4**4  # of a linear layer's contact, and coefficients around a place in the table
 _POSITION = 2  # two more variables: the contact's x and y
-
-
-@dataclass(frozen=True)
-class Response:
-    """FRFs at one or several points of the fit coordinates, in two factors: leading axes are those of the points.
-
-    `place_slopes` are by the contact's x and y, None where they were not asked for.
-    """
-
-    level: Differentiated  # (…, recordings) [C/N], real: before the dynamics
-    place_slopes: Floats | None  # (2, …, recordings) [C/N/m]
-    lines: Differentiated | None  # (…, distinct lines) complex: the dynamics' factor; None where there are none
-    inside: NDArray[np.bool_]  # (…, recordings)
-
-    def part(self, index: int | slice) -> "Response":
-        """At some of several points."""
-
-        def of(x: Differentiated) -> Differentiated:
-            return Differentiated(x.value[index], x.slopes[:, index])
-
-        place = None if self.place_slopes is None else self.place_slopes[:, index]
-        return Response(of(self.level), place, None if self.lines is None else of(self.lines), self.inside[index])
-
-
-def joined(responses: Sequence[Response]) -> Response:
-    """Responses of one model at several sets of points, as one."""
-
-    def of(parts: Sequence[Differentiated]) -> Differentiated:
-        return Differentiated(
-            np.concatenate([part.value for part in parts]), np.concatenate([part.slopes for part in parts], axis=1)
-        )
-
-    place = [entry.place_slopes for entry in responses if entry.place_slopes is not None]
-    lines = [entry.lines for entry in responses if entry.lines is not None]
-    return Response(
-        of([entry.level for entry in responses]),
-        np.concatenate(place, axis=1) if place else None,
-        of(lines) if lines else None,
-        np.concatenate([entry.inside for entry in responses]),
-    )
 
 
 class FrfModel:
