@@ -75,7 +75,7 @@ def test_derivatives_are_by_the_parameters_in_their_units() -> None:
     conditions = rows(dwell_s=[2.0, 60.0, 600.0], load_cycles=[0.0, 300.0, 900.0], dynamic_force_n=0.1)
     derivatives = predict(conditions, table(), COMBINED, mechanisms=MECHANISMS).derivatives
     for name, value in COMBINED.items():
-        step = 1e-5 * value
+        step = 1e-4 * value
         high, low = (
             predict(conditions, table(), {**COMBINED, name: value + way}, mechanisms=MECHANISMS).value
             for way in (step, -step)

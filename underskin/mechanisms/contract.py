@@ -150,14 +150,14 @@ def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
     model = _called(field, lambda: _model(mechanism, campaign, kind))
     count = len(_parameters(mechanism, kind))
     points = list(_points(model.parameters[:count], model.parameters[count:]))
-    if isinstance(model, FrfModel):
-        _check_several_points(model, np.array([fit for fit, _ in points]), field)
     for fit, place in points:
         with np.errstate(all="ignore"):
             answer = _called(f"{field} at {place}", partial(model.predict, fit))
         numbers = [answer.value, answer.slopes, *([] if answer.pickup is None else [answer.pickup])]
         if not all(np.isfinite(part).all() for part in numbers):
             raise not_finite(f"{field} at {place}", None, "gives numbers that are not finite")
+    if isinstance(model, FrfModel):
+        _check_several_points(model, np.array([fit for fit, _ in points]), field)
 
 
 def _check_several_points(model: FrfModel, fits: Floats, field: str) -> None:

@@ -76,26 +76,19 @@ def compose(names: Sequence[str], conditions: Conditions, table: SigmaTable, kin
     _require_kind(conditions, kind)
     mechanisms = chosen(names, CATALOGUE)
     check_supported(mechanisms, conditions, kind)
-    return forward_model(mechanisms, conditions, table, kind, beside=tuple(CATALOGUE.values()))
+    return forward_model(mechanisms, conditions, table, kind)
 
 
-def forward_model(
-    mechanisms: Sequence[Mechanism],
-    conditions: Conditions,
-    table: SigmaTable,
-    kind: Kind,
-    *,
-    beside: Sequence[Mechanism] = (),
-) -> Model:
+def forward_model(mechanisms: Sequence[Mechanism], conditions: Conditions, table: SigmaTable, kind: Kind) -> Model:
     """The model of mechanisms in order of composition, whether or not the recordings would tell their parameters.
 
-    With models of mechanisms `beside` it shares what is worked out beforehand.
+    All models of a skin are worked out from one and the same σ around its sensors.
 
     Raises InvalidInput for a kind of which there is no recording, and where a declared value is lacking.
     """
     _require_kind(conditions, kind)
     if kind == "frf":
-        return FrfModel(mechanisms, conditions, table, beside)
+        return FrfModel(mechanisms, conditions, table, tuple(CATALOGUE.values()))
     if kind == "indentation":
         return IndentationModel(mechanisms, conditions)
     return CompressionModel(mechanisms, conditions)
