@@ -5,7 +5,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -26,31 +26,27 @@ class WorkerProcess:
 
     process: "subprocess.Popen[bytes]"
     stderr: BinaryIO
+    _shared: ExitStack
 
     @classmethod
     def started(cls, table: Path) -> Self:
-        """A new one, which loads this table."""
-        stderr = tempfile.TemporaryFile()  # noqa: SIM115 (closed by `end`)
+        """A new one, which loads this table; raises OSError where the system has no room for a process."""
         environment = {key: os.environ[key] for key in _INHERITED if key in os.environ} | _ONE_THREAD
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))  # the packages of this process
-        process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "service.jobs.worker", str(table)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=stderr,
-            env=environment,
-        )
-        return cls(process, stderr)
+        with ExitStack() as shared:
+            stderr = shared.enter_context(tempfile.TemporaryFile())
+            command = [sys.executable, "-P", "-m", "service.jobs.worker", str(table)]
+            pipe = subprocess.PIPE
+            process = shared.enter_context(
+                subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=stderr, env=environment)
+            )
+            return cls(process, stderr, shared.pop_all())
 
     def end(self) -> None:
         """Kill it, whatever it does, and close what is shared with it."""
         self.process.kill()
-        self.process.wait()
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
-        for file in (self.process.stdin, self.process.stdout, self.stderr):
-            with suppress(OSError):  # what it had not read is lost with it
-                file.close()
+        with suppress(OSError):  # what it had not read is lost with it
+            self._shared.close()
 
 
 class WorkerProcesses:
@@ -89,8 +85,10 @@ class WorkerProcesses:
                 self._ready = None
 
     def _start(self) -> None:
+        """Without room for it now, the next job has to wait for its own process to load."""
         if self._ready is None:
-            self._ready = WorkerProcess.started(self._table)
+            with suppress(OSError):
+                self._ready = WorkerProcess.started(self._table)
 
 
 class Worker:

@@ -15,6 +15,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from underskin.surrogate.sigma_table import SigmaTable
 
 _NICENESS = 10
+_LOADED = "underskin.diagnosis.pipeline", "underskin.diagnosis.reporting.figures"  # ahead of the job
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,8 @@ def main() -> None:
 
     os.nice(_NICENESS)
     _be_called("underskin-ready")
-    from underskin.diagnosis.reporting import figures  # noqa: F401 (with all that a diagnosis needs)
+    for module in _LOADED:
+        import_module(module)
     from underskin.errors import UnderskinError
     from underskin.surrogate.sigma_table import load_table
 

@@ -36,40 +36,34 @@ Target = Callable[[Evaluated], Floats]  # costs (points,) that points must get b
 class Fitter(Evaluator):
     """Begins and improves points of hypotheses."""
 
-    def start(self, own: Floats, parents: FitPoint | None = None, hypothesis: int = 0) -> Points:
-        """Points of one hypothesis with these coordinates of its mechanisms (points, own), and the nuisances of a
+    def _start(self, own: Floats, parent: FitPoint | None) -> Points:
+        """Points of the one hypothesis with these coordinates of its mechanisms (points, own), and the nuisances of a
         parent or at their centre; noise as it is usual."""
-        entry = self.hypotheses[hypothesis]
-        count, mechanisms = self.counts[hypothesis], entry.own_parameters
-        fit = np.zeros((len(own), max(self.counts)))
-        nuisances = slice(mechanisms, count)
-        fit[:, nuisances] = [parameter.start for parameter in entry.model.parameters[nuisances]]
-        if parents is not None:
-            fit[:, nuisances] = parents.fit[len(parents.fit) - (count - mechanisms) :]
+        (entry,) = self.hypotheses
+        count, mechanisms = len(entry.model.parameters), entry.own_parameters
+        fit = np.zeros((len(own), count))
+        fit[:, mechanisms:] = [parameter.start for parameter in entry.model.parameters[mechanisms:]]
+        if parent is not None:
+            fit[:, mechanisms:] = parent.fit[len(parent.fit) - (count - mechanisms) :]
         fit[:, :mechanisms] = own
         common = [GAIN_PRIOR.middle, 0.0]
         if self.placed:
             common.append(POSITION_PRIOR.middle)
         if self.lines.curves:
             common.append(entry.smooth.middle)
-        covariance = np.concatenate([np.tile(common, (len(own), 1)), fit[:, self.own[hypothesis]]], axis=1)
-        owner = np.full(len(own), hypothesis, dtype=np.intp)
-        return Points(owner, fit, covariance, np.tile(self.no_bend, (len(own), 1)))
+        covariance = np.concatenate([np.tile(common, (len(own), 1)), fit[:, self.own[0]]], axis=1)
+        return Points(np.zeros(len(own), dtype=np.intp), fit, covariance, np.tile(self.no_bend, (len(own), 1)))
 
     def begin(self, own: Floats, parent: FitPoint | None = None, *, slopes: bool = False) -> Evaluated:
-        """The starts of these coordinates of one hypothesis, d33 as the data would have it, evaluated."""
-        points = self.start(own, parent)
+        """The starts of these coordinates of the one hypothesis, d33 as the data would have it, evaluated."""
+        points = self._start(own, parent)
         products = self.products(points, slopes=slopes, place=self.placed)
         if not any(entry.proportional for entry in self.hypotheses[0].model.parameters):
             return self.weighed(points, products)
         ratio = self._ratio(points, products)
         if isinstance(products, FrfProducts):
             return self.weighed(*self._scaled(points, products, ratio))
-        place = self._d33[0]
-        fit = points.fit.copy()
-        change = np.log(np.where(ratio > 0, ratio, 1.0))
-        fit[:, place] = np.clip(fit[:, place] + change, self.low[0, place], self.high[0, place])
-        return self.evaluate(replace(points, fit=fit), slopes=slopes)
+        return self.evaluate(self._times(points, ratio)[0], slopes=slopes)
 
     def _ratio(self, points: Points, products: Products) -> Floats:
         """What measured recordings are of the predicted ones (points,): their mean, weighed by noise and scatter."""
@@ -106,14 +100,19 @@ class Fitter(Evaluator):
         return at.points[at.cost.reshape(-1, sets).argmin(axis=1) + sets * np.arange(len(points))]
 
     def _scaled(self, points: Points, products: Products, ratio: Floats) -> tuple[Points, Products]:
-        """With d33 so many times as large (points,), within its bounds; as it is where the ratio is not above 0."""
+        """Points with d33 so many times as large (points,), and what they predict."""
+        assert isinstance(products, FrfProducts)
+        moved, factor = self._times(points, ratio)
+        return moved, products.scaled(factor)
+
+    def _times(self, points: Points, ratio: Floats) -> tuple[Points, Floats]:
+        """With d33 so many times as large (points,), within its bounds, and by how much; as it is where not above 0."""
         number, place = np.arange(len(points)), self._d33[points.owner]
         fit = points.fit.copy()
         change = np.log(np.where(ratio > 0, ratio, 1.0))
         low, high = self.low[points.owner, place], self.high[points.owner, place]
         fit[number, place] = np.clip(fit[number, place] + change, low, high)
-        assert isinstance(products, FrfProducts)
-        return replace(points, fit=fit), products.scaled(np.exp(fit[number, place] - points.fit[number, place]))
+        return replace(points, fit=fit), np.exp(fit[number, place] - points.fit[number, place])
 
     def _with_d33(self, at: Evaluated) -> Evaluated:
         """With the d33 that the data would have at these noise levels: no further prediction."""
@@ -146,8 +145,11 @@ class Fitter(Evaluator):
     def descend(self, best: Evaluated, settling: int, target: Target | None = None) -> Evaluated:
         """Steps of the mean parameters, each followed by so many of the covariance's.
 
-        A point goes no further once it promises no cost below its target.
+        A point goes no further once it promises no cost below its target. What the gradient promises leaves out what
+        the noise levels may gain: where these are a curve's, or a mechanism's own, no point is left.
         """
+        if self.lines.curves or self.own.size:
+            target = None
         damping = np.full(len(best), 1e-3)
         moving = np.arange(len(best))
         for _ in range(_MOST_ITERATIONS):

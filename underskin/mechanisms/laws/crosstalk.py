@@ -4,7 +4,7 @@ import numpy as np
 
 from underskin.autodiff import Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
-from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.models.frf_design import frf_design
 from underskin.recordings.conditions import Conditions
 from underskin.units import to_si
 
@@ -44,7 +44,7 @@ class Crosstalk(Mechanism):
         """A neighbour under stress is needed."""
         if len(conditions.skin.sensors) < 2:
             return "the skin has one sensor, and so no neighbours"
-        design = FrfDesign.of(conditions, (), neighbours=True)
+        design = frf_design(conditions, (), neighbours=True)
         nearest = np.hypot(design.point_x, design.point_y)[design.neighbour_point].min(initial=np.inf)
         if nearest > _LARGEST_DISTANCE * to_si("thickness_mm", conditions.skin.thickness_mm or 0.0):
             return "no recording presses within three thicknesses of a sensor's neighbour (position_mm)"

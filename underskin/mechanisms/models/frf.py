@@ -20,7 +20,7 @@ from underskin.mechanisms.base import Mechanism, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
 from underskin.mechanisms.models.contact_stage import layer_curves, press, stiffness
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.frf_design import FrfDesign, Indices, largest_offset
+from underskin.mechanisms.models.frf_design import FrfDesign, Indices, frf_design, largest_offset
 from underskin.mechanisms.models.nuisances import FRF_NUISANCES
 from underskin.mechanisms.models.off_centre_response import PROFILE_END, offset_sigma
 from underskin.mechanisms.models.pickup import Pickup, together
@@ -55,7 +55,7 @@ class FrfModel:
         self._mechanisms = self._composition.mechanisms
         fields = {field for mechanism in mechanisms for field in mechanism.needs_fields}
         neighbours = any(mechanism.needs_neighbours for mechanism in mechanisms)
-        self.design = design = FrfDesign.of(conditions, fields, neighbours=neighbours)
+        self.design = design = frf_design(conditions, fields, neighbours=neighbours)
         self.recording = design.recording
         self.sensor: Indices | None = design.sensor
         skin = conditions.skin
@@ -102,10 +102,7 @@ class FrfModel:
         if fit.ndim != 1:
             raise InvalidInput("fit", fit.shape, "must be one point: (parameters,)", code=ErrorCode.UNEQUAL_LENGTHS)
         response = self.respond(fit, place=True)
-        assert response.place_slopes is not None
-        level = response.level
-        whole = Differentiated(level.value, np.concatenate([level.slopes, response.place_slopes]))
-        value, slopes = _on_rows(whole, response.lines, self.design)
+        value, slopes = response.on_rows(self.design)
         count = len(self.parameters)
         own, _, _ = self._composition.values(fit)
         return Prediction(
@@ -280,21 +277,6 @@ def _on_one_layer(contacts: Contacts) -> bool:
     """Whether the contacts at several points of the fit coordinates all are on the same linear layer."""
     layers = [x.value for x in (contacts.poisson_ratio, contacts.slip) if x is not None]
     return all(bool((value == value.flat[0]).all()) for value in layers)
-
-
-def _on_rows(level: Differentiated, lines: Differentiated | None, design: FrfDesign) -> tuple[Array, Array]:
-    """Level times line factor on every row, and the slopes (variables, rows); the factor has those of the parameters,
-    which come first."""
-    recording: Indices = design.recording
-    if lines is None:
-        return level.value[recording].astype(complex), level.slopes[:, recording].astype(complex)
-    factor = lines.value[design.line]
-    on_rows = level.value[recording]
-    slopes = level.slopes[:, recording] * factor
-    for row, of_lines in zip(slopes, lines.slopes, strict=False):
-        if of_lines.any():
-            row += on_rows * of_lines[design.line]
-    return on_rows * factor, slopes
 
 
 def _by_name(own: dict[str, Values]) -> dict[str, Floats]:

@@ -48,12 +48,6 @@ class FrfDesign:
     @classmethod
     def of(cls, conditions: Conditions, fields: Collection[str], *, neighbours: bool) -> "FrfDesign":
         """The design; `fields` may name what else tells contacts apart: "dwell_s", "dynamic_force_n"."""
-        apart = frozenset(fields) & {"dwell_s", "dynamic_force_n"}
-        return _design(conditions, apart, neighbours)
-
-    @classmethod
-    def worked_out(cls, conditions: Conditions, fields: Collection[str], *, neighbours: bool) -> "FrfDesign":
-        """The same, anew."""
         recordings = frf_of(conditions)
         sensor_ids = tuple(sensor.id for sensor in conditions.skin.sensors)
         number = {name: index for index, name in enumerate(sensor_ids)}
@@ -104,9 +98,14 @@ class FrfDesign:
         )
 
 
+def frf_design(conditions: Conditions, fields: Collection[str], *, neighbours: bool) -> FrfDesign:
+    """`FrfDesign.of`, kept for the next model of the same conditions."""
+    return _kept(conditions, frozenset(fields) & {"dwell_s", "dynamic_force_n"}, neighbours)
+
+
 @lru_cache(maxsize=8)  # by the conditions' identity: a diagnosis composes dozens of models of one campaign
-def _design(conditions: Conditions, fields: frozenset[str], neighbours: bool) -> FrfDesign:
-    return FrfDesign.worked_out(conditions, fields, neighbours=neighbours)
+def _kept(conditions: Conditions, fields: frozenset[str], neighbours: bool) -> FrfDesign:
+    return FrfDesign.of(conditions, fields, neighbours=neighbours)
 
 
 def frequencies(entry: FrfConditions) -> Floats:

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.autodiff import Differentiated
-from underskin.units import Floats
+from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.units import Array, Floats
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,23 @@ class Response:
     place_slopes: Floats | None  # (2, …, recordings) [C/N/m]
     lines: Differentiated | None  # (…, distinct lines) complex: the dynamics' factor; None where there are none
     inside: NDArray[np.bool_]  # (…, recordings)
+
+    def on_rows(self, design: FrfDesign) -> tuple[Array, Array]:
+        """Level times line factor on every row of a single point (rows,), and its derivatives (variables, rows).
+
+        These are by the parameters, then by the place where those were asked for.
+        """
+        place = np.zeros((0, *self.level.value.shape)) if self.place_slopes is None else self.place_slopes
+        level = self.level.value[design.recording]
+        slopes = np.concatenate([self.level.slopes, place])[:, design.recording]
+        if self.lines is None:
+            return level.astype(complex), slopes.astype(complex)
+        factor = self.lines.value[design.line]
+        slopes = slopes * factor
+        for row, of_lines in zip(slopes, self.lines.slopes, strict=False):  # which are by the parameters alone
+            if of_lines.any():
+                row += level * of_lines[design.line]
+        return level * factor, slopes
 
     def part(self, index: int | slice) -> "Response":
         """At some of several points."""
