@@ -6,6 +6,16 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 
 def prove(
@@ -30,12 +40,14 @@ def prove(
             raise typer.BadParameter(f"{name!r}: must be one of {', '.join(PARTS)}", param_hint="PART")
     work = Work(work_dir, workers or os.cpu_count() or 1, count)
     written: list[Path] = []
-    for name in part or PARTS:
-        work_out(name, work, partial(_tell, name))
-        written = write_page(stored_parts(work), docs_dir)  # after each part, so that a stopped run leaves a page
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, TextColumn("left"), TimeRemainingColumn(), console=Console(stderr=True)) as bars:
+        for name in part or PARTS:
+            work_out(name, work, partial(_tell, bars, bars.add_task(name, total=None)))
+            written = write_page(stored_parts(work), docs_dir)  # after each part, so that a stopped run leaves a page
     for path in written:
         typer.echo(str(path))
 
 
-def _tell(part: str, text: str) -> None:
-    typer.echo(f"{part}: {text}", err=True)
+def _tell(bars: Progress, task: TaskID, done: int, total: int) -> None:
+    bars.update(task, completed=done, total=total)

@@ -16,7 +16,7 @@ from proof.stored import Work, reports
 from underskin.cli.diagnose import write_report
 
 
-def judge_open(work: Work, campaigns: Path, progress: Callable[[str], None]) -> dict[str, Any]:
+def judge_open(work: Work, campaigns: Path, progress: Callable[[int, int], None]) -> dict[str, Any]:
     """Every open campaign beside its truth."""
     truths = json.loads((campaigns / "open-truth.json").read_text(encoding="utf-8"))
     cases = _cases(campaigns / "open", work)
@@ -27,7 +27,7 @@ def judge_open(work: Work, campaigns: Path, progress: Callable[[str], None]) -> 
     return {"judged": [asdict(entry) for entry in judged]}
 
 
-def report_sealed(work: Work, campaigns: Path, folder: Path, progress: Callable[[str], None]) -> dict[str, Any]:
+def report_sealed(work: Work, campaigns: Path, folder: Path, progress: Callable[[int, int], None]) -> dict[str, Any]:
     """Write the report of each sealed campaign into the folder, under the campaign's file name."""
     cases = _cases(campaigns / "sealed", work)
     results = reports(work, cases, progress)

@@ -19,17 +19,17 @@ SEED = 77077
 MIXTURE, QUIET = 300, 500
 
 
-def judge_mixture(work: Work, progress: Callable[[str], None]) -> dict[str, Any]:
+def judge_mixture(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
     """The mixture's campaigns beside their truth."""
     return _judge(work, [DrawnCase(SEED, number) for number in range(work.count or MIXTURE)], progress)
 
 
-def judge_quiet(work: Work, progress: Callable[[str], None]) -> dict[str, Any]:
+def judge_quiet(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
     """Campaigns with nothing missing; what they need besides is drawn anew, so none is one of the mixture's."""
     return _judge(work, [DrawnCase(SEED + 1, number, "none") for number in range(work.count or QUIET)], progress)
 
 
-def _judge(work: Work, cases: list[DrawnCase], progress: Callable[[str], None]) -> dict[str, Any]:
+def _judge(work: Work, cases: list[DrawnCase], progress: Callable[[int, int], None]) -> dict[str, Any]:
     truths = of_each(work, cases, partial(truth, work, sources("rig")), progress)
     results = reports(work, cases, progress)
     return {

@@ -11,7 +11,7 @@ from proof.cases import DrawnCase, MadeCase
 from proof.stored import Work, of_each, reports, sources, stored
 from underskin.errors import InvalidInput
 
-Tell = Callable[[str], None]
+Tell = Callable[[int, int], None]
 Part = Callable[[Work, Tell], dict[str, Any]]
 _JUDGE = "proof/judge.py"
 SEALED = Path(__file__).parent / "sealed"

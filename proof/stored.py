@@ -63,23 +63,24 @@ def stored(folder: Path, key: str, make: Callable[[], dict[str, Any]]) -> dict[s
 
 
 def of_each(
-    work: Work, items: Sequence[Item], make: Callable[[Item], dict[str, Any]], progress: Callable[[str], None]
+    work: Work, items: Sequence[Item], make: Callable[[Item], dict[str, Any]], progress: Callable[[int, int], None]
 ) -> list[dict[str, Any]]:
-    """`make` of each item, in order, on all of the work's processes; `progress` is called with the count."""
+    """`make` of each item, in order, on all of the work's processes; `progress` is told how many are done, of
+    how many."""
     if work.workers == 1 or len(items) < 2:
         results = []
         for number, item in enumerate(items, 1):
             results.append(make(item))
-            progress(f"{number} of {len(items)}")
+            progress(number, len(items))
         return results
     with processes(min(work.workers, len(items))) as pool:
         pending: list[Future[dict[str, Any]]] = [pool.submit(make, item) for item in items]
         for number, _ in enumerate(as_completed(pending), 1):
-            progress(f"{number} of {len(items)}")
+            progress(number, len(items))
         return [future.result() for future in pending]
 
 
-def reports(work: Work, cases: Sequence[Case], progress: Callable[[str], None]) -> list[dict[str, Any]]:
+def reports(work: Work, cases: Sequence[Case], progress: Callable[[int, int], None]) -> list[dict[str, Any]]:
     """The report (`report/1`) of each case."""
     from underskin.surrogate.sigma_table import load_table
 
