@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.diagnosis.rig_pads import pressed
-from underskin.diagnosis.data.snap_in import jumps
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import parse
+from underskin.recordings.curve_course import jumps
 from underskin.surrogate.sigma_table import load_table
 
 

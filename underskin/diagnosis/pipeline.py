@@ -15,7 +15,7 @@ from underskin.diagnosis.inference.residuals import residuals, whole_prediction
 from underskin.diagnosis.localisation.effect_size import effect
 from underskin.diagnosis.localisation.permutation_test import SEED, locate
 from underskin.diagnosis.localisation.region import in_region, region
-from underskin.diagnosis.localisation.residual_shape import above_noise, contradicts, describe, largest_floor_percent
+from underskin.diagnosis.localisation.residual_shape import above_noise, describe, doubt, largest_floor_percent
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
@@ -38,6 +38,7 @@ from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
 
 _CURVES: tuple[Kind, ...] = ("indentation", "compression")
+_FAR_ABOVE = 3.0  # times the noise floor, beyond which an error of indentations held out contradicts an explanation
 _LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
 
 Progress = Callable[[float], None]
@@ -118,8 +119,12 @@ def _work_out(
     ranked = [answer.explanation for answer in result.answers if answer.explanation is not None]
     groups = cross_validation.hold_out(problem, ranked, nothing, result.supported)
     progress(0.95)
-    if contradicts(problem, nothing):
-        result = replace(result, null_contradicted=True)
+    doubtful = {entry.names: doubt(problem, entry) for entry in (nothing, *ranked[:1])}
+    after = cross_validation.total(groups)[1]
+    if problem.kind == "indentation" and after.recordings and after.rmse_percent > _FAR_ABOVE * after.floor_percent:
+        doubtful |= {entry.names: 1.0 for entry in ranked[:1] if entry.names}
+    if any(doubtful.values()):
+        result = replace(result, doubtful=doubtful)
         leader = result.answers[0]
         shown = result.shown_or_nothing(leader)
     floor = largest_floor_percent(problem, nothing, groups)

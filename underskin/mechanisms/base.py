@@ -6,7 +6,7 @@ which it acts. It keeps no state. Values inside hooks are SI, parameters are in 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -95,6 +95,9 @@ class Parameter:
     of a logarithm), None where no finite or infinite value does that. `shown` is the value at which the mechanism's
     figure has it, None for a typical strength. The response is `proportional` to a parameter such as d33. A parameter
     that does not act on the mean is positive and has the scale `log`.
+
+    A parameter `relative_to` another one of its mechanism is fitted as a multiple of it: `low`, `high`, `limit` and
+    the prior are of the multiple, while laws and reports have the product, in `unit`.
     """
 
     name: str
@@ -108,6 +111,7 @@ class Parameter:
     acts_on: ActsOn = "mean"
     shown: float | None = None
     proportional: bool = False
+    relative_to: str | None = None
 
     @property
     def moves_covariance(self) -> bool:
@@ -225,6 +229,7 @@ class Mechanism:
     largest_offset: ClassVar[float] = 0.0
     largest_stretch: ClassVar[float] = 1.0
     moves_predictions: ClassVar[bool] = True  # False: it acts on the covariance alone
+    moves_contact_points: ClassVar[bool] = False  # of indentations: contact begins elsewhere than the base model has it
     needs_history: ClassVar[bool] = False  # a curve without its beginning cannot be predicted
     imitated_by_seating: ClassVar[bool] = False  # a platen that seats bends the beginning of a compression alike
     # Axes of its figure, keys of PANELS in docs/mechanisms/signatures.py; empty: the first two of `axes` with a panel.
@@ -244,6 +249,10 @@ class Mechanism:
     ) -> tuple[Parameter, ...]:
         """Its parameters in a model that these other mechanisms are in too, which may show more of it."""
         return self.parameters(conditions, kind)
+
+    def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
+        """Values of its parameters, in their order and units, that measured recordings suggest: where fits begin."""
+        return ()
 
     def values_on(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
         """Values of its parameters found on one campaign, as those that it has on another.

@@ -39,7 +39,7 @@ HOOKS = {  # by the stage that calls them
 }
 T = TypeVar("T")
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
-_NUISANCES = (*(entry.name for entry in FRF_NUISANCES), "contact_point", "force_offset")
+_NUISANCES = (*(entry.name for entry in FRF_NUISANCES), "contact_point")
 
 
 def check(mechanism: Mechanism, others: Sequence[Mechanism] = ()) -> None:

@@ -161,6 +161,11 @@ class ContactCurves:
         value, *slopes = self._evaluated(self.interval.basis(alpha))[:, _STIFFNESS[0][2]]
         return Differentiated(value, np.stack(slopes))
 
+    def ratios_at(self, alpha: Floats) -> Floats:
+        """A, B, S and V at a/h (rows,) from 0 to LARGEST_A_OVER_H: (rows, 4)."""
+        ratios = self._evaluated(self.interval.basis(alpha))[0]
+        return np.stack([ratios[0], ratios[2], ratios[4], ratios[3]], axis=-1)
+
     def _newton(self, target: Floats, root_adhesion: Floats, start: Floats) -> Floats:
         """α; the law of load is convex: from the stable side the steps end at its root, or cross its minimum."""
         alpha = np.clip(start, _SMALLEST, LARGEST_A_OVER_H)

@@ -64,7 +64,7 @@ def predict(
     parameters
         Values by name, in the parameter's unit: those of every mechanism, and of the base model `d33` [pC/N] (default
         the declared one), `youngs_modulus` and `thickness` (factors on the declared ones, default 1), and of curves
-        `contact_point <id>` [mm] and `force_offset <id>` [N].
+        `contact_point <id>` [mm].
     mechanisms
         Names from the catalogue, in any order.
     kind
@@ -134,8 +134,14 @@ def _fit_coordinates(model: Model, values: Mapping[str, float], own: int) -> NDA
     for name in values:
         if name not in names:
             raise not_one_of("parameters", name, names)
-    needed = {*names[:own], "d33"}
-    return np.array([_coordinate(entry, values.get(entry.name), entry.name in needed) for entry in model.parameters])
+    needed = {*(entry.name for entry in model.parameters[:own] if entry.relative_to is None), "d33"}
+    return np.array([_coordinate(entry, _fitted(entry, values), entry.name in needed) for entry in model.parameters])
+
+
+def _fitted(entry: Parameter, values: Mapping[str, float]) -> float | None:
+    """The given value, as a multiple where the parameter is one of another."""
+    value = values.get(entry.name)
+    return value if value is None or entry.relative_to is None else value / values[entry.relative_to]
 
 
 def _coordinate(entry: Parameter, value: float | None, needed: bool) -> float:

@@ -90,7 +90,11 @@ class FrfConditions:
 
 @dataclass(frozen=True, eq=False)
 class IndentationConditions:
-    """A sphere pressed in and drawn back by `displacement_mm`, loading and unloading in order."""
+    """A sphere pressed in and drawn back by `displacement_mm`, loading and unloading in order.
+
+    `displacement_mm` is the sphere's own; `stage_stiffness_n_per_mm` is that of a stage or cantilever whose deflection
+    has been subtracted, which decides where a contact that sticks comes off.
+    """
 
     id: field.Name
     indenter_radius_mm: field.Declared
@@ -103,6 +107,7 @@ class IndentationConditions:
     load_cycles: field.Count | None = None
     dwell_s: field.NotNegative | None = None
     position_mm: field.Position | None = None
+    stage_stiffness_n_per_mm: field.Positive | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,6 +238,11 @@ def frf_of(conditions: Conditions) -> list[FrfConditions]:
     if not recordings:
         raise too_few("recordings", "none of kind frf", "must hold at least one")
     return recordings
+
+
+def curves_of(conditions: Conditions) -> list[CurveConditions]:
+    """Those of indentations and compressions, in order."""
+    return [entry for entry in conditions.recordings if isinstance(entry, CurveConditions)]
 
 
 def offsets(conditions: Conditions) -> Floats:

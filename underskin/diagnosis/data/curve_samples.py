@@ -1,30 +1,38 @@
 """Indentation and compression curves as the diagnosis uses them: samples of force in place of lines of an FRF.
 
-A curve is thinned to means over blocks of neighbouring samples that lie evenly along it; near a jump every sample
-stays. The deviation of a sample is its noise, read from second differences of the raw samples, and an instrument's
-usual accuracy: 0.2 % of the reading and 0.1 % of the full scale. How accurate it really is, the level of the noise
-says, which every hypothesis fits under the same prior. What neighbouring samples share is in smooth_error.
+A curve is thinned to means over blocks of neighbouring samples that lie evenly along it, and ever shorter towards its
+jumps. The deviation of a mean is the samples' noise, read from second differences, of the force and, times the slope,
+of the displacement. How large it really is, the level of the noise says, which every hypothesis fits under the same
+prior. What a cell adds, and what neighbouring samples share, is in correlated_error.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.data.snap_in import around_jumps
-from underskin.diagnosis.noise.correlated_error import SmoothError
+from underskin.diagnosis.noise.correlated_error import CurveError, instrument_columns
 from underskin.diagnosis.noise.line_noise import LineNoise
 from underskin.mechanisms.base import Kind
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.curve_course import Course, course, roughness
 from underskin.units import Floats
 
-_SAMPLES = 60
-_READING, _FULL_SCALE = 2e-3, 1e-3
+_SAMPLES, _MOST_SAMPLES = 50, 160  # of a curve, before and after blocks are split
+_STRAIGHT = 3.0  # standard deviations of χ² about a straight line beyond which a block is split
+_LEAST_NOISE = 2e-5  # of the range of force: what numbers written with five digits are good to
+_READING, _FULL_SCALE = 2e-3, 1e-3  # of a testing machine, whose samples in the air are none
 _LEVEL_SD = 0.25  # of the logarithm of the noise's level
 _LEAST_SAMPLES = 5
 _COARSE, _BEYOND_NOISE = 240, 4.0  # samples at which changes of force are summed, standard deviations of noise
 _PLACE = (1.0, 10.0)  # the abscissa: displacement over a curve's range, on this scale
+_NEAR_JUMP = np.array([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])  # samples from it at which blocks begin
+_BESIDE = 5  # samples on either side of the deepest one
+_STEP, _RESTS = 0.2, 1e-3  # of the usual step: the smaller way's, and that between samples at which a sphere rests
+_IN_THE_AIR, _AT_CONTACT = 0.2, 0.7  # of the largest force, what the smooth error counts where there is less
+_FEW_FOR_ZERO = 0.01  # of the largest force: how well a cell's zero is known that no sample shows
 
 CurveRecording = IndentationRecording | CompressionRecording
 
@@ -32,7 +40,7 @@ CurveRecording = IndentationRecording | CompressionRecording
 def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
     """The thinned curves of one kind; curves with fewer than five finite samples are left out."""
     entries: list[CurveRecording] = []
-    forces, deviations, places, scales, ways = [], [], [], [], []
+    forces, deviations, places, errors = [], [], [], []
     for entry in campaign.recordings:
         if not isinstance(entry, IndentationRecording | CompressionRecording) or entry.kind != kind:
             continue
@@ -41,22 +49,19 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         if finite.sum() < _LEAST_SAMPLES:
             continue
         columns = [column[finite] for column in columns]
-        noise = _roughness(columns[1])
-        way = _way(columns[0], columns[1], noise)
-        even = np.searchsorted(way, np.linspace(0.0, 1.0, _SAMPLES, endpoint=False))
-        block = int(np.ceil(len(way) / _SAMPLES))
-        largest = float(np.abs(columns[1]).max())
-        starts = np.union1d(even, around_jumps(columns[1], float(np.hypot(noise, _FULL_SCALE * largest)), block))
-        counts = np.diff(np.append(starts, len(way)))
-        *thinned, place = [np.add.reduceat(column, starts) / counts for column in (*columns, way)]
+        seen = course(columns[0], columns[1])
+        force_zero = seen.zero if kind == "indentation" else 0.0
+        columns[1] = columns[1] - force_zero
+        thinned, deviation, way, counts = _thinned(_with_corner(columns, seen.turn), seen)
         displacement, force = thinned[:2]
-        entries.append(
-            replace(entry, displacement_mm=displacement, force_n=force, time_s=thinned[2] if len(thinned) > 2 else None)
-        )
+        if kind == "compression":
+            largest = float(np.abs(force).max())
+            deviation = np.sqrt(deviation**2 + (_READING * force) ** 2 + (_FULL_SCALE * largest) ** 2)
+        time = thinned[2] if len(thinned) > 2 else None
+        entries.append(replace(entry, displacement_mm=displacement, force_n=force, time_s=time))
         forces.append(force)
-        deviations.append(np.sqrt(noise**2 / counts + (_READING * force) ** 2 + (_FULL_SCALE * largest) ** 2))
-        scales.append(np.full(len(force), largest))
-        ways.append(place)
+        deviations.append(deviation)
+        errors.append(_error(kind, seen, displacement, force, time, way, counts))
         span = float(np.ptp(displacement)) or 1.0
         places.append(_PLACE[0] + (_PLACE[1] - _PLACE[0]) * (displacement - displacement.min()) / span)
     value = _joined(forces)
@@ -70,8 +75,144 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         sensor=np.zeros(len(forces), dtype=np.intp),
         noise=LineNoise(deviation, _LEVEL_SD, 0.0),
         scatter=(0.0, -len(value)),  # a force has no imaginary part
-        smooth=SmoothError(_joined(scales), _joined(ways)),
+        smooth=CurveError.joined(errors),
     )
+
+
+def _with_corner(columns: Sequence[Floats], turn: int) -> list[Floats]:
+    """With the deepest sample where the way in and the way back meet, which was between two samples.
+
+    How far the contact has grown is remembered on all of the way back. By straight lines through the samples on either
+    side; as it is where the sphere was held.
+    """
+    whole = [column.copy() for column in columns]
+    displacement = columns[0]
+    before, after = np.arange(turn - _BESIDE, turn), np.arange(turn + 1, turn + 1 + _BESIDE)
+    if before[0] < 0 or after[-1] >= len(displacement):
+        return whole
+    lines = [[np.polyfit(side - turn, column[side], 1) for side in (before, after)] for column in columns]
+    (rise, high), (fall, low) = lines[0]
+    steep = min(rise, -fall) > _STEP * max(rise, -fall)
+    rests = displacement[turn] - max(displacement[turn - 1], displacement[turn + 1]) < _RESTS * max(rise, -fall)
+    if not steep or rests:
+        return whole
+    place = (low - high) / (rise - fall)
+    peak = high + rise * place
+    if abs(place) > 1 or not 0 <= peak - displacement[turn] <= max(rise, -fall):
+        return whole
+    for column, ((up, at_up), (down, at_down)) in zip(whole, lines, strict=True):
+        column[turn] = 0.5 * (at_up + up * place + at_down + down * place)
+    return whole
+
+
+def _thinned(columns: Sequence[Floats], seen: Course) -> tuple[list[Floats], Floats, Floats, Floats]:
+    """The means of the columns over blocks, the deviation of the force's, how far along the curve each lies, and the
+    samples in each."""
+    displacement, force = columns[:2]
+    way = _way(displacement, force, seen.noise)
+    even = np.searchsorted(way, np.linspace(0.0, 1.0, _SAMPLES, endpoint=False))
+    steepness = float(np.ptp(force)) / max(float(displacement.max() - np.median(displacement)), 1e-300)
+    unseen = seen.noise / steepness if steepness else float(np.ptp(displacement))  # travel that noise of force hides
+    straight = ((force, seen.noise), (displacement, max(roughness(displacement), unseen)))
+    starts = _split(np.union1d(even, _around(seen, len(force))), straight)
+    counts = np.diff(np.append(starts, len(way)))
+    *thinned, place = [np.add.reduceat(column, starts) / counts for column in (*columns, way)]
+    unsure = np.zeros(len(starts))
+    for number in range(len(columns)):
+        sag, doubt = _sag(columns[number], starts, _corners(seen))
+        thinned[number] = thinned[number] - sag
+        unsure = doubt if number == 1 else unsure
+    slope = np.gradient(thinned[1], place) / (np.gradient(thinned[0], place) + 1e-300) if len(starts) > 2 else 0.0
+    steep = np.where(np.isfinite(slope), slope, 0.0) * roughness(displacement)
+    steep = np.clip(np.abs(steep), 0.0, 3 * seen.noise + 1e-2 * float(np.ptp(force)))
+    least = _LEAST_NOISE * float(np.ptp(force))
+    deviation = np.sqrt((seen.noise**2 + steep**2) / counts + least**2 + unsure**2)
+    return thinned, deviation, place, counts.astype(float)
+
+
+def _corners(seen: Course) -> NDArray[np.intp]:
+    """The first samples of what is not smoothly joined to what was before."""
+    places = (seen.snap_in, seen.pull_off, seen.turn, seen.leave)
+    return np.unique(np.array([place for place in places if place is not None], dtype=np.intp))
+
+
+def _sag(column: Floats, starts: NDArray[np.intp], corners: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """How far the mean over each block lies beside the column's value in the block's middle, and how surely.
+
+    By the parabola through the means of the block and of those beside it, bent no more than those of its neighbours:
+    beside a kink one is bent that the curve is not, and what it would add is doubtful. 0 where a corner lies among
+    them.
+    """
+    ends = np.append(starts[1:], len(column))
+    counts = ends - starts
+    middle, mean = (starts + ends - 1) / 2, np.add.reduceat(column, starts) / counts
+    sag, doubt = np.zeros(len(starts)), np.zeros(len(starts))
+    if len(starts) < 3:
+        return sag, doubt
+    first, second = np.diff(middle[:-1]), np.diff(middle[1:])
+    bend = 2 * (np.diff(mean[1:]) / second - np.diff(mean[:-1]) / first) / (first + second)
+    beside = np.stack([np.append(bend[1:], bend[-1]), bend, np.append(bend[0], bend[:-1])])
+    alike = (np.sign(beside) == np.sign(bend)).all(axis=0)
+    limited = np.where(alike, np.sign(bend) * np.abs(beside).min(axis=0), 0.0)
+    smooth = ~((corners[:, None] > starts[:-2]) & (corners[:, None] < ends[2:])).any(axis=0)
+    unit = np.where(smooth, (counts[1:-1] ** 2 - 1) / 24, 0.0)
+    sag[1:-1] = limited * unit
+    doubt[1:-1] = np.abs(bend - limited) * unit
+    return sag, doubt
+
+
+def _split(starts: NDArray[np.intp], columns: Sequence[tuple[Floats, float]]) -> NDArray[np.intp]:
+    """Blocks halved until each column is straight within its noise: a mean over a bend lies beside the curve.
+
+    The most bent ones first, as long as there are not too many.
+    """
+    while len(starts) < _MOST_SAMPLES:
+        ends = np.append(starts[1:], len(columns[0][0]))
+        blocks = list(zip(starts, ends, strict=True))
+        excess = np.array([max(_bend(one[low:high], noise) for one, noise in columns) for low, high in blocks])
+        worst = np.argsort(-excess)[: max(_MOST_SAMPLES - len(starts), 0)]
+        worst = worst[excess[worst] > _STRAIGHT]
+        if not len(worst):
+            break
+        starts = np.union1d(starts, (starts[worst] + ends[worst]) // 2)
+    return starts
+
+
+def _bend(force: Floats, noise: float) -> float:
+    """How far χ² about a straight line lies above its expectation, in its standard deviations."""
+    freedom = len(force) - 2
+    if freedom < 1:
+        return 0.0
+    place = np.arange(len(force)) - (len(force) - 1) / 2
+    left = force - force.mean() - place * (place @ force) / (place @ place)
+    least = max(noise, _LEAST_NOISE * float(np.abs(force).max()))
+    if not least**2 > 0:
+        return 0.0
+    return float((left @ left) / least**2 - freedom) / np.sqrt(2.0 * freedom)
+
+
+def _around(seen: Course, count: int) -> NDArray[np.intp]:
+    """The samples with which blocks begin near the jumps, where a force falls steeply, and where the way turns: how
+    far a contact has grown is told by single samples."""
+    near = (_corners(seen)[:, None] + np.concatenate([-_NEAR_JUMP[:0:-1], _NEAR_JUMP])).ravel()
+    return np.unique(near[(near >= 0) & (near < count)])
+
+
+def _error(
+    kind: Kind, seen: Course, displacement: Floats, force: Floats, time: Floats | None, way: Floats, counts: Floats
+) -> CurveError:
+    """What the samples of one curve share."""
+    largest = float(np.abs(force).max()) or 1.0
+    noise = np.full(len(force), seen.noise)
+    if kind == "compression":
+        return CurveError(np.full(len(force), largest), way, np.zeros((len(force), 0)), counts, noise)
+    in_air = np.abs(force) < 4 * seen.noise + 1e-3 * largest
+    if seen.pull_off is None and seen.snap_in is None:
+        in_air &= displacement < displacement[np.argmax(displacement)]
+    scale = np.maximum(np.abs(force), np.where(in_air, _IN_THE_AIR, _AT_CONTACT) * largest)
+    zero = largest if seen.has_air else _FEW_FOR_ZERO * largest
+    columns = instrument_columns(displacement, time, zero, largest, drifts=seen.has_air)
+    return CurveError(scale, way, columns, counts, noise)
 
 
 def _joined(columns: Sequence[Floats]) -> Floats:
@@ -89,9 +230,3 @@ def _way(displacement: Floats, force: Floats, noise: float) -> Floats:
     moved = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(displacement)))])
     parts = [part / part[-1] for part in (moved, changed, np.arange(len(force), dtype=float)) if part[-1] > 0]
     return np.asarray(sum(parts) / len(parts))
-
-
-def _roughness(force: Floats) -> float:
-    """The noise of a raw sample; second differences of a smooth curve are small against it, or cautious."""
-    second = force[2:] - 2 * force[1:-1] + force[:-2]
-    return 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0)

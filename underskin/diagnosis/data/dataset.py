@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.diagnosis.noise.correlated_error import SmoothError, Whitening
+from underskin.diagnosis.noise.correlated_error import CurveError, Whitening
 from underskin.diagnosis.noise.line_noise import LineNoise, line_noise
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.models.composition import kind_of
@@ -41,7 +41,7 @@ class Lines:
     sensor: NDArray[np.intp]  # (recordings,)
     noise: LineNoise
     scatter: tuple[float, int] = (0.0, 0)
-    smooth: SmoothError | None = None  # of curves
+    smooth: CurveError | None = None  # of curves
 
     @property
     def recordings(self) -> int:

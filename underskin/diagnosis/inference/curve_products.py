@@ -21,6 +21,7 @@ class CurveLines:
         self.whitening = lines.whitening
         self.first = lines.first
         self.measured = self.whitening.turned(lines.value.real)
+        self.columns = self.whitening.columns
 
     def sums(self, products: Floats) -> Floats:
         """Over the samples of each recording (…, samples) to (…, recordings)."""
@@ -63,18 +64,57 @@ class CurveProducts:
 
     def summed(self, levels: SeveralLevels) -> Sums:
         """The sums at noise levels (points, sets, 1), as (points, sets, recordings)."""
-        ratio = levels.smooth / levels.level
-        weight = self.lines.whitening.weight(ratio)
-        force, measured = self.force[:, None], self.lines.measured
-        uu, uy, yy = (self.lines.sums(weight * product) for product in (force**2, force * measured, measured**2))
-        return Sums(uu, uy, yy, self.lines.whitening.log_determinant(ratio))
+        taken = _Taken(self.lines, levels)
+        force, measured = self.force[:, None], np.broadcast_to(self.lines.measured, (1, 1, self.force.shape[-1]))
+        by_force, by_measured = taken.along(force), taken.along(measured)
+        uu = taken.products(force, force, by_force, by_force)
+        uy = taken.products(force, measured, by_force, by_measured)
+        yy = taken.products(measured, measured, by_measured, by_measured)
+        return Sums(uu, uy, yy, taken.log_determinant)
 
     def slope_sums(self, levels: SeveralLevels) -> SlopeSums:
         """The sums with derivatives, at the first of the sets of noise levels."""
-        slopes, sums = self.force_slopes, self.lines.sums
+        slopes = self.force_slopes
         assert slopes is not None
-        weighed = self.lines.whitening.weight((levels.smooth / levels.level)[:, :1]) * slopes
-        uv, vy = sums(weighed * self.force[:, None]), sums(weighed * self.lines.measured)
+        taken = _Taken(self.lines, levels.at_first)
+        force, measured = self.force[:, None], np.broadcast_to(self.lines.measured, (1, 1, self.force.shape[-1]))
+        by_slopes = taken.along(slopes)  # (points, parameters, recordings, columns)
+        uv = taken.products(slopes, force, by_slopes, taken.along(force))
+        vy = taken.products(slopes, measured, by_slopes, taken.along(measured))
         edges = [*self.lines.first, self.force.shape[-1]]
+        weighed = taken.weight * slopes
         vv = [weighed[..., low:high] @ slopes[..., low:high].transpose(0, 2, 1) for low, high in pairwise(edges)]
-        return SlopeSums(np.moveaxis(uv, 1, -1), np.moveaxis(vy, 1, -1), np.stack(vv, axis=1))
+        columns = np.moveaxis(by_slopes, 1, 2)  # (points, recordings, parameters, columns)
+        less = columns @ taken.inverse[:, 0] @ columns.swapaxes(-1, -2)
+        return SlopeSums(np.moveaxis(uv, 1, -1), np.moveaxis(vy, 1, -1), np.stack(vv, axis=1) - less)
+
+
+class _Taken:
+    """Products under the covariance κ² D + η² B + P Pᵀ, by Woodbury's identity; what P takes out of them."""
+
+    def __init__(self, lines: CurveLines, levels: SeveralLevels) -> None:
+        """At noise levels (points, sets, 1)."""
+        ratio = levels.smooth / levels.level
+        self._lines = lines
+        self.weight = lines.whitening.weight(ratio)  # (points, sets, rows)
+        count = len(lines.columns)
+        one, other = np.triu_indices(count)
+        square = lines.sums(self.weight[..., None, :] * (lines.columns[one] * lines.columns[other]))
+        matrix = np.empty((*square.shape[:-2], square.shape[-1], count, count))
+        matrix[..., one, other] = matrix[..., other, one] = np.moveaxis(square, -2, -1)
+        level = levels.level[..., None, None] ** 2
+        whole = matrix + level * np.eye(count)
+        self.inverse = np.linalg.inv(whole)  # (points, sets, recordings, columns, columns)
+        _, log = np.linalg.slogdet(whole / level)
+        self.log_determinant = lines.whitening.log_determinant(ratio) + log.sum(axis=-1, keepdims=True)
+
+    def along(self, rows: Floats) -> Floats:
+        """Pᵀ times turned rows (points, sets, rows): (points, sets, recordings, columns)."""
+        weighed = (self.weight * rows)[..., None, :] * self._lines.columns
+        return np.moveaxis(self._lines.sums(weighed), -2, -1)
+
+    def products(self, rows: Floats, others: Floats, by_rows: Floats, by_others: Floats) -> Floats:
+        """Of turned rows (points, sets, rows) of each recording."""
+        whole = self._lines.sums(self.weight * rows * others)
+        less = ((by_rows[..., None, :] @ self.inverse)[..., 0, :] * by_others).sum(axis=-1)
+        return np.asarray(whole - less)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 
 from underskin.diagnosis.data.dataset import Lines
+from underskin.diagnosis.inference.curve_starts import softer, with_contact_points
 from underskin.diagnosis.inference.evidence import Evidence, around
 from underskin.diagnosis.inference.evidence import integrated as over_all_values
 from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis
@@ -22,7 +23,7 @@ from underskin.diagnosis.inference.objective import Points
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.inference.position_curvature import curvature
 from underskin.errors import InvalidInput
-from underskin.mechanisms.base import Unsupported
+from underskin.mechanisms.base import Parameter, Unsupported
 from underskin.mechanisms.models.composed import Model, compose
 from underskin.mechanisms.models.composition import parameters_together
 from underskin.mechanisms.registry import CATALOGUE
@@ -32,6 +33,8 @@ from underskin.units import Floats
 
 _QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7, 0.9), 3: (0.2, 0.5, 0.8)}
 _KEPT_STARTS = 3
+_KEPT_OF_PARENT = 1  # of curves, from an explanation with one mechanism less
+_PLACED_STARTS = 4  # of curves, whose contact points are looked for
 _DECIDED = 0.999  # probability beyond which a parent's positioning scatter, or none, is its offspring's
 _COUNTS = 8.0  # nats behind the other fit within which one counts
 _LEAST_GAIN = 1.0  # in log posterior density
@@ -80,6 +83,7 @@ class Request:
 
     names: tuple[str, ...]
     parent: Explanation | None = None
+    begin: FitPoint | None = None  # where nuisances begin, if not where the parent has them
 
     @property
     def without_scatter(self) -> bool:
@@ -268,10 +272,55 @@ def _starts(fitter: Fitter, request: Request) -> Points:
         if name not in new:
             own[:, places[name]] = values
     own[:, free] = grid
-    tried = fitter.settle(fitter.begin(own, parent.point if parent else None), 1)
-    cost = tried.cost.reshape([len(axis) for axis in axes] or [1])
-    lowest = np.flatnonzero(_are_lowest(cost))
-    return tried.points[np.sort(lowest[np.argsort(tried.cost[lowest], kind="stable")][:_KEPT_STARTS])]
+    guessed = _guesses(new, hypothesis)
+    if guessed:
+        more = np.repeat(own[:1], len(guessed), axis=0)
+        more[:, free] = guessed
+        own = np.concatenate([own, more])
+    begin = parent.point if parent and request.begin is None else request.begin
+    tried = fitter.settle(fitter.begin(own, begin), 1)
+    cost = tried.cost[: len(grid)].reshape([len(axis) for axis in axes] or [1])
+    lowest = tried[np.append(np.flatnonzero(_are_lowest(cost)), np.arange(len(grid), len(own)))]
+    if hypothesis.lines.curves:
+        return _of_curves(fitter, lowest, len(guessed), request, new)
+    return lowest.points[np.sort(_cheapest(lowest)[:_KEPT_STARTS])]
+
+
+def _of_curves(fitter: Fitter, lowest: Evaluated, guessed: int, request: Request, new: Sequence[str]) -> Points:
+    """The best starts of curves, contact points looked for where nothing tells them; the last so many are guesses."""
+    count = len(lowest) - guessed
+    ranked = _cheapest(lowest[:count])[:_PLACED_STARTS]
+    several = lowest[np.append(np.sort(ranked), np.arange(count, len(lowest)))]
+    sticks = any(CATALOGUE[name].moves_contact_points for name in new) and len(request.names) == 1
+    known = request.parent is not None or request.begin is not None
+    if fitter.lines.kind == "indentation" and (sticks or not known):
+        several = with_contact_points(fitter, softer(fitter, several) if sticks else several)
+    kept = _KEPT_STARTS if request.parent is None else _KEPT_OF_PARENT
+    return several.points[np.sort(_cheapest(several)[:kept])]
+
+
+def _cheapest(at: Evaluated) -> NDArray[np.intp]:
+    """The points in the order of their costs."""
+    return np.argsort(at.cost, kind="stable")
+
+
+def _guesses(names: Sequence[str], hypothesis: Hypothesis) -> list[list[float]]:
+    """Fit coordinates of these mechanisms' parameters as the recordings suggest them; none where one has no guess."""
+    conditions, kind = hypothesis.lines.campaign, hypothesis.lines.kind
+    each = []
+    for name in names:
+        entries = CATALOGUE[name].parameters(conditions, kind)
+        values = [
+            dict(zip([one.name for one in entries], guess, strict=True))
+            for guess in CATALOGUE[name].guesses(conditions, kind)
+        ]
+        each.append([[_coordinate(one, guess) for one in entries] for guess in values])
+    return [list(itertools.chain(*combined)) for combined in itertools.product(*each)] if names else []
+
+
+def _coordinate(entry: Parameter, values: Mapping[str, float]) -> float:
+    unit = 1.0 if entry.relative_to is None else values[entry.relative_to]
+    return float(np.clip(entry.to_fit(values[entry.name] / unit), *entry.bounds))
 
 
 def _are_lowest(cost: Floats) -> NDArray[np.bool_]:

@@ -16,12 +16,13 @@ from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR, P
 from underskin.mechanisms.base import Normal, Parameter
 from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.models.composition import parameters_together
+from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Floats
 
 _LEVELS = (0.1, 100.0)  # bounds of the lines' level
-_CURVE_LEVELS = (0.5, 3.0)  # no cell is more accurate, however smooth; rougher than its neighbours differ is no noise
+_CURVE_LEVELS = (0.3, 5.0)  # no cell is more accurate, however smooth; rougher than its neighbours differ is no noise
 _NUMBERS_AT_ONCE = 4_000_000
 
 
@@ -92,11 +93,10 @@ class Hypothesis:
         """The inner products of the model at points (points, parameters); with derivatives by the parameters, and by
         the contact's place, on request."""
         model = self.model
-        if not isinstance(model, FrfModel):
-            answers = [model.predict(one) for one in fit]
-            force = np.array([answer.value for answer in answers])
-            by_force = np.array([answer.slopes for answer in answers]) if slopes else None
+        if isinstance(model, CurveModel):
+            force, by_force = model.forces_and_slopes(fit) if slopes else (model.forces(fit), None)
             return CurveProducts.of(self._curve_lines, force, by_force)
+        assert isinstance(model, FrfModel)
         lines = frf_lines(self.lines, model.design)
         pickup = None if model.pickup is None else PickupRows(self.lines, model.pickup.rows, model.design.line)
         of_lines = len(model.design.line_frequency) * (len(model.parameters) if slopes else 1)

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import log_ndtr
 
+from underskin.diagnosis.inference.curve_nuisances import cell_response
 from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis
 from underskin.diagnosis.inference.likelihood import Likelihoods
 from underskin.diagnosis.inference.objective import Places
@@ -24,6 +25,7 @@ _NEAR = 4.0  # standard deviations from a bound within which it counts
 _POLISHING, _POLISHED = 4, 0.05  # steps at most, and the gain in log posterior below which it stops
 _LEAST_COVARIANCE_CURVATURE = 0.3  # of logarithms of noise levels: their priors are not wider
 _TRUSTED = 1.0  # gain in log posterior that polishing may leave
+_LEAST_EIGENVALUE = 1e-11  # of the correlations' information
 _FLAT = 1e-3  # least standard deviations of the quadratic within a parameter's bounds: keeps H invertible
 
 
@@ -55,8 +57,12 @@ class Evidence:
 
     @cached_property
     def prediction(self) -> Prediction:
-        """The model's prediction there, on the rows of the hypothesis."""
-        return self.hypothesis.model.predict(self.point.fit)
+        """The model's prediction there, on the rows of the hypothesis; of curves with what the cell adds."""
+        prediction = self.hypothesis.model.predict(self.point.fit)
+        if not self.hypothesis.lines.curves:
+            return prediction
+        added = cell_response(self.hypothesis.lines, self.levels, prediction.value.real).offset
+        return replace(prediction, value=prediction.value + added)
 
     @cached_property
     def levels(self) -> NoiseLevels:
@@ -103,7 +109,7 @@ def around_mean(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:
         owner = at.points.owner[number]
         places = np.flatnonzero(fitter.free[owner])
         fit, low, high = at.points.fit[number, places], fitter.low[owner, places], fitter.high[owner, places]
-        information, gradient = information[np.ix_(places, places)], gradient[places]
+        information, gradient = _definite(information[np.ix_(places, places)]), gradient[places]
         # Towards a bound the gradient stays; elsewhere, where polishing left much of it, the fit hangs at a kink, and
         # what a smooth cost would still gain there is not to be had.
         free = ~(((fit <= low) & (gradient > 0)) | ((fit >= high) & (gradient < 0)))
@@ -116,6 +122,15 @@ def around_mean(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:
         values.append(float(-at.cost[number] + gain + volume + log_box(mean, covariance, low, high)))
         covariances.append(covariance)
     return np.array(values), covariances
+
+
+def _definite(information: Floats) -> Floats:
+    """With eigenvalues above 0, which rounding may have taken from nearly singular ones."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    if values[0] > _LEAST_EIGENVALUE:
+        return information
+    return np.asarray((vectors * np.maximum(values, _LEAST_EIGENVALUE)) @ vectors.T * np.outer(scale, scale))
 
 
 def around_levels(fitter: Fitter, at: Evaluated) -> Floats:

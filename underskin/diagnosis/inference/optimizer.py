@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.diagnosis.inference.curve_starts import by_least_squares
 from underskin.diagnosis.inference.frf_products import FrfProducts
 from underskin.diagnosis.inference.hypothesis import FitPoint
 from underskin.diagnosis.inference.objective import Evaluated, Evaluator, Places, Points
@@ -27,6 +28,7 @@ _LARGEST_STEP = 1.0
 _CONVERGED = 0.01  # in log posterior
 _MOST_ITERATIONS = 25
 _USUAL_GAIN = 0.03  # scatter of gains while nothing was fitted yet
+_MAY_GAIN = 60.0  # nats that a fit of curves may still gain beyond the least-squares one's
 _POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
 
 
@@ -131,16 +133,10 @@ class Fitter(Evaluator):
         """The most probable points near the starts; only roughly where their targets will not be reached."""
         if not self.lines.curves:
             return self.settle(self.descend(self.settle(self.evaluate(start), 3), 1, target), 2)
-        # Small smooth error and close fit, or large and loose: each may be a maximum of its own.
-        smooth = self.hypotheses[0].smooth
-        each = []
-        for value in (smooth.low, smooth.middle):
-            covariance = np.tile([GAIN_PRIOR.middle, 0.0, value], (len(start), 1))
-            fitted = self.settle(self.descend(self.evaluate(replace(start, covariance=covariance)), 0), _CURVE_SETTLING)
-            each.append(self.settle(self.descend(fitted, 1, target), _CURVE_SETTLING))
-        one, other = each
-        better = np.flatnonzero(other.cost < one.cost)
-        return self.replaced(one, better, other[better])
+        begun = by_least_squares(self, start)
+        if target is not None and begun.cost[0] > target(begun)[0] + _MAY_GAIN:
+            return begun
+        return self.settle(self.descend(begun, 1), _CURVE_SETTLING)
 
     def descend(self, best: Evaluated, settling: int, target: Target | None = None) -> Evaluated:
         """Steps of the mean parameters, each followed by so many of the covariance's.

@@ -26,6 +26,8 @@ _GRID = 40
 _LEAST_IN_ORDER = 8  # recordings
 _ABOVE_NOISE, _LEAST_REMAINDER = 2.0, 3e-3  # times the noise, and of the largest force
 NOISY = 2.0  # times what the lines' own roughness says
+_GRANTED = 4.0  # times as much remainder as the null hypothesis is allowed
+_DOUBT = 0.4  # where a law of indentation leaves more than noise, and less than that
 _STRUCTURED = 2.0**0.5  # the same, where what is added is as large as the noise
 REACHES_NOISE = 1.5  # times the noise floor: an error that noise explains
 ALONG_CURVES = {"displacement_mm": "mm", "time_s": "s"}
@@ -106,13 +108,22 @@ def above_noise(problem: FittingProblem, explanation: Explanation, groups: Seque
     return findings
 
 
-def contradicts(problem: FittingProblem, null: Explanation) -> bool:
-    """Whether the recordings contradict the null hypothesis, however improbable its rivals are: its residual keeps
-    structure above the noise. Of curves that is a smooth part, of FRFs lines that scatter about the model more than
-    about their neighbours by as much as those do."""
-    if problem.lines.smooth is not None:
-        return _is_above_noise(*_smooth_part(problem, null))
-    return null.best.levels.level > _STRUCTURED
+def doubt(problem: FittingProblem, explanation: Explanation) -> float:
+    """The share of an explanation's probability that structure in its residual takes away: 1 where the recordings
+    contradict it, however improbable its rivals are, less where it describes most but not all.
+
+    Of curves structure is a smooth part above the noise; the null hypothesis is granted none of it, laws what
+    idealisations usually cost. Of the null hypothesis on FRFs it is lines that scatter about the model more than about
+    their neighbours by as much as those do.
+    """
+    if problem.lines.smooth is None:
+        return float(not explanation.names and explanation.best.levels.level > _STRUCTURED)
+    smooth, noise = _smooth_part(problem, explanation)
+    if not _is_above_noise(smooth, noise):
+        return 0.0
+    if not explanation.names or _is_above_noise(smooth / _GRANTED, noise):
+        return 1.0
+    return _DOUBT if problem.kind == "indentation" else 0.0
 
 
 def largest_floor_percent(problem: FittingProblem, null: Explanation, groups: Sequence[HeldOut]) -> float:

@@ -1,18 +1,25 @@
-"""The smooth error of a curve under every hypothesis: no law of a soft contact holds to better than a percent.
+"""What the samples of a curve share under every hypothesis: what the cell adds, and that no law is exact.
 
-The zero and gain of a load cell, the position of the surface, friction in a stage and the idealisation of every law
-bend a curve a little. Neighbouring samples share that error, so they are not independent. Within each curve, with
-F_max its largest force, x the place along the curve from 0 to 1 and η the size,
+A cell shows its zero F0 and a drift b in time or along the travel beside the force (its gain is the recording's, as of
+FRFs): columns P with normal coefficients, whose scale is the prior's standard deviation. Where samples in the air show
+the zero, F0 is as good as free; else a tared cell is within a hundredth of what it measures. The drift over the curve
+is 2 % of the largest force, and none is looked for where no air shows it.
 
-    ε ~ N(0, η² B),  B = F_max² k(x − x'),
+The position of the surface, friction in a stage and the idealisation of every law bend a curve a little. Neighbouring
+samples share that error too. Within each curve, with s the force (or, near the contact's beginning and in the air, 0.7
+and 0.2 of the largest), x the place along the curve from 0 to 1 and η the size,
+
+    ε ~ N(0, η² B + P Pᵀ),  B = s s' k(x − x'),
 
 k the mean of Matérn-3/2 kernels of length 0.1 (the beginning of a contact, a grip that seats) and 0.4 (the
-idealisation of a law). η is a parameter of every hypothesis: log-uniform from 0.1 to 1 %, falling off outside, more
-slowly downwards. An unmodelled discrepancy is the same process with η from 2 to 50 %.
+idealisation of a law). η is a parameter of every hypothesis: log-uniform from 0.1 to 1 %, falling off outside, slowly
+downwards. An unmodelled discrepancy is the same process with η from 2 to 50 %.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,25 +30,58 @@ from underskin.units import Floats
 USUAL = Plateau.of((1e-3, 1e-2), (1.0, 0.25))
 UNNAMED = Plateau.of((2e-2, 0.5), (0.05, 0.05))
 TYPICAL = 3e-3
-_LENGTHS = (0.1, 0.4)
+_LENGTHS = (0.025, 0.1, 0.4)
+_DRIFT = 0.02  # of the largest force, over the curve
+_COLUMNS = 3
 
 
 @dataclass(frozen=True)
-class SmoothError:
+class CurveError:
     """Of all rows of a campaign's curves, one curve after another."""
 
     scale: Floats  # (rows,) [N]: the deviation is η times this
     place: Floats  # (rows,) along the curve, 0 to 1
+    columns: Floats  # (rows, columns) [N] of each curve's own coefficients
+    count: Floats  # (rows,) raw samples that each row is the mean of
+    noise: Floats  # (rows,) [N] standard deviation of these
 
-    def part(self, order: NDArray[np.intp]) -> "SmoothError":
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Of several curves."""
+        columns = [part.columns for part in parts] or [np.zeros((0, 0))]
+
+        def of(name: str) -> Floats:
+            return np.concatenate([*(getattr(part, name) for part in parts), np.zeros(0)])
+
+        return cls(of("scale"), of("place"), np.concatenate(columns), of("count"), of("noise"))
+
+    def part(self, order: NDArray[np.intp]) -> Self:
         """Of some of the rows."""
-        return SmoothError(self.scale[order], self.place[order])
+        columns = self.columns[order]
+        return type(self)(self.scale[order], self.place[order], columns, self.count[order], self.noise[order])
+
+    def covariance(self, size: float) -> Floats:
+        """Of rows that are one curve's, with η = `size` (rows, rows)."""
+        return np.asarray(size**2 * np.outer(self.scale, self.scale) * _likeness(self.place))
+
+
+def instrument_columns(
+    displacement: Floats, time: Floats | None, zero: float, largest: float, *, drifts: bool
+) -> Floats:
+    """P of one curve (rows, 3): zero, drift in time, drift along the travel."""
+    columns = np.zeros((len(displacement), _COLUMNS))
+    columns[:, 0] = zero
+    if drifts:
+        for place, axis in ((1, time), (2, displacement)):
+            if axis is not None and np.ptp(axis) > 0:
+                columns[:, place] = _DRIFT * largest * ((axis - axis[0]) / np.ptp(axis))
+    return columns
 
 
 class Whitening:
     """κ² D + η² B as κ² times a unit matrix: each curve's rows over d, turned to where B is diagonal, and weighed."""
 
-    def __init__(self, error: SmoothError, deviation: Floats, recording: NDArray[np.intp]) -> None:
+    def __init__(self, error: CurveError, deviation: Floats, recording: NDArray[np.intp]) -> None:
         """Find the directions of each curve; `deviation` is D's square root (rows,)."""
         self._deviation = deviation
         edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
@@ -53,6 +93,7 @@ class Whitening:
             self._turns.append(turn.T)
             sizes.append(np.maximum(size, 0.0))
         self._size = np.concatenate(sizes)
+        self.columns = self.turned(error.columns.T)  # (columns, rows)
 
     def log_determinant(self, ratio: Floats) -> Floats:
         """log|I + (η/κ)² D^(−½) B D^(−½)| at ratios η/κ (…, 1)."""

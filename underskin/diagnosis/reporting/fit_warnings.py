@@ -19,6 +19,9 @@ def _at_bounds(explanation: Explanation) -> list[Finding]:
     for name, place in own_places(explanation.names, explanation.best.hypothesis.lines).items():
         for index in range(place.start, place.stop):
             entry = explanation.model.parameters[index]
+            curves = explanation.best.hypothesis.lines.curves
+            if curves and entry.unit == "-" and entry.limit is None:  # a law's form, whose ends are laws of their own
+                continue
             if min(abs(explanation.point.fit[index] - bound) for bound in entry.bounds) < 1e-9:
                 arguments = {
                     "mechanism": name,

@@ -7,6 +7,7 @@ import numpy as np
 
 from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from underskin.diagnosis.inference.least_squares import least_squares_percent
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation import cross_validation
@@ -56,7 +57,8 @@ def fit_summary(
     outside = cross_validation.total(groups)
     parts = {
         name: {
-            "rmse_percent": rounded(fitted.rmse_percent),
+            "rmse_percent": rounded(_least_squares(problem, entry) or fitted.rmse_percent),
+            **({"correlated_rmse_percent": rounded(fitted.rmse_percent)} if problem.lines.curves else {}),
             "heldout_rmse_percent": rounded(left.rmse_percent),
             "log_score": rounded(left.log_score / left.recordings) if left.recordings else None,
             **({"youngs_modulus": modulus(problem, entry)} if problem.lines.curves else {}),
@@ -80,6 +82,13 @@ def fit_summary(
         ],
         "noise": _noise(explanation),
     }
+
+
+def _least_squares(problem: FittingProblem, explanation: Explanation) -> float | None:
+    """Of curves, what plain least squares of the same law leave [%]."""
+    if problem.kind != "indentation":
+        return None
+    return least_squares_percent(explanation.best.hypothesis, explanation.point.fit)
 
 
 def modulus(problem: FittingProblem, explanation: Explanation) -> dict[str, Any]:

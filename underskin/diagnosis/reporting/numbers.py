@@ -39,11 +39,24 @@ def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
     half_width = _QUANTILE * np.sqrt(max(variance, 0.0))
     low, high = entry.bounds
     middle = float(point.fit[place])
-    ends = (max(middle - half_width, low), min(middle + half_width, high))
-    return {
-        "name": entry.name,
-        "unit": entry.unit,
-        "value": rounded(float(entry.from_fit(middle))),
-        "low": rounded(float(entry.from_fit(ends[0]))),
-        "high": rounded(float(entry.from_fit(ends[1]))),
-    }
+    values = [entry.from_fit(at) for at in (middle, max(middle - half_width, low), min(middle + half_width, high))]
+    if entry.relative_to is not None:
+        values = _absolute(explanation, place, values)
+    stated = zip(("value", "low", "high"), values, strict=True)
+    return {"name": entry.name, "unit": entry.unit, **{key: rounded(float(value)) for key, value in stated}}
+
+
+def _absolute(explanation: Explanation, place: int, multiples: list[float]) -> list[float]:
+    """A parameter that is fitted as a multiple of another, as their product; both on logarithmic scales.
+
+    The interval is that of the product, cut off where the multiple has its bounds.
+    """
+    best, entry = explanation.best, explanation.model.parameters[place]
+    assert entry.relative_to is not None
+    other = place_of(explanation, entry.relative_to)
+    places = [best.hypothesis.mean_places.index(one) for one in (place, other)]
+    deviation = float(np.sqrt(max(best.covariance[np.ix_(places, places)].sum(), 0.0)))
+    unit = float(np.exp(explanation.point.fit[other]))
+    factor = np.exp(_QUANTILE * deviation)
+    value = multiples[0] * unit
+    return [value, max(value / factor, min(entry.low * unit, value)), min(value * factor, entry.high * unit)]

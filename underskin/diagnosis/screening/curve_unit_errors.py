@@ -1,7 +1,8 @@
 """Curves that contradict the others, or what rubber can be: copies, reversed forces, units off by 1000.
 
-What is compared is the apparent modulus at the largest displacement u from the first sample: of a cylinder
-(F/A)/(u/height), of a sphere 3 (1 − ν²) F/(4 √R u^1.5). It need not be right, only of the right magnitude.
+What is compared is the apparent modulus: of a cylinder (F/A)/(u/height) at the largest force, u from the first sample;
+of a sphere 3 (1 − ν²) F/(4 √R u^1.5) at the deepest sample, u from the end of the air. It need not be right, only of
+the right magnitude.
 """
 
 from collections.abc import Sequence
@@ -18,6 +19,7 @@ from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.base import Kind
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
 from underskin.recordings.conditions import SkinDescription
+from underskin.recordings.curve_course import course
 from underskin.units import Floats
 
 _RUBBER_MPA = 0.003, 300.0
@@ -44,8 +46,10 @@ def without_inconsistent(campaign: Campaign, kind: Kind) -> Inspected:
         findings += step_findings
     left = replace(campaign, recordings=tuple(curves))
     shared = _shared(campaign, curves)
+    if campaign.units_checked and _possible(campaign, curves):
+        shared = []  # whoever checked the units need not be asked
     findings += shared
-    if shared and (not campaign.units_checked or not _possible(campaign, curves)):
+    if shared:
         return Inspected(replace(left, recordings=()), findings, Lacking(Lack.CURVES_CONTRADICT))
     return Inspected(left, findings, None if curves else Lacking(Lack.NO_CURVE))
 
@@ -157,10 +161,21 @@ def _apparent_mpa(entry: CurveRecording, poisson_ratio: float) -> float:
     force: Floats = entry.force_n[finite]
     if len(place) < 2:
         return float("nan")
+    if isinstance(entry, IndentationRecording):
+        load, moved = _pressed(place, force)
+        return float(0.75 * (1 - poisson_ratio**2) * load / (np.sqrt(entry.indenter_radius_mm) * moved**1.5))
     at = int(np.argmax(np.abs(force)))
     load, moved = abs(force[at] - force[0]), abs(place[at] - place[0])
     if not load or not moved:
         return float("nan")
-    if isinstance(entry, CompressionRecording):
-        return float(load / (np.pi / 4 * entry.sample_diameter_mm**2) / (moved / entry.sample_height_mm))
-    return float(0.75 * (1 - poisson_ratio**2) * load / (np.sqrt(entry.indenter_radius_mm) * moved**1.5))
+    return float(load / (np.pi / 4 * entry.sample_diameter_mm**2) / (moved / entry.sample_height_mm))
+
+
+def _pressed(place: Floats, force: Floats) -> tuple[float, float]:
+    """The force of a sphere where it is deepest, and the way there from contact; NaN where it is not pressed there: a
+    sphere may come a long way through the air, and what sticks pulls harder than it was pressed."""
+    seen = course(place, force)
+    before = seen.air[seen.air < seen.turn]
+    begin = float(place[before[-1]]) if len(before) else float(place[0])
+    load, moved = float(force[seen.turn]) - seen.zero, float(place[seen.turn]) - begin
+    return (load, moved) if load > 0 and moved > 0 else (float("nan"), 1.0)

@@ -14,7 +14,7 @@ from underskin.diagnosis.data.inspected import Inspected
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
-from underskin.recordings.campaign import Campaign, Recording
+from underskin.recordings.campaign import Campaign, FrfRecording, Recording
 from underskin.recordings.conditions import SkinDescription
 
 _LENGTH, _FORCE, _TIME = (1e-9, 1e6), (1e-8, 1e8), (1e-12, 1e12)
@@ -45,7 +45,7 @@ _WIDEST_SENSOR = 100.0  # radii over the thickness; tables end far below
 
 def without_extremes(campaign: Campaign) -> Inspected:
     """The campaign without recordings that hold such numbers, each a finding; `lacking` where its skin does."""
-    of_skin = _of_skin(campaign.skin)
+    of_skin = _of_skin(campaign.skin, any(isinstance(entry, FrfRecording) for entry in campaign.recordings))
     if of_skin:
         arguments = {"fields": [entry.field for entry in of_skin], "confirmable": False}
         return Inspected(replace(campaign, recordings=()), of_skin, Lacking(Lack.IMPOSSIBLE_DECLARATION, arguments))
@@ -60,12 +60,14 @@ def without_extremes(campaign: Campaign) -> Inspected:
     return Inspected(replace(campaign, recordings=tuple(usable)), findings, lacking)
 
 
-def _of_skin(skin: SkinDescription) -> list[Finding]:
+def _of_skin(skin: SkinDescription, has_frf: bool) -> list[Finding]:
+    """Of the skin's fields; the sensors' size is of use to FRFs alone."""
     findings = [
         Finding(Reason.IMPOSSIBLE_SKIN, "", f"skin.{name}", arguments) for name, arguments in _out_of_bounds(skin)
     ]
-    if skin.thickness_mm and skin.sensor_radius_mm and skin.sensor_radius_mm > _WIDEST_SENSOR * skin.thickness_mm:
-        arguments = {"radius_mm": skin.sensor_radius_mm, "thicknesses": _WIDEST_SENSOR}
+    thickness, radius = skin.thickness_mm, skin.sensor_radius_mm
+    if has_frf and thickness and radius and radius > _WIDEST_SENSOR * thickness:
+        arguments = {"radius_mm": radius, "thicknesses": _WIDEST_SENSOR}
         findings.append(Finding(Reason.IMPOSSIBLE_SENSOR_RADIUS, "", "skin.sensor_radius_mm", arguments))
     return findings
 

@@ -1,12 +1,13 @@
 """Which sets of mechanisms are fitted, and how probable each is.
 
 Priors over sets are fixed: see PRIORS. Within a size, every set of mechanisms that the campaign supports is equally
-probable. Singles are all fitted; pairs and triples grow greedily from the best.
+probable. Singles are all fitted; pairs and triples grow greedily from the best, but of curves all pairs are.
 """
 
+import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -51,14 +52,14 @@ class Answer:
 class Search:
     """What was tried: explanations, processes on top of some of them, and what the campaign does not support.
 
-    `null_contradicted`: under the null hypothesis the residual keeps structure, or its noise is no noise (see
-    residual_shape.py); its probability is then that of `none_of_these`.
+    `doubtful`: sets under which the residual keeps structure, or its noise is no noise (see residual_shape.py), and the
+    share of their probability that is then that of `none_of_these`.
     """
 
     explanations: tuple[Explanation, ...]
     discrepancies: tuple[tuple[Explanation, Discrepancy], ...]
     unsupported: dict[str, str]
-    null_contradicted: bool = False
+    doubtful: Mapping[tuple[str, ...], float] = field(default_factory=dict)
     tried: int = 0  # sets, of which the explanations are those that were not left out early
 
     @property
@@ -106,14 +107,14 @@ class Search:
         probabilities = (1 - _UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
         probabilities[-1] += _UNTHOUGHT
         rivals: list[Explanation | None] = [*kept, None]
-        if self.null_contradicted:
-            null = next(number for number, entry in enumerate(kept) if not entry.names)
-            probabilities[-1] += probabilities[null]
-            probabilities[null] = 0.0
+        for number, entry in enumerate(kept):
+            taken = self.doubtful.get(entry.names, 0.0) * probabilities[number]
+            probabilities[-1] += taken
+            probabilities[number] -= taken
         answers = [
             Answer(entry, value)
             for entry, value in zip(rivals, probabilities.tolist(), strict=True)
-            if entry is None or entry.names or not self.null_contradicted
+            if entry is None or self.doubtful.get(entry.names, 0.0) < 1
         ]
         return sorted(answers, key=lambda answer: -answer.probability)
 
@@ -144,17 +145,23 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
     names = [name for name in CATALOGUE if name not in unsupported]
     singles = [Request(()), *(Request((name,)) for name in names)]
     tried |= {frozenset(request.names) for request in singles}
+    if problem.lines.curves:  # whose contact points the null hypothesis finds once for all
+        _explain(problem, explanations, singles[:1])
+        singles = [Request(request.names, begin=explanations[frozenset()].point) for request in singles[1:]]
     _explain(problem, explanations, singles)
     integrated: Explanations = {}
     for size in (2, 3):
         integrated |= _integrated(explanations, frozenset(integrated), unsupported, 1)
         explanations |= integrated
-        requests = [
-            Request(tuple(entry for entry in CATALOGUE if entry in {*parent.names, name}), parent)
-            for parent in _parents(Search(tuple(explanations.values()), (), unsupported), size)
-            for name in names
-            if name not in parent.names
-        ]
+        if problem.lines.curves and size == 2:
+            requests = _all_pairs(names, explanations)
+        else:
+            requests = [
+                Request(tuple(entry for entry in CATALOGUE if entry in {*parent.names, name}), parent)
+                for parent in _parents(Search(tuple(explanations.values()), (), unsupported), size)
+                for name in names
+                if name not in parent.names
+            ]
         tried |= {frozenset(request.names) for request in requests}
         _explain(problem, explanations, requests)
     explanations |= _integrated(explanations, frozenset(integrated), unsupported, _BEST)
@@ -162,6 +169,16 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
     best = sorted((entry for entry in result.explanations if entry.names), key=result.log_weight, reverse=True)[:2]
     processes = tuple((entry, discrepancy(problem, entry)) for entry in (explanations[frozenset()], *best))
     return replace(result, discrepancies=processes)
+
+
+def _all_pairs(names: Sequence[str], explanations: Explanations) -> list[Request]:
+    """Of curves, on which few mechanisms act and two may hide each other: every pair, from the better of its two."""
+    requests = []
+    for one, other in itertools.combinations(names, 2):
+        known = [explanations[key] for key in (frozenset([one]), frozenset([other])) if key in explanations]
+        parent = max(known, key=lambda entry: entry.log_evidence, default=None)
+        requests.append(Request((one, other), parent))
+    return requests
 
 
 def _explain(problem: FittingProblem, explanations: Explanations, requests: Sequence[Request]) -> None:

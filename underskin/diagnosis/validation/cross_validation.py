@@ -2,8 +2,9 @@
 
 Groups: the highest preload, one sphere (the largest), one sensor (the last), the highest band, the latest day. Without
 the group everything is fitted again: nothing missing, and the choice among the best sets is made again from evidence.
-rmse = 100 √(Σ|y − m|²/Σ|m|²) over all groups together; the noise floor is its expectation from the noise alone, for
-a new recording: gain, positioning and line scatter, and the sensors' gains where the sensor was not seen.
+rmse = 100 √(Σ|y − m|²/Σ|m|²) over all groups together, of curves with the measured force in place of m below; the noise
+floor is its expectation from the noise alone, for a new recording: gain, positioning and line scatter, and the
+sensors' gains where the sensor was not seen.
 """
 
 from collections.abc import Sequence
@@ -15,12 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
+from underskin.diagnosis.inference.curve_nuisances import cell_response
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.noise.noise_levels import NoiseLevels
 from underskin.diagnosis.selection.search import log_prior
 from underskin.mechanisms.models.composed import Prediction, compose
-from underskin.recordings.conditions import frf_of
+from underskin.recordings.conditions import curves_of, frf_of
+from underskin.units import Floats
 
 _FURTHEST = 0.6  # of a curve's highest force
+_LOADED, _RETURN = 0.02, 0.02  # of the highest force and of the travel: a way back under load
 _LEAST_AFTER = 6  # samples beyond the highest force that make a hold or a way back
 _LEAST_KEPT = 3  # recordings that must remain
 _BEST = 10  # sets among which the choice is repeated
@@ -96,15 +101,26 @@ def groups(lines: Lines) -> dict[str, NDArray[np.bool_]]:
 
 
 def _parts_of_curves(lines: Lines) -> dict[str, NDArray[np.bool_]]:
-    """A curve's contact point is its own, so parts of each are left out: the highest force of curves that only load,
-    and the later half of what follows the highest force where curves hold or return."""
+    """A curve's contact point is its own, so parts of each are left out: the middle of the way back where there is one,
+    else the later half of what is held, else the highest force."""
     force = np.abs(lines.value.real)  # tension is negative
-    later = np.zeros(len(force), dtype=bool)
-    for low, high in pairwise((*lines.first, len(force))):
-        rest = high - 1 - (low + int(np.argmax(force[low:high])))
-        later[high - rest // 2 : high] = rest >= _LEAST_AFTER
-    if later.any():
-        return {"the later half after the highest force_n": later}
+    back, held = np.zeros(len(force), dtype=bool), np.zeros(len(force), dtype=bool)
+    for (low, high), entry in zip(pairwise((*lines.first, len(force))), curves_of(lines.campaign), strict=True):
+        travel = entry.displacement_mm - entry.displacement_mm[0]
+        if lines.kind == "compression" and -travel.min() > travel.max():  # pulled
+            travel = -travel
+        turn = int(np.argmax(travel))
+        loaded = np.flatnonzero(force[low + turn : high] > _LOADED * force[low:high].max())
+        last = turn + (int(loaded[-1]) if len(loaded) else 0)
+        peak = int(np.argmax(force[low : low + turn + 1])) if turn else 0
+        if last - turn >= _LEAST_AFTER and travel[turn] - travel[last] > _RETURN * float(np.ptp(travel[: turn + 1])):
+            third = (last - turn) // 3
+            back[low + turn + third : low + turn + 2 * third] = True
+        elif high - low - 1 - peak >= _LEAST_AFTER:
+            held[high - (high - low - 1 - peak) // 2 : high] = True
+    parts = {"the middle of the way back": back, "the later half of what is held": held}
+    if back.any() or held.any():
+        return {name: rows for name, rows in parts.items() if rows.any()}
     highest = np.maximum.reduceat(force, lines.first)[lines.recording]
     return {f"force_n above {_FURTHEST:.0%}": force > _FURTHEST * highest}
 
@@ -136,6 +152,8 @@ def _predict(
     model = compose(explanation.names, problem.lines.campaign, problem.table, problem.kind)
     point, levels = explanation.point, explanation.best.levels
     whole = model.predict(point.fit)
+    if left.curves:
+        return _predict_curves(problem.lines, levels, whole.value.real, rows, smaller)
     prediction, pickup_variance = _some(whole, rows), whole.pickup_variance
     seen = np.isin(left.sensor, smaller.lines.sensor)
     gains = np.zeros(max(int(left.sensor.max()), int(smaller.lines.sensor.max())) + 1)
@@ -146,23 +164,37 @@ def _predict(
     value = prediction.value * np.exp(gains[left.sensor])[left.recording]
     value = value * np.exp(0.5 * p2 * curvature.laplacian)[recording]
     scatter = levels.gain**2 + np.where(seen, 0.0, levels.spread**2)
-    noise = (
-        scatter[left.recording] * np.abs(value) ** 2 + (1 if left.curves else 2) * (levels.level * left.deviation) ** 2
-    )
-    if left.smooth is not None:
-        noise = noise + (levels.smooth * left.smooth.scale) ** 2
+    noise = scatter[left.recording] * np.abs(value) ** 2 + 2 * (levels.level * left.deviation) ** 2
     if prediction.position_slopes is not None:
         noise = noise + p2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
         noise = noise + 0.5 * p2**2 * curvature.square[recording] * np.abs(value) ** 2
     pickup_noise = 2 * pickup_variance[rows]
     noise = noise + pickup_noise
     square = np.abs(left.value - value) ** 2
-    first = left.first
-    each, expected = np.add.reduceat(square, first), np.add.reduceat(noise, first)
-    size = np.add.reduceat(np.abs(value) ** 2, first)
-    score = -0.5 * (each / expected + np.log(2 * np.pi * expected / size))
-    square_sum, size_sum, noise_sum, score_sum = (float(column.sum()) for column in (square, size, noise, score))
-    return PredictionScore(square_sum, size_sum, noise_sum, score_sum, len(first), float(pickup_noise.sum()))
+    return replace(_scored(left.first, square, noise, np.abs(value) ** 2), pickup=float(pickup_noise.sum()))
+
+
+def _predict_curves(
+    lines: Lines, levels: NoiseLevels, force: Floats, rows: NDArray[np.bool_], smaller: FittingProblem
+) -> PredictionScore:
+    """Some of the rows, with the gain, the zero and the drift of the cell that the rows fitted to show."""
+    fitted = ~rows if len(smaller.lines.value) < len(lines.value) else rows
+    cell = cell_response(lines, levels, force, fitted)
+    assert lines.smooth is not None
+    value = force * (1 + cell.gain[lines.recording]) + cell.offset
+    noise = cell.variance + (levels.level * lines.deviation) ** 2 + (levels.smooth * lines.smooth.scale) ** 2
+    recording = lines.recording[rows]
+    first = np.flatnonzero(np.diff(recording, prepend=-1))
+    measured = (lines.value.real - cell.offset)[rows]  # a law may predict no force where there is one
+    return _scored(first, (lines.value.real - value)[rows] ** 2, noise[rows], measured**2)
+
+
+def _scored(first: NDArray[np.intp], square: Floats, noise: Floats, size: Floats) -> PredictionScore:
+    """From what was missed, what noise would give, and what was predicted (rows,), all squared."""
+    each, expected, sizes = (np.add.reduceat(column, first) for column in (square, noise, size))
+    sizes = np.maximum(sizes, 1e-300)
+    score = -0.5 * (each / expected + np.log(2 * np.pi * expected / sizes))
+    return PredictionScore(float(square.sum()), float(size.sum()), float(noise.sum()), float(score.sum()), len(first))
 
 
 def total(held_out: Sequence[HeldOut]) -> tuple[PredictionScore, PredictionScore]:

@@ -1,10 +1,36 @@
 """The mechanism `adhesion`."""
 
-from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
+from underskin.recordings.campaign import IndentationRecording
+from underskin.recordings.conditions import Conditions, IndentationConditions
+from underskin.recordings.curve_course import course
+from underskin.units import to_si
 
 _REASON = "0.04 J/m² is thermodynamic for silicone; rate effects and soft gels raise it to some J/m²"
+_OF_FRF = Parameter(
+    "work_of_adhesion", "J/m²", 1e-3, 20.0, Normal(-1.6, 1.3), "log", limit=0.0, shown=0.5, reason=_REASON
+)
+_WORK = replace(_OF_FRF, low=1e-4, high=30.0, prior=Normal(-2.0, 2.0))  # of curves, which show far smaller ones
+_SEPARATION = Parameter(
+    name="work_of_separation",
+    unit="J/m²",
+    low=1.0,
+    high=30.0,
+    prior=Normal(0.0, 1.0),
+    scale="log",
+    limit=None,
+    shown=2.0,
+    relative_to="work_of_adhesion",
+    reason="a rolling or receding edge costs more than an advancing one: twice on silicones, tens of times on gels",
+)
+_RETURN = 0.05  # of the range of displacement, that a way back covers
 
 
 class Adhesion(Mechanism):
@@ -21,20 +47,37 @@ class Adhesion(Mechanism):
     )
     assumptions = (
         "short-ranged adhesion (soft, large contacts: Tabor's number far above 1), equilibrium on the loading branch "
-        "under a given force. FRF = Q(F)/F with the static pressure. An indentation sticks from the first touch to "
-        "the pull-off, which comes where the travel δ + F/k has its least value: at JKR's depth under a stiff stage, "
-        "at the force −3πwR/2 under a soft one; from there on it must touch again."
+        "under a given force. FRF = Q(F)/F with the static pressure. An indentation sticks from the first touch on. "
+        "When it is drawn back the edge rests while its energy release rate rises from the work of adhesion to that of "
+        "separation, then recedes. It comes off where the travel δ + F/k has its least value: at JKR's depth under a "
+        "stiff stage, at the force −3πwR/2 under a soft one; from there on it must touch again."
     )
     source = "Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301."
     stage = Stage.CONTACT
     order = 20
     kinds = ("frf", "indentation")
     axes = ("preload_n", "indenter_radius_mm", "position_mm", "force_n")
-    parameters_stated = (
-        Parameter(
-            "work_of_adhesion", "J/m²", 1e-3, 20.0, Normal(-1.6, 1.3), "log", limit=0.0, shown=0.5, reason=_REASON
-        ),
-    )
+    moves_contact_points = True
+    parameters_stated = (_OF_FRF,)
+
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The work of adhesion, and of separation where an indentation has a way back."""
+        if kind == "frf":
+            return self.parameters_stated
+        back = any(isinstance(entry, IndentationConditions) and _comes_back(entry) for entry in conditions.recordings)
+        return (_WORK, _SEPARATION) if back else (_WORK,)
+
+    def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
+        """By the least forces on both ways: -4πwR/3 where a sphere snaps in, -5πwR/6 to -3πwR/2 where it parts."""
+        measured = [entry for entry in conditions.recordings if isinstance(entry, IndentationRecording)]
+        if kind != "indentation" or not measured:
+            return ()
+        each = np.array([_works(entry) for entry in measured])
+        snapping, parting = np.clip(np.median(each, axis=0), _WORK.low, _WORK.high)
+        if len(self.parameters(conditions, kind)) == 1:
+            return [(snapping,)]
+        parting = max(parting, snapping)
+        return [(one, max(share * parting, one)) for one in (snapping, 0.5 * parting, parting) for share in (1.0, 1.8)]
 
     def on_material(self, contacts: Contacts, values: Values) -> None:
         """Make it stick."""
@@ -43,3 +86,18 @@ class Adhesion(Mechanism):
     def on_curve(self, curve: Curve, values: Values) -> None:
         """Make it stick."""
         curve.work_of_adhesion = values["work_of_adhesion"]
+        curve.work_of_separation = values.get("work_of_separation")
+
+
+def _comes_back(entry: IndentationConditions) -> bool:
+    way = entry.displacement_mm
+    return bool(way.max() - way[int(np.argmax(way)) :].min() > _RETURN * np.ptp(way))
+
+
+def _works(entry: IndentationRecording) -> tuple[float, float]:
+    """What the least forces on the way in and on the way back would be with -4πwR/3 and -3πwR/2 [J/m²]."""
+    seen = course(entry.displacement_mm, entry.force_n)
+    force = entry.force_n - seen.zero
+    radius = float(to_si("indenter_radius_mm", entry.indenter_radius_mm))
+    least = [-float(part.min()) / (np.pi * radius) for part in (force[: seen.turn + 1], force[seen.turn :])]
+    return max(least[0], 0.0) / (4 / 3), max(least[1], 0.0) / 1.5

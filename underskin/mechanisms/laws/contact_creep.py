@@ -1,5 +1,7 @@
 """The mechanism `contact_creep`."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from underskin.autodiff import exp
@@ -12,11 +14,25 @@ from underskin.units import Floats
 
 _RETURN = 0.05  # of the range of displacement: smaller returns are noise
 _FRACTION = "from a few percent in a well cured silicone to most of the modulus in a gel"
+_CURVE_TIME = "mean of the logarithms; an instrument sees milliseconds to hours"
+_SPREAD = "logarithm of the ratio of the two times: 0 is one pair; two times seldom lie a factor of 100 apart"
+_SHARE = "of the faster pair in the relaxed fraction"
 _TIME = "what a bench can see lies between seconds and an hour; 40 s within a factor of 4.5"
+
+_ONE_PAIR = (
+    Parameter("relaxed_fraction", "-", 0.0, 0.9, Uniform(), "linear", limit=0.0, shown=0.4, reason=_FRACTION),
+    Parameter("relaxation_time", "s", 0.05, 5e4, Normal(3.7, 1.5), "log", limit=None, shown=40.0, reason=_TIME),
+)
+_TWO_PAIRS = (
+    Parameter("relaxed_fraction", "-", 0.0, 0.95, Uniform(), "linear", limit=0.0, shown=0.4, reason=_FRACTION),
+    Parameter("relaxation_time", "s", 1e-3, 5e4, Normal(2.0, 2.5), "log", limit=None, shown=40.0, reason=_CURVE_TIME),
+    Parameter("time_spread", "-", 0.0, 6.0, Normal(0.0, 1.5), "linear", limit=None, shown=0.0, reason=_SPREAD),
+    Parameter("first_share", "-", 0.05, 0.95, Uniform(), "linear", limit=None, shown=0.5, reason=_SHARE),
+)
 
 
 class ContactCreep(Mechanism):
-    """Viscoelastic relaxation of the skin, one Prony pair."""
+    """Viscoelastic relaxation of the skin, one Prony pair or, of indentations, two."""
 
     name = "contact_creep"
     plain = (
@@ -52,10 +68,25 @@ class ContactCreep(Mechanism):
     needs_fields = ("dwell_s",)
     needs_history = True
     figure = ("dwell_s", "time_s")
-    parameters_stated = (
-        Parameter("relaxed_fraction", "-", 0.0, 0.9, Uniform(), "linear", limit=0.0, shown=0.4, reason=_FRACTION),
-        Parameter("relaxation_time", "s", 0.05, 5e4, Normal(3.7, 1.5), "log", limit=None, shown=40.0, reason=_TIME),
-    )
+    parameters_stated = _ONE_PAIR
+
+    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """One Prony pair, or for indentations two: their sum, mean time, how far apart they lie, and their shares."""
+        return _TWO_PAIRS if kind == "indentation" else _ONE_PAIR
+
+    def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
+        """Times that the recordings show, from a fiftieth of the longest to all of it."""
+        if kind != "indentation":
+            return ()
+        spans = [
+            float(np.ptp(entry.time_s))
+            for entry in conditions.recordings
+            if isinstance(entry, IndentationConditions) and entry.time_s is not None
+        ]
+        longest = max(spans, default=0.0)
+        if not longest > 0:
+            return ()
+        return [(0.3, share * longest, spread, 0.5) for share in (0.02, 0.1, 0.4) for spread in (0.3, 2.0)]
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Times are needed that say more than the loads: dwell_s that differ, or time_s apart from displacement."""
@@ -85,7 +116,13 @@ class ContactCreep(Mechanism):
 
     def on_curve(self, curve: Curve, values: Values) -> None:
         """Relax the force."""
-        curve.relaxation = values["relaxed_fraction"], values["relaxation_time"]
+        fraction, time = values["relaxed_fraction"], values["relaxation_time"]
+        if "time_spread" not in values:
+            curve.relaxation = ((fraction, time),)
+            return
+        spread, share = values["time_spread"], values["first_share"]
+        fast, slow = time * exp(-spread * (1.0 - share)), time * exp(spread * share)
+        curve.relaxation = (fraction * share, fast), (fraction * (1.0 - share), slow)
 
 
 def _again(conditions: Conditions) -> str | None:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from underskin.autodiff import chain
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.recordings.conditions import Conditions
@@ -22,6 +22,30 @@ _COEFFICIENT = Parameter(
     limit=0.0,
     shown=5.0,
     reason="1 for a neo-Hookean solid, 1.1 to 1.2 for the silicones of docs/mechanisms.md; filled elastomers more",
+)
+_SPHERE = (
+    Parameter(
+        name="stiffening_coefficient",
+        unit="-",
+        low=1e-2,
+        high=300.0,
+        prior=Normal(0.0, 2.0),
+        scale="log",
+        limit=None,
+        shown=5.0,
+        reason="c of (1 + q c I)^(1/q): 0.1 for a silicone (2 C20/C10), 1/Jm of Gent's law, 40 for tissue-like gels",
+    ),
+    Parameter(
+        name="stiffening_form",
+        unit="-",
+        low=-1.0,
+        high=1.0,
+        prior=Uniform(),
+        scale="linear",
+        limit=None,
+        shown=1.0,
+        reason="q of (1 + q c I)^(1/q): 1 is Yeoh's law, 0 an exponential, -1 Gent's",
+    ),
 )
 _YEOH = (
     Parameter(
@@ -59,13 +83,13 @@ class StrainStiffening(Mechanism):
     )
     law = (
         "FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved "
-        "together. Curves: Yeoh's law, nominal stress (E/3)(λ⁻² − λ)(1 + 2 c2 I + 3 c3 I²), I = λ² + 2/λ − 3, λ = 1 − "
-        "strain; under a sphere its secant ratio at ε multiplies the force."
+        "together. Curves: nominal stress (E/3)(λ⁻² − λ) f(I), I = λ² + 2/λ − 3, λ = 1 − strain; compression f = 1 + "
+        "2 c2 I + 3 c3 I² (Yeoh); under a sphere f = (1 + q c I)^(1/q), the secant ratio at ε multiplying the modulus."
     )
     assumptions = (
         "incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative strain; for "
-        "FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0 a curve is "
-        "neo-Hookean, not a straight line: the base model is recovered at small strain."
+        "FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0, or c = 0, a "
+        "curve is neo-Hookean, not a straight line: the base model is recovered at small strain."
     )
     source = (
         "Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of Metals (1951), for 0.2 a/R; Lin, "
@@ -79,8 +103,8 @@ class StrainStiffening(Mechanism):
     figure = ("preload_n", "displacement_mm")
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The stiffening coefficient, or for curves the law's constants C20/C10 and C30/C10."""
-        return (_COEFFICIENT,) if kind == "frf" else _YEOH
+        """The stiffening coefficient, or for curves the law's constants."""
+        return {"frf": (_COEFFICIENT,), "indentation": _SPHERE, "compression": _YEOH}[kind]
 
     def on_material(self, contacts: Contacts, values: Values) -> None:
         """Stiffen each contact by its own strain."""
@@ -90,8 +114,11 @@ class StrainStiffening(Mechanism):
         contacts.modulus = contacts.modulus * (1.0 + excess * chain(ratio, (slope, excess)))
 
     def on_curve(self, curve: Curve, values: Values) -> None:
-        """Take Yeoh's law."""
-        curve.yeoh = values["second_over_first"], values["third_over_first"]
+        """Take the law."""
+        if "stiffening_form" in values:
+            curve.stiffening = values["stiffening_coefficient"], values["stiffening_form"]
+        else:
+            curve.yeoh = values["second_over_first"], values["third_over_first"]
 
 
 def _radius_ratio(excess: Array) -> tuple[Array, Array]:

@@ -77,13 +77,19 @@ class Composition:
             [np.where(self._log, np.exp(np.where(self._log, fit, 0.0)), fit), np.zeros((*points, further))], axis=-1
         )
         by_own = np.zeros((count + further, *points, count + further))
-        own = np.arange(count + further)
-        by_own[own, ..., own] = np.moveaxis(
+        every = np.arange(count + further)
+        by_own[every, ..., every] = np.moveaxis(
             np.concatenate([np.where(self._log, value[..., :count], 1.0), np.ones((*points, further))], axis=-1), -1, 0
         )
         seeds = variables(value, by_own if slopes else by_own[count:])
+        own = {name: {key: seeds[place] for key, place in places.items()} for name, places in self._places.items()}
+        for name, places in self._places.items():
+            for key, place in places.items():
+                other = self.parameters[place].relative_to
+                if other is not None:
+                    own[name][key] = own[name][key] * own[name][other]
         return (
-            {name: {key: seeds[place] for key, place in places.items()} for name, places in self._places.items()},
+            dict(own),
             {name: seeds[place] for name, place in self._nuisances.items()},
             seeds[count:],
         )

@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from underskin.autodiff import Differentiated, constant
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Mechanism, Parameter, Values
-from underskin.mechanisms.models.composition import Composition, Prediction
-from underskin.mechanisms.models.curve_state import Curve, stiffened
-from underskin.mechanisms.models.indentation import declared_modulus, times_of
+from underskin.mechanisms.models.curve_state import Curve
+from underskin.mechanisms.models.curves import CurveModel, declared_modulus
 from underskin.mechanisms.models.nuisances import contact_point, modulus_parameter, required_modulus
-from underskin.mechanisms.models.pickup import Pickup
-from underskin.mechanisms.models.relaxation import relaxed
+from underskin.mechanisms.models.relaxation import Relaxation, memories
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings import elastomer
 from underskin.recordings.campaign import CompressionRecording
@@ -27,69 +25,62 @@ from underskin.units import Floats, to_si
 _CONTACT_SD, _CONTACT_BOUND = 0.01, 0.1  # of the sample's height: the contact point's prior and bounds
 
 
-class CompressionModel:
-    """The force of compressions under a set of mechanisms; rows are all samples, one recording after another.
+class CompressionModel(CurveModel):
+    """The force of compressions under a set of mechanisms.
 
     Of measured curves, contact points and an undeclared modulus have priors around the base model's own fits. Of
     conditions alone, contact is around displacement 0 and the modulus must be declared.
     """
 
-    sensor: NDArray[np.intp] | None = None
-
     def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions) -> None:
         """Work out everything that no parameter changes; InvalidInput names a recording that does not load."""
         recordings = [entry for entry in conditions.recordings if isinstance(entry, CompressionConditions)]
-        self._skin = conditions.skin
-        self._composition = Composition(mechanisms, conditions, "compression", _nuisances(recordings, self._skin))
-        self.names = tuple(mechanism.name for mechanism in mechanisms)
-        self.parameters = self._composition.parameters
-        self._mechanisms = self._composition.mechanisms
-        self._ids = [entry.id for entry in recordings]
-        self.recording = np.repeat(np.arange(len(recordings)), [len(entry.displacement_mm) for entry in recordings])
-        self.valid = np.ones(len(self.recording), dtype=bool)
-        self.pickup: Pickup | None = None
-        self._first = np.diff(self.recording, prepend=-1) > 0
-        heights = to_si("sample_height_mm", [entry.sample_height_mm for entry in recordings])
-        diameters = to_si("sample_diameter_mm", [entry.sample_diameter_mm for entry in recordings])
-        self._height = heights[self.recording]
-        self._area = (np.pi / 4 * diameters**2)[self.recording]
-        self._shape_factor = (diameters / (4 * heights))[self.recording]
-        self._displacement = to_si("displacement_mm", np.concatenate([entry.displacement_mm for entry in recordings]))
-        self._time = times_of(recordings)
+        nuisances = _nuisances(recordings, conditions.skin)
+        super().__init__(mechanisms, conditions, "compression", recordings, nuisances)
+        self._height = to_si("sample_height_mm", [entry.sample_height_mm for entry in recordings])[:, None]
+        diameter = to_si("sample_diameter_mm", [entry.sample_diameter_mm for entry in recordings])[:, None]
+        self._area = np.pi / 4 * diameter**2
+        self._shape_factor = diameter / (4 * self._height)
 
-    def predict(self, fit: Floats) -> Prediction:
-        """All samples at one point of the fit coordinates (parameters,)."""
-        own, nuisances, _ = self._composition.values(np.asarray(fit, dtype=float))
-        curve = Curve(
-            modulus=declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"],
-            poisson_ratio=constant(INCOMPRESSIBLE, len(self.parameters)),
-        )
+    def _curve(self, own: dict[str, Values], nuisances: Values) -> Curve:
+        modulus = declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"]
+        curve = Curve(modulus=modulus, poisson_ratio=constant(INCOMPRESSIBLE, 0, modulus.value.shape[:-1]))
         for mechanism in self._mechanisms:
             mechanism.on_curve(curve, own[mechanism.name])
-        answer = curve.modulus * self._area * self._relative_stress(curve, self._strain(nuisances))
-        if curve.relaxation is not None:
-            answer = relaxed(answer, self._time, self._first, *curve.relaxation)
-        return Prediction(answer.value, answer.slopes, None, None, None, self.valid)
+        return curve
 
-    def sensor_spread_of(self, fit: Floats) -> tuple[float, Floats]:
-        """No sensor takes part: the usual spread."""
-        return self._composition.sensor_spread(np.asarray(fit, dtype=float))
+    def _force(
+        self, curve: Curve, contact: Floats, held: NDArray[np.bool_] | None
+    ) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+        strain = (self.displacement - contact) / self._height
+        force = _numbers(curve.modulus) * self._area * self._relative_stress(curve, strain)
+        if curve.relaxation:
+            pairs = [np.stack([_numbers(pair[part]) for pair in curve.relaxation], axis=-1) for part in range(2)]
+            relaxation = Relaxation(*pairs)
+            force = relaxation.convolved(force, memories(force, self.time, relaxation))
+        every = np.ones(force.shape, dtype=bool)
+        return force, every, every
 
-    def _strain(self, nuisances: Values) -> Differentiated:
-        """Nominal strain (rows,), compression positive."""
-        points = [nuisances[f"contact_point {name}"] for name in self._ids]
-        begins = Differentiated(
-            1e-3 * np.concatenate([point.value for point in points])[self.recording],
-            1e-3 * np.concatenate([point.slopes for point in points], axis=1)[:, self.recording],
-        )
-        return (self._displacement - begins) / self._height
+    def _relative_stress(self, curve: Curve, strain: Floats) -> Floats:
+        """Nominal stress over E, compression positive.
 
-    def _relative_stress(self, curve: Curve, strain: Differentiated) -> Differentiated:
-        """Nominal stress over E."""
-        stress = strain if curve.yeoh is None else stiffened(1.0 - strain, curve.yeoh) / 3.0
+        Yeoh: (λ⁻² − λ)(1 + 2 c2 I + 3 c3 I²)/3, I = I1 − 3.
+        """
+        stress = strain
+        if curve.yeoh is not None:
+            second, third = map(_numbers, curve.yeoh)
+            stretch = 1.0 - strain
+            invariant = stretch * stretch + 2.0 / stretch - 3.0
+            neo_hookean = 1.0 / (stretch * stretch) - stretch
+            stress = neo_hookean * (1.0 + 2.0 * second * invariant + 3.0 * third * invariant * invariant) / 3.0
         if curve.platen_friction is None:
             return stress
-        return stress * (1.0 + 2.0 * self._shape_factor**2 * curve.platen_friction)
+        return np.asarray(stress * (1.0 + 2.0 * self._shape_factor**2 * _numbers(curve.platen_friction)))
+
+
+def _numbers(quantity: Differentiated) -> Floats:
+    """(points, 1, 1)."""
+    return quantity.value[..., None]
 
 
 def _nuisances(recordings: Sequence[CompressionConditions], skin: SkinDescription) -> list[Parameter]:

@@ -1,5 +1,5 @@
 """Parameters that every model has, whatever its mechanisms: of FRFs d33 and factors on the declared modulus and
-thickness; of a curve its modulus, where its contact begins, and what the load cell shows without contact.
+thickness; of a curve its modulus and where its contact begins.
 """
 
 from collections.abc import Sequence
@@ -44,7 +44,6 @@ THICKNESS = Parameter(
 )
 FRF_NUISANCES = (D33, YOUNGS_MODULUS, THICKNESS)
 _WIDE_SD = 1.5  # of the logarithm of a modulus that nobody declared
-_OFFSET_SHARE = 0.01  # of the largest force
 
 
 def modulus_parameter(skin: SkinDescription, estimates: Sequence[float]) -> Parameter:
@@ -84,18 +83,4 @@ def contact_point(recording: str, middle: float, sd: float, bound: float) -> Par
         scale="linear",
         limit=None,
         reason="where the curve leaves zero, found by the base model",
-    )
-
-
-def force_offset(recording: str, largest: float) -> Parameter:
-    """What the force cell shows without contact [N]."""
-    return Parameter(
-        name=f"force_offset {recording}",
-        unit="N",
-        low=-10 * _OFFSET_SHARE * largest,
-        high=10 * _OFFSET_SHARE * largest,
-        prior=Normal(0.0, _OFFSET_SHARE * largest),
-        scale="linear",
-        limit=0.0,
-        reason="a tared cell drifts by some thousandths to a hundredth of what it measures",
     )

@@ -1,52 +1,60 @@
-"""What a body that relaxes with one Prony pair remembers: E(t)/E(0) = 1 − g + g e^(−t/τ).
+"""What a body that relaxes remembers: E(t)/E(0) = 1 − Σ g (1 − e^(−t/τ)) over its Prony pairs.
 
-u(t) is what an elastic body would show; F(t) = ∫ E(t−s)/E(0) du(s) = (1 − g) u(t) + g Y(t) with the fading memory
+u(t) is what an elastic body would show; F(t) = ∫ E(t−s)/E(0) du(s) = (1 − Σ g) u(t) + Σ g Y(t) with the fading memories
 Y(t) = ∫ e^(−(t−s)/τ) du(s). u is taken as linear between samples, for which the step is exact (Fung, Biomechanics,
-1993, section 7.6).
+1993, section 7.6). Memories have the pairs on a last axis of their own.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import solve_banded
+from dataclasses import dataclass
 
-from underskin.autodiff import Differentiated, chain, exp, where
+import numpy as np
+
 from underskin.units import Floats
 
 _SERIES = 1e-3
 
 
-def relaxed(
-    elastic: Differentiated, time: Floats, first: NDArray[np.bool_], fraction: Differentiated, tau: Differentiated
-) -> Differentiated:
-    """F of the histories u (rows,) at times [s]; `first` marks the first sample of each history, at once there."""
-    at = Differentiated(time, np.zeros_like(elastic.slopes))
-    return (1.0 - fraction) * elastic + fraction * faded(elastic, at, first, tau)
+@dataclass(frozen=True)
+class Relaxation:
+    """The Prony pairs: g and τ [s], (points, 1, 1, pairs)."""
+
+    fraction: Floats
+    time: Floats
+
+    def decay(self, age: Floats) -> Floats:
+        """e^(−t/τ) of each pair."""
+        return np.exp(-np.maximum(age, 0.0)[..., None] / self.time)
+
+    def remaining(self, age: Floats) -> Floats:
+        """E(t)/E(0)."""
+        return self.remaining_of(self.decay(age))
+
+    def remaining_of(self, decay: Floats) -> Floats:
+        """The same from e^(−t/τ) of each pair."""
+        return np.asarray(1.0 - (self.fraction * (1.0 - decay)).sum(axis=-1))
+
+    def lagging(self, passed: Floats) -> Floats:
+        """(1 − e^(−x))/x: what is left of a steady change at its end, x of its duration over τ."""
+        x = np.maximum(passed, 0.0)[..., None] / self.time
+        safe = np.maximum(x, _SERIES)
+        return np.where(x < safe, 1 - x / 2 + x**2 / 6, -np.expm1(-safe) / safe)
+
+    def convolved(self, history: Floats, memory: Floats) -> Floats:
+        """∫ e(t−s) du(s) from u(t) and its memories."""
+        whole = 1.0 - self.fraction.sum(axis=-1)
+        return np.asarray(whole * history + (self.fraction * memory).sum(axis=-1))
 
 
-def faded(
-    history: Differentiated, time: Differentiated, begins: NDArray[np.bool_], tau: Differentiated
-) -> Differentiated:
-    """Y (rows,) of the histories u (rows,); all of u has just come where one `begins`."""
-    before = np.maximum(np.arange(len(begins)) - 1, 0)
-    x = where(~begins, (time - time[before]) / tau, 0.0)
-    decay = exp(-x)
-    known = where(begins, history, lagging(x) * (history - history[before]))
-    held = np.where(begins, 0.0, decay.value)
-    value = _march(held, known.value[:, None])[:, 0]
-    rows = np.where(begins, 0.0, decay.slopes * value[before]) + known.slopes
-    return Differentiated(value, _march(held, rows.T).T)
-
-
-def lagging(x: Differentiated) -> Differentiated:
-    """(1 − e^(−x))/x: what is left of a steady change at its end, x of its duration over τ."""
-    safe = np.maximum(x.value, _SERIES)
-    small = x.value < safe
-    value = np.where(small, 1 - x.value / 2 + x.value**2 / 6, -np.expm1(-safe) / safe)
-    slope = np.where(small, -0.5 + x.value / 3, (np.exp(-safe) + np.expm1(-safe) / safe) / safe)
-    return chain(value, (slope, x))
-
-
-def _march(decay: Floats, known: Floats) -> Floats:
-    """y_i = decay_i y_(i−1) + known_i, for each column."""
-    bands = np.stack([np.ones_like(decay), -np.append(decay[1:], 0.0)])
-    return np.asarray(solve_banded((1, 0), bands, known))
+def memories(history: Floats, time: Floats, relaxation: Relaxation) -> Floats:
+    """Y (…, samples, pairs) of histories u (…, samples) at times [s]; what u is at the first sample came at once."""
+    passed = np.diff(time, axis=-1, prepend=time[..., :1])
+    decay, lag = relaxation.decay(passed), relaxation.lagging(passed)
+    known = lag * np.diff(history, axis=-1, prepend=0.0)[..., None]
+    known[..., 0, :] = history[..., :1]
+    decay, known = np.broadcast_arrays(np.moveaxis(decay, -2, 0), np.moveaxis(known, -2, 0))
+    memory = np.empty(known.shape)
+    memory[0] = known[0]
+    for sample in range(1, len(known)):
+        np.multiply(decay[sample], memory[sample - 1], out=memory[sample])
+        memory[sample] += known[sample]
+    return np.moveaxis(memory, 0, -2)

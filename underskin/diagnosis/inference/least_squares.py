@@ -1,0 +1,130 @@
+"""Curves fitted by least squares, where fits begin: residuals in units of a law's usual error, with the parameters'
+priors, a gain of each recording, and the zero and drift of its cell taken out (variable projection).
+
+Scipy's trust-region reflective algorithm finds from far away what steps on the whole likelihood, whose covariance moves
+with the fit, do not.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from underskin.diagnosis.inference.hypothesis import Hypothesis, curvature_of_prior
+from underskin.mechanisms.models.curves import CurveModel
+from underskin.units import Floats
+
+_ERROR = 3e-3  # of the largest force: the unit of the residuals
+_GAIN = 0.03  # standard deviation of a recording's gain
+_TOLERANCE, _EVALUATIONS = 1e-4, 40
+_INSIDE = 1e-9  # of a parameter's range, off its bounds
+
+
+class LeastSquares:
+    """Of one hypothesis of curves."""
+
+    def __init__(self, hypothesis: Hypothesis) -> None:
+        """Prepare the measured samples and the projections."""
+        lines, model = hypothesis.lines, hypothesis.model
+        assert isinstance(model, CurveModel)
+        assert lines.smooth is not None
+        self._model = model
+        self._recording = lines.recording
+        self._spans = list(pairwise((*lines.first, len(lines.value))))
+        largest = np.array([np.abs(lines.value[low:high]).max() for low, high in self._spans])
+        self._unit = _ERROR * np.maximum(largest, 1e-300)[lines.recording]
+        self._taken = []
+        for low, high in self._spans:
+            columns = lines.smooth.columns[low:high] / self._unit[low:high, None]
+            solved = np.linalg.solve(np.eye(columns.shape[1]) + columns.T @ columns, columns.T)
+            self._taken.append((columns, solved))
+        self._measured = lines.value.real
+        self._low, self._high = np.array([entry.bounds for entry in model.parameters]).T
+        priors = np.array([curvature_of_prior(entry) for entry in model.parameters])
+        self._precision, self._centre = np.sqrt(priors[:, 0]), priors[:, 1]
+
+    def fitted(self, start: Floats) -> tuple[Floats, float]:
+        """The fit coordinates (parameters,) from a start, and half the sum of squares there."""
+        count, curves = len(start), len(self._spans)
+        margin = _INSIDE * (self._high - self._low)
+        inside = np.clip(start, self._low + margin, self._high - margin)
+        bounds = np.append(self._low, np.full(curves, -0.5)), np.append(self._high, np.full(curves, 0.5))
+        result = least_squares(
+            self._residuals,
+            np.append(inside, np.zeros(curves)),
+            self._jacobian,
+            bounds=bounds,
+            x_scale="jac",
+            ftol=_TOLERANCE,
+            xtol=_TOLERANCE,
+            gtol=1e-12,
+            max_nfev=_EVALUATIONS,
+        )
+        return np.asarray(result.x[:count]), float(result.cost)
+
+    def _residuals(self, x: Floats) -> Floats:
+        count = len(self._low)
+        fit, gain = x[:count], x[count:]
+        force = self._model.forces(fit[None])[0]
+        left = (self._measured - (1 + gain[self._recording]) * force) / self._unit
+        return np.concatenate([self._projected(left), (fit - self._centre) * self._precision, gain / _GAIN])
+
+    def _jacobian(self, x: Floats) -> Floats:
+        count = len(self._low)
+        fit, gain = x[:count], x[count:]
+        force, slopes = (part[0] for part in self._model.forces_and_slopes(fit[None]))
+        by_fit = -(slopes * (1 + gain[self._recording])) / self._unit
+        by_gain = np.where(self._recording == np.arange(len(gain))[:, None], -force / self._unit, 0.0)
+        rows = np.concatenate([self._projected(by_fit), self._projected(by_gain)]).T
+        priors = np.diag(np.append(self._precision, np.full(len(gain), 1 / _GAIN)))
+        return np.concatenate([rows, priors])
+
+    def _projected(self, rows: Floats) -> Floats:
+        """Rows (…, rows) less what zero and drift of each cell take of them, and the coefficients of these."""
+        parts, coefficients = [], []
+        for (low, high), (columns, solved) in zip(self._spans, self._taken, strict=True):
+            own = rows[..., low:high]
+            coefficients.append(own @ solved.T)
+            parts.append(own - coefficients[-1] @ columns.T)
+        return np.concatenate([*parts, *coefficients], axis=-1)
+
+
+def least_squares_percent(hypothesis: Hypothesis, start: Floats) -> float:
+    """The root mean square that a plain least-squares fit of the law leaves of all raw samples [% of the force's own].
+
+    Without priors, gains and drifts: the parameters and a zero of each curve are free. From a start (parameters,).
+    """
+    lines, model = hypothesis.lines, hypothesis.model
+    assert isinstance(model, CurveModel)
+    assert lines.smooth is not None
+    count, first = lines.smooth.count, lines.first
+    root, measured = np.sqrt(count), lines.value.real
+    total = np.add.reduceat(count, first)
+
+    def about_zero(rows: Floats) -> Floats:
+        """Rows (…, rows) less their mean over each curve's samples: what a zero takes of them."""
+        mean = np.add.reduceat(count * rows, first, axis=-1) / total
+        return np.asarray(root * (rows - mean[..., lines.recording]))
+
+    def residuals(x: Floats) -> Floats:
+        return about_zero(measured - model.forces(x[None])[0]) / unit
+
+    def jacobian(x: Floats) -> Floats:
+        return -about_zero(model.forces_and_slopes(x[None])[1][0]).T / unit
+
+    unit = float(np.sqrt((about_zero(measured) ** 2).sum()))
+    low, high = np.array([entry.bounds for entry in model.parameters]).T
+    margin = _INSIDE * (high - low)
+    result = least_squares(
+        residuals,
+        np.clip(start, low + margin, high - margin),
+        jacobian,
+        bounds=(low, high),
+        x_scale="jac",
+        ftol=_TOLERANCE,
+        xtol=_TOLERANCE,
+        max_nfev=_EVALUATIONS,
+    )
+    within = (count - 1) * lines.smooth.noise**2  # of raw samples about their blocks' means
+    left = 2 * float(result.cost) * unit**2 + float(within.sum())
+    return 100 * float(np.sqrt(left / (count * measured**2).sum()))

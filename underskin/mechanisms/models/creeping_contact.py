@@ -1,0 +1,274 @@
+"""The force of a sphere on a body that relaxes, while its contact grows, stays and recedes (Ting's theory). SI.
+
+E(t) = E(0) e(t), e(t) = 1 − Σ g (1 − e^(−t/τ)) over the Prony pairs. While the contact grows it is as large as on an
+elastic body at this depth δ, u being that body's force. A ring of the contact that was reached at the time s and has
+stuck since carries H(s,t) = ∫ e(t−s') dδ(s') over s < s' < t, and the contact recedes to the ring that is about to let
+go:
+
+    H(t1,t) = ℓ e(t−t1) − ℓ_s,   F(t) = ∫₀^{t1} e(t−s) du(s) + K H(t1,t)
+
+(Ting, J. Appl. Mech. 33 (1966) 845: without adhesion the stretches ℓ, ℓ_s are 0, and so is H(t1,t)). K is the stiffness
+of the contact as large as at t1, ℓ its adhesive stretch when it was reached and ℓ_s that at which it lets go; an edge
+that moves sees the instantaneous modulus (Greenwood & Johnson, Phil. Mag. A 43 (1981) 697). Where all rings but those
+of the first touch have let go, these are an elastic contact of modulus E(0) e at the depth [(1−g) δ + Σ g Y]/e with the
+work of separation over e²; it ends at that contact's pull-off. Y is the fading memory of δ (relaxation). δ and u run
+straight between samples.
+
+Exact for half space and layer through one growing and one shrinking of the contact, with holds in between. Of small
+returns on the way (noise) the rings are taken to have stuck throughout; larger ones are refused by contact_creep.
+
+Arrays are (points, curves, samples), as in sphere_contact.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.mechanisms.models.relaxation import Relaxation, memories
+from underskin.mechanisms.models.sphere_contact import Sphere
+from underskin.units import Floats
+
+_SECANTS, _SHARE = 12, 1e-9  # of the edge's place between two samples
+_ITERATIONS, _SETTLED = 40, 1e-9  # of the depths on a stage that gives; of the largest travel
+_UNSETTLED = 1e-5
+
+
+@dataclass(frozen=True)
+class Adhesion:
+    """Works of adhesion and of separation [J/m²] (points, 1, 1)."""
+
+    work: Floats
+    separation: Floats
+
+
+@dataclass(frozen=True)
+class _Now:
+    """Depth, time and memory of depth by pair at the samples at which rings are looked at."""
+
+    depth: Floats
+    time: Floats
+    memory: Floats
+
+    def carried(self, rings: "_Rings", relaxation: Relaxation) -> Floats:
+        """H(s,t) of rings."""
+        faded = self.memory - relaxation.decay(self.time - rings.time) * rings.memory
+        return relaxation.convolved(self.depth - rings.depth, faded)
+
+    def excess(self, rings: "_Rings", relaxation: Relaxation) -> Floats:
+        """H(s,t) + ℓ_s − ℓ e(t−s), above 0 where a ring holds."""
+        decay = relaxation.decay(self.time - rings.time)
+        carried = relaxation.convolved(self.depth - rings.depth, self.memory - decay * rings.memory)
+        if not rings.sticks:
+            return carried
+        return carried + rings.parting - rings.slack * relaxation.remaining_of(decay)
+
+
+@dataclass(frozen=True)
+class _Rings:
+    """Depth, time, memory of depth by pair, stretches, force, its memory by pair and stiffness when reached."""
+
+    depth: Floats
+    time: Floats
+    memory: Floats  # (…, pairs)
+    slack: Floats  # ℓ
+    parting: Floats  # ℓ_s
+    force: Floats
+    force_memory: Floats  # (…, pairs)
+    stiffness: Floats
+
+    @property
+    def sticks(self) -> bool:
+        """Whether there is adhesion."""
+        return bool(np.any(self.parting))
+
+    def at(self, index: NDArray[np.intp]) -> "_Rings":
+        """Those reached at samples `index` (points, curves, samples)."""
+
+        def of(values: Floats) -> Floats:
+            if values.ndim == index.ndim:
+                return np.take_along_axis(values, index, axis=-1)
+            return np.take_along_axis(values, index[..., None], axis=-2)
+
+        return _Rings(*(of(getattr(self, name)) for name in self.__dataclass_fields__))
+
+    def between(self, other: "_Rings", share: Floats, relaxation: Relaxation) -> "_Rings":
+        """Those reached at a share of the way to the next sample."""
+
+        def along(name: str) -> Floats:
+            one, two = getattr(self, name), getattr(other, name)
+            return np.asarray(one + share * (two - one))
+
+        passed = share * (other.time - self.time)
+
+        def remembered(memory: Floats, change: Floats) -> Floats:
+            lag = relaxation.lagging(passed)
+            return np.asarray(relaxation.decay(passed) * memory + lag * (share * change)[..., None])
+
+        return _Rings(
+            along("depth"),
+            along("time"),
+            remembered(self.memory, other.depth - self.depth),
+            along("slack"),
+            along("parting"),
+            along("force"),
+            remembered(self.force_memory, other.force - self.force),
+            along("stiffness"),
+        )
+
+
+def relaxing(
+    sphere: Sphere,
+    relaxation: Relaxation,
+    adhesion: Adhesion | None,
+    depth: Floats,
+    time: Floats,
+    begins: NDArray[np.intp],
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """F (points, curves, samples) [N] at depths δ [m], and where there is contact.
+
+    `begins` (points, curves) is the sample with which the contact starts: the first, or one put where it touches; the
+    number of samples where there is none. The sphere's own stage is not looked at.
+    """
+    sphere = replace(sphere, give=0.0)
+    number = np.arange(depth.shape[-1])
+    started = number >= begins[..., None]
+    depth = np.where(started, depth, 0.0)
+    first = np.take_along_axis(time, np.minimum(begins, time.shape[-1] - 1)[..., None], axis=-1)
+    time = np.maximum(time, first)  # what is felt at the touch comes at once
+    work = None if adhesion is None else adhesion.work
+    least, lowest = sphere.pull_off(work)
+    held = started & (depth > lowest) if adhesion is not None else started & (depth > 0)
+    a = sphere.radius_at(depth, work, np.maximum(least, 1e-12))
+    force, stiffness, slack, parting = _elastic(sphere, a, adhesion)
+    force = np.where(held, force, 0.0)
+    depth_memory, force_memory = memories(depth, time, relaxation), memories(force, time, relaxation)
+    rings = _Rings(depth, time, depth_memory, slack, parting, force, force_memory, stiffness)
+    answer = relaxation.convolved(force, force_memory)
+    record = np.maximum.accumulate(np.where(depth >= np.maximum.accumulate(depth, axis=-1), number, 0), axis=-1)
+    record = np.maximum(record, np.minimum(begins, depth.shape[-1] - 1)[..., None])
+    back = started & (record < number)
+    if not back.any():
+        return np.where(held, answer, 0.0), held
+    late = slice(int(np.argmax(back.any(axis=(0, 1)))), None)  # what was before is not looked at again
+    now = _Now(depth[..., late], time[..., late], depth_memory[..., late, :])
+    edge, stuck = _edge(rings, now, record, begins, relaxation)
+    carried = now.carried(edge, relaxation)
+    reached, stiffness, _, _ = _elastic(sphere, sphere.radius_at(edge.depth, work, np.maximum(least, 1e-12)), adhesion)
+    kept = relaxation.decay(now.time - edge.time) * edge.force_memory
+    answer[..., late] = np.where(
+        back[..., late], relaxation.convolved(reached, kept) + stiffness * carried, answer[..., late]
+    )
+    held[..., late] = np.where(back[..., late], stuck, held[..., late])
+    touch = back & ~held
+    if touch.any() and adhesion is not None:
+        of_touch, holds = _first_touch(sphere, relaxation, adhesion, depth, depth_memory, time)
+        answer, held = np.where(touch, of_touch, answer), np.where(touch, holds, held)
+    return np.where(held, answer, 0.0), held
+
+
+def relaxing_on_stage(
+    sphere: Sphere,
+    relaxation: Relaxation,
+    adhesion: Adhesion | None,
+    travel: Floats,
+    time: Floats,
+    begins: NDArray[np.intp],
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """The same at the travel δ + F/k of a stage that gives: depths found by secant steps at all samples together."""
+    give = sphere.give
+    work = None if adhesion is None else adhesion.work
+    least, _ = sphere.pull_off(work)
+    a = sphere.radius_at(travel, work, np.maximum(least, 1e-12))
+    elastic = sphere.force_at(travel, a) if work is not None else sphere.at(a)[1]
+    touched = np.arange(travel.shape[-1]) >= begins[..., None]
+    depth = np.where(touched, travel - give * elastic, travel)
+    slope = sphere.at(a)[2]
+    scale = np.abs(travel).max(axis=-1, keepdims=True) + 1e-15
+    force, held = relaxing(sphere, relaxation, adhesion, depth, time, begins)
+    for _ in range(_ITERATIONS):
+        left = np.where(touched, depth + give * force - travel, 0.0)
+        if (np.abs(left) <= _SETTLED * scale).all():
+            break
+        moved = depth - left / (1 + give * slope)
+        after, held = relaxing(sphere, relaxation, adhesion, moved, time, begins)
+        change = moved - depth
+        with np.errstate(divide="ignore", invalid="ignore"):
+            secant = (after - force) / change
+        far = np.abs(change) > 1e-12 * scale
+        slope = np.where(far & np.isfinite(secant) & (secant > 0), 0.5 * (slope + np.minimum(secant, 4 * slope)), slope)
+        depth, force = moved, after
+    lost = np.maximum.accumulate(np.abs(left) > _UNSETTLED * scale, axis=-1) & touched
+    held = held & ~lost
+    return np.where(held, force, 0.0), held
+
+
+def _elastic(sphere: Sphere, a: Floats, adhesion: Adhesion | None) -> tuple[Floats, Floats, Floats, Floats]:
+    """F, K, ℓ and ℓ_s of the elastic contact that grows."""
+    _, force, stiffness, _ = sphere.at(a)
+    if adhesion is None:
+        none = np.zeros_like(force)
+        return force, stiffness, none, none
+    stretch = sphere.stretch(a, adhesion.work)
+    return force - stiffness * stretch, stiffness, stretch, sphere.stretch(a, adhesion.separation)
+
+
+def _edge(
+    rings: _Rings, now: _Now, record: NDArray[np.intp], begins: NDArray[np.intp], relaxation: Relaxation
+) -> tuple[_Rings, NDArray[np.bool_]]:
+    """The outermost ring in contact now, and whether any holds.
+
+    A ring is reached at a sample deeper than all before: `record` is the last such one. The rings let go one after
+    another from the outermost; the one about to is between two samples.
+    """
+    last = rings.depth.shape[-1] - 1
+
+    def excess(of: _Rings) -> Floats:
+        return now.excess(of, relaxation)
+
+    high = record[..., record.shape[-1] - now.time.shape[-1] :].copy()
+    low = np.broadcast_to(np.minimum(begins, last)[..., None], high.shape).copy()
+    stuck = excess(rings.at(low)) >= 0
+    whole = excess(rings.at(high)) >= 0
+    low = np.where(whole, high, low)
+    while (high - low > 1).any():
+        middle = (low + high) // 2
+        # What was reached between two records was not deeper than the first of them.
+        holds = excess(rings.at(np.take_along_axis(record, middle, axis=-1))) >= 0
+        low, high = np.where(holds, middle, low), np.where(holds, high, middle)
+    low = np.where(whole, low, np.maximum(high - 1, low))
+    near, far = rings.at(low), rings.at(high)
+    at_near, at_far = excess(near), excess(far)
+    inner, outer = np.zeros_like(at_near), np.ones_like(at_near)
+    share = inner
+    for _ in range(_SECANTS):  # regula falsi, the end that stays halved (Illinois)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            tried = inner + (outer - inner) * at_near / (at_near - at_far)
+        tried = np.where(whole | ~np.isfinite(tried), 0.0, np.clip(tried, 0.0, 1.0))
+        settled = bool((np.abs(tried - share) < _SHARE).all())
+        share = tried
+        if settled:
+            break
+        value = excess(near.between(far, share, relaxation))
+        positive = value >= 0
+        inner, outer = np.where(positive, share, inner), np.where(positive, outer, share)
+        at_near, at_far = np.where(positive, value, 0.5 * at_near), np.where(positive, 0.5 * at_far, value)
+    return near.between(far, share, relaxation), stuck
+
+
+def _first_touch(
+    sphere: Sphere,
+    relaxation: Relaxation,
+    adhesion: Adhesion,
+    depth: Floats,
+    memory: Floats,
+    time: Floats,
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """F of what is left of the first touch, at the first of the times, and whether it holds."""
+    left = relaxation.remaining(time - time[..., :1])
+    relaxed = relaxation.convolved(depth, memory) / left
+    work = adhesion.separation / left**2
+    unit = replace(sphere, radius=sphere.radius + np.zeros_like(depth))
+    least, lowest = unit.pull_off(work)
+    a = unit.radius_at(relaxed, work, least)
+    return left * unit.force_at(relaxed, a), relaxed > lowest

@@ -1,0 +1,127 @@
+"""The course of an indentation curve: how noisy it is, where it turns, where it jumps, what the cell shows in the air.
+
+Displacement grows into the sample. All is found from the samples alone, without a law of contact.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+
+from underskin.units import Floats
+
+_BEYOND_NOISE = 3.0  # standard deviations; a jump that was none only ends a mean early
+_BLOCKS = 60  # of a curve, over whose means jumps are sought
+_AIR = 5  # samples at least that tell what the cell shows in the air
+_BEYOND_JUMP, _LEAST_JUMP = 6.0, 2e-3  # standard deviations, and of the range of force, of a jump of contact
+_HELD = 0.2  # of the usual step between samples, below which a sphere is held
+_RISE = 0.02  # of the range of force: below that a sphere has not yet pressed
+
+
+@dataclass(frozen=True)
+class Course:
+    """Of one curve. `air` are samples before contact or after it has ended, none where none were recorded.
+
+    `snap_in` and `pull_off` number the first samples after those jumps; None where there is none.
+    """
+
+    noise: float  # standard deviation of a sample of force
+    turn: int  # the deepest sample
+    leave: int  # the last sample of the hold there
+    snap_in: int | None
+    pull_off: int | None
+    air: NDArray[np.intp]
+    zero: float  # what the cell shows in the air, or at the first sample
+    jumps: NDArray[np.intp]
+
+    @property
+    def has_air(self) -> bool:
+        """Whether the force's zero is known from samples."""
+        return len(self.air) >= _AIR
+
+
+def course(displacement: Floats, force: Floats) -> Course:
+    """Of samples (samples,), all finite."""
+    noise = roughness(force)
+    block = int(np.ceil(len(force) / _BLOCKS))
+    turn = int(np.argmax(displacement))
+    span = float(np.ptp(force))
+    found = jumps(force, float(np.hypot(noise, 1e-3 * span)), block)
+    step = np.array([_step(force, place, block) for place in found.tolist()])
+    least = np.maximum(_BEYOND_JUMP * noise, _LEAST_JUMP * span)
+    begin, end = (float(np.median(part)) for part in (force[: max(3, block)], force[-max(3, block) :]))
+    # From the air into contact, or back into it
+    few = max(2, min(block, 5))
+    before = np.array([np.median(force[max(place - few, 0) : place]) for place in found.tolist()])
+    after = np.array([np.median(force[place : place + few]) for place in found.tolist()])
+    in_air = least + _RISE * span
+    down = np.flatnonzero((found < turn) & (step < -least) & (np.abs(before - begin) < in_air) & (found > few))
+    up = np.flatnonzero((found > turn) & (step > least) & (np.abs(after - end) < in_air))
+    snap_in = int(found[down[np.argmin(step[down])]]) if len(down) else None
+    pull_off = int(found[up[np.argmax(step[up])]]) if len(up) else None
+    steps = np.abs(np.diff(displacement[turn:], append=-np.inf))
+    still = steps <= _HELD * float(np.median(np.abs(np.diff(displacement)))) + 1e-300
+    leave = turn + int(np.argmin(still))
+    air = _air(force, turn, snap_in, pull_off, noise, span)
+    zero = float(np.median(force[air])) if len(air) >= _AIR else float(force[0])
+    return Course(noise, turn, leave, snap_in, pull_off, air, zero, found)
+
+
+def roughness(force: Floats) -> float:
+    """The noise of a raw sample; second differences of a smooth curve are small against it, or cautious."""
+    second = force[2:] - 2 * force[1:-1] + force[:-2]
+    if not len(second):
+        return 0.0
+    noise = 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0)
+    steps = np.abs(np.diff(force))
+    steps = steps[steps > 0]
+    quantum = float(steps.min()) if len(steps) else 0.0
+    coarse = len(np.unique(force)) < len(force) / 2  # an analog-digital converter's steps show
+    return float(np.hypot(noise, quantum / np.sqrt(12.0))) if coarse else noise
+
+
+def jumps(force: Floats, noise: float, block: int) -> NDArray[np.intp]:
+    """The samples (jumps,) with which a new course begins, where means over `block` samples would hide it.
+
+    A mean over samples on both sides is a force that never was. `noise`: the standard deviation of one sample. The
+    mean of a block ahead less that of the block behind is held against a third of the same over the blocks beyond,
+    which on a straight course is equal to it; near there the jump is the largest change between two samples.
+    """
+    if block == 1 or len(force) < 2 * block + 1:
+        return np.zeros(0, dtype=np.intp)
+    longer = np.pad(force, 2 * block, mode="reflect", reflect_type="odd")  # straight on at both ends
+    means = np.convolve(longer, np.full(block, 1 / block), mode="valid")  # of longer[i : i + block]
+    at = np.arange(len(force)) + 2 * block
+    size = np.abs(means[at] - means[at - block] - (means[at + block] - means[at - 2 * block]) / 3)
+    least = _BEYOND_NOISE * noise * np.sqrt(20 / 9 / block)
+    about = np.flatnonzero((size > least) & (size == maximum_filter1d(size, 2 * block + 1)))
+    change = np.abs(np.diff(force, prepend=force[0]))
+    return np.array([_largest(change, sample - block, sample + block) for sample in about.tolist()], dtype=np.intp)
+
+
+def _largest(change: Floats, first: int, last: int) -> int:
+    """The place of the largest change from first to last."""
+    first = max(first, 0)
+    return first + int(np.argmax(change[first : last + 1]))
+
+
+def _step(force: Floats, place: int, block: int) -> float:
+    """How much a jump changes the force: medians of a few samples on either side."""
+    few = max(2, min(block, 5))
+    return float(np.median(force[place : place + few]) - np.median(force[max(place - few, 0) : max(place, 1)]))
+
+
+def _air(
+    force: Floats, turn: int, snap_in: int | None, pull_off: int | None, noise: float, span: float
+) -> NDArray[np.intp]:
+    """The samples in the air: up to the snap-in, or while the force stays where it began; else those after the end."""
+    if snap_in is not None:
+        return np.arange(snap_in)
+    begin = float(np.median(force[: max(3, min(turn, len(force)) // 50)])) if turn else float(force[0])
+    off = np.abs(force[: turn + 1] - begin) > max(4 * noise, _RISE * span)
+    staying = off[::-1].cumprod()[::-1].astype(bool)  # from where it stays off
+    first = int(np.argmax(staying)) if staying.any() else 0
+    if first >= _AIR:
+        return np.arange(first)
+    return np.arange(pull_off, len(force)) if pull_off is not None else np.zeros(0, dtype=np.intp)
