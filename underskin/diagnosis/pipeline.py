@@ -119,7 +119,8 @@ def _work_out(
     ranked = [answer.explanation for answer in result.answers if answer.explanation is not None]
     groups = cross_validation.hold_out(problem, ranked, nothing, result.supported)
     progress(0.95)
-    doubtful = {entry.names: doubt(problem, entry) for entry in (nothing, *ranked[:1])}
+    doubted = (nothing, *(ranked if problem.kind == "indentation" else ranked[:1]))
+    doubtful = {entry.names: doubt(problem, entry) for entry in doubted}
     after = cross_validation.total(groups)[1]
     if problem.kind == "indentation" and after.recordings and after.rmse_percent > _FAR_ABOVE * after.floor_percent:
         doubtful |= {entry.names: 1.0 for entry in ranked[:1] if entry.names}
