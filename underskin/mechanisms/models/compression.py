@@ -9,13 +9,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.autodiff import Differentiated, constant
+from underskin.autodiff import constant
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Mechanism, Parameter, Values
-from underskin.mechanisms.models.curve_state import Curve
+from underskin.mechanisms.models.curve_state import Curve, numbers
 from underskin.mechanisms.models.curves import CurveModel, declared_modulus
 from underskin.mechanisms.models.nuisances import contact_point, modulus_parameter, required_modulus
-from underskin.mechanisms.models.relaxation import Relaxation, memories
+from underskin.mechanisms.models.relaxation import memories
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings import elastomer
 from underskin.recordings.campaign import CompressionRecording
@@ -53,10 +53,9 @@ class CompressionModel(CurveModel):
         self, curve: Curve, contact: Floats, held: NDArray[np.bool_] | None
     ) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
         strain = (self.displacement - contact) / self._height
-        force = _numbers(curve.modulus) * self._area * self._relative_stress(curve, strain)
-        if curve.relaxation:
-            pairs = [np.stack([_numbers(pair[part]) for pair in curve.relaxation], axis=-1) for part in range(2)]
-            relaxation = Relaxation(*pairs)
+        force = numbers(curve.modulus) * self._area * self._relative_stress(curve, strain)
+        relaxation = curve.prony_pairs
+        if relaxation is not None:
             force = relaxation.convolved(force, memories(force, self.time, relaxation))
         every = np.ones(force.shape, dtype=bool)
         return force, every, every
@@ -68,19 +67,14 @@ class CompressionModel(CurveModel):
         """
         stress = strain
         if curve.yeoh is not None:
-            second, third = map(_numbers, curve.yeoh)
+            second, third = map(numbers, curve.yeoh)
             stretch = 1.0 - strain
             invariant = stretch * stretch + 2.0 / stretch - 3.0
             neo_hookean = 1.0 / (stretch * stretch) - stretch
             stress = neo_hookean * (1.0 + 2.0 * second * invariant + 3.0 * third * invariant * invariant) / 3.0
         if curve.platen_friction is None:
             return stress
-        return np.asarray(stress * (1.0 + 2.0 * self._shape_factor**2 * _numbers(curve.platen_friction)))
-
-
-def _numbers(quantity: Differentiated) -> Floats:
-    """(points, 1, 1)."""
-    return quantity.value[..., None]
+        return np.asarray(stress * (1.0 + 2.0 * self._shape_factor**2 * numbers(curve.platen_friction)))
 
 
 def _nuisances(recordings: Sequence[CompressionConditions], skin: SkinDescription) -> list[Parameter]:

@@ -43,6 +43,24 @@ class Adhesion:
 
 
 @dataclass(frozen=True)
+class Path:
+    """What is commanded: `travel` [m] and `time` [s] of samples (points, curves, samples).
+
+    `begins` (points, curves) is the sample with which contact starts: the first, or one put where it touches; the
+    number of samples where there is none.
+    """
+
+    travel: Floats
+    time: Floats
+    begins: NDArray[np.intp]
+
+    @property
+    def touched(self) -> NDArray[np.bool_]:
+        """From the touch on."""
+        return np.asarray(np.arange(self.travel.shape[-1]) >= self.begins[..., None])
+
+
+@dataclass(frozen=True)
 class _Now:
     """Depth, time and memory of depth by pair at the samples at which rings are looked at."""
 
@@ -118,24 +136,17 @@ class _Rings:
 
 
 def relaxing(
-    sphere: Sphere,
-    relaxation: Relaxation,
-    adhesion: Adhesion | None,
-    depth: Floats,
-    time: Floats,
-    begins: NDArray[np.intp],
+    sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, path: Path
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """F (points, curves, samples) [N] at depths δ [m], and where there is contact.
+    """F (points, curves, samples) [N] where a path's travel is the depth δ, and where there is contact.
 
-    `begins` (points, curves) is the sample with which the contact starts: the first, or one put where it touches; the
-    number of samples where there is none. The sphere's own stage is not looked at.
+    The sphere's own stage is not looked at.
     """
     sphere = replace(sphere, give=0.0)
-    number = np.arange(depth.shape[-1])
-    started = number >= begins[..., None]
-    depth = np.where(started, depth, 0.0)
-    first = np.take_along_axis(time, np.minimum(begins, time.shape[-1] - 1)[..., None], axis=-1)
-    time = np.maximum(time, first)  # what is felt at the touch comes at once
+    begins, started = np.minimum(path.begins, path.travel.shape[-1] - 1)[..., None], path.touched
+    number = np.arange(path.travel.shape[-1])
+    depth = np.where(started, path.travel, 0.0)
+    time = np.maximum(path.time, np.take_along_axis(path.time, begins, axis=-1))  # what is felt at the touch is at once
     work = None if adhesion is None else adhesion.work
     least, lowest = sphere.pull_off(work)
     held = started & (depth > lowest) if adhesion is not None else started & (depth > 0)
@@ -146,7 +157,7 @@ def relaxing(
     rings = _Rings(depth, time, depth_memory, slack, parting, force, force_memory, stiffness)
     answer = relaxation.convolved(force, force_memory)
     record = np.maximum.accumulate(np.where(depth >= np.maximum.accumulate(depth, axis=-1), number, 0), axis=-1)
-    record = np.maximum(record, np.minimum(begins, depth.shape[-1] - 1)[..., None])
+    record = np.maximum(record, begins)
     back = started & (record < number)
     if not back.any():
         return np.where(held, answer, 0.0), held
@@ -168,30 +179,24 @@ def relaxing(
 
 
 def relaxing_on_stage(
-    sphere: Sphere,
-    relaxation: Relaxation,
-    adhesion: Adhesion | None,
-    travel: Floats,
-    time: Floats,
-    begins: NDArray[np.intp],
+    sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, path: Path
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """The same at the travel δ + F/k of a stage that gives: depths found by secant steps at all samples together."""
-    give = sphere.give
+    """The same where the travel is δ + F/k of a stage that gives: depths by secant steps at all samples together."""
+    give, travel, touched = sphere.give, path.travel, path.touched
     work = None if adhesion is None else adhesion.work
     least, _ = sphere.pull_off(work)
     a = sphere.radius_at(travel, work, np.maximum(least, 1e-12))
     elastic = sphere.force_at(travel, a) if work is not None else sphere.at(a)[1]
-    touched = np.arange(travel.shape[-1]) >= begins[..., None]
     depth = np.where(touched, travel - give * elastic, travel)
     slope = sphere.at(a)[2]
     scale = np.abs(travel).max(axis=-1, keepdims=True) + 1e-15
-    force, held = relaxing(sphere, relaxation, adhesion, depth, time, begins)
+    force, held = relaxing(sphere, relaxation, adhesion, replace(path, travel=depth))
     for _ in range(_ITERATIONS):
         left = np.where(touched, depth + give * force - travel, 0.0)
         if (np.abs(left) <= _SETTLED * scale).all():
             break
         moved = depth - left / (1 + give * slope)
-        after, held = relaxing(sphere, relaxation, adhesion, moved, time, begins)
+        after, held = relaxing(sphere, relaxation, adhesion, replace(path, travel=moved))
         change = moved - depth
         with np.errstate(divide="ignore", invalid="ignore"):
             secant = (after - force) / change
@@ -219,15 +224,14 @@ def _edge(
     """The outermost ring in contact now, and whether any holds.
 
     A ring is reached at a sample deeper than all before: `record` is the last such one. The rings let go one after
-    another from the outermost; the one about to is between two samples.
+    another from the outermost; the one about to is between two samples. `begins` (points, curves, 1).
     """
-    last = rings.depth.shape[-1] - 1
 
     def excess(of: _Rings) -> Floats:
         return now.excess(of, relaxation)
 
     high = record[..., record.shape[-1] - now.time.shape[-1] :].copy()
-    low = np.broadcast_to(np.minimum(begins, last)[..., None], high.shape).copy()
+    low = np.broadcast_to(begins, high.shape).copy()
     stuck = excess(rings.at(low)) >= 0
     whole = excess(rings.at(high)) >= 0
     low = np.where(whole, high, low)

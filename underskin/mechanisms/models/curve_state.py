@@ -2,7 +2,11 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from underskin.autodiff import Differentiated
+from underskin.mechanisms.models.relaxation import Relaxation
+from underskin.units import Floats
 
 
 @dataclass
@@ -20,3 +24,16 @@ class Curve:
     relaxation: tuple[tuple[Differentiated, Differentiated], ...] = ()  # g and τ [s] of each Prony pair
     stage_stiffness: Differentiated | None = None  # [N/m]
     platen_friction: Differentiated | None = None  # 0 to 1
+
+    @property
+    def prony_pairs(self) -> Relaxation | None:
+        """The pairs, (points, 1, 1, pairs); None where nothing relaxes."""
+        if not self.relaxation:
+            return None
+        fraction, time = (np.stack([numbers(pair[part]) for pair in self.relaxation], axis=-1) for part in range(2))
+        return Relaxation(fraction, time)
+
+
+def numbers(quantity: Differentiated) -> Floats:
+    """A number of each point, as curves take it: (points, 1, 1)."""
+    return quantity.value[..., None]

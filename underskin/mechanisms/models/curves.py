@@ -5,7 +5,7 @@ end. Derivatives are central differences, exact to about 1e-8: all points aside 
 the middle, whose samples decide which are in contact. Contact points move one curve each, all of them at once.
 """
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,12 +18,11 @@ from underskin.mechanisms.models.pickup import Pickup
 from underskin.recordings.conditions import Conditions, CurveConditions
 from underskin.units import Floats, to_si
 
-CONTACT_POINT = "contact_point"
 _STEP = 1e-5  # of a logarithm or of a prior's width
 _AT_ONCE = 1_000_000  # samples of all points
 
 
-class CurveModel:
+class CurveModel(ABC):
     """The force of curves under a set of mechanisms; rows are all samples, one recording after another."""
 
     sensor: NDArray[np.intp] | None = None
@@ -59,6 +58,10 @@ class CurveModel:
         self._step = np.where(logarithmic, _STEP, _STEP * np.minimum(1.0, self._high - self._low))
 
     @abstractmethod
+    def _curve(self, own: dict[str, Values], nuisances: Values) -> Curve:
+        """What governs the curves, its numbers (points, 1), as the mechanisms make it."""
+
+    @abstractmethod
     def _force(
         self, curve: Curve, contact: Floats, held: NDArray[np.bool_] | None
     ) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
@@ -79,7 +82,7 @@ class CurveModel:
         return np.stack(values), np.stack(slopes)
 
     def predict(self, fit: Floats) -> Prediction:
-        """All samples at one point of the fit coordinates (parameters,)."""
+        """All samples at one point of the fit coordinates (parameters,); raises InvalidInput for another length."""
         value, slopes, inside = self._differentiated(np.asarray(fit, dtype=float))
         return Prediction(value, slopes, None, None, None, inside)
 
@@ -114,10 +117,6 @@ class CurveModel:
             else:
                 slopes[places[0]] = change / way[0]
         return middle[0][rows], slopes, inside[0][rows]
-
-    def _curve(self, own: dict[str, Values], nuisances: Values) -> Curve:
-        """What governs the curves, its numbers (points, 1), as the mechanisms make it."""
-        raise NotImplementedError
 
     def _arranged(self, columns: Sequence[Floats]) -> Floats:
         """Columns of the curves as one array (curves, samples), each staying at its last value."""

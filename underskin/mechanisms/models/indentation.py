@@ -6,21 +6,20 @@ through the body's history where it relaxes. What the load cell adds, a zero, a 
 covariance (diagnosis/noise).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.autodiff import Differentiated, constant
+from underskin.autodiff import constant
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Mechanism, Parameter, Values
-from underskin.mechanisms.models.creeping_contact import Adhesion, relaxing, relaxing_on_stage
-from underskin.mechanisms.models.curve_state import Curve
+from underskin.mechanisms.models.creeping_contact import Adhesion, Path, relaxing, relaxing_on_stage
+from underskin.mechanisms.models.curve_state import Curve, numbers
 from underskin.mechanisms.models.curves import CurveModel, declared_modulus
 from underskin.mechanisms.models.nuisances import THICKNESS, contact_point, modulus_parameter, required_modulus
-from underskin.mechanisms.models.relaxation import Relaxation
 from underskin.mechanisms.models.sphere_contact import (
     Layers,
     Sphere,
@@ -71,8 +70,10 @@ class IndentationModel(CurveModel):
     ) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
         travel = self.displacement - contact
         sphere, adhesion = self._sphere(curve), _adhesion(curve)
-        if curve.relaxation:
-            return self._relaxing(sphere, curve, adhesion, contact, held)
+        relaxation = curve.prony_pairs
+        if relaxation is not None:
+            on = relaxing if curve.stage_stiffness is None else relaxing_on_stage
+            return self._relaxing(sphere, partial(on, sphere, relaxation, adhesion), adhesion, contact, held)
         if adhesion is None:
             depth = np.maximum(travel, 0.0)
             a = sphere.radius_at(depth, None)
@@ -80,7 +81,7 @@ class IndentationModel(CurveModel):
             return force, travel > 0, sphere.inside(a) | (travel <= 0)
         if held is None:
             held = in_contact(travel, self._last_travel(sphere, adhesion.separation))
-        a, _ = edges(sphere, travel, held, adhesion.work, adhesion.separation if curve.work_of_separation else None)
+        a = edges(sphere, travel, held, adhesion.work, adhesion.separation if curve.work_of_separation else None)
         force = np.where(held, sphere.force_at(travel, a), 0.0)
         return force, held, sphere.inside(a) | ~held
 
@@ -97,51 +98,42 @@ class IndentationModel(CurveModel):
     def _relaxing(
         self,
         sphere: Sphere,
-        curve: Curve,
+        force_on: Callable[[Path], tuple[Floats, NDArray[np.bool_]]],
         adhesion: Adhesion | None,
         contact: Floats,
         held: NDArray[np.bool_] | None,
     ) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
         """The same through the history, which begins where a recording touches, between two samples."""
-        travel, time, begins = _with_touch(self.displacement - contact, self.time)
-        pairs = [np.stack([_numbers(pair[part]) for pair in curve.relaxation], axis=-1) for part in range(2)]
-        relaxation = Relaxation(*pairs)
-        on = relaxing if curve.stage_stiffness is None else relaxing_on_stage
-        force, own = on(sphere, relaxation, adhesion, travel, time, begins)
+        path = _with_touch(self.displacement - contact, self.time)
+        force, own = force_on(path)
         least = sphere.pull_off(None if adhesion is None else adhesion.work)[0]
-        a = sphere.radius_at(np.maximum(travel, 0.0), None, least)
+        a = sphere.radius_at(np.maximum(path.travel, 0.0), None, least)
         own = own & (self.displacement - contact >= 0).cumsum(axis=-1).astype(bool)  # the touch lies after its sample
         held = own if held is None else held
         return np.where(held, force, 0.0), held, sphere.inside(a) | ~held
 
     def _sphere(self, curve: Curve) -> Sphere:
-        poisson_ratio = _numbers(curve.poisson_ratio)
+        poisson_ratio = numbers(curve.poisson_ratio)
         layers = None
         if curve.layered:
             assert curve.thickness is not None
             each = poisson_ratio.ravel().tolist()
             alike = each[:1] if len(set(each)) == 1 else each
-            layers = Layers(_numbers(curve.thickness), [layer_ratios(value) for value in alike])
-        stiffening = None if curve.stiffening is None else Stiffening(*map(_numbers, curve.stiffening))
-        give = 0.0 if curve.stage_stiffness is None else 1.0 / _numbers(curve.stage_stiffness)
-        return Sphere(_numbers(curve.modulus) / (1 - poisson_ratio**2), self._radius, layers, stiffening, give)
-
-
-def _numbers(quantity: Differentiated) -> Floats:
-    """(points, 1, 1)."""
-    return quantity.value[..., None]
+            layers = Layers(numbers(curve.thickness), [layer_ratios(value) for value in alike])
+        stiffening = None if curve.stiffening is None else Stiffening(*map(numbers, curve.stiffening))
+        give = 0.0 if curve.stage_stiffness is None else 1.0 / numbers(curve.stage_stiffness)
+        return Sphere(numbers(curve.modulus) / (1 - poisson_ratio**2), self._radius, layers, stiffening, give)
 
 
 def _adhesion(curve: Curve) -> Adhesion | None:
     if curve.work_of_adhesion is None:
         return None
-    work = _numbers(curve.work_of_adhesion)
-    return Adhesion(work, work if curve.work_of_separation is None else _numbers(curve.work_of_separation))
+    work = numbers(curve.work_of_adhesion)
+    return Adhesion(work, work if curve.work_of_separation is None else numbers(curve.work_of_separation))
 
 
-def _with_touch(travel: Floats, time: Floats) -> tuple[Floats, Floats, NDArray[np.intp]]:
-    """Travel and time (points, curves, samples) with the touch, travel 0, in the place of the last sample before it;
-    and the number of the sample with which contact begins, the number of samples where there is none."""
+def _with_touch(travel: Floats, time: Floats) -> Path:
+    """The path, with the touch, travel 0, in the place of the last sample before it."""
     touched = travel >= 0
     first = np.where(touched.any(axis=-1), touched.argmax(axis=-1), travel.shape[-1])
     time = np.broadcast_to(time, travel.shape).copy()
@@ -153,7 +145,7 @@ def _with_touch(travel: Floats, time: Floats) -> tuple[Floats, Floats, NDArray[n
     time[point, curve, then - 1] += share * (time[point, curve, then] - time[point, curve, then - 1])
     travel[point, curve, then - 1] = 0.0
     begins = np.where((first > 0) & (first < travel.shape[-1]), first - 1, first)
-    return travel, time, begins
+    return Path(travel, time, begins)
 
 
 def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescription) -> list[Parameter]:

@@ -138,13 +138,13 @@ class Sphere:
     def stretch(self, a: Floats, work: Floats) -> Floats:
         """ℓ of an edge with the energy release rate `work` [J/m²]."""
         ratio = 1.0 if self.layers is None else self.layers.at(a)[..., 3]
-        return np.asarray(np.sqrt(2 * np.pi * a * work / self._modulus_at(a)) * ratio)
+        return self._stretch(a, work, ratio)
 
     def travel(self, a: Floats, work: Floats | None) -> Floats:
         """δ + F/k in equilibrium."""
         depth, force, stiffness, ratio = self.at(a)
         if work is not None:
-            stretch = np.sqrt(2 * np.pi * a * work / self._modulus_at(a)) * ratio
+            stretch = self._stretch(a, work, ratio)
             depth, force = depth - stretch, force - stiffness * stretch
         return np.asarray(depth + self.give * force)
 
@@ -164,13 +164,12 @@ class Sphere:
         if work is None and not np.any(self.give):
             return root if self.layers is None else self.layers.radius_of(root)
         if work is not None and self._plain:
-            unit = np.cbrt(2 * np.pi * self.radius**2 * work / self.modulus)
+            unit = self._unit(work)
             return np.maximum(_jkr_radius(travel * self.radius / unit**2) * unit, least)
         start = root if self.layers is None else self.layers.radius_of(root)
         if work is not None:
-            unit = np.cbrt(2 * np.pi * self.radius**2 * work / self.modulus)
             pulled = np.sqrt(1.5 * np.pi * work * self.give) * self.radius
-            start = start + (1.0 if self.layers is None else 1.3) * (unit + pulled)
+            start = start + (1.0 if self.layers is None else 1.3) * (self._unit(work) + pulled)
         a = start + np.zeros(np.broadcast_shapes(np.shape(start), np.shape(travel)))
         a = np.maximum(a, least)
         for _ in range(_STEPS):
@@ -190,10 +189,10 @@ class Sphere:
         shape = np.broadcast_shapes(np.shape(self.modulus), np.shape(self.radius))
         if work is None:
             return np.zeros(shape), np.zeros(shape)
+        unit = self._unit(work)
         if self._plain:
-            unit = np.cbrt(2 * np.pi * self.radius**2 * work / self.modulus)
             return _LAST * unit, _LEAST_TRAVEL * unit**2 / self.radius
-        unit = np.cbrt(2 * np.pi * self.radius**2 * work / self.modulus) + np.zeros(shape)
+        unit = unit + np.zeros(shape)
         low, high = _LEAST * unit, _MOST * unit
         if self.layers is not None:
             largest = LARGEST_A_OVER_H * self.layers.thickness
@@ -215,6 +214,13 @@ class Sphere:
             return np.ones(np.shape(a), dtype=bool)
         return np.asarray(a < (1 - 1e-9) * LARGEST_A_OVER_H * self.layers.thickness)
 
+    def _unit(self, work: Floats) -> Floats:
+        """JKR's unit of length [m]: the contact radius at δ = 0 on the half space under a stiff stage."""
+        return np.asarray(np.cbrt(2 * np.pi * self.radius**2 * work / self.modulus))
+
+    def _stretch(self, a: Floats, work: Floats, ratio: Floats | float) -> Floats:
+        return np.asarray(np.sqrt(2 * np.pi * a * work / self._modulus_at(a)) * ratio)
+
     def _modulus_at(self, a: Floats) -> Floats:
         if self.stiffening is None:
             return self.modulus
@@ -224,7 +230,7 @@ class Sphere:
 def _jkr_radius(travel: Floats) -> Floats:
     """x of x² − √x = t, on the stable side: a and δ R in units of (2πwR²/E')^(1/3), and its square.
 
-    By a spline in √(t − t_least), in which x is smooth, and one of Newton's steps.
+    By a spline in √(t − t_least), in which x is smooth, and two of Newton's steps.
     """
     above = np.sqrt(np.maximum(travel - _LEAST_TRAVEL, 0.0))
     x = np.asarray(_jkr_spline()(np.minimum(above, _FURTHEST)))
@@ -253,10 +259,8 @@ def in_contact(travel: Floats, pull_off: Floats) -> NDArray[np.bool_]:
     return np.asarray(np.take_along_axis(meets, last, axis=-1))
 
 
-def edges(
-    sphere: Sphere, travel: Floats, held: NDArray[np.bool_], work: Floats, separation: Floats | None
-) -> tuple[Floats, Floats]:
-    """The edge's radius at each sample (points, curves, samples), and that at pull-off (points, curves, 1).
+def edges(sphere: Sphere, travel: Floats, held: NDArray[np.bool_], work: Floats, separation: Floats | None) -> Floats:
+    """The edge's radius at each sample (points, curves, samples).
 
     The edge advances where its energy release rate is the `work` of adhesion, recedes where it is that of `separation`,
     and rests in between.
@@ -264,7 +268,7 @@ def edges(
     parting = work if separation is None else separation
     least, _ = sphere.pull_off(parting)
     if separation is None:
-        return sphere.radius_at(travel, work, least), least
+        return sphere.radius_at(travel, work, least)
     first_least, _ = sphere.pull_off(work)
     advancing, receding = sphere.radius_at(travel, work, first_least), sphere.radius_at(travel, parting, least)
     a = np.empty_like(receding)
@@ -274,4 +278,4 @@ def edges(
         edge = np.where(held[..., sample] & (edge > 0), np.minimum(np.maximum(edge, forward), back), forward)
         a[..., sample] = edge
         edge = np.where(held[..., sample], edge, 0.0)
-    return a, least
+    return a
