@@ -33,7 +33,6 @@ class Course:
     pull_off: int | None
     air: NDArray[np.intp]
     zero: float  # what the cell shows in the air, or at the first sample
-    jumps: NDArray[np.intp]
 
     @property
     def has_air(self) -> bool:
@@ -48,13 +47,13 @@ def course(displacement: Floats, force: Floats) -> Course:
     turn = int(np.argmax(displacement))
     span = float(np.ptp(force))
     found = jumps(force, float(np.hypot(noise, 1e-3 * span)), block)
-    step = np.array([_step(force, place, block) for place in found.tolist()])
     least = np.maximum(_BEYOND_JUMP * noise, _LEAST_JUMP * span)
     begin, end = (float(np.median(part)) for part in (force[: max(3, block)], force[-max(3, block) :]))
     # From the air into contact, or back into it
     few = max(2, min(block, 5))
-    before = np.array([np.median(force[max(place - few, 0) : place]) for place in found.tolist()])
+    before = np.array([np.median(force[max(place - few, 0) : max(place, 1)]) for place in found.tolist()])
     after = np.array([np.median(force[place : place + few]) for place in found.tolist()])
+    step = after - before
     in_air = least + _RISE * span
     down = np.flatnonzero((found < turn) & (step < -least) & (np.abs(before - begin) < in_air) & (found > few))
     up = np.flatnonzero((found > turn) & (step > least) & (np.abs(after - end) < in_air))
@@ -65,7 +64,7 @@ def course(displacement: Floats, force: Floats) -> Course:
     leave = turn + int(np.argmin(still))
     air = _air(force, turn, snap_in, pull_off, noise, span)
     zero = float(np.median(force[air])) if len(air) >= _AIR else float(force[0])
-    return Course(noise, turn, leave, snap_in, pull_off, air, zero, found)
+    return Course(noise, turn, leave, snap_in, pull_off, air, zero)
 
 
 def roughness(force: Floats) -> float:
@@ -104,12 +103,6 @@ def _largest(change: Floats, first: int, last: int) -> int:
     """The place of the largest change from first to last."""
     first = max(first, 0)
     return first + int(np.argmax(change[first : last + 1]))
-
-
-def _step(force: Floats, place: int, block: int) -> float:
-    """How much a jump changes the force: medians of a few samples on either side."""
-    few = max(2, min(block, 5))
-    return float(np.median(force[place : place + few]) - np.median(force[max(place - few, 0) : max(place, 1)]))
 
 
 def _air(

@@ -8,6 +8,7 @@ first sum, which no such model changes, is carried along in `scatter`.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +68,11 @@ class Lines:
     def first(self) -> NDArray[np.intp]:
         """The first row of each recording."""
         return np.searchsorted(self.recording, np.arange(self.recordings))
+
+    @cached_property
+    def spans(self) -> list[slice]:
+        """The rows of each recording."""
+        return [slice(low, high) for low, high in pairwise((*self.first.tolist(), len(self.value)))]
 
     @cached_property
     def about_means(self) -> tuple[float, int]:

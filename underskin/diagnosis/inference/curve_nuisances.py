@@ -1,7 +1,6 @@
 """What the cell of each curve adds under a prediction: its zero and drift, and the gain of the recording."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +30,10 @@ def cell_response(
     assert lines.smooth is not None
     known = np.ones(len(force), dtype=bool) if known is None else known
     offset, variance, gain = np.zeros(len(force)), np.zeros(len(force)), []
-    for low, high in pairwise((*lines.first, len(force))):
-        own = slice(low, high)
+    for own in lines.spans:
         design = np.column_stack([levels.gain * force[own], lines.smooth.columns[own]])
         rows = np.flatnonzero(known[own])
-        of_known = lines.smooth.part(low + rows)
+        of_known = lines.smooth.part(own.start + rows)
         noise = of_known.covariance(levels.smooth) + np.diag((levels.level * lines.deviation[own][rows]) ** 2)
         weighed = np.linalg.solve(noise, design[rows])
         information = np.eye(design.shape[1]) + design[rows].T @ weighed

@@ -6,11 +6,10 @@ import numpy as np
 
 from underskin.diagnosis.inference.least_squares import LeastSquares
 from underskin.diagnosis.inference.objective import Evaluated, Evaluator, Points
-from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR
+from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, START_GAIN
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.recordings.conditions import curves_of
 
-_USUAL_GAIN = 0.03  # scatter of the cells' gains
 _SETTLING = 20
 _SOFTER = (1.0, 0.25, 0.06)
 _DEPTHS = (np.geomspace(1.5, 0.003, 24), np.geomspace(0.8, 1.25, 9), np.geomspace(0.96, 1.04, 7))  # of the one before
@@ -49,7 +48,7 @@ def with_contact_points(fitter: Evaluator, at: Evaluated) -> Evaluated:
         fit[:, places] = tried
         sums = fitter.products(replace(points, fit=fit), slopes=False, place=False).summed(levels)
         uu, uy, yy = (part[:, 0] for part in (sums.uu, sums.uy, np.broadcast_to(sums.yy, sums.uu.shape)))
-        left = yy - 2 * uy + uu - (uu - uy) ** 2 / (_USUAL_GAIN**-2 + uu)
+        left = yy - 2 * uy + uu - (uu - uy) ** 2 / (START_GAIN**-2 + uu)
         best = left.reshape(depths.shape).argmin(axis=1)[:, None]
         depth = np.take_along_axis(depths, best, axis=1)[:, 0]
     chosen = at.points.fit.copy()

@@ -4,37 +4,29 @@ Every set is fitted without positioning scatter and, where that could show, with
 two under their prior.
 """
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.ndimage import minimum_filter
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.curve_starts import softer, with_contact_points
 from underskin.diagnosis.inference.evidence import Evidence, around
 from underskin.diagnosis.inference.evidence import integrated as over_all_values
-from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis
+from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis, own_places
 from underskin.diagnosis.inference.likelihood import Curvature
 from underskin.diagnosis.inference.objective import Points
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.inference.position_curvature import curvature
+from underskin.diagnosis.inference.starts import best_starts
 from underskin.errors import InvalidInput
-from underskin.mechanisms.base import Parameter, Unsupported
+from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import Model, compose
-from underskin.mechanisms.models.composition import parameters_together
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER, POSITION_RANGE
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
-_QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7, 0.9), 3: (0.2, 0.5, 0.8)}
-_KEPT_STARTS = 3
-_KEPT_OF_PARENT = 1  # of curves, from an explanation with one mechanism less
-_PLACED_STARTS = 4  # of curves, whose contact points are looked for
 _DECIDED = 0.999  # probability beyond which a parent's positioning scatter, or none, is its offspring's
 _COUNTS = 8.0  # nats behind the other fit within which one counts
 _LEAST_GAIN = 1.0  # in log posterior density
@@ -98,16 +90,6 @@ class Request:
         return self.parent.best.cost - _LEAST_GAIN
 
 
-def own_places(names: Sequence[str], lines: Lines) -> dict[str, slice]:
-    """Where in a composed model's parameters each mechanism's are."""
-    mechanisms = [mechanism for name, mechanism in CATALOGUE.items() if name in names]
-    places, first = {}, 0
-    for name, own in parameters_together(mechanisms, lines.campaign, lines.kind).items():
-        places[name] = slice(first, first + len(own))
-        first += len(own)
-    return places
-
-
 class FittingProblem:
     """Recordings of one kind and their noise, to which hypotheses are fitted: all rows, and a mean a recording."""
 
@@ -137,7 +119,7 @@ class FittingProblem:
         starts: dict[bool, dict[int, Points]] = {False: {}, True: {}}  # without and with positioning scatter
         for number, request in enumerate(requests):
             scattered = not request.without_scatter
-            starts[scattered][number] = _starts(Fitter([(placed if scattered else plain)[number]]), request)
+            starts[scattered][number] = _starts((placed if scattered else plain)[number], request)
         fits: list[list[tuple[float, Evidence]]] = [[] for _ in requests]
         log_priors = np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER])
         for number, improved, evidence in _fitted(plain, starts[False], requests, best):
@@ -255,75 +237,9 @@ def _stacked(points: Sequence[Points]) -> Points:
     return Points(owner, fit, covariance, bend)
 
 
-def _starts(fitter: Fitter, request: Request) -> Points:
-    """The best of the local minima of a grid over the new mechanisms' prior quantiles."""
-    hypothesis, parent = fitter.hypotheses[0], request.parent
-    places = own_places(request.names, hypothesis.lines)
-    known = {} if parent is None else {name: parent.own(name) for name in parent.names}
-    # New too is what has other parameters beside the mechanism that was added.
-    new = [name for name, place in places.items() if len(known.get(name, ())) != place.stop - place.start]
-    parameters = {name: hypothesis.model.parameters[places[name]] for name in new}
-    quantiles = _QUANTILES.get(sum(map(len, parameters.values())), (0.5,))
-    axes = [[entry.quantile(q) for q in quantiles] for name in new for entry in parameters[name]]
-    free = [place for name in new for place in range(places[name].start, places[name].stop)]
-    grid = list(itertools.product(*axes))
-    own = np.zeros((len(grid), hypothesis.own_parameters))
-    for name, values in known.items():
-        if name not in new:
-            own[:, places[name]] = values
-    own[:, free] = grid
-    guessed = _guesses(new, hypothesis)
-    if guessed:
-        more = np.repeat(own[:1], len(guessed), axis=0)
-        more[:, free] = guessed
-        own = np.concatenate([own, more])
+def _starts(hypothesis: Hypothesis, request: Request) -> Points:
+    """Where the fit of a request begins."""
+    parent = request.parent
+    known = None if parent is None else {name: parent.own(name) for name in parent.names}
     begin = parent.point if parent and request.begin is None else request.begin
-    tried = fitter.settle(fitter.begin(own, begin), 1)
-    cost = tried.cost[: len(grid)].reshape([len(axis) for axis in axes] or [1])
-    lowest = tried[np.append(np.flatnonzero(_are_lowest(cost)), np.arange(len(grid), len(own)))]
-    if hypothesis.lines.curves:
-        return _of_curves(fitter, lowest, len(guessed), request, new)
-    return lowest.points[np.sort(_cheapest(lowest)[:_KEPT_STARTS])]
-
-
-def _of_curves(fitter: Fitter, lowest: Evaluated, guessed: int, request: Request, new: Sequence[str]) -> Points:
-    """The best starts of curves, contact points looked for where nothing tells them; the last so many are guesses."""
-    count = len(lowest) - guessed
-    ranked = _cheapest(lowest[:count])[:_PLACED_STARTS]
-    several = lowest[np.append(np.sort(ranked), np.arange(count, len(lowest)))]
-    sticks = any(CATALOGUE[name].moves_contact_points for name in new) and len(request.names) == 1
-    known = request.parent is not None or request.begin is not None
-    if fitter.lines.kind == "indentation" and (sticks or not known):
-        several = with_contact_points(fitter, softer(fitter, several) if sticks else several)
-    kept = _KEPT_STARTS if request.parent is None else _KEPT_OF_PARENT
-    return several.points[np.sort(_cheapest(several)[:kept])]
-
-
-def _cheapest(at: Evaluated) -> NDArray[np.intp]:
-    """The points in the order of their costs."""
-    return np.argsort(at.cost, kind="stable")
-
-
-def _guesses(names: Sequence[str], hypothesis: Hypothesis) -> list[list[float]]:
-    """Fit coordinates of these mechanisms' parameters as the recordings suggest them; none where one has no guess."""
-    conditions, kind = hypothesis.lines.campaign, hypothesis.lines.kind
-    each = []
-    for name in names:
-        entries = CATALOGUE[name].parameters(conditions, kind)
-        values = [
-            dict(zip([one.name for one in entries], guess, strict=True))
-            for guess in CATALOGUE[name].guesses(conditions, kind)
-        ]
-        each.append([[_coordinate(one, guess) for one in entries] for guess in values])
-    return [list(itertools.chain(*combined)) for combined in itertools.product(*each)] if names else []
-
-
-def _coordinate(entry: Parameter, values: Mapping[str, float]) -> float:
-    unit = 1.0 if entry.relative_to is None else values[entry.relative_to]
-    return float(np.clip(entry.to_fit(values[entry.name] / unit), *entry.bounds))
-
-
-def _are_lowest(cost: Floats) -> NDArray[np.bool_]:
-    """Where on a grid no neighbour is lower."""
-    around_each = minimum_filter(cost, size=3, mode="nearest")
-    return np.asarray(cost <= around_each)
+    return best_starts(Fitter([hypothesis]), known, begin)

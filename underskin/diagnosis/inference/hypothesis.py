@@ -1,5 +1,6 @@
 """One hypothesis: a model, the lines it is to explain, and the coordinates in which it is fitted."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -132,3 +133,13 @@ def curvature_of_prior(entry: Parameter) -> tuple[float, float]:
     if isinstance(entry.prior, Normal):
         return entry.prior.sd**-2, entry.prior.mean
     return 0.0, 0.0
+
+
+def own_places(names: Sequence[str], lines: Lines) -> dict[str, slice]:
+    """Where in a composed model's parameters each mechanism's are."""
+    mechanisms = [mechanism for name, mechanism in CATALOGUE.items() if name in names]
+    places, first = {}, 0
+    for name, own in parameters_together(mechanisms, lines.campaign, lines.kind).items():
+        places[name] = slice(first, first + len(own))
+        first += len(own)
+    return places

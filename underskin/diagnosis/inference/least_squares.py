@@ -5,17 +5,15 @@ Scipy's trust-region reflective algorithm finds from far away what steps on the 
 with the fit, do not.
 """
 
-from itertools import pairwise
-
 import numpy as np
 from scipy.optimize import least_squares
 
 from underskin.diagnosis.inference.hypothesis import Hypothesis, curvature_of_prior
+from underskin.diagnosis.noise.noise_priors import START_GAIN
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.units import Floats
 
 _ERROR = 3e-3  # of the largest force: the unit of the residuals
-_GAIN = 0.03  # standard deviation of a recording's gain
 _TOLERANCE, _EVALUATIONS = 1e-4, 40
 _INSIDE = 1e-9  # of a parameter's range, off its bounds
 
@@ -30,12 +28,12 @@ class LeastSquares:
         assert lines.smooth is not None
         self._model = model
         self._recording = lines.recording
-        self._spans = list(pairwise((*lines.first, len(lines.value))))
-        largest = np.array([np.abs(lines.value[low:high]).max() for low, high in self._spans])
+        self._spans = lines.spans
+        largest = np.array([np.abs(lines.value[own]).max() for own in lines.spans])
         self._unit = _ERROR * np.maximum(largest, 1e-300)[lines.recording]
         self._taken = []
-        for low, high in self._spans:
-            columns = lines.smooth.columns[low:high] / self._unit[low:high, None]
+        for own in lines.spans:
+            columns = lines.smooth.columns[own] / self._unit[own, None]
             solved = np.linalg.solve(np.eye(columns.shape[1]) + columns.T @ columns, columns.T)
             self._taken.append((columns, solved))
         self._measured = lines.value.real
@@ -67,7 +65,7 @@ class LeastSquares:
         fit, gain = x[:count], x[count:]
         force = self._model.forces(fit[None])[0]
         left = (self._measured - (1 + gain[self._recording]) * force) / self._unit
-        return np.concatenate([self._projected(left), (fit - self._centre) * self._precision, gain / _GAIN])
+        return np.concatenate([self._projected(left), (fit - self._centre) * self._precision, gain / START_GAIN])
 
     def _jacobian(self, x: Floats) -> Floats:
         count = len(self._low)
@@ -76,16 +74,15 @@ class LeastSquares:
         by_fit = -(slopes * (1 + gain[self._recording])) / self._unit
         by_gain = np.where(self._recording == np.arange(len(gain))[:, None], -force / self._unit, 0.0)
         rows = np.concatenate([self._projected(by_fit), self._projected(by_gain)]).T
-        priors = np.diag(np.append(self._precision, np.full(len(gain), 1 / _GAIN)))
+        priors = np.diag(np.append(self._precision, np.full(len(gain), 1 / START_GAIN)))
         return np.concatenate([rows, priors])
 
     def _projected(self, rows: Floats) -> Floats:
         """Rows (…, rows) less what zero and drift of each cell take of them, and the coefficients of these."""
         parts, coefficients = [], []
-        for (low, high), (columns, solved) in zip(self._spans, self._taken, strict=True):
-            own = rows[..., low:high]
-            coefficients.append(own @ solved.T)
-            parts.append(own - coefficients[-1] @ columns.T)
+        for own, (columns, solved) in zip(self._spans, self._taken, strict=True):
+            coefficients.append(rows[..., own] @ solved.T)
+            parts.append(rows[..., own] - coefficients[-1] @ columns.T)
         return np.concatenate([*parts, *coefficients], axis=-1)
 
 

@@ -16,7 +16,7 @@ from underskin.diagnosis.inference.frf_products import FrfProducts
 from underskin.diagnosis.inference.hypothesis import FitPoint
 from underskin.diagnosis.inference.objective import Evaluated, Evaluator, Places, Points
 from underskin.diagnosis.inference.products import Products, joined
-from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
+from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR, START_GAIN
 from underskin.units import Floats
 
 __all__ = ["Evaluated", "Fitter"]
@@ -27,7 +27,6 @@ _SLOPE_STEP = 1e-4  # of a parameter's range, for differences of the position's 
 _LARGEST_STEP = 1.0
 _CONVERGED = 0.01  # in log posterior
 _MOST_ITERATIONS = 25
-_USUAL_GAIN = 0.03  # scatter of gains while nothing was fitted yet
 _MAY_GAIN = 60.0  # nats that a fit of curves may still gain beyond the least-squares one's
 _POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
 
@@ -72,7 +71,7 @@ class Fitter(Evaluator):
         sums = products.summed(self.levels(points.covariance[:, None]))
         uu, uy = sums.uu[:, 0], sums.uy[:, 0]
         level = products.level
-        weight = 1 / (1 + _USUAL_GAIN**2 * level**2 * uu)
+        weight = 1 / (1 + START_GAIN**2 * level**2 * uu)
         return np.asarray((weight * level * uy).sum(axis=1) / np.maximum((weight * level**2 * uu).sum(axis=1), 1e-300))
 
     def with_scatter(self, points: Points) -> Points:

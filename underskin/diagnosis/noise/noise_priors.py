@@ -71,6 +71,7 @@ class Plateaus:
         return np.asarray(-0.5 * ((below + above) ** 2).sum(axis=-1) - self._log_areas)
 
 
+START_GAIN = 0.03  # scatter of gains while nothing was fitted yet
 GAIN_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
 POSITION_PRIOR = Plateau.of(POSITION_RANGE, POSITION_FALL)
 # No rig's: something that nobody named moves the recordings

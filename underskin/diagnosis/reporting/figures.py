@@ -13,7 +13,8 @@ from plotly.subplots import make_subplots
 
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import SIMPLEST
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, own_places
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT
 from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned
 from underskin.diagnosis.reporting.report import DiagnosisResult

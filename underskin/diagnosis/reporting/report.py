@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, own_places
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.localisation.effect_size import EffectSize
 from underskin.diagnosis.localisation.permutation_test import AxisResult
 from underskin.diagnosis.localisation.region import reaches_all_along

@@ -15,7 +15,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from underskin.diagnosis.inference.explanation import Explanation, own_places
+from underskin.diagnosis.inference.explanation import Explanation
+from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.units import Floats
 
 _BEHIND = 1e-6  # of an equal: the leader stays the leader

@@ -9,7 +9,6 @@ sensors' gains where the sensor was not seen.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -105,7 +104,8 @@ def _parts_of_curves(lines: Lines) -> dict[str, NDArray[np.bool_]]:
     else the later half of what is held, else the highest force."""
     force = np.abs(lines.value.real)  # tension is negative
     back, held = np.zeros(len(force), dtype=bool), np.zeros(len(force), dtype=bool)
-    for (low, high), entry in zip(pairwise((*lines.first, len(force))), curves_of(lines.campaign), strict=True):
+    for own, entry in zip(lines.spans, curves_of(lines.campaign), strict=True):
+        low, high = own.start, own.stop
         travel = entry.displacement_mm - entry.displacement_mm[0]
         if lines.kind == "compression" and -travel.min() > travel.max():  # pulled
             travel = -travel

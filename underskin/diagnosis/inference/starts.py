@@ -1,0 +1,106 @@
+"""Where a fit begins: a grid over what is new in a set of mechanisms, and what the recordings suggest of it."""
+
+import itertools
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter
+
+from underskin.diagnosis.inference.curve_starts import softer, with_contact_points
+from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis, own_places
+from underskin.diagnosis.inference.objective import Points
+from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
+from underskin.mechanisms.base import Parameter
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.units import Floats
+
+_QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7, 0.9), 3: (0.2, 0.5, 0.8)}
+_KEPT_STARTS = 3
+_KEPT_OF_PARENT = 1  # of curves, from an explanation with one mechanism less
+_PLACED_STARTS = 4  # of curves, whose contact points are looked for
+
+
+def best_starts(fitter: Fitter, parent: Mapping[str, Sequence[float]] | None, begin: FitPoint | None) -> Points:
+    """The best of the local minima of a grid over the new mechanisms' prior quantiles, and of what recordings suggest.
+
+    Parameters
+    ----------
+    fitter
+        Of the one hypothesis.
+    parent
+        Fit coordinates of its mechanisms that were fitted without the others; None where none were.
+    begin
+        Where the nuisances begin; None for their priors' centres.
+    """
+    (hypothesis,) = fitter.hypotheses
+    places = own_places(hypothesis.model.names, hypothesis.lines)
+    known = parent or {}
+    # New too is what has other parameters beside the mechanism that was added.
+    new = [name for name, place in places.items() if len(known.get(name, ())) != place.stop - place.start]
+    parameters = {name: hypothesis.model.parameters[places[name]] for name in new}
+    quantiles = _QUANTILES.get(sum(map(len, parameters.values())), (0.5,))
+    axes = [[entry.quantile(q) for q in quantiles] for name in new for entry in parameters[name]]
+    free = [place for name in new for place in range(places[name].start, places[name].stop)]
+    grid = list(itertools.product(*axes))
+    own = np.zeros((len(grid), hypothesis.own_parameters))
+    for name, values in known.items():
+        if name not in new:
+            own[:, places[name]] = values
+    own[:, free] = grid
+    guessed = _guesses(new, hypothesis)
+    if guessed:
+        more = np.repeat(own[:1], len(guessed), axis=0)
+        more[:, free] = guessed
+        own = np.concatenate([own, more])
+    tried = fitter.settle(fitter.begin(own, begin), 1)
+    cost = tried.cost[: len(grid)].reshape([len(axis) for axis in axes] or [1])
+    lowest = tried[np.append(np.flatnonzero(_are_lowest(cost)), np.arange(len(grid), len(own)))]
+    if hypothesis.lines.curves:
+        return _of_curves(fitter, lowest, len(guessed), new, known=begin is not None, grown=parent is not None)
+    return lowest.points[np.sort(_cheapest(lowest)[:_KEPT_STARTS])]
+
+
+def _of_curves(
+    fitter: Fitter, lowest: Evaluated, guessed: int, new: Sequence[str], *, known: bool, grown: bool
+) -> Points:
+    """The best starts of curves, contact points looked for where they are not `known`; the last so many are guesses."""
+    count = len(lowest) - guessed
+    ranked = _cheapest(lowest[:count])[:_PLACED_STARTS]
+    several = lowest[np.append(np.sort(ranked), np.arange(count, len(lowest)))]
+    alone = len(fitter.hypotheses[0].model.names) == 1
+    sticks = alone and any(CATALOGUE[name].moves_contact_points for name in new)
+    if fitter.lines.kind == "indentation" and (sticks or not known):
+        several = with_contact_points(fitter, softer(fitter, several) if sticks else several)
+    kept = _KEPT_OF_PARENT if grown else _KEPT_STARTS
+    return several.points[np.sort(_cheapest(several)[:kept])]
+
+
+def _cheapest(at: Evaluated) -> NDArray[np.intp]:
+    """The points in the order of their costs."""
+    return np.argsort(at.cost, kind="stable")
+
+
+def _guesses(names: Sequence[str], hypothesis: Hypothesis) -> list[list[float]]:
+    """Fit coordinates of these mechanisms' parameters as the recordings suggest them; none where one has no guess."""
+    conditions, kind = hypothesis.lines.campaign, hypothesis.lines.kind
+    each = []
+    for name in names:
+        entries = CATALOGUE[name].parameters(conditions, kind)
+        values = [
+            dict(zip([one.name for one in entries], guess, strict=True))
+            for guess in CATALOGUE[name].guesses(conditions, kind)
+        ]
+        each.append([[_coordinate(one, guess) for one in entries] for guess in values])
+    return [list(itertools.chain(*combined)) for combined in itertools.product(*each)] if names else []
+
+
+def _coordinate(entry: Parameter, values: Mapping[str, float]) -> float:
+    unit = 1.0 if entry.relative_to is None else values[entry.relative_to]
+    return float(np.clip(entry.to_fit(values[entry.name] / unit), *entry.bounds))
+
+
+def _are_lowest(cost: Floats) -> NDArray[np.bool_]:
+    """Where on a grid no neighbour is lower."""
+    around_each = minimum_filter(cost, size=3, mode="nearest")
+    return np.asarray(cost <= around_each)
