@@ -50,4 +50,7 @@ def prove(
 
 
 def _tell(bars: Progress, task: TaskID, done: int, total: int) -> None:
+    """A bar, or where there is no terminal a line."""
     bars.update(task, completed=done, total=total)
+    if not bars.console.is_terminal:
+        typer.echo(f"{bars.tasks[task].description}: {done} of {total}", err=True)

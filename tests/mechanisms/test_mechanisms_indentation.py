@@ -1,6 +1,5 @@
 """Loops of indentation: stick, relax, give and come off as the exact laws and independent solutions say."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,38 +8,24 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from tests.mechanisms.contact_elements import Body, force_of_elements
-from tests.support.mechanism_campaigns import SKIN, fit_of, hertz_force, predicted, table
+from tests.mechanisms.indentation_loops import (
+    CREEP,
+    E_MPA,
+    H_MM,
+    LOOP,
+    NO_CREEP,
+    REDUCED,
+    TIME,
+    R,
+    force_at,
+    jkr,
+    recorded,
+)
+from tests.support.mechanism_campaigns import fit_of, predicted, table
 from tests.support.sphere_contact import SphereOnLayer
 from underskin.mechanisms import Unsupported, compose
 from underskin.physics.elastic_layer import Layer
-from underskin.recordings.campaign import Campaign, IndentationRecording
-from underskin.units import Floats
-
-E_MPA, R_MM, H_MM = 2.0, 4.0, 2.5
-R, REDUCED = R_MM * 1e-3, E_MPA * 1e6 / 0.75
-TIME = 0.2
-LOOP = np.concatenate([np.linspace(-0.02, 0.4, 60), np.full(14, 0.4), np.linspace(0.4, -0.1, 70)[1:]])
-CREEP = {"relaxed_fraction": 0.5, "relaxation_time": 3.0}
-NO_CREEP = {"relaxed_fraction": 0.0, "relaxation_time": 3.0}
-
-
-def recorded(depth_mm: Floats) -> Campaign:
-    time = TIME * np.arange(float(len(depth_mm)))
-    recording = IndentationRecording("i", R_MM, depth_mm, hertz_force(depth_mm, R_MM, E_MPA), time_s=time)
-    return Campaign("one", SKIN, (recording,))
-
-
-def force_at(names: Sequence[str], depth_mm: Floats, **values: float) -> Floats:
-    """[N], with the contact beginning at 0."""
-    return predicted(names, recorded(depth_mm), **{"contact_point i": 0.0, **values})
-
-
-def jkr(a: Floats, work: float) -> tuple[Floats, Floats]:
-    """δ and F on the half space."""
-    return a**2 / R - np.sqrt(2 * np.pi * work * a / REDUCED), 4 / 3 * REDUCED * a**3 / R - np.sqrt(
-        8 * np.pi * work * REDUCED * a**3
-    )
-
+from underskin.recordings.campaign import IndentationRecording
 
 # A loop that relaxes.
 
@@ -139,66 +124,6 @@ def test_a_mechanism_at_its_limit_leaves_the_others(
 ) -> None:
     expected = force_at(kept, LOOP, **of_kept)
     assert force_at([*kept, gone], LOOP, **of_kept, **limit) == pytest.approx(expected, abs=2e-5 * expected.max())
-
-
-# Adhesion that costs more to part than it gave.
-
-HYSTERESIS = {"work_of_adhesion": 0.2, "work_of_separation": 2.5}  # the second in multiples of the first
-
-
-def of_jkr(depth: Floats, work: float) -> Floats:
-    """F of the stable branch."""
-    a = np.linspace(1e-5, 2e-3, 400_001)
-    along, force = jkr(a, work)
-    least = int(np.argmin(along))
-    return np.interp(depth, along[least:], force[least:])
-
-
-def test_the_edge_rests_until_it_costs_the_work_of_separation_then_recedes() -> None:
-    depth = np.concatenate([np.linspace(-0.05, 0.3, 71), np.linspace(0.3, -0.1, 401)[1:]])
-    found = force_at(["adhesion"], depth, **HYSTERESIS)
-    into = (depth[:71] >= 0).nonzero()[0]
-    assert found[into] == pytest.approx(of_jkr(depth[into] * 1e-3, 0.2), abs=2e-5)
-    a = brentq(lambda a: float(jkr(np.asarray(a), 0.2)[0]) - 0.3e-3, 1e-4, 2e-3)
-    flat = found[70] - 2 * REDUCED * a * (0.3e-3 - depth[71:] * 1e-3)
-    receding = of_jkr(depth[71:] * 1e-3, 0.5)
-    back, resting = found[71:], flat > receding
-    assert 10 < resting.sum() < 200
-    assert back[resting] == pytest.approx(flat[resting], abs=2e-5)
-    held = back != 0
-    assert back[~resting & held] == pytest.approx(receding[~resting & held], abs=2e-5)
-    release = (4 * REDUCED * a**3 / (3 * R) - flat[resting][-1]) ** 2 / (8 * np.pi * REDUCED * a**3)
-    assert release == pytest.approx(0.5, rel=0.03)
-
-
-def test_hysteresis_loses_work_and_none_without_it() -> None:
-    depth = np.concatenate([np.linspace(0.0, 0.3, 301), np.linspace(0.3, 0.0, 301)[1:]])
-
-    def lost(separation: float) -> float:
-        force = force_at(["adhesion"], depth, work_of_adhesion=0.2, work_of_separation=separation)
-        return float(np.trapezoid(force, depth))
-
-    assert lost(1.0) == pytest.approx(0.0, abs=1e-6)
-    assert 1e-4 < lost(1.5) < lost(3.0)
-
-
-def test_creep_leaves_the_hysteresis_of_a_body_that_does_not_relax() -> None:
-    depth = np.concatenate([np.linspace(-0.05, 0.3, 71), np.linspace(0.3, -0.1, 81)[1:]])
-    expected = force_at(["adhesion"], depth, **HYSTERESIS)
-    found = force_at(["adhesion", "contact_creep"], depth, **HYSTERESIS, **NO_CREEP)
-    assert found == pytest.approx(expected, abs=5e-5 * expected.max())
-
-
-def test_two_prony_pairs_relax_as_their_sum() -> None:
-    depth = np.append(np.linspace(0, 0.3, 2000), np.full(8, 0.3))
-    ages = np.array([0.01, 0.1, 0.5, 1, 5, 20, 50, 1000.0])
-    time = np.append(np.linspace(0, 1e-6, 2000), 1e-6 + ages)
-    recording = IndentationRecording("i", R_MM, depth, hertz_force(depth, R_MM, E_MPA), time_s=time)
-    values = {"relaxed_fraction": 0.5, "relaxation_time": 2.0, "time_spread": 3.0, "first_share": 0.3}
-    found = predicted(["contact_creep"], Campaign("one", SKIN, (recording,)), **{"contact_point i": 0.0}, **values)
-    fast, slow = 2.0 * np.exp(-3.0 * 0.7), 2.0 * np.exp(3.0 * 0.3)
-    left = 1 - 0.5 * (0.3 * (1 - np.exp(-ages / fast)) + 0.7 * (1 - np.exp(-ages / slow)))
-    assert found[-8:] == pytest.approx(found[1999] * left, rel=1e-4)
 
 
 # Adhesion on a stage that gives.
