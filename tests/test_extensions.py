@@ -97,6 +97,8 @@ def test_one_that_keeps_the_contract_is_taken() -> None:
         ({"changes": {"scale": "square"}}, "parameters[upper_corner].scale", "linear or log"),
         ({"changes": {"limit": "0"}}, "parameters[upper_corner].limit", "number"),
         ({"changes": {"reason": ""}}, "parameters[upper_corner].reason", "text"),
+        ({"changes": {"relative_to": "corner"}}, "parameters[upper_corner].relative_to", "another"),
+        ({"changes": {"relative_to": "upper_corner"}}, "parameters[upper_corner].relative_to", "another"),
         ({"changes": {"acts_on": "line_variance"}}, "parameters[upper_corner].acts_on", "mean"),
         ({"on_lines": lambda *_: 1 / 0}, "law (frf) at the priors' centres", "ZeroDivisionError"),
         ({"parameters": lambda *_: None}, "parameters", "tuple"),

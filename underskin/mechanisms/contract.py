@@ -68,6 +68,7 @@ def check(mechanism: Mechanism, others: Sequence[Mechanism] = ()) -> None:
         _require("parameters", parameters, isinstance(parameters, tuple), "must be a tuple of Parameter")
         for place, entry in enumerate(parameters):
             _check_parameter(mechanism, entry)
+            _check_relative(entry, parameters)
             if entry.name in {other.name for other in parameters[:place]}:
                 raise not_unique(_field(entry, "name"), entry.name, "must be that of one parameter")
             if entry.name in taken:
@@ -139,6 +140,14 @@ def _check_parameter(mechanism: Mechanism, entry: Any) -> None:
     require("acts_on", entry.acts_on in allowed, f"must be {' or '.join(allowed)}")
     require("acts_on", entry.moves_covariance != mechanism.moves_predictions, "must fit moves_predictions")
     require("scale", entry.scale == "log" or not entry.moves_covariance, "must be log: it does not act on the mean")
+
+
+def _check_relative(entry: Parameter, parameters: Sequence[Parameter]) -> None:
+    """A multiple is one of another parameter, positive, that is a value itself."""
+    units = {other.name for other in parameters if other.scale == "log" and other.relative_to is None} - {entry.name}
+    good = entry.relative_to is None or (entry.relative_to in units and entry.scale == "log")
+    allowed = "must be None, or of a log parameter another log parameter of this mechanism that is relative to none"
+    _require(_field(entry, "relative_to"), entry.relative_to, good, allowed)
 
 
 def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:

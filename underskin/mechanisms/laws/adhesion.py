@@ -43,7 +43,9 @@ class Adhesion(Mechanism):
     )
     law = (
         "Johnson, Kendall and Roberts: on the half space a³ = (3R/4E') [F + 3πwR + √(6πwRF + (3πwR)²)], pressure = "
-        "Hertz' less a flat punch's; on the layer φ(a) = −√(2awE'/π) in the integral equation of layered_contact."
+        "Hertz' less a flat punch's; on the layer φ(a) = −√(2awE'/π) in the integral equation of layered_contact. "
+        "Drawn back, the edge rests at the a that it reached while the energy release rate "
+        "G < w_s, the work of separation, and recedes at G = w_s."
     )
     assumptions = (
         "short-ranged adhesion (soft, large contacts: Tabor's number far above 1), equilibrium on the loading branch "

@@ -39,10 +39,15 @@ class ContactCreep(Mechanism):
         "The skin slowly gives way under the preload, so the contact grows and the response changes with the time for "
         "which the preload has been held."
     )
-    law = "E(t) = E (1 − g (1 − e^(−t/τ))), with t the time held; a³ ∝ 1/E(t), L ∝ 1/E(t)."
+    law = (
+        "E(t) = E (1 − g (1 − e^(−t/τ))), with t the time held; a³ ∝ 1/E(t), L ∝ 1/E(t). Indentations: "
+        "E(t) = E (1 − g s (1 − e^(−t/τ₁)) − g (1 − s) (1 − e^(−t/τ₂))), with s the first share, "
+        "ln τ = s ln τ₁ + (1 − s) ln τ₂ and ln(τ₂/τ₁) the time spread."
+    )
     assumptions = (
-        "quasi-elastic: each instant as an elastic layer of modulus E(t), one Prony pair, the declared E is the "
-        "instantaneous one. (Exact creep under a constant force uses J(t), whose time is τ/(1 − g): fitted to FRFs of "
+        "quasi-elastic: each instant as an elastic layer of modulus E(t), one Prony pair (two of "
+        "indentations), the declared E is the instantaneous one. (Exact creep under a constant force uses J(t), whose "
+        "time is τ/(1 − g): fitted to FRFs of "
         "a solid that creeps so, τ comes out 7 % too long at g 0.2, 15 % at 0.4, 24 % at 0.6.) A held oscillation is "
         "felt through the contact radius alone, since transmission through a linear layer under force control has no "
         "modulus in it, and a contact's stiffness against an oscillation much faster than τ is the instantaneous "
