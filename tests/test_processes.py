@@ -22,7 +22,7 @@ import time
 from pathlib import Path
 from proof.stored import Work, of_each
 if __name__ == "__main__":
-    of_each(Work(Path("."), 2), [0.0] * 4 + [60.0] * 4, time.sleep, lambda told: Path("{done}").touch())
+    of_each(Work(Path("."), 2), [0.0] * 4 + [60.0] * 4, time.sleep, lambda done, count: Path("{done}").touch())
 """
 PATIENCE_S = 120.0
 
