@@ -28,6 +28,8 @@ from underskin.diagnosis.selection.search import Search, search
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import confounding, left_open
 from underskin.diagnosis.validation.platen_seating import without_seating
+from underskin.diagnosis.validation.power import power
+from underskin.diagnosis.validation.signatures import Signatures
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
@@ -39,6 +41,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 _CURVES: tuple[Kind, ...] = ("indentation", "compression")
 _FAR_ABOVE = 3.0  # times the noise floor, beyond which an error of indentations held out contradicts an explanation
+_LEAST_TO_AGREE = 3  # FRFs: d33 takes up what two have in common, and their gain scatters by what they differ
 _LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
 
 Progress = Callable[[float], None]
@@ -102,7 +105,8 @@ def _work_out(
 ) -> DiagnosisResult:
     """All steps after the search."""
     progress(0.65)
-    confounded = confounding(problem)
+    signatures = Signatures(problem)
+    confounded = confounding(signatures)
     progress(0.7)
     leader = result.answers[0]
     nothing = next(entry for entry in result.explanations if not entry.names)
@@ -131,6 +135,9 @@ def _work_out(
     floor = largest_floor_percent(problem, nothing, groups)
     if leader.explanation is nothing and floor > _LARGEST_FLOOR:
         return DiagnosisResult(name, findings, provenance, lacking=Lacking(Lack.NOISE, {"floor_percent": floor}))
+    if leader.explanation is nothing and problem.kind == "frf" and problem.lines.recordings < _LEAST_TO_AGREE:
+        few = {"recordings": problem.lines.recordings, "least": _LEAST_TO_AGREE}
+        return DiagnosisResult(name, findings, provenance, lacking=Lacking(Lack.FEW_TO_AGREE, few))
     shape = describe(problem, shown) if leader.explanation is None else None
     return DiagnosisResult(
         name,
@@ -143,6 +150,7 @@ def _work_out(
         effect=size,
         groups=groups,
         confounded=left_open(confounded, result.answers),
+        power=power(signatures, shown, result.supported),
         shape=shape,
         plan=plan(problem, result, limits),
     )

@@ -47,6 +47,8 @@ LACKING: Mapping[Lack, Words] = {
     "which is off",
     Lack.FEW_RECORDINGS: "usable recordings: {recordings}; at least {least} are needed, better at different preloads "
     "or spheres",
+    Lack.FEW_TO_AGREE: "{recordings} recordings agree with the model, but would do so with much missing, which d33 and "
+    "their scatter take up; at least {least} are needed, better at different preloads or spheres",
     Lack.MADE_ALIKE: "all recordings were made alike, at one frequency; different preloads, spheres or places are "
     "needed",
     Lack.IMPOSSIBLE_DECLARATION: _impossible_declaration,

@@ -16,6 +16,7 @@ class Lack(StrEnum):
     NO_RESPONSE = "no_response"
     TWO_RECORDINGS_CONTRADICT = "two_recordings_contradict"
     FEW_RECORDINGS = "few_recordings"
+    FEW_TO_AGREE = "few_to_agree"
     MADE_ALIKE = "made_alike"
     IMPOSSIBLE_DECLARATION = "impossible_declaration"
     NOISE = "noise"

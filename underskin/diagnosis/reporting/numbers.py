@@ -6,6 +6,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from underskin.diagnosis.inference.explanation import Explanation
+from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.inference.laplace import levels_covariance
 
 _QUANTILE = float(ndtri(0.975))
@@ -44,6 +45,28 @@ def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
         values = _absolute(explanation, place, values)
     stated = zip(("value", "low", "high"), values, strict=True)
     return {"name": entry.name, "unit": entry.unit, **{key: rounded(float(value)) for key, value in stated}}
+
+
+def without_effect(explanation: Explanation) -> list[str]:
+    """Its mechanisms of which the 95 % interval of every strength holds the value at which the mechanism does nothing.
+
+    A strength is a parameter with such a value (`limit`); on a logarithmic scale none reaches 0 or ∞.
+    """
+    idle = []
+    for name, place in own_places(explanation.names, explanation.best.hypothesis.lines).items():
+        strengths = [index for index in range(place.start, place.stop) if _limit(explanation, index) is not None]
+        if strengths and all(_holds_limit(explanation, index) for index in strengths):
+            idle.append(name)
+    return idle
+
+
+def _limit(explanation: Explanation, place: int) -> float | None:
+    return explanation.model.parameters[place].limit
+
+
+def _holds_limit(explanation: Explanation, place: int) -> bool:
+    stated, limit = parameter(explanation, place), _limit(explanation, place)
+    return limit is not None and bool(stated["low"] <= limit <= stated["high"])
 
 
 def _absolute(explanation: Explanation, place: int, multiples: list[float]) -> list[float]:

@@ -20,7 +20,7 @@ from underskin.diagnosis.reporting import next_experiment
 from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
-from underskin.diagnosis.reporting.numbers import parameter, place_of, probability, rounded
+from underskin.diagnosis.reporting.numbers import parameter, place_of, probability, rounded, without_effect
 from underskin.diagnosis.reporting.statements import (
     CONFOUNDED,
     UNDECIDABLE,
@@ -32,6 +32,7 @@ from underskin.diagnosis.reporting.statements import (
 from underskin.diagnosis.selection.search import Answer, Search
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import Confounding
+from underskin.diagnosis.validation.power import Power
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lacking
@@ -57,6 +58,7 @@ class DiagnosisResult:
     effect: EffectSize | None = None
     groups: Sequence[cross_validation.HeldOut] = ()
     confounded: Sequence[Confounding] = ()
+    power: Sequence[Power] = ()
     shape: Shape | None = None  # of what remains, where no mechanism describes it
     plan: NextRecordings | None = None
 
@@ -67,7 +69,10 @@ class DiagnosisResult:
 
 
 def verdict(diagnosis: DiagnosisResult) -> str:
-    """The verdict that the probabilities give, as docs/diagnosis.md explains it."""
+    """The verdict that the probabilities give, as docs/diagnosis.md explains it.
+
+    A set of mechanisms explains nothing while one of them may as well have no effect.
+    """
     if diagnosis.search is None:
         return "insufficient_data"
     leader = diagnosis.search.answers[0]
@@ -75,7 +80,8 @@ def verdict(diagnosis: DiagnosisResult) -> str:
         return "no_mismatch"
     if leader.explanation is None:
         return "unexplained"
-    return "explained" if leader.probability >= EXPLAINED else "ambiguous"
+    certain = leader.probability >= EXPLAINED and not without_effect(leader.explanation)
+    return "explained" if certain else "ambiguous"
 
 
 def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
@@ -93,6 +99,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
             "not_identifiable": [],
             "findings": [finding.in_report() for finding in diagnosis.findings],
             "fit": None,
+            "power": [],
             "d33": None,
             "next_experiment": None,
             "provenance": dict(diagnosis.provenance),
@@ -102,11 +109,19 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     shown = search.shown_or_nothing(leader)
     fit = fit_summary(search, problem, diagnosis.groups, shown)
     named = leader.explanation if stated in ("explained", "ambiguous") else None
-    d33, implausible = _d33(problem, shown, leader, fit)
+    stands = stated in ("explained", "no_mismatch") and leader.probability >= EXPLAINED
+    d33, implausible = _d33(problem, shown, fit) if stands else (None, [])
     findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *implausible)]
     modulus = fit["after"].get("youngs_modulus")
     statement = answer_statement(
-        search.answers, stated, diagnosis.shape, problem.kind, modulus, caveats=caveats(findings)
+        search.answers,
+        stated,
+        diagnosis.shape,
+        problem.kind,
+        modulus,
+        caveats=caveats(findings),
+        power=diagnosis.power,
+        idle=without_effect(named) if named is not None else (),
     )
     return {
         **document,
@@ -125,6 +140,13 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         ],
         "findings": findings,
         "fit": fit,
+        "power": [
+            {
+                "mechanism": entry.mechanism,
+                "smallest_visible_percent": rounded(entry.smallest_visible_percent, 2),
+            }
+            for entry in diagnosis.power
+        ],
         "d33": d33,
         "next_experiment": diagnosis.next_experiment or None,
         # The rest was left early: hopeless, or without a gain over the smaller set that it grew from.
@@ -136,14 +158,13 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
 
 
 def _d33(
-    problem: FittingProblem, shown: Explanation, leader: Answer, fit: Mapping[str, Any]
+    problem: FittingProblem, shown: Explanation, fit: Mapping[str, Any]
 ) -> tuple[dict[str, Any] | None, list[Finding]]:
-    """The d33 under the one answer that stands, and a finding where no PVDF has it; None where several answers are
-    left, or none: each would mean another d33.
+    """The d33 under the one answer that stands, and a finding where no PVDF has it; None of curves.
 
     `quotable`: it is plausible, and the answer fits the recordings to their noise.
     """
-    if problem.lines.curves or leader.explanation is None or leader.probability < EXPLAINED:
+    if problem.lines.curves:
         return None, []
     d33 = parameter(shown, place_of(shown, "d33"))
     implausible = plausibility.implausibility(d33["value"])

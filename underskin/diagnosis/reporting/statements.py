@@ -19,6 +19,7 @@ from underskin.diagnosis.localisation.residual_shape import (
 )
 from underskin.diagnosis.selection.search import Answer
 from underskin.diagnosis.validation.identifiability import Likeness
+from underskin.diagnosis.validation.power import Power
 from underskin.findings.english import lacking
 from underskin.findings.formatting import in_digits, in_percent
 from underskin.findings.lacking import Lacking
@@ -28,6 +29,7 @@ from underskin.mechanisms.registry import CATALOGUE
 _WORTH_NAMING = 0.02
 _UNTHOUGHT_AT_MOST = 0.016  # of none_of_these, where no process shows
 _INSUFFICIENT = "The recordings cannot tell anything: "
+_SMALL = 5.0  # % of the response
 _IN_PERCENT = 90.0  # beyond it an effect is said as a factor
 
 
@@ -38,11 +40,18 @@ def answer_statement(
     kind: Kind = "frf",
     modulus: Mapping[str, Any] | None = None,
     caveats: str = "",
+    power: Sequence[Power] = (),
+    idle: Sequence[str] = (),
 ) -> str:
     """Some plain sentences: what is missing, what decides how far that can be trusted (`caveats`), the laws; of curves
-    also the modulus under the stated answer."""
-    first, rest = _answer(answers, verdict, shape, SIMPLEST[kind], all_used=not caveats)
+    also the modulus under the stated answer; where nothing is missing, what would have shown (`power`).
+
+    `idle`: mechanisms of the leading answer that may as well have no effect.
+    """
+    first, rest = _answer(answers, verdict, shape, SIMPLEST[kind], idle, all_used=not caveats)
     parts = [first, caveats, rest]
+    if verdict == "no_mismatch":
+        parts.append(power_statement(power, kind))
     if modulus is not None and verdict != "unexplained":
         interval = f"95 %: {modulus['low']:.3g} to {modulus['high']:.3g}"
         parts.append(f"Young's modulus under this answer: {modulus['value']:.3g} {modulus['unit']} ({interval}).")
@@ -68,7 +77,13 @@ def first_and_rest(statement: str) -> tuple[str, str]:
 
 
 def _answer(
-    answers: Sequence[Answer], verdict: str, shape: Shape | None, model: str, *, all_used: bool
+    answers: Sequence[Answer],
+    verdict: str,
+    shape: Shape | None,
+    model: str,
+    idle: Sequence[str],
+    *,
+    all_used: bool,
 ) -> tuple[str, str]:
     """The verdict in one sentence, and what else there is to say of it."""
     leader = answers[0]
@@ -87,7 +102,24 @@ def _answer(
     names = in_words(leader.names)
     if verdict == "explained":
         return f"{model[0].upper()}{model[1:]} lacks {names} (probability {percent}).", _laws(leader.names)
-    return f"Best explained by {names} ({percent}), but these rivals remain: {listed}.", _laws(tuple(mentioned))
+    but = [f"the 95 % intervals of {in_words(idle)} hold the values at which nothing changes"] if idle else []
+    but += [f"these rivals remain: {listed}"] if listed else []
+    certain = f"What is certain is that {model} does not describe the recordings. " if idle else ""
+    return f"Best explained by {names} ({percent}), but {', and '.join(but)}.", certain + _laws(tuple(mentioned))
+
+
+def power_statement(power: Sequence[Power], kind: Kind) -> str:
+    """What the recordings would have shown, as one sentence."""
+    all_of_them = sum(kind in mechanism.kinds for mechanism in CATALOGUE.values())
+    shown = [entry.mechanism for entry in power if entry.smallest_visible_percent <= _SMALL]
+    if not shown:
+        return f"None of the {all_of_them} known mechanisms would have shown with {_SMALL:g} % of the response."
+    which = f"these {len(shown)} would each have shown with {_SMALL:g} % of the response"
+    return f"Of the {all_of_them} known mechanisms {which}: {_separated(shown)}."
+
+
+def _separated(names: Sequence[str]) -> str:
+    return ", ".join(in_words([name]) for name in names)
 
 
 def _laws(names: Sequence[str]) -> str:

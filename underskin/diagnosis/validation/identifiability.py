@@ -1,11 +1,7 @@
 """Which mechanisms a campaign's design cannot tell from d33, E and h, or from each other; worked out before any fit.
 
-Each mechanism's signature is what a typical strength of it (the quartile of its prior away from the limit) would change
-in the base model's response. Under the noise that is usual, the information of all signatures and the nuisances is one
-matrix JᵀC⁻¹J. What is left of a signature after the nuisances (with their priors) are taken out is the χ² by which the
-mechanism would show; the cosine between two such remainders says whether they are alike. A law has a shape too (when an
-ageing sets in, at which stress a d33 saturates): what one mechanism typically does is held against all shapes of
-another, each further parameter at its middle and at either end of its usual range.
+By their signatures under the noise that is usual: the cosine between what the nuisances leave of two of them says
+whether they are alike. What one mechanism typically does is held against all shapes of another.
 """
 
 import itertools
@@ -15,22 +11,15 @@ from enum import Enum, auto
 
 import numpy as np
 
-from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.explanation import FittingProblem
-from underskin.diagnosis.inference.likelihood import Likelihoods
-from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.noise.correlated_error import TYPICAL
-from underskin.diagnosis.noise.noise_levels import SeveralLevels
+from underskin.diagnosis.noise.noise_levels import NoiseLevels
 from underskin.diagnosis.selection.search import Answer
-from underskin.mechanisms.base import Normal, Parameter, Unsupported
+from underskin.diagnosis.validation.signatures import Signatures
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
-from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.usual_scatter import USUAL_GAIN
-from underskin.units import Array, Floats
 
 _LEAST_CHI2 = 9.0
 _TWINS = 0.98
-_ENDS = (0.1, 0.9)  # of a shape's usual range
 _OPEN = 0.1  # of the leader's probability: a rival beyond that is not told from it
 
 
@@ -53,101 +42,12 @@ class Confounding:
     why: Likeness
 
 
-def confounding(problem: FittingProblem) -> list[Confounding]:
+def confounding(signatures: Signatures) -> list[Confounding]:
     """What cannot be told apart here; mechanisms that the campaign does not support at all are not listed."""
-    fitter = Fitter([problem.hypothesis((), placed=False)])
-    base = fitter.begin(np.zeros((1, 0)))
-    nuisances = fitter.hypotheses[0].model.predict(base.points.fit[0])
-    rows = _Rows(problem, nuisances.value)
-    owners, signatures = [], []
-    for name, mechanism in CATALOGUE.items():
-        if problem.kind not in mechanism.kinds:
-            continue
-        parameters = mechanism.parameters(problem.lines.campaign, problem.kind)
-        if any(entry.moves_covariance for entry in parameters):
-            continue
-        try:
-            hypothesis = problem.hypothesis((name,), placed=False)
-        except Unsupported:
-            continue
-        for own in _shapes(parameters):
-            owners.append(name)
-            value = hypothesis.model.predict(np.concatenate([own, base.points.fit[0]])).value
-            along, rest = rows.split(value, hypothesis.lines)
-            signatures.append((along - rows.base, rest))
+    owners = signatures.owners
     if not owners:
         return []
-    each = [*(rows.split(slope, fitter.lines) for slope in nuisances.slopes), *signatures]
-    gain, level, position, spread, smooth = (
-        np.full((1, 1, 1), value) for value in (USUAL_GAIN, 1.0, 0.0, SENSOR_SPREAD, rows.smooth)
-    )
-    levels = SeveralLevels(gain, level, position, spread, None, smooth)
-    likelihood = Likelihoods(fitter.lines, problem.curvature, base.products, levels, base.points.bend)
-    information = likelihood.information(*rows.products(each))[0]
-    return _confounding(owners, information, fitter.hypotheses[0].model.parameters)
-
-
-class _Rows:
-    """Rows as what they are along the base model's own direction in each recording, and the rest across it."""
-
-    def __init__(self, problem: FittingProblem, base: Array) -> None:
-        """From the base model's prediction of the collapsed lines, or of curves."""
-        self.smooth = TYPICAL if problem.lines.curves else 0.0
-        self._lines = problem.lines
-        whitening = problem.lines.whitening
-        self._root = 1.0 if whitening is None else np.sqrt(whitening.weight(np.array([self.smooth])))
-        self._direction = self._whitened(base.real if problem.lines.curves else np.ones(len(problem.lines.value)))
-        self._size = np.sqrt(self._sums(self._direction**2))
-        self.base, _ = self.split(base, problem.collapsed)
-
-    def split(self, value: Array, lines: Lines) -> tuple[Floats, Floats | None]:
-        """Along it (recordings,), and across it (numbers,), None where that is 0, of a prediction of these lines."""
-        if lines is not self._lines:
-            return value.real * self._size, None
-        whitened = self._whitened(value.real)
-        along = self._sums(self._direction * whitened) / self._size
-        across = whitened - self._direction * (along / self._size)[lines.recording]
-        return along, across if lines.curves else np.concatenate([across, self._whitened(value.imag)])
-
-    def products(self, parts: Sequence[tuple[Floats, Floats | None]]) -> tuple[Floats, Floats]:
-        """Re u*J (1, recordings, P) and Re JᵀJ (1, P, P) of columns J split like that."""
-        along = np.array([own for own, _ in parts])
-        square = along @ along.T
-        beside = [number for number, (_, rest) in enumerate(parts) if rest is not None]
-        if beside:
-            across = np.array([rest for _, rest in parts if rest is not None])
-            square[np.ix_(beside, beside)] += across @ across.T
-        return (along * self._size).T[None], square[None]
-
-    def _whitened(self, rows: Floats) -> Floats:
-        """Real rows such that their errors are independent and of variance 1."""
-        whitening = self._lines.whitening
-        return rows / self._lines.deviation if whitening is None else whitening.turned(rows) * self._root
-
-    def _sums(self, rows: Floats) -> Floats:
-        return np.add.reduceat(rows, self._lines.first)
-
-
-def _shapes(parameters: Sequence[Parameter]) -> list[Floats]:
-    """The fit coordinates of a typical strength, then of the same with one other parameter at the ends of its range."""
-    middle = np.array([entry.typical for entry in parameters])
-    shapes = [middle]
-    for place, entry in enumerate(parameters):
-        if entry.limit is not None and np.isfinite(entry.to_fit(entry.limit) if entry.limit > 0 else entry.limit):
-            continue  # its strength
-        for quantile in _ENDS:
-            moved = middle.copy()
-            moved[place] = entry.quantile(quantile)
-            shapes.append(moved)
-    return shapes
-
-
-def _confounding(owners: Sequence[str], information: Floats, nuisances: Sequence[Parameter]) -> list[Confounding]:
-    """From the information on the nuisances and then on every signature, whose mechanisms are `owners`."""
-    count = len(nuisances)
-    prior = np.diag([entry.prior.sd**-2 if isinstance(entry.prior, Normal) else 0.0 for entry in nuisances])
-    own, shared, beside = information[count:, count:], information[count:, :count], information[:count, :count] + prior
-    left = own - shared @ np.linalg.solve(beside, shared.T)
+    left, own = signatures.left(NoiseLevels(USUAL_GAIN, 1.0, 0.0, SENSOR_SPREAD, smooth=TYPICAL))
     chi2 = np.maximum(np.diag(left), 0.0)
     first = {name: owners.index(name) for name in owners}  # a mechanism's first signature is the typical one
     confounded = []

@@ -1,0 +1,121 @@
+"""What a campaign could have shown at all, and what its answers are worth where they could show little."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.support.diagnosis_campaigns import Made, campaign
+from underskin.diagnosis.data.dataset import lines
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.reporting.numbers import without_effect
+from underskin.diagnosis.reporting.report import DiagnosisResult, verdict
+from underskin.diagnosis.selection.search import Search
+from underskin.diagnosis.validation.power import least_chi2, power
+from underskin.diagnosis.validation.signatures import Signatures
+from underskin.mechanisms import compose
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.units import Floats
+
+QUIET = Made(sensors=1, repeats=2)
+
+
+@pytest.fixture(scope="module")
+def table() -> SigmaTable:
+    return load_table()
+
+
+def visible(made: Made, table: SigmaTable) -> dict[str, float]:
+    """The smallest visible percentage of each mechanism in a campaign."""
+    problem = FittingProblem(lines(campaign(made, table)), table)
+    (nothing,) = problem.explain([Request(())])
+    assert nothing is not None
+    return {entry.mechanism: entry.smallest_visible_percent for entry in power(Signatures(problem), nothing, 16)}
+
+
+def changed_percent(made: Made, name: str, values: Sequence[float], table: SigmaTable) -> float:
+    """What a mechanism changes of the response, as a root mean square over all rows [%]."""
+    empty = campaign(QUIET, table)
+    base, model = compose((), empty, table), compose((name,), empty, table)
+    fit = np.array([entry.start for entry in base.parameters])
+    own = [entry.to_fit(value) for entry, value in zip(model.parameters, values, strict=False)]
+    with_it, without = model.predict(np.array([*own, *fit])).value, base.predict(fit).value
+    return float(100 * np.sqrt((np.abs(with_it - without) ** 2).sum() / (np.abs(without) ** 2).sum()))
+
+
+@pytest.mark.slow
+def test_three_times_what_is_visible_is_seen_and_a_third_of_it_is_not(table: SigmaTable) -> None:
+    document = diagnosis_report(campaign(QUIET, table), table)
+    assert document["verdict"] == "no_mismatch"
+    least = {entry["mechanism"]: entry["smallest_visible_percent"] for entry in document["power"]}
+    coefficients = np.geomspace(0.01, 5.0, 60)
+    changes: Floats = np.array(
+        [changed_percent(QUIET, "preload_dependent_d33", (value, 1.0), table) for value in coefficients]
+    )
+    for times, seen in ((3.0, True), (1 / 3, False)):
+        strength = float(np.interp(times * least["preload_dependent_d33"], changes, coefficients))
+        hidden = replace(QUIET, mechanisms=("preload_dependent_d33",), parameters=(strength, 1.0))
+        for seed in (11, 12):
+            answer = diagnosis_report(campaign(replace(hidden, seed=seed), table), table)
+            assert (answer["verdict"] != "no_mismatch") is seen
+
+
+def test_more_recordings_and_less_scatter_show_more(table: SigmaTable) -> None:
+    few, many, rough = (
+        visible(made, table) for made in (QUIET, replace(QUIET, repeats=8), replace(QUIET, gain=0.05, line=0.02))
+    )
+    assert set(few) <= set(many)
+    for name in ("timing_delay", "preload_dependent_d33"):
+        assert rough[name] > 1.5 * few[name]
+        assert many[name] < 0.9 * few[name]
+    assert many["timing_delay"] == pytest.approx(few["timing_delay"] / 2, rel=0.2)  # four times as many recordings
+
+
+def test_a_quiet_report_says_what_would_have_shown(table: SigmaTable) -> None:
+    document = diagnosis_report(campaign(QUIET, table), table)
+    known = sum("frf" in mechanism.kinds for mechanism in CATALOGUE.values())
+    small = [entry["mechanism"] for entry in document["power"] if entry["smallest_visible_percent"] <= 5.0]
+    assert 0 < len(small) < known
+    assert f"Of the {known} known mechanisms these {len(small)} would each have shown" in document["statement"]
+    assert all(name.replace("_", " ") in document["statement"] for name in small)
+    percents = [entry["smallest_visible_percent"] for entry in document["power"]]
+    assert percents == sorted(percents)
+    assert all(0 < percent < 100 for percent in percents)
+
+
+def test_two_recordings_that_agree_tell_nothing(table: SigmaTable) -> None:
+    two = replace(QUIET, spheres_mm=(4.0,), preloads_n=(0.5, 1.5), repeats=1)
+    document = diagnosis_report(campaign(two, table), table)
+    assert document["verdict"] == "insufficient_data"
+    assert "at least 3 are needed" in document["statement"]
+
+
+def test_what_must_be_gained_grows_with_the_number_of_rivals() -> None:
+    assert least_chi2(4) < least_chi2(20) < 16.0
+    assert least_chi2(1) > 2 * np.log(4.0)
+
+
+def best_of(name: str, made: Made, table: SigmaTable) -> tuple[FittingProblem, Explanation, Explanation]:
+    problem = FittingProblem(lines(campaign(made, table)), table)
+    nothing, found = problem.explain([Request(()), Request((name,))])
+    assert nothing is not None
+    assert found is not None
+    return problem, nothing, found
+
+
+@pytest.mark.parametrize(("coefficient", "stated"), [(0.0, "ambiguous"), (3.0, "explained")])
+def test_a_mechanism_that_may_have_no_effect_explains_nothing(
+    coefficient: float, stated: str, table: SigmaTable
+) -> None:
+    name = "preload_dependent_d33"
+    made = replace(QUIET, mechanisms=(name,), parameters=(coefficient, 1.0))
+    problem, nothing, found = best_of(name, made, table)
+    assert without_effect(found) == ([name] if stated == "ambiguous" else [])
+    certain = replace(found, log_evidence=nothing.log_evidence + 50.0)
+    result = DiagnosisResult("", (), {}, search=Search((nothing, certain), (), {}), problem=problem)
+    assert result.search is not None
+    assert result.search.answers[0].names == (name,)
+    assert verdict(result) == stated

@@ -1,0 +1,147 @@
+"""What each mechanism would change in the recordings of this design, and how much of that noise and nuisances leave.
+
+Each mechanism's signature is what a typical strength of it (the quartile of its prior away from the limit) would change
+in the base model's response. The information of all signatures and the nuisances is one matrix JᵀC⁻¹J. What is left of
+a signature after the nuisances (with their priors) are taken out is the χ² by which the mechanism would show. A law has
+a shape too (when an ageing sets in, at which stress a d33 saturates): after its typical one, a mechanism has signatures
+with each further parameter at either end of its usual range.
+"""
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from underskin.diagnosis.data.dataset import Lines
+from underskin.diagnosis.inference.explanation import FittingProblem
+from underskin.diagnosis.inference.likelihood import Likelihoods
+from underskin.diagnosis.inference.optimizer import Fitter
+from underskin.diagnosis.noise.noise_levels import NoiseLevels, SeveralLevels
+from underskin.mechanisms.base import Normal, Parameter, Unsupported
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.units import Array, Floats
+
+_ENDS = (0.1, 0.9)  # of a shape's usual range
+
+
+class Signatures:
+    """The signatures of all mechanisms that the campaign supports and that change the mean.
+
+    Attributes: `owners`, the mechanism of each; `percent`, the root mean square of each over that of the base model's
+    response.
+    """
+
+    def __init__(self, problem: FittingProblem) -> None:
+        """Predict them around the base model as declared."""
+        self._problem = problem
+        self._fitter = Fitter([problem.hypothesis((), placed=False)])
+        point = self._fitter.begin(np.zeros((1, 0))).points.fit[0]
+        self._base = self._fitter.hypotheses[0].model.predict(point)
+        self.owners: list[str] = []
+        self._values: list[tuple[Array, Lines]] = []
+        for name, mechanism in CATALOGUE.items():
+            if problem.kind not in mechanism.kinds:
+                continue
+            parameters = mechanism.parameters(problem.lines.campaign, problem.kind)
+            if any(entry.moves_covariance for entry in parameters):
+                continue
+            try:
+                hypothesis = problem.hypothesis((name,), placed=False)
+            except Unsupported:
+                continue
+            for own in _shapes(parameters):
+                self.owners.append(name)
+                value = hypothesis.model.predict(np.concatenate([own, point])).value
+                self._values.append((value, hypothesis.lines))
+
+    @cached_property
+    def percent(self) -> list[float]:
+        """100 · √(Σ|change|² / Σ|base|²) over the rows on which a mechanism is judged."""
+        sizes = []
+        for value, lines in self._values:
+            base = self._base.value if len(value) == len(self._base.value) else self._base.value[lines.recording]
+            sizes.append(100 * float(np.sqrt((np.abs(value - base) ** 2).sum() / (np.abs(base) ** 2).sum())))
+        return sizes
+
+    def left(self, levels: NoiseLevels) -> tuple[Floats, Floats]:
+        """The information on the signatures (signatures, signatures) under this noise: what the nuisances leave of it,
+        and before they are taken out."""
+        nuisances = self._fitter.hypotheses[0].model.parameters
+        information = self._information(levels)
+        count = len(nuisances)
+        prior = np.diag([entry.prior.sd**-2 if isinstance(entry.prior, Normal) else 0.0 for entry in nuisances])
+        own, shared, beside = information[count:, count:], information[count:, :count], information[:count, :count]
+        return own - shared @ np.linalg.solve(beside + prior, shared.T), own
+
+    def _information(self, levels: NoiseLevels) -> Floats:
+        """On the nuisances and then on every signature."""
+        hypothesis = self._problem.hypothesis((), placed=levels.position > 0)
+        fitter = Fitter([hypothesis])
+        base = fitter.begin(np.zeros((1, 0)))
+        rows = _Rows(self._problem, self._base.value, levels.smooth)
+        parts = [rows.split(slope, fitter.lines) for slope in self._base.slopes]
+        for value, lines in self._values:
+            along, across = rows.split(value, lines)
+            parts.append((along - rows.base, across))
+        gain, level, position, spread, smooth = (
+            np.full((1, 1, 1), value)
+            for value in (levels.gain, levels.level, levels.position, levels.spread, levels.smooth)
+        )
+        several = SeveralLevels(gain, level, position, spread, None, smooth)
+        likelihood = Likelihoods(fitter.lines, self._problem.curvature, base.products, several, base.points.bend)
+        along, square = rows.products(parts)
+        return likelihood.information(along / levels.level**2, square / levels.level**2)[0]
+
+
+class _Rows:
+    """Rows as what they are along the base model's own direction in each recording, and the rest across it."""
+
+    def __init__(self, problem: FittingProblem, base: Array, smooth: float) -> None:
+        """From the base model's prediction of the collapsed lines, or of curves with a smooth error of that share."""
+        self._lines = problem.lines
+        whitening = problem.lines.whitening
+        self._root = 1.0 if whitening is None else np.sqrt(whitening.weight(np.array([smooth])))
+        self._direction = self._whitened(base.real if problem.lines.curves else np.ones(len(problem.lines.value)))
+        self._size = np.sqrt(self._sums(self._direction**2))
+        self.base, _ = self.split(base, problem.collapsed)
+
+    def split(self, value: Array, lines: Lines) -> tuple[Floats, Floats | None]:
+        """Along it (recordings,), and across it (numbers,), None where that is 0, of a prediction of these lines."""
+        if lines is not self._lines:
+            return value.real * self._size, None
+        whitened = self._whitened(value.real)
+        along = self._sums(self._direction * whitened) / self._size
+        across = whitened - self._direction * (along / self._size)[lines.recording]
+        return along, across if lines.curves else np.concatenate([across, self._whitened(value.imag)])
+
+    def products(self, parts: Sequence[tuple[Floats, Floats | None]]) -> tuple[Floats, Floats]:
+        """Re u*J (1, recordings, P) and Re JᵀJ (1, P, P) of columns J split like that."""
+        along = np.array([own for own, _ in parts])
+        square = along @ along.T
+        beside = [number for number, (_, rest) in enumerate(parts) if rest is not None]
+        if beside:
+            across = np.array([rest for _, rest in parts if rest is not None])
+            square[np.ix_(beside, beside)] += across @ across.T
+        return (along * self._size).T[None], square[None]
+
+    def _whitened(self, rows: Floats) -> Floats:
+        """Real rows such that their errors are independent and of variance 1."""
+        whitening = self._lines.whitening
+        return rows / self._lines.deviation if whitening is None else whitening.turned(rows) * self._root
+
+    def _sums(self, rows: Floats) -> Floats:
+        return np.add.reduceat(rows, self._lines.first)
+
+
+def _shapes(parameters: Sequence[Parameter]) -> list[Floats]:
+    """The fit coordinates of a typical strength, then of the same with one other parameter at the ends of its range."""
+    middle = np.array([entry.typical for entry in parameters])
+    shapes = [middle]
+    for place, entry in enumerate(parameters):
+        if entry.limit is not None and np.isfinite(entry.to_fit(entry.limit) if entry.limit > 0 else entry.limit):
+            continue  # its strength
+        for quantile in _ENDS:
+            moved = middle.copy()
+            moved[place] = entry.quantile(quantile)
+            shapes.append(moved)
+    return shapes
