@@ -92,7 +92,8 @@ def _methods(api: FastAPI, path: str) -> list[str]:
 def job_settings_of(settings: Settings, table: SigmaTable) -> JobSettings:
     """What diagnoses and plans are run with."""
     memory_bytes = int(settings.diagnosis_memory_mb * 1e6)
-    return JobSettings(settings.diagnosis_workers, memory_bytes, settings.tables / SIGMA_TABLE, table.sha256)
+    path = settings.tables / SIGMA_TABLE
+    return JobSettings(settings.diagnosis_workers, memory_bytes, settings.diagnosis_ready, path, table.sha256)
 
 
 def create_app(settings: Settings, table: SigmaTable, access: AccessControl, store: Database) -> ASGIApp:

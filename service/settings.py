@@ -48,6 +48,11 @@ class Settings(BaseSettings):
         le=1e6,
         description="Memory that one diagnosis may take, in MB (10^6 bytes); one that needs more fails.",
     )
+    diagnosis_ready: bool = Field(
+        default=True,
+        description="Whether a process with the program loaded waits for the next diagnosis (some 150 MB of memory); "
+        "without it each diagnosis begins a second or two later.",
+    )
     hosts: str = Field(
         default="",
         description="Names, separated by commas, by which clients reach the service, beside localhost, "

@@ -30,6 +30,7 @@ class JobSettings:
 
     workers: int
     memory_bytes: int
+    keeps_ready: bool
     table: Path
     table_sha256: str
 
@@ -88,7 +89,7 @@ class Runner:
                     thread.start()
             except _STORE_FAILED as error:
                 self._failure.log("no diagnosis can be claimed", error)
-            if not self._stirred.wait(_POLL_S):
+            if not self._stirred.wait(_POLL_S) and self._job_settings.keeps_ready:
                 self._processes.keep_ready()  # now that nothing else is going on
 
     def _claim(self) -> AnyRow | None:

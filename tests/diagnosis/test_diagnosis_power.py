@@ -9,8 +9,9 @@ import pytest
 from tests.support.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.pipeline import diagnosis_report
-from underskin.diagnosis.reporting.numbers import without_effect
+from underskin.diagnosis.reporting.numbers import parameter, without_effect
 from underskin.diagnosis.reporting.report import DiagnosisResult, verdict
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation.power import least_chi2, power
@@ -104,6 +105,25 @@ def best_of(name: str, made: Made, table: SigmaTable) -> tuple[FittingProblem, E
     assert nothing is not None
     assert found is not None
     return problem, nothing, found
+
+
+def test_an_interval_ends_where_the_posterior_has_fallen_though_it_is_skewed(table: SigmaTable) -> None:
+    made = Made(("ageing",), (0.2, 300.0, 0.0), sensors=4)
+    _, nothing, ageing = best_of("ageing", made, table)
+    assert ageing.log_evidence > nothing.log_evidence + 5.0  # a loss there is, though its size is uncertain
+    place = [entry.name for entry in ageing.model.parameters].index("loss")
+    stated = parameter(ageing, place)
+    assert 0.02 < stated["low"] < stated["value"]
+    density = {}
+    for value in (stated["low"], stated["value"]):
+        held = Fitter([ageing.best.hypothesis], held=[place])
+        starts = []
+        for onset in np.log([10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0]):
+            fit = ageing.point.fit.copy()
+            fit[place], fit[place + 1] = value, onset
+            starts.append(float(held.improve(held.at(replace(ageing.point, fit=fit))).cost[0]))
+        density[value] = min(starts) - ageing.model.parameters[place].log_prior(value)
+    assert density[stated["low"]] - density[stated["value"]] == pytest.approx(1.92, abs=0.3)
 
 
 @pytest.mark.parametrize(("coefficient", "stated"), [(0.0, "ambiguous"), (3.0, "explained")])

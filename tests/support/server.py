@@ -37,7 +37,12 @@ def running(folder: Path, settings: Mapping[str, str] | None = None, *options: s
     """`underskin serve` with its data and log in `folder`; RuntimeError with its log when it does not start."""
     port = free_port()
     log = folder / "server.log"
-    environment = {**os.environ, "UNDERSKIN_DATA": str(folder / "data"), **dict(settings or {})}
+    environment = {
+        **os.environ,
+        "UNDERSKIN_DIAGNOSIS_READY": "false",
+        "UNDERSKIN_DATA": str(folder / "data"),
+        **dict(settings or {}),
+    }
     with log.open("wb") as errors:
         process = subprocess.Popen(
             [UNDERSKIN, "serve", "--port", str(port), *options], env=environment, stdout=errors, stderr=errors

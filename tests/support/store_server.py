@@ -55,7 +55,7 @@ def running(place: Place, *, key: str | None = None, **settings: str) -> Iterato
     """A server over `place`; killed at the end, since it must not matter."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
-    environment = place.environment() | settings
+    environment = {"UNDERSKIN_DIAGNOSIS_READY": "false"} | place.environment() | settings
     log = place.folder.parent / f"{place.folder.name}.log"
     headers = {} if key is None else {"Authorization": f"Bearer {key}"}
     with log.open("ab") as stderr:

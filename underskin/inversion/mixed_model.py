@@ -17,8 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
-from scipy.stats import t as student
+from scipy.special import ndtr, ndtri, stdtrit
 
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER, POSITION_RANGE, USUAL_GAIN
 from underskin.units import Floats, to_lab
@@ -112,7 +111,7 @@ class ScatterPosterior:
             # A variance known only roughly: the Student t whose own variance has the same mean and spread.
             freedom = 4 + 2 * variance**2 / np.maximum(unsure, 1e-12 * variance**2)
             scale = np.sqrt(variance * (freedom - 2) / freedom + between)
-        half_width = student.ppf((1 + _LEVEL) / 2, freedom) * scale
+        half_width = stdtrit(freedom, (1 + _LEVEL) / 2) * scale
         return Estimate(value, np.sqrt(variance + between), value - half_width, value + half_width)
 
 

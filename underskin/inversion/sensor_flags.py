@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
-from scipy.stats import t as student
+from scipy.special import chdtrc, stdtr
 
 from underskin.findings import english
 from underskin.findings.codes import Reason
@@ -136,7 +135,7 @@ def scatter_flags(
             flags.append(Flag(name, Reason.BENT, {"percent": 100 * bend}))
         if len(numbers) > 2 and line_of[index] > _NOISY * usual:
             flags.append(Flag(name, Reason.NOISY_LINES, {"times": float(line_of[index] / usual)}))
-        elif scatter > _NOISY and chi2.sf(freedom * scatter**2, freedom) < alarm:
+        elif scatter > _NOISY and chdtrc(freedom, freedom * scatter**2) < alarm:
             flags.append(Flag(name, Reason.NOISY_RECORDINGS, {"times": scatter}))
     return flags
 
@@ -166,5 +165,5 @@ def _bend(rest: Floats, preload: Floats, expected: Floats) -> tuple[float, float
     freedom = len(rest) - 3
     scatter = float(np.sqrt(np.sum((rest / expected - basis @ coefficients) ** 2) / freedom))
     deviation = max(scatter, 1.0) * float(np.sqrt(np.linalg.pinv(basis.T @ basis)[2, 2]))
-    chance = 2 * student.sf(abs(coefficients[2]) / deviation, freedom)
+    chance = 2 * stdtr(freedom, -abs(coefficients[2]) / deviation)
     return 1.5 * float(coefficients[2]), float(chance), scatter, freedom

@@ -134,11 +134,17 @@ class Parameter:
         """The fit coordinate of a typical strength: the quartile of the prior that is farther from the limit."""
         if self.limit is None or not isinstance(self.prior, Normal):
             return self.quantile(0.5)
-        with np.errstate(divide="ignore"):
-            limit = self.limit if self.scale == "linear" else float(np.log(self.limit))
-        if not np.isfinite(limit):
+        limit = self.fit_limit
+        if limit is None:
             return self.quantile(0.5)
         return max(self.quantile(0.25), self.quantile(0.75), key=lambda end: abs(end - limit))
+
+    @property
+    def fit_limit(self) -> float | None:
+        """The limit's fit coordinate; None where there is no limit, or it is infinite there."""
+        if self.limit is None or (self.scale == "log" and not 0 < self.limit < np.inf):
+            return None
+        return self.to_fit(self.limit)
 
     def to_fit(self, value: float) -> float:
         """The fit coordinate of a value."""

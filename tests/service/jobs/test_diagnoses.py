@@ -129,7 +129,7 @@ def test_cancelled_while_it_runs_and_while_it_waits(file_place: Place) -> None:
 
 
 def test_a_worker_is_kept_ready_for_the_next_job(file_place: Place) -> None:
-    with running(file_place, **ONE) as server:
+    with running(file_place, **ONE, UNDERSKIN_DIAGNOSIS_READY="true") as server:
         (ready,) = await_workers(server, 1, "underskin-ready")
         diagnosis_id = asked(server, sent(server, resonant("array")))
         assert await_workers(server, 1) == [ready]

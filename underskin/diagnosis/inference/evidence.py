@@ -21,7 +21,7 @@ from underskin.diagnosis.inference.objective import GAIN, POSITION, Evaluated, P
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.units import Floats
 
-__all__ = ["Evidence", "around", "integrated", "laplace"]
+__all__ = ["Evidence", "around", "held_points", "integrated", "laplace"]
 
 _TRUSTED = 1.0  # gain in log posterior within which an integral was begun at the most probable point
 _LOOSE = 0.3  # standard deviation beyond which a logarithmic parameter is integrated over: a factor of 1.35
@@ -126,7 +126,7 @@ def _over_loose(evidence: list[Evidence]) -> list[Evidence]:
     better: dict[int, Evidence] = {}
 
     def log_values(numbers: list[int], values: Floats) -> Floats:
-        points = _held_points(held, evidence, known, numbers, values)
+        points = held_points(held, evidence, known, numbers, values)
         begun = held.settle(held.evaluate(points), 1)
         found = around(held, held.descend(begun, 1, _within_reach))
         own = [held.hypotheses[number].model.parameters[known[number]] for number in numbers]
@@ -169,7 +169,7 @@ def _loosest(evidence: Evidence) -> int | None:
     return place if place is not None and deviations[place] > _LOOSE else None
 
 
-def _held_points(
+def held_points(
     held: Fitter, evidence: Sequence[Evidence], places: Sequence[int], numbers: Sequence[int], values: Floats
 ) -> Points:
     """Where the held parameters have these values and the others follow as the quadratics say."""

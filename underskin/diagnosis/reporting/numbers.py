@@ -8,6 +8,7 @@ from scipy.special import ndtri
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.inference.laplace import levels_covariance
+from underskin.diagnosis.inference.profile import profile_end
 
 _QUANTILE = float(ndtri(0.975))
 
@@ -28,7 +29,8 @@ def place_of(explanation: Explanation, name: str) -> int:
 
 
 def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
-    """A parameter's most probable value and 95 % interval, within its bounds."""
+    """A parameter's most probable value and 95 % interval, within its bounds: 1.96 standard deviations either way, and
+    by the profile of the posterior where these reach the value at which a mechanism does nothing."""
     best, point = explanation.best, explanation.point
     entry = explanation.model.parameters[place]
     if entry.moves_covariance:
@@ -40,7 +42,11 @@ def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
     half_width = _QUANTILE * np.sqrt(max(variance, 0.0))
     low, high = entry.bounds
     middle = float(point.fit[place])
-    values = [entry.from_fit(at) for at in (middle, max(middle - half_width, low), min(middle + half_width, high))]
+    ends = [max(middle - half_width, low), min(middle + half_width, high)]
+    limit = None if entry.moves_covariance else entry.fit_limit
+    if limit is not None and ends[0] <= limit <= ends[1] and limit != middle:
+        ends[0 if limit < middle else 1] = profile_end(best, place, limit)
+    values = [entry.from_fit(at) for at in (middle, *ends)]
     if entry.relative_to is not None:
         values = _absolute(explanation, place, values)
     stated = zip(("value", "low", "high"), values, strict=True)
@@ -54,18 +60,15 @@ def without_effect(explanation: Explanation) -> list[str]:
     """
     idle = []
     for name, place in own_places(explanation.names, explanation.best.hypothesis.lines).items():
-        strengths = [index for index in range(place.start, place.stop) if _limit(explanation, index) is not None]
+        own = range(place.start, place.stop)
+        strengths = [index for index in own if explanation.model.parameters[index].limit is not None]
         if strengths and all(_holds_limit(explanation, index) for index in strengths):
             idle.append(name)
     return idle
 
 
-def _limit(explanation: Explanation, place: int) -> float | None:
-    return explanation.model.parameters[place].limit
-
-
 def _holds_limit(explanation: Explanation, place: int) -> bool:
-    stated, limit = parameter(explanation, place), _limit(explanation, place)
+    stated, limit = parameter(explanation, place), explanation.model.parameters[place].limit
     return limit is not None and bool(stated["low"] <= limit <= stated["high"])
 
 

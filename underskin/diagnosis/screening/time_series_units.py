@@ -6,7 +6,6 @@ oscillation: the straight line through each eighth of the record is removed.
 """
 
 import numpy as np
-from scipy.signal import detrend
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -51,6 +50,8 @@ def contradiction_of(entry: FrfRecording) -> Finding | None:
 def _oscillation(force: Floats) -> Floats:
     """√2 times the deviation of a force less its drift, and its peak [N]."""
     parts = np.arange(0, len(force), max(len(force) // _PARTS, _PARTS))
+    from scipy.signal import detrend  # takes 0.3 s to load, which few need
+
     drift_free = detrend(force, bp=parts)
     return np.array([np.sqrt(2.0) * np.std(drift_free), np.max(np.abs(drift_free))])
 

@@ -138,7 +138,7 @@ def _shapes(parameters: Sequence[Parameter]) -> list[Floats]:
     middle = np.array([entry.typical for entry in parameters])
     shapes = [middle]
     for place, entry in enumerate(parameters):
-        if entry.limit is not None and np.isfinite(entry.to_fit(entry.limit) if entry.limit > 0 else entry.limit):
+        if entry.limit is not None and (entry.limit == 0 or entry.fit_limit is not None):
             continue  # its strength
         for quantile in _ENDS:
             moved = middle.copy()

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import get_window
 
 from underskin.errors import not_finite, out_of_range, too_few, unequal_lengths, unusable
 from underskin.recordings.campaign import FrfRecording
@@ -152,7 +151,7 @@ def broadband(
     if not 0 <= overlap < 1:
         raise out_of_range("overlap", overlap, "must be 0 or greater and less than 1")
     step = max(1, round(size * (1 - overlap)))
-    taper = np.asarray(get_window(window, size), dtype=np.float64)
+    taper = _taper(window, size)
     average = averaged(force, charge, Blocks(taper, step, slice(1, (size + 1) // 2), without_line), estimator)
     return _frf(average, sample_rate, independent=False)
 
@@ -189,7 +188,7 @@ def periodic(force: Floats, charge: Floats, sample_rate: float, *, estimator: Es
     period = period_of(force)
     if not period:
         raise unusable("force_n", f"{len(force)} samples", "must repeat itself at least four times")
-    taper = np.asarray(get_window("hann", 2 * period), dtype=np.float64)
+    taper = _taper("hann", 2 * period)
     average = averaged(force, charge, Blocks(taper, period, slice(2, period, 2), without_drift), estimator)
     return _frf(average, sample_rate, independent=True)
 
@@ -263,3 +262,9 @@ def _check(force: Floats, charge: Floats, sample_rate: float) -> None:
         bad: NDArray[np.bool_] = ~np.isfinite(signal)
         if bad.any():
             raise not_finite(name, "not finite", index=int(np.argmax(bad)))
+
+
+def _taper(window: str, size: int) -> Floats:
+    from scipy.signal import get_window  # takes 0.3 s to load, which few need
+
+    return np.asarray(get_window(window, size), dtype=np.float64)

@@ -9,7 +9,6 @@ are equal but for the drift, tell the drift alone.
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
-from scipy.signal import correlate
 
 from underskin.units import Floats
 
@@ -34,6 +33,8 @@ def period_of(force: Floats) -> int:
     if power <= (_ROUNDING * float(np.abs(force).max())) ** 2:
         return 0
     lags = np.arange(len(steady) // 2 + 1)
+    from scipy.signal import correlate  # takes 0.3 s to load, which few need
+
     products = correlate(steady, steady, method="fft")[len(steady) - 1 :]
     likeness = products[: len(lags)] / (len(steady) - lags) / power
     dips = np.flatnonzero(likeness < _DIP)

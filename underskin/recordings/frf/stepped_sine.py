@@ -9,7 +9,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import resample_poly
 
 from underskin.units import Complexes, Floats
 
@@ -48,6 +47,8 @@ def find_steps(force: Floats, sample_rate: float) -> list[Step]:
     """
     crossings = _rising_crossings(force)
     if len(crossings) > 1 and np.median(np.diff(crossings)) < _FINE:  # too few samples a cycle to place a crossing
+        from scipy.signal import resample_poly  # takes 0.3 s to load, which few need
+
         crossings = _rising_crossings(resample_poly(force - np.median(force), _FINE, 1)) / _FINE
     if len(crossings) <= _FEWEST_CYCLES:
         return []
