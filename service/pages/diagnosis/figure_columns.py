@@ -59,16 +59,11 @@ def _before_after(figure: Mapping[str, Any]) -> FigureColumns:
 
 def _curve(figure: Mapping[str, Any]) -> FigureColumns:
     """Samples, predictions, residuals and marks of every recording, one below the other."""
-    rows = [
-        (
-            trace["meta"]["recording"],
-            trace["meta"]["shows"],
-            _rounded(x * trace["meta"]["mm"]),
-            _rounded(y * trace["meta"]["n"]),
-        )
-        for trace in figure["data"]
-        for x, y in zip(_numbers(trace["x"]), _numbers(trace["y"]), strict=True)
-    ]
+    rows = []
+    for trace in figure["data"]:
+        meta = trace["meta"]
+        for x, y in zip(_numbers(trace["x"]), _numbers(trace["y"]), strict=True):
+            rows.append((meta["recording"], meta["shows"], _rounded(x * meta["mm"]), _rounded(y * meta["n"])))
     return _by_name(("recording", "shows", "depth_mm", "force_n"), rows)
 
 

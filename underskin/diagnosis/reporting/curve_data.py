@@ -18,7 +18,7 @@ from underskin.recordings.curve_course import course
 from underskin.units import Floats
 
 MOST_SAMPLES = 600  # of a curve
-_BESIDE_JUMP = 12  # samples on either side of a jump, all of which are shown
+_BESIDE_CORNER = 12  # samples on either side of a jump or of the deepest one, all of which are shown
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def _shown(
         measured = measured - seen.zero
         jumps = [seen.snap_in, None if seen.pull_off is None else seen.pull_off - 1]
     snap_in, pull_off = (None if at is None else Mark(float(place[at]), float(measured[at])) for at in jumps)
-    shown = _thinned(way_along(place, measured, seen.noise), [at for at in jumps if at is not None])
+    shown = _thinned(way_along(place, measured, seen.noise), [seen.turn, *(at for at in jumps if at is not None)])
     return ShownCurve(
         name=raw.id,
         count=len(measured),
@@ -126,12 +126,12 @@ def _shown(
     )
 
 
-def _thinned(way: Floats, jumps: list[int]) -> NDArray[np.intp]:
+def _thinned(way: Floats, corners: list[int]) -> NDArray[np.intp]:
     """Which samples are shown of those that lie so far along a curve, 0 to 1: as evenly as they lie, and all beside
-    jumps."""
+    corners."""
     count = len(way)
     if count <= MOST_SAMPLES:
         return np.arange(count)
     even = np.minimum(np.searchsorted(way, np.linspace(0.0, 1.0, MOST_SAMPLES)), count - 1)
-    beside = [np.arange(max(at - _BESIDE_JUMP, 0), min(at + _BESIDE_JUMP + 1, count)) for at in jumps]
+    beside = [np.arange(max(at - _BESIDE_CORNER, 0), min(at + _BESIDE_CORNER + 1, count)) for at in corners]
     return np.unique(np.concatenate([even, *beside]))

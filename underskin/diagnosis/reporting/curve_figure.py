@@ -94,9 +94,7 @@ class _Curve:
         traces = [self._trace("measured", curve.sample_mm, curve.sample_n, largest, measured)]
         layout: dict[str, Any] = {"yaxis.title.text": f"force [{readable_unit('force_n', largest)[0]}]"}
         residuals = [curve.force_n - self._predicted(model).force_n for model in self._models]
-        most = min(
-            float(np.abs(left).max()) for left in residuals
-        )  # one unit for all, in which the best one reads well
+        most = min(float(np.abs(left).max()) for left in residuals)  # the unit of all is the best one's
         for row, (model, left) in enumerate(zip(self._models, residuals, strict=True), start=2):
             alone = len(self._models) == 1
             name = model.name if alone else f"{model.shows}: {model.name}"

@@ -44,10 +44,10 @@ _ERROR = (
 )
 _CURVE = (
     "One recording at a time, the worst explained one first. Circles are samples: of a long recording some, evenly "
-    "chosen, and all beside a jump. Lines and residuals (measured less predicted) are at the means over neighbouring "
-    "samples that were fitted, which grow shorter towards jumps; predictions include the zero, the drift and the gain "
-    "that the fit grants the load cell of each recording. Depth is counted from the fitted contact point, force from "
-    "the reading in the air. Snap-in is the first sample in contact, pull-off the last."
+    "chosen, and all beside a jump or the turn. Lines and residuals (measured less predicted) are at the means over "
+    "neighbouring samples that were fitted, which grow shorter towards jumps; predictions include the zero, the drift "
+    "and the gain that the fit grants the load cell of each recording. Depth is counted from the fitted contact point, "
+    "force from the reading in the air. Snap-in is the first sample in contact, pull-off the last."
 )
 _SHARE = "; accounts for {:.0f} % of the misfit beyond noise in the recordings fitted to"
 _D33_NOT_TO_QUOTE = (
