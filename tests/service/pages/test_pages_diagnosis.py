@@ -130,7 +130,7 @@ def test_a_curve_is_chosen_with_keys(reader: Visit, idle: Server, made: Made) ->
     reader.drawn(5)
     reader.require_accessible()
     names = [button.name for button in figure.layout.updatemenus[0].buttons]
-    listed = page.get_by_label("Recording")
+    listed = page.get_by_role("combobox", name="Recording")
     assert listed.locator("option").all_inner_texts() == names
     of_plot = "document.querySelector('#figure-curve .plot').data.filter((t) => t.visible).map((t) => t.meta.recording)"
     seen = []
