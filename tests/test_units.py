@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from underskin import Indenter, InvalidInput, Skin
-from underskin.units import LAB, checked, to_lab, to_si, unusual
+from underskin.units import LAB, checked, readable_unit, to_lab, to_si, unusual
 
 GOOD: dict[str, Any] = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16.0, "sensor_radius_mm": 1.5}
 
@@ -73,3 +73,21 @@ def test_measured_magnitudes_are_findings_not_errors() -> None:
     assert [(finding.field, finding.index) for finding in found] == [("frf_pc_per_n", 1)]
     assert "7.4 pC/N: was it given in C/N? (1 more rows like it)" in found[0].statement
     assert "dead sensor" in unusual("frf_pc_per_n", 0.0)[0].statement
+
+
+@pytest.mark.parametrize(
+    ("name", "largest", "unit", "count"),
+    [
+        ("displacement_mm", 12.0, "mm", 1.0),
+        ("displacement_mm", 7e-4, "µm", 1e3),
+        ("force_n", 0.3, "N", 1.0),
+        ("force_n", 2e-5, "µN", 1e6),
+        ("force_n", 5e-8, "nN", 1e9),
+        ("force_n", 1e-20, "pN", 1e12),
+        ("force_n", 0.0, "N", 1.0),
+    ],
+)
+def test_small_numbers_are_read_in_a_finer_unit(name: str, largest: float, unit: str, count: float) -> None:
+    chosen, factor = readable_unit(name, largest)
+    assert chosen == unit
+    assert factor == pytest.approx(count)

@@ -69,6 +69,8 @@ LAB: dict[str, LabField] = {
     )
 }
 
+_FINER = {"mm": ("µm", "nm"), "N": ("mN", "µN", "nN", "pN")}  # each a thousandth of the one before
+_LEAST_READ = 0.1  # of an axis' unit, below which its numbers are hard to read
 _NEIGHBOURS = {
     "mm": {1e-3: "µm", 1e3: "m"},
     "MPa": {1e-3: "kPa", 1e-6: "Pa", 1e3: "GPa"},
@@ -85,6 +87,19 @@ def to_si(name: str, value: ArrayLike) -> Floats:
 def to_lab(name: str, value: ArrayLike) -> Floats:
     """The lab-unit value of a field given in SI."""
     return np.asarray(value, dtype=float) / LAB[name].to_si
+
+
+def readable_unit(name: str, largest: float) -> tuple[str, float]:
+    """The unit in which values up to `largest` (lab unit) of a length or force read well, and how many make the lab's.
+
+    Of 2e-5 N it is ("µN", 1e6). Zero is shown in the lab's own unit.
+    """
+    unit, count = LAB[name].unit, 1.0
+    for finer in _FINER[unit]:
+        if largest == 0 or largest * count >= _LEAST_READ:
+            break
+        unit, count = finer, 1e3 * count
+    return unit, count
 
 
 def checked(name: str, value: ArrayLike, *, units_checked: bool = False) -> Floats:

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from tests.support.adhesive_curves import adhesive_figure
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.mechanism_campaigns import indentation_campaign
 from underskin.cli.app import app
@@ -159,6 +160,31 @@ def test_a_browser_draws_every_figure(text: str, tmp_path: Path) -> None:
     assert "<img src=x" not in drawn
 
 
+@pytest.mark.browser
+@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
+def test_a_list_that_keys_reach_chooses_the_recording(document: dict[str, Any], tmp_path: Path) -> None:
+    assert CHROMIUM is not None
+    file = tmp_path / "page.html"
+    text = page(document, {"curve": adhesive_figure()})
+    choosing = "const list = document.querySelector('label select'); list.selectedIndex = 1; "
+    choosing += "list.dispatchEvent(new Event('change')); document.title = "
+    choosing += "document.getElementById('figure-curve').data.filter((t) => t.visible).map((t) => t.meta.recording);"
+    file.write_text(
+        text.replace(
+            "</html>", f"<script>addEventListener('load', () => setTimeout(() => {{{choosing}}}, 500))</script></html>"
+        ),
+        encoding="utf-8",
+    )
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=10000", "--dump-dom"]
+    shown = subprocess.run(
+        [CHROMIUM, *options, f"--user-data-dir={tmp_path / 'profile'}", file.as_uri()],
+        capture_output=True, text=True, check=True, timeout=120,
+    ).stdout  # fmt: skip
+    title = re.findall("<title>(.*?)</title>", shown)[0]
+    menu = adhesive_figure().layout.updatemenus[0]
+    assert set(title.split(",")) == {menu.buttons[1].name.partition(":")[0]}
+
+
 @pytest.mark.slow
 def test_figures_show_the_report_s_numbers(found: DiagnosisResult, document: dict[str, Any]) -> None:
     drawn = figures(found, document)
@@ -222,7 +248,7 @@ KINDS = [
     (lambda: campaign(Made(), load_table()), "no_mismatch", EVERY - {"parameters"}),
     (lambda: campaign(OFF_CENTRE, load_table()), "explained", EVERY),
     (lambda: campaign(ALONE, load_table()), "insufficient_data", set()),
-    (curves, "explained", EVERY - {"parameters"}),  # a thin layer has no parameter
+    (curves, "explained", EVERY - {"parameters"} | {"curve"}),  # a thin layer has no parameter
 ]
 
 
@@ -238,6 +264,7 @@ def test_every_kind_of_report_has_its_page(make: Callable[[], Campaign], verdict
     assert readable(document["statement"]).partition(". ")[0].rstrip(".") in tags.text
     if not names:
         assert tags.count("script") == 0
+    assert ("Depth is counted from the fitted contact point" in tags.text) == ("curve" in names)
     for figure in drawn.values():
         json.loads(figure.to_json())
 

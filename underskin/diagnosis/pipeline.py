@@ -84,7 +84,8 @@ def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits
             if seated is not None:
                 problem, seating = seated
                 findings, result = [*findings, seating], search(problem)
-            return _work_out(campaign.name, problem, result, findings, provenance, progress, limits)
+            diagnosis = _work_out(campaign.name, problem, result, findings, provenance, progress, limits)
+            return replace(diagnosis, curves=curves.campaign)
     frf = tuple(entry for entry in campaign.recordings if isinstance(entry, FrfRecording))
     inspected = inspect(replace(campaign, recordings=frf), table)
     findings += inspected.findings

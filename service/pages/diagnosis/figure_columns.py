@@ -57,6 +57,21 @@ def _before_after(figure: Mapping[str, Any]) -> FigureColumns:
     return _by_name(("model", "recording", f"predicted {unit}", f"measured {unit}"), rows)
 
 
+def _curve(figure: Mapping[str, Any]) -> FigureColumns:
+    """Samples, predictions, residuals and marks of every recording, one below the other."""
+    rows = []
+    for trace in figure["data"]:
+        meta = trace["meta"]
+        for x, y in zip(_numbers(trace["x"]), _numbers(trace["y"]), strict=True):
+            rows.append((meta["recording"], meta["shows"], _rounded(x * meta["mm"]), _rounded(y * meta["n"])))
+    return _by_name(("recording", "shows", "depth_mm", "force_n"), rows)
+
+
+def _rounded(value: float) -> float:
+    """To the digits of a number of four bytes."""
+    return float(f"{value:.6g}")
+
+
 def _by_name(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> FigureColumns:
     return {name: [row[number] for row in rows] for number, name in enumerate(names)}
 
@@ -73,4 +88,8 @@ _OF_REPORT: dict[str, Callable[[Mapping[str, Any]], FigureColumns]] = {
     "explanations": _explanations,
     "parameters": _parameters,
 }
-_OF_FIGURE: dict[str, Callable[[Mapping[str, Any]], FigureColumns]] = {"where": _where, "before_after": _before_after}
+_OF_FIGURE: dict[str, Callable[[Mapping[str, Any]], FigureColumns]] = {
+    "where": _where,
+    "curve": _curve,
+    "before_after": _before_after,
+}

@@ -30,6 +30,7 @@ class Drawn:
     json: Markup
     numbers: str | None  # address of its numbers as CSV
     about: str
+    choices: tuple[str, ...] = ()  # what one can choose to see, the first at first
 
 
 def drawn(name: str, figure: "go.Figure", about: str, numbers: str | None = None) -> Drawn:
@@ -50,9 +51,10 @@ def prepare() -> None:
 
 
 def drawn_before(name: str, text: str, about: str, numbers: str | None = None) -> Drawn:
-    """The same of a figure's JSON."""
+    """The same of a figure's JSON; the choices are those of its menu."""
     layout = orjson.loads(text)["layout"]
-    return Drawn(name, layout["title"]["text"], layout["height"], json_inside(text), numbers, about)
+    choices = tuple(button["name"] for menu in layout.get("updatemenus", []) for button in menu["buttons"])
+    return Drawn(name, layout["title"]["text"], layout["height"], json_inside(text), numbers, about, choices)
 
 
 def drawn_curves(recordings: Iterable[Recording], most: int, noun: str = "", numbers: str | None = None) -> list[Drawn]:

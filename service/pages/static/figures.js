@@ -4,7 +4,22 @@
 const CONFIG = { displaylogo: false, responsive: true, displayModeBar: false };
 
 function document_of(plot) {
-  return in_zone(JSON.parse(plot.parentElement.querySelector('script[type="application/json"]').textContent));
+  const figure = JSON.parse(plot.parentElement.querySelector('script[type="application/json"]').textContent);
+  return in_zone(as_chosen(figure, plot.parentElement.querySelector("[data-choice]")));
+}
+
+// What the figure's own menu would do, which only a pointer can open; a list of the page stands in its place.
+function as_chosen(figure, list) {
+  if (!list) return figure;
+  const [changed, layout] = figure.layout.updatemenus[0].buttons[list.value].args;
+  figure.data.forEach((trace, index) => (trace.visible = changed.visible[index]));
+  for (const [path, value] of Object.entries(layout)) {
+    const keys = path.split(".");
+    const last = keys.pop();
+    keys.reduce((part, key) => (part[key] ??= {}), figure.layout)[last] = value;
+  }
+  delete figure.layout.updatemenus;
+  return figure;
 }
 
 // Times come in UTC, and plotly draws them as they are written: written here as the viewer's clocks show them.
@@ -68,6 +83,10 @@ addEventListener("beforeprint", () => {
 addEventListener("afterprint", () => {
   for (const plot of document.querySelectorAll(".plot")) Plotly.relayout(plot, { autosize: true, width: null });
 });
+
+for (const list of document.querySelectorAll("[data-choice]")) {
+  list.addEventListener("change", () => redraw(list.closest("figure").querySelector(".plot")));
+}
 
 for (const button of document.querySelectorAll("[data-save]")) {
   button.addEventListener("click", async () => {

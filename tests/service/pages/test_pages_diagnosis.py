@@ -13,6 +13,7 @@ import pytest
 from service.store import database, diagnoses
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING, HOSTILE, token_of
+from tests.support.adhesive_curves import adhesive_figure
 from tests.support.diagnosed import asked, resonant, sent, table
 from tests.support.store_server import Server
 from underskin import __version__
@@ -118,6 +119,34 @@ def test_a_figure_s_numbers_are_those_of_the_report(idle: Server, made: Made) ->
     lines = sum(int(row["points"]) for row in tables["where"])
     assert lines == len(tables["before_after"]) / 2  # each point is in one cell
     assert idle.http.get(f"{place}/nothing.csv").status_code == 404
+
+
+def test_a_curve_is_chosen_with_keys(reader: Visit, idle: Server, made: Made) -> None:
+    figure = adhesive_figure()
+    whole = Made(made.report, {**made.figures, "curve": figure.to_json()})
+    place = f"/diagnoses/{keep(idle, resonant('curve', lines=LINES), whole, 'curve')}"
+    page = reader.page
+    reader.go(place)
+    reader.drawn(5)
+    reader.require_accessible()
+    names = [button.name for button in figure.layout.updatemenus[0].buttons]
+    listed = page.get_by_role("combobox", name="Recording")
+    assert listed.locator("option").all_inner_texts() == names
+    of_plot = "document.querySelector('#figure-curve .plot').data.filter((t) => t.visible).map((t) => t.meta.recording)"
+    seen = []
+    for key in (None, "ArrowDown"):
+        if key is not None:
+            listed.focus()
+            page.keyboard.press(key)
+            page.wait_for_function(f"{of_plot}[0] === {names[1].partition(':')[0]!r}")
+        seen.append(set(page.evaluate(of_plot)))
+    assert seen == [{name.partition(":")[0]} for name in names]
+    assert "the fitted contact point" in page.locator(".report").inner_text()
+    rows = list(csv.DictReader(idle.http.get(f"{place}/curve.csv").text.splitlines()))
+    (mark,) = [row for row in rows if (row["recording"], row["shows"]) == ("c01", "pull-off")]
+    (trace,) = [one for one in figure.data if (one.meta["recording"], one.meta["shows"]) == ("c01", "pull-off")]
+    assert float(mark["depth_mm"]) == pytest.approx(float(trace.x[0]) * trace.meta["mm"], rel=1e-5)
+    assert float(mark["force_n"]) == pytest.approx(float(trace.y[0]) * trace.meta["n"], rel=1e-5)
 
 
 def test_one_that_waits_is_cancelled_and_asked_for_again(reader: Visit, idle: Server) -> None:

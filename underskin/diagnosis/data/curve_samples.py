@@ -44,11 +44,9 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
     for entry in campaign.recordings:
         if not isinstance(entry, IndentationRecording | CompressionRecording) or entry.kind != kind:
             continue
-        columns = [entry.displacement_mm, entry.force_n, *([] if entry.time_s is None else [entry.time_s])]
-        finite = np.isfinite(np.stack(columns)).all(axis=0)
-        if finite.sum() < _LEAST_SAMPLES:
+        columns = finite_samples(entry)
+        if len(columns[0]) < _LEAST_SAMPLES:
             continue
-        columns = [column[finite] for column in columns]
         seen = course(columns[0], columns[1])
         force_zero = seen.zero if kind == "indentation" else 0.0
         columns[1] = columns[1] - force_zero
@@ -77,6 +75,13 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         scatter=(0.0, -len(value)),  # a force has no imaginary part
         smooth=CurveError.joined(errors),
     )
+
+
+def finite_samples(entry: CurveRecording) -> list[Floats]:
+    """Displacement [mm], force [N] and, where there is one, time [s] of the samples that have all of them."""
+    columns = [entry.displacement_mm, entry.force_n, *([] if entry.time_s is None else [entry.time_s])]
+    finite = np.isfinite(np.stack(columns)).all(axis=0)
+    return [column[finite] for column in columns]
 
 
 def _with_corner(columns: Sequence[Floats], turn: int) -> list[Floats]:
@@ -109,7 +114,7 @@ def _thinned(columns: Sequence[Floats], seen: Course) -> tuple[list[Floats], Flo
     """The means of the columns over blocks, the deviation of the force's, how far along the curve each lies, and the
     samples in each."""
     displacement, force = columns[:2]
-    way = _way(displacement, force, seen.noise)
+    way = way_along(displacement, force, seen.noise)
     even = np.searchsorted(way, np.linspace(0.0, 1.0, _SAMPLES, endpoint=False))
     steepness = float(np.ptp(force)) / max(float(displacement.max() - np.median(displacement)), 1e-300)
     unseen = seen.noise / steepness if steepness else float(np.ptp(displacement))  # travel that noise of force hides
@@ -219,7 +224,7 @@ def _joined(columns: Sequence[Floats]) -> Floats:
     return np.concatenate([*columns, np.zeros(0)])
 
 
-def _way(displacement: Floats, force: Floats, noise: float) -> Floats:
+def way_along(displacement: Floats, force: Floats, noise: float) -> Floats:
     """How far along the curve each sample lies, 0 to 1: as much by displacement, by force and by count.
 
     A sphere's way through the air is long and says little; force counts where it changes by more than its noise.

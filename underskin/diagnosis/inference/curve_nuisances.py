@@ -19,6 +19,10 @@ class CellResponse:
     gain: Floats
     variance: Floats
 
+    def reading(self, lines: Lines, force: Floats) -> Floats:
+        """What the cells show of a force (rows,) [N]."""
+        return force * (1 + self.gain[lines.recording]) + self.offset
+
 
 def cell_response(
     lines: Lines, levels: NoiseLevels, force: Floats, known: NDArray[np.bool_] | None = None

@@ -16,9 +16,12 @@ from underskin.diagnosis.data.names import SIMPLEST
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT
+from underskin.diagnosis.reporting.curve_data import shown_curves
+from underskin.diagnosis.reporting.curve_figure import curve_figure
 from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned
 from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.findings.formatting import in_percent
+from underskin.recordings.campaign import Campaign
 from underskin.units import Floats
 
 AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in WORDS.items()}
@@ -30,7 +33,7 @@ _ROW, _BETWEEN = 110, 0.65  # height of a parameter's row [pixels], and the shar
 
 
 def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str, go.Figure]:
-    """By name: where, before_after, explanations, parameters; those that the diagnosis has. `document`: its report."""
+    """By name: where, curve, before_after, explanations, parameters; those that it has. `document`: its report."""
     if diagnosis.search is None or diagnosis.problem is None:
         return {}
     nothing = next(entry for entry in diagnosis.search.explanations if not entry.names)
@@ -42,9 +45,18 @@ def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str
         "before_after": before_and_after(diagnosis, thinned, before, after, shown),
         "explanations": explanations(document),
     }
+    if diagnosis.curves is not None:
+        drawn["curve"] = _curve(diagnosis.problem, diagnosis.curves, nothing, shown)
     if any(entry["parameters"] for entry in document["mechanisms"]):
         drawn["parameters"] = parameter_intervals(diagnosis.problem, shown, document)
     return drawn
+
+
+def _curve(problem: FittingProblem, recorded: Campaign, nothing: Explanation, shown: Explanation) -> go.Figure:
+    """Each curve with the model before and after; with one of them where nothing is added."""
+    simplest = SIMPLEST[problem.kind]
+    before, after = (simplest, _named(shown)) if shown.names else ("", f"{simplest}, nothing added")
+    return curve_figure(shown_curves(problem, recorded, nothing, shown), problem.kind, before, after)
 
 
 def explanations(document: Mapping[str, Any]) -> go.Figure:
@@ -120,9 +132,8 @@ def before_and_after(
     diagnosis: DiagnosisResult, thinned: Thinned, before: Points, after: Points, shown: Explanation
 ) -> go.Figure:
     """Measured against predicted, by the model alone and by what is stated, each with the band that noise allows."""
-    named = " + ".join(shown.names).replace("_", " ") or "nothing added"
     figure = make_subplots(
-        1, 2, subplot_titles=(f"before: {SIMPLEST[thinned.lines.kind]}", f"after: {named}"), shared_yaxes=True
+        1, 2, subplot_titles=(f"before: {SIMPLEST[thinned.lines.kind]}", f"after: {_named(shown)}"), shared_yaxes=True
     )
     _, name = _part(diagnosis, before.measured)
     ids = [escape(entry.id) for entry in thinned.lines.campaign.recordings]
@@ -204,6 +215,10 @@ def parameter_intervals(problem: FittingProblem, shown: Explanation, document: M
         margin={"t": 100, "b": 90},
     )
     return _styled(figure)
+
+
+def _named(shown: Explanation) -> str:
+    return " + ".join(shown.names).replace("_", " ") or "nothing added"
 
 
 def _labelled(entry: Mapping[str, Any]) -> str:

@@ -17,6 +17,16 @@ from underskin.diagnosis.reporting import report_view
 from underskin.diagnosis.reporting.figures import explanations
 from underskin.diagnosis.reporting.report_view import Report
 
+_LIST = """
+const plot = document.getElementById("{plot_id}"), {buttons} = plot.layout.updatemenus[0];
+const label = document.createElement("label"), list = label.appendChild(document.createElement("select"));
+label.prepend("Recording ");
+for (const button of buttons) list.add(new Option(button.name));
+list.addEventListener("change", () => Plotly.update(plot, ...buttons[list.selectedIndex].args));
+Plotly.relayout(plot, {"updatemenus[0].visible": false});
+plot.before(label);
+"""  # stands in for a figure's own menu, which only a pointer can open
+
 FigureHtml = Mapping[str, str]  # HTML of each figure, by its name
 
 
@@ -64,5 +74,6 @@ def _plot(figure: go.Figure, name: str) -> str:
         include_plotlyjs=False,
         div_id=f"figure-{name}",
         config={"displaylogo": False, "responsive": True},
+        post_script=_LIST if figure.layout.updatemenus else None,
     )
     return text

@@ -37,6 +37,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lacking
 from underskin.prediction import plausibility
+from underskin.recordings.campaign import Campaign
 
 SCHEMA = "report/1"
 _ALTERNATIVES = 6
@@ -61,6 +62,7 @@ class DiagnosisResult:
     power: Sequence[Power] = ()
     shape: Shape | None = None  # of what remains, where no mechanism describes it
     plan: NextRecordings | None = None
+    curves: Campaign | None = None  # with every sample, where curves were diagnosed
 
     @property
     def next_experiment(self) -> dict[str, Any]:

@@ -42,6 +42,13 @@ _ERROR = (
     "chosen again without it, and then predicted; the noise floor is what noise alone would give. Before: the model "
     "with nothing added; after: {after}."
 )
+_CURVE = (
+    "One recording at a time, the worst explained one first. Circles are samples: of a long recording some, evenly "
+    "chosen, and all beside a jump or the turn. Lines and residuals (measured less predicted) are at the means over "
+    "neighbouring samples that were fitted, which grow shorter towards jumps; predictions include the zero, the drift "
+    "and the gain that the fit grants the load cell of each recording. Depth is counted from the fitted contact point, "
+    "force from the reading in the air. Snap-in is the first sample in contact, pull-off the last."
+)
 _SHARE = "; accounts for {:.0f} % of the misfit beyond noise in the recordings fitted to"
 _D33_NOT_TO_QUOTE = (
     "Do not quote it: PVDF cannot have this value, or the error in the recordings is well above their noise."
@@ -70,9 +77,10 @@ class TableBlock:
 
 @dataclass(frozen=True)
 class FigureBlock:
-    """The place of a figure that may have been drawn."""
+    """The place of a figure that may have been drawn; its note stands below it."""
 
     name: str
+    note: str = ""
     kind: Literal["figure"] = "figure"
 
 
@@ -228,7 +236,11 @@ def _better(report: Report) -> list[ReportBlock]:
         for entry in fit["groups"]
     ]
     heads = ("before", "after", "noise floor")
-    blocks: list[ReportBlock] = [TableBlock(("error of", *heads), rows), FigureBlock("before_after")]
+    blocks: list[ReportBlock] = [
+        TableBlock(("error of", *heads), rows),
+        FigureBlock("curve", _CURVE),
+        FigureBlock("before_after"),
+    ]
     if groups:
         blocks += [
             TextBlock("Group by group", "heading"),

@@ -181,7 +181,7 @@ def _predict_curves(
     fitted = ~rows if len(smaller.lines.value) < len(lines.value) else rows
     cell = cell_response(lines, levels, force, fitted)
     assert lines.smooth is not None
-    value = force * (1 + cell.gain[lines.recording]) + cell.offset
+    value = cell.reading(lines, force)
     noise = cell.variance + (levels.level * lines.deviation) ** 2 + (levels.smooth * lines.smooth.scale) ** 2
     recording = lines.recording[rows]
     first = np.flatnonzero(np.diff(recording, prepend=-1))

@@ -1,0 +1,137 @@
+"""What the figure of a curve shows: its samples, what two explanations predict of it, and the marks on its course.
+
+Forces are less the zero that the samples in the air tell. Predicted ones are what the cell would show of the law's: the
+fit grants it the rest of a zero, a drift and a gain, of each curve its own.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.diagnosis.data.curve_samples import CurveRecording, finite_samples, way_along
+from underskin.diagnosis.inference.curve_nuisances import cell_response
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.reporting.numbers import place_of
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.curve_course import course
+from underskin.units import Floats
+
+MOST_SAMPLES = 600  # of a curve
+_BESIDE_CORNER = 12  # samples on either side of a jump or of the deepest one, all of which are shown
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A place on a curve."""
+
+    displacement_mm: float
+    force_n: float
+
+
+@dataclass(frozen=True)
+class CurvePrediction:
+    """Of one curve by one explanation: the force of its rows (rows,), and where contact begins."""
+
+    force_n: Floats
+    contact: Mark
+
+
+@dataclass(frozen=True)
+class ShownCurve:
+    """One recording: those of its `count` samples that are shown (shown,), and the means that were fitted (rows,).
+
+    `snap_in` is the first sample in contact after that jump, `pull_off` the last one before that; None where no jump
+    was found.
+    """
+
+    name: str
+    count: int
+    sample_mm: Floats  # (shown,)
+    sample_n: Floats  # (shown,)
+    displacement_mm: Floats  # (rows,)
+    force_n: Floats  # (rows,)
+    before: CurvePrediction
+    after: CurvePrediction
+    snap_in: Mark | None
+    pull_off: Mark | None
+
+    @property
+    def left_percent(self) -> float:
+        """100 √(Σ|y − m|²/Σ|y|²) of the explanation after."""
+        size = float(np.linalg.norm(self.force_n))
+        return 100 * float(np.linalg.norm(self.force_n - self.after.force_n)) / size if size else 0.0
+
+
+def shown_curves(
+    problem: FittingProblem, recorded: Campaign, before: Explanation, after: Explanation
+) -> list[ShownCurve]:
+    """Every curve that was fitted, the worst explained one first; `recorded` holds them with all their samples."""
+    raw = {
+        entry.id: entry
+        for entry in recorded.recordings
+        if isinstance(entry, IndentationRecording | CompressionRecording) and entry.kind == problem.kind
+    }
+    rows = zip(
+        problem.lines.campaign.recordings,
+        problem.lines.spans,
+        _predictions(problem, before),
+        _predictions(problem, after),
+        strict=True,
+    )
+    curves = []
+    for entry, own, *predicted in rows:
+        assert isinstance(entry, IndentationRecording | CompressionRecording)
+        curves.append(_shown(raw[entry.id], entry.displacement_mm, problem.lines.value.real[own], *predicted))
+    return sorted(curves, key=lambda curve: -curve.left_percent)
+
+
+def _predictions(problem: FittingProblem, explanation: Explanation) -> list[CurvePrediction]:
+    """Of each curve."""
+    lines = problem.lines
+    force = explanation.model.predict(explanation.point.fit).value.real
+    cell = cell_response(lines, explanation.best.levels, force)
+    reading = cell.reading(lines, force)
+    predicted = []
+    for entry, own in zip(lines.campaign.recordings, lines.spans, strict=True):
+        assert isinstance(entry, IndentationRecording | CompressionRecording)
+        contact = float(explanation.point.fit[place_of(explanation, f"contact_point {entry.id}")])
+        nearest = int(np.abs(entry.displacement_mm - contact).argmin())
+        predicted.append(CurvePrediction(reading[own], Mark(contact, float(cell.offset[own][nearest]))))
+    return predicted
+
+
+def _shown(
+    raw: CurveRecording, displacement: Floats, force: Floats, before: CurvePrediction, after: CurvePrediction
+) -> ShownCurve:
+    place, measured = finite_samples(raw)[:2]
+    seen = course(place, measured)
+    jumps: list[int | None] = [None, None]
+    if raw.kind == "indentation":
+        measured = measured - seen.zero
+        jumps = [seen.snap_in, None if seen.pull_off is None else seen.pull_off - 1]
+    snap_in, pull_off = (None if at is None else Mark(float(place[at]), float(measured[at])) for at in jumps)
+    shown = _thinned(way_along(place, measured, seen.noise), [seen.turn, *(at for at in jumps if at is not None)])
+    return ShownCurve(
+        name=raw.id,
+        count=len(measured),
+        sample_mm=place[shown],
+        sample_n=measured[shown],
+        displacement_mm=displacement,
+        force_n=force,
+        before=before,
+        after=after,
+        snap_in=snap_in,
+        pull_off=pull_off,
+    )
+
+
+def _thinned(way: Floats, corners: list[int]) -> NDArray[np.intp]:
+    """Which samples are shown of those that lie so far along a curve, 0 to 1: as evenly as they lie, and all beside
+    corners."""
+    count = len(way)
+    if count <= MOST_SAMPLES:
+        return np.arange(count)
+    even = np.minimum(np.searchsorted(way, np.linspace(0.0, 1.0, MOST_SAMPLES)), count - 1)
+    beside = [np.arange(max(at - _BESIDE_CORNER, 0), min(at + _BESIDE_CORNER + 1, count)) for at in corners]
+    return np.unique(np.concatenate([even, *beside]))
