@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from tests.support.adhesive_curves import MODULUS_MPA, WORK_J_PER_M2, adhesive_curves
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.diagnosis.inference.least_squares import least_squares_percent
@@ -85,6 +86,19 @@ def test_a_textbook_case_of_adhesion_is_named_with_its_modulus_and_both_works(ta
     fit = report["fit"]
     assert fit["before"]["rmse_percent"] > 20 > 1 > fit["after"]["rmse_percent"]
     assert fit["after"]["heldout_rmse_percent"] < 3 * fit["noise_floor_percent"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("work", [WORK_J_PER_M2, 5.0])  # the sphere tears off on the way back, or does not
+def test_a_jump_into_contact_between_two_samples_asks_for_no_companion(work: float, table: SigmaTable) -> None:
+    report = diagnosis_report(parse(adhesive_curves(work)[0]), table)
+    assert report["verdict"] == "explained"
+    (named,) = report["mechanisms"]
+    assert named["name"] == "adhesion"
+    assert named["parameters"][0]["low"] < work < named["parameters"][0]["high"]
+    modulus = report["fit"]["after"]["youngs_modulus"]
+    assert modulus["low"] <= MODULUS_MPA <= modulus["high"]
+    assert report["fit"]["after"]["heldout_rmse_percent"] < 1.2 * report["fit"]["noise_floor_percent"]
 
 
 @pytest.mark.parametrize("stiffness", [None, 3e-3, 1e3])

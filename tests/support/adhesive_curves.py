@@ -19,7 +19,6 @@ from underskin.surrogate.sigma_table import load_table
 WORK_J_PER_M2, MODULUS_MPA, NOISE_N = 0.6, 0.5, 2e-4
 _DESCRIPTION: dict[str, Any] = {
     "schema": "experiment/1", "name": "curves", "seed": 3, "kind": "indentation",
-    "effects": {"adhesion": {"work_j_per_m2": WORK_J_PER_M2}},
     "skin": {"thickness_mm": 8.0, "youngs_modulus_mpa": MODULUS_MPA, "sensor_radius_mm": 1.5, "d33_pc_per_n": 14.0},
     "curves": {
         "indenters_mm": [2.5, 4.0], "largest_displacement_mm": 0.6, "samples": 2000, "force_noise_n": NOISE_N,
@@ -37,9 +36,9 @@ class Truth:
 
 
 @cache
-def adhesive_curves() -> tuple[dict[str, Any], dict[str, Truth]]:
+def adhesive_curves(work_j_per_m2: float = WORK_J_PER_M2) -> tuple[dict[str, Any], dict[str, Truth]]:
     """The campaign (`campaign/1`), and of each recording the truth."""
-    experiment = parse(_DESCRIPTION)
+    experiment = parse(_DESCRIPTION | {"effects": {"adhesion": {"work_j_per_m2": work_j_per_m2}}})
     recorded = record_curves(experiment)
     truth = {}
     for curve in recorded:

@@ -2,7 +2,8 @@
 priors, a gain of each recording, and the zero and drift of its cell taken out (variable projection).
 
 Scipy's trust-region reflective algorithm finds from far away what steps on the whole likelihood, whose covariance moves
-with the fit, do not.
+with the fit, do not. Where a sphere snaps in, the force jumps at the contact point, and no slope leads past a sample
+there: the curve is fitted again between those samples where it fits best.
 """
 
 import numpy as np
@@ -11,10 +12,13 @@ from scipy.optimize import least_squares
 from underskin.diagnosis.inference.hypothesis import Hypothesis, curvature_of_prior
 from underskin.diagnosis.noise.noise_priors import START_GAIN
 from underskin.mechanisms.models.curves import CurveModel
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.recordings.conditions import curves_of
 from underskin.units import Floats
 
 _ERROR = 3e-3  # of the largest force: the unit of the residuals
 _TOLERANCE, _EVALUATIONS = 1e-4, 40
+_PASSED = 4  # samples at most, either way, past which a contact point is moved
 _INSIDE = 1e-9  # of a parameter's range, off its bounds
 
 
@@ -40,25 +44,55 @@ class LeastSquares:
         self._low, self._high = np.array([entry.bounds for entry in model.parameters]).T
         priors = np.array([curvature_of_prior(entry) for entry in model.parameters])
         self._precision, self._centre = np.sqrt(priors[:, 0]), priors[:, 1]
+        travels = [entry.displacement_mm for entry in curves_of(lines.campaign)]
+        self._approach = [np.unique(travel[: int(travel.argmax()) + 1]) for travel in travels]
+        self._jumps = any(CATALOGUE[name].moves_contact_points for name in model.names)
 
     def fitted(self, start: Floats) -> tuple[Floats, float]:
         """The fit coordinates (parameters,) from a start, and half the sum of squares there."""
-        count, curves = len(start), len(self._spans)
-        margin = _INSIDE * (self._high - self._low)
-        inside = np.clip(start, self._low + margin, self._high - margin)
-        bounds = np.append(self._low, np.full(curves, -0.5)), np.append(self._high, np.full(curves, 0.5))
+        x, cost = self._descended(np.append(start, np.zeros(len(self._spans))), self._low, self._high)
+        if self._jumps:
+            other, less = self._descended(*self._between_samples(x))
+            x, cost = (other, less) if less < cost else (x, cost)
+        return x[: len(start)], cost
+
+    def _between_samples(self, x: Floats) -> tuple[Floats, Floats, Floats]:
+        """Fit coordinates and gains with each contact point amid those two samples of the approach, near where it is,
+        between which its curve fits best; and bounds that keep it there."""
+        count, places = len(self._low), self._model.contact_points
+        lower, upper = (np.empty((2 * _PASSED + 1, len(places))) for _ in range(2))
+        for curve, travel in enumerate(self._approach):
+            first = np.searchsorted(travel, x[places[curve]]) - 1 - _PASSED
+            cells = np.clip(first + np.arange(len(lower)), 0, len(travel) - 2)
+            lower[:, curve], upper[:, curve] = travel[cells], travel[cells + 1]
+        lower, upper = (np.clip(edge, self._low[places], self._high[places]) for edge in (lower, upper))
+        fits = np.tile(x[:count], (len(lower), 1))
+        fits[:, places] = (lower + upper) / 2
+        force = (1 + x[count:][self._recording]) * self._model.forces(fits)
+        left = self._projected((self._measured - force) / self._unit)[:, : len(self._measured)]
+        best = np.add.reduceat(left**2, [own.start for own in self._spans], axis=1).argmin(axis=0)
+        curves = np.arange(len(places))
+        moved, low, high = x.copy(), self._low.copy(), self._high.copy()
+        moved[places], low[places], high[places] = fits[best, places], lower[best, curves], upper[best, curves]
+        return moved, low, high
+
+    def _descended(self, start: Floats, low: Floats, high: Floats) -> tuple[Floats, float]:
+        """Fit coordinates and gains from a start, and half the sum of squares there."""
+        count = len(low)
+        gains = np.full(len(start) - count, 0.5)
+        margin = _INSIDE * (high - low)
         result = least_squares(
             self._residuals,
-            np.append(inside, np.zeros(curves)),
+            np.append(np.clip(start[:count], low + margin, high - margin), start[count:]),
             self._jacobian,
-            bounds=bounds,
+            bounds=(np.append(low, -gains), np.append(high, gains)),
             x_scale="jac",
             ftol=_TOLERANCE,
             xtol=_TOLERANCE,
             gtol=1e-12,
             max_nfev=_EVALUATIONS,
         )
-        return np.asarray(result.x[:count]), float(result.cost)
+        return np.asarray(result.x), float(result.cost)
 
     def _residuals(self, x: Floats) -> Floats:
         count = len(self._low)
