@@ -11,10 +11,10 @@ import numpy as np
 
 from rig.layer import Floats
 
-_ROUNDS = 60
-_ENOUGH = 1e-4  # of χ², absolute and relative
+_ROUNDS = 40
+_ENOUGH = 3e-4  # of χ², absolute and relative
 _DAMPING = 1e-3
-_MOST_DAMPING = 1e8
+_MOST_DAMPING = 1e4
 _STEP = 1e-5  # of ln E
 
 Law = Callable[[int, float, float], Floats]  # force of a curve at ln E and a zero of displacement

@@ -11,11 +11,11 @@ compression, a declared modulus is known within 2 %.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rig.contact_course import course
+from rig.contact_course import Body, course
 from rig.curve_fit import Curve, Law, Priors, least_chi2
 from rig.effects import INDENTATION, Values
 from rig.elastomer import RecordedCurve, frame_compliance, pressed_body, true_modulus
@@ -25,9 +25,9 @@ from rig.layer import Floats
 THRESHOLD = 30.0
 _DECLARED = 0.02
 _FACTORS_ON_E = {"modulus_error", "compressible_layer"}
-_SHIFTS = (0.0, -0.2, 0.2)  # starts of z, of the largest displacement
+_SHIFTS = (0.0, -0.2, 0.2)  # starts of z, of the largest displacement; beside known effects the first alone
 _STEP = 1e-4  # of the largest displacement
-_POINTS = 300  # of a course along the recorded displacement
+_POINTS = 200  # of a course along the recorded displacement
 _JUMP = 0.02  # of the largest force, between neighbouring samples
 _LEAST_NOISE = 1e-6  # of the largest force
 
@@ -54,7 +54,10 @@ def visibility(experiment: Experiment, recorded: list[RecordedCurve], known: tup
     curves = [_Base(experiment, recorded, {}).measured(number) for number in range(len(recorded))]
     priors = base.priors()
     chi2, fitted = min(
-        (least_chi2(base.law(), curves, priors, shift * depth, _STEP * depth) for shift in _SHIFTS),
+        (
+            least_chi2(base.law(), curves, priors, shift * depth, _STEP * depth)
+            for shift in (_SHIFTS[:1] if known else _SHIFTS)
+        ),
         key=lambda result: result[0],
     )
     true, _ = least_chi2(
@@ -75,6 +78,7 @@ class _Base:
     experiment: Experiment
     recorded: list[RecordedCurve]
     on: Mapping[str, Values]
+    bodies: dict[float, Body] = field(default_factory=dict)  # by the sphere's radius
 
     def measured(self, number: int) -> Curve:
         """Force, noise (that of displacement through dF/du), and columns of zero of force and drift."""
@@ -126,12 +130,17 @@ class _Base:
         radius = self.recorded[number].entry["indenter_radius_mm"]
         return np.asarray(4 / 3 * self._modulus(log_modulus) / 0.75 * np.sqrt(radius) * depth**1.5)
 
+    def _body(self, radius: float) -> Body:
+        if radius not in self.bodies:
+            deepest = max(float((curve.exact_displacement_mm - curve.zero_mm).max()) for curve in self.recorded)
+            self.bodies[radius] = pressed_body(self.experiment, self.on, radius, 1.2 * deepest)
+        return self.bodies[radius]
+
     def _course(self, number: int, log_modulus: float, shift: float) -> Floats:
         """Force of the known effects, calculated at some samples and at those beside a jump."""
         displacement, curve = self._displacement(number, shift), self.recorded[number]
         radius = curve.entry["indenter_radius_mm"]
-        body = pressed_body(self.experiment, self.on, radius, float(displacement.max()))
-        body = replace(body, modulus=self._modulus(log_modulus))
+        body = replace(self._body(radius), modulus=self._modulus(log_modulus))
         jumps = np.flatnonzero(np.abs(np.diff(curve.exact_force_n)) > _JUMP * np.abs(curve.exact_force_n).max())
         even = np.linspace(0, len(displacement) - 1, min(_POINTS, len(displacement))).astype(int)
         at = np.unique(np.concatenate([even, jumps, jumps + 1]))
