@@ -19,7 +19,7 @@ from rig.experiment import (
 )
 
 _RANGES: dict[str, tuple[float, float]] = {
-    "thickness_mm": (5e-3, 1e3), "youngs_modulus_mpa": (1e-3, 1e4), "sensor_radius_mm": (0.05, 50),
+    "thickness_mm": (1e-3, 100), "youngs_modulus_mpa": (1e-3, 1e4), "sensor_radius_mm": (0.05, 50),
     "d33_pc_per_n": (-5000, 5000), "width_mm": (0.1, 1e4), "length_mm": (0.1, 1e4),
     "indenters_mm": (1e-3, 200), "preloads_n": (1e-6, 1e4), "dynamic_forces_n": (1e-6, 1e3), "dwells_s": (0, 1e7),
     "cycles_per_recording": (0, 1e9), "minutes_per_recording": (0, 1e5),
