@@ -96,9 +96,10 @@ class _Fit:
         return result
 
     def chi2(self, point: Floats) -> float:
-        """χ² with the priors."""
-        pairs = zip(self.predictions(point), self.curves, strict=True)
-        total = sum(float(np.sum(((curve.force - force) / curve.deviation) ** 2)) for force, curve in pairs)
+        """χ² with the priors; infinite or NaN for a step that went far astray, which is then rejected."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            pairs = zip(self.predictions(point), self.curves, strict=True)
+            total = sum(float(np.sum(((curve.force - force) / curve.deviation) ** 2)) for force, curve in pairs)
         off = (point[0] - self.priors.log_modulus) / self.priors.modulus_deviation
         return total + float(off**2 + np.sum(point[2 :: self.each] ** 2))
 
