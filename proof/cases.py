@@ -6,6 +6,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from rig.draw import drawn, record
+from rig.draw_curves import drawn_curves
+from rig.effects import INDENTATION
+from rig.elastomer import campaign_of_curves
 from rig.recorded import campaign
 
 
@@ -54,6 +57,24 @@ class DrawnCase:
     def document(self) -> dict[str, Any]:
         """What the rig records, without its truth."""
         return campaign(record(drawn(self.seed, self.number, self.what)))
+
+
+@dataclass(frozen=True)
+class DrawnCurves:
+    """Raw indentation curves of random experiment `number` of a seed on the virtual rig, with what they hide."""
+
+    seed: int
+    number: int
+    what: str
+
+    @property
+    def name(self) -> str:
+        """Seed, number and what was asked for."""
+        return f"curves-{self.seed}-{self.number:04d}-{self.what}"
+
+    def document(self) -> dict[str, Any]:
+        """What the rig records, without its truth."""
+        return campaign_of_curves(*drawn_curves(self.seed, self.number, INDENTATION, self.what))
 
 
 @dataclass(frozen=True)

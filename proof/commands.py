@@ -21,7 +21,9 @@ from rich.progress import (
 def prove(
     part: Annotated[
         list[str] | None,
-        typer.Argument(help="open, sealed, recordings, paper, mixture, ceiling, quiet; default: all of them."),
+        typer.Argument(
+            help="open, sealed, recordings, paper, mixture, ceiling, quiet, curves, quiet_curves; default: all."
+        ),
     ] = None,
     count: Annotated[int | None, typer.Option(min=1, help="Campaigns of each part at most; default: all.")] = None,
     workers: Annotated[int, typer.Option(min=0, help="Processes; 0 is one for each core.")] = 0,

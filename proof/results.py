@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from proof import concealed, own_rig, paper_array, real
+from proof import concealed, own_curves, own_rig, paper_array, real
 from proof.cases import DrawnCase, MadeCase
 from proof.stored import Work, of_each, reports, sources, stored
 from underskin.errors import InvalidInput
@@ -82,6 +82,8 @@ PARTS: dict[str, Part] = {
     "mixture": own_rig.judge_mixture,
     "ceiling": _ceiling,
     "quiet": own_rig.judge_quiet,
+    "curves": own_curves.judge_curves,
+    "quiet_curves": own_curves.judge_quiet_curves,
 }
 
 

@@ -40,22 +40,22 @@ def draw(
     what: Annotated[
         str | None, typer.Option(help="none, single, pair or unknown: what each hides; default: a mixture.")
     ] = None,
+    kind: Annotated[str, typer.Option(help="frf, indentation (raw curves) or compression.")] = "frf",
 ) -> None:
     """Random campaigns with hidden effects, to test a diagnosis on: campaigns/NNNN.json and truth.json."""
-    from rig.draw import SHARES, drawn
-    from rig.draw import record as carry_out
-    from rig.recorded import campaign
-    from rig.truth import truth_of_lines
+    from rig.draw import SHARES
+    from rig.drawn_campaign import KINDS, document_and_truth
 
-    if what is not None and what not in SHARES:
-        raise typer.BadParameter(f"{what!r}: must be one of {', '.join(SHARES)}", param_hint="--what")
+    for option, value, allowed in (("--what", what, (None, *SHARES)), ("--kind", kind, KINDS)):
+        if value not in allowed:
+            names = ", ".join(name for name in allowed if name)
+            raise typer.BadParameter(f"{value!r}: must be one of {names}", param_hint=option)
     folder = output_dir / "campaigns"
     folder.mkdir(parents=True, exist_ok=True)
     truths = {}
     for number in range(count):
-        recorded = carry_out(drawn(seed, number, what))
         name = f"{number:04d}"
-        (folder / f"{name}.json").write_text(json.dumps(campaign(recorded)) + "\n", encoding="utf-8")
-        truths[name] = truth_of_lines(recorded)
+        document, truths[name] = document_and_truth(seed, number, kind, what)
+        (folder / f"{name}.json").write_text(json.dumps(document) + "\n", encoding="utf-8")
     (output_dir / "truth.json").write_text(json.dumps(truths, ensure_ascii=False) + "\n", encoding="utf-8")
     typer.echo(f"{count} campaigns in {folder}, what they hide in {output_dir / 'truth.json'}")

@@ -19,17 +19,20 @@ from rig.experiment import (
 )
 
 _RANGES: dict[str, tuple[float, float]] = {
-    "thickness_mm": (0.05, 100), "youngs_modulus_mpa": (1e-3, 1e4), "sensor_radius_mm": (0.05, 50),
+    "thickness_mm": (1e-3, 100), "youngs_modulus_mpa": (1e-3, 1e4), "sensor_radius_mm": (0.05, 50),
     "d33_pc_per_n": (-5000, 5000), "width_mm": (0.1, 1e4), "length_mm": (0.1, 1e4),
-    "indenters_mm": (0.05, 200), "preloads_n": (1e-6, 1e4), "dynamic_forces_n": (1e-6, 1e3), "dwells_s": (0, 1e7),
+    "indenters_mm": (1e-3, 200), "preloads_n": (1e-6, 1e4), "dynamic_forces_n": (1e-6, 1e3), "dwells_s": (0, 1e7),
     "cycles_per_recording": (0, 1e9), "minutes_per_recording": (0, 1e5),
     "low_hz": (1e-3, 1e6), "high_hz": (1e-3, 1e6), "sample_rate_hz": (1, 1e6), "duration_s": (1e-3, 3600),
     "charge_noise_pc": (0, 1e6), "flicker_corner_hz": (0, 1e5), "force_noise_n": (0, 100),
     "charge_range_pc": (1e-6, 1e9), "force_range_n": (1e-6, 1e6),
     "gain": (0, 0.5), "position_mm": (0, 10), "line": (0, 1), "low": (0, 100), "high": (0, 100),
     "floor_pc_per_n": (0, 1e3), "averages": (1, 1e6),
-    "heights_mm": (0.1, 1e3), "diameters_mm": (0.1, 1e3), "largest_displacement_mm": (1e-4, 500),
-    "speeds_mm_per_s": (1e-6, 1e4), "hold_s": (0, 1e6), "displacement_noise_mm": (0, 10), "contact_point_mm": (0, 10),
+    "heights_mm": (0.1, 1e3), "diameters_mm": (0.1, 1e3), "largest_displacement_mm": (1e-6, 500),
+    "speeds_mm_per_s": (1e-7, 1e4), "hold_s": (0, 1e6), "displacement_noise_mm": (0, 10), "contact_point_mm": (0, 100),
+    "modulus_scatter": (0, 0.5), "approach_mm": (0, 1e3), "retreat_mm": (0, 1e3),
+    "stage_stiffness_n_per_mm": (1e-6, 1e6), "cell_gain": (0, 0.5), "force_zero_n": (0, 1e3),
+    "drift_n_per_s": (0, 100), "drift_n_per_mm": (0, 1e3), "force_step_n": (0, 100), "displacement_step_mm": (0, 10),
 }  # fmt: skip
 _COUNTS = {
     "repeats": (1, 1000),

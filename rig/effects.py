@@ -25,7 +25,8 @@ class Effect:
     kinds: tuple[str, ...]
     parameters: Mapping[str, tuple[float, float]]
     laws: tuple[str, ...] = ()
-    optional: tuple[str, ...] = ()  # parameters that only some laws need
+    optional: tuple[str, ...] = ()  # parameters that only some laws need, or that only some bodies have
+    only_curves: tuple[str, ...] = ()  # optional parameters that recordings of kind frf do not have
 
 
 EFFECTS: dict[str, Effect] = {
@@ -34,7 +35,13 @@ EFFECTS: dict[str, Effect] = {
     ),
     "layered_contact": Effect("contact radius and pressure of a sphere on the layer with its base", _PRESSED, {}),
     "misalignment": Effect("all positions are displaced by one vector", (FRF,), {"x_mm": (-5, 5), "y_mm": (-5, 5)}),
-    "adhesion": Effect("JKR theory, on the layer where layered_contact is on", _PRESSED, {"work_j_per_m2": (0, 5)}),
+    "adhesion": Effect(
+        "JKR theory, on the layer where layered_contact is on; the way back may have a larger work of separation",
+        _PRESSED,
+        {"work_j_per_m2": (0, 5), "work_of_separation_j_per_m2": (0, 20)},
+        optional=("work_of_separation_j_per_m2",),
+        only_curves=("work_of_separation_j_per_m2",),
+    ),
     "strain_stiffening": Effect(
         "with the contact strain e = 0.2 a/R (of a cylinder: u/H): linear E (1 + c e), limited E/(1 − c e)",
         (FRF, INDENTATION, COMPRESSION),
@@ -73,9 +80,12 @@ EFFECTS: dict[str, Effect] = {
         optional=("exponent", "step", "corner_hz"),
     ),
     "contact_creep": Effect(
-        "standard linear solid: relaxes to E (1 − g) with τ; under constant load a³ grows with its creep compliance",
+        "standard linear solid: relaxes to E (1 − g) with τ; under constant load a³ grows with its creep compliance; "
+        "of curves a second pair (g, τ) may relax too",
         (FRF, INDENTATION, COMPRESSION),
-        {"fraction": (0, 0.95), "time_s": (1e-3, 1e6)},
+        {"fraction": (0, 0.95), "time_s": (1e-3, 1e6), "fraction_2": (0, 0.95), "time_2_s": (1e-3, 1e6)},
+        optional=("fraction_2", "time_2_s"),
+        only_curves=("fraction_2", "time_2_s"),
     ),
     "mains_pickup": Effect(
         "a charge at the mains frequency and a third of it at its third harmonic",
@@ -151,6 +161,32 @@ UNCATALOGUED: dict[str, Effect] = {
         (INDENTATION, COMPRESSION),
         {"n_per_root_s": (-1, 1)},
     ),
+    "thermal_drift": Effect(
+        "the frame warms: displacement drifts by D (1 − e^(−t/τ))",
+        (INDENTATION,),
+        {"drift_mm": (-1, 1), "time_s": (1e-3, 1e6)},
+    ),
+    "guide_friction": Effect(
+        "friction of the guide against the motion, μF, which turns round within a slip after each reversal",
+        (INDENTATION,),
+        {"friction": (0, 0.5), "slip_mm": (1e-7, 10)},
+    ),
+    "nonlinear_cell": Effect(
+        "the force cell is not linear: F (1 + c F/range)",
+        (INDENTATION,),
+        {"nonlinearity": (-0.5, 0.5), "range_n": (1e-9, 1e4)},
+    ),
+    "plastic_set": Effect(
+        "the surface stays behind: it sinks by a share of the largest depth so far", (INDENTATION,), {"ratio": (0, 0.8)}
+    ),
+    "flattened_tip": Effect(
+        "the sphere is worn flat over a radius b: contact at δ = a √(a² − b²)/R", (INDENTATION,), {"radius_mm": (0, 10)}
+    ),
+    "rough_surface": Effect(
+        "asperities close first: a further displacement s ln(1 + F/F_s)",
+        (INDENTATION,),
+        {"height_mm": (0, 1), "force_n": (1e-12, 100)},
+    ),
     "tilted_platen": Effect(
         "the end face comes into contact gradually over a wedge", (COMPRESSION,), {"wedge_mm": (0, 5)}
     ),
@@ -175,6 +211,8 @@ def checked(kind: str, document: Any) -> dict[str, Values]:
         for parameter, (low, high) in effect.parameters.items():
             if parameter in entry:
                 values[parameter] = checks.number(f"{field}.{parameter}", entry[parameter], low, high)
+                if kind == FRF and parameter in effect.only_curves:
+                    raise RigError(f"{field}.{parameter}", entry[parameter], "only for indentation and compression")
             elif parameter not in effect.optional:
                 raise RigError(
                     f"{field}.{parameter}", None, f"required, {low:g} to {high:g}{checks.in_unit(parameter)}"
@@ -182,8 +220,21 @@ def checked(kind: str, document: Any) -> dict[str, Values]:
         for parameter in needed_by_law(name, values):
             if parameter not in values:
                 raise RigError(f"{field}.{parameter}", None, f"required by the law {values['law']}")
+        _check_together(field, values)
         result[name] = values
     return result
+
+
+def _check_together(field: str, values: Values) -> None:
+    """Raise RigError where parameters of one effect exclude each other."""
+    if ("fraction_2" in values) != ("time_2_s" in values):
+        raise RigError(f"{field}.time_2_s", values.get("time_2_s"), "required with fraction_2, and only with it")
+    if "fraction_2" in values and float(values["fraction"]) + float(values["fraction_2"]) > 0.95:
+        raise RigError(f"{field}.fraction_2", values["fraction_2"], "must leave 0.05 of the modulus unrelaxed")
+    work, separation = (values.get(name) for name in ("work_j_per_m2", "work_of_separation_j_per_m2"))
+    if work is not None and separation is not None and float(separation) < float(work):
+        allowed = f"must be at least work_j_per_m2, {float(work):g} J/m²"
+        raise RigError(f"{field}.work_of_separation_j_per_m2", separation, allowed)
 
 
 def needed_by_law(name: str, values: Values) -> tuple[str, ...]:

@@ -1,39 +1,47 @@
-"""Force against displacement of the elastomer: a sphere pressed in and drawn back, a cylinder between platens.
-
-The law of a curve is its force on an elastic body of unit modulus, F₁(u); the body's relaxation E(t) acts through
-    F(t) = ∫₀^{t₁} E(t − s) dF₁(u(s)),
-with t₁ = t while the contact grows; as a sphere is drawn back, t₁ is the time at which the contact last had its present
-size, ∫_{t₁}^{t} E(t − s) du(s) = 0 (Ting 1966). A cylinder's t₁ is always t.
-"""
+"""Force–displacement curves of the elastomer: a sphere pressed in and drawn back, a cylinder between platens."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from rig import effects
-from rig.contact import sphere_contact
+from rig import effects, instrument
+from rig.contact_course import Body, course
+from rig.cylinder import cylinder_force
 from rig.effects import COMPRESSION, INDENTATION, Values
 from rig.errors import RigError
-from rig.experiment import Experiment
-from rig.layer import Floats, Layer
-from rig.layer_contacts import stiffening
+from rig.experiment import CurveDesign, Experiment
+from rig.layer import Floats
+from rig.relaxation import of_effects
+from rig.sphere import sphere_law
 
-_APPROACH = 0.08  # of the largest indentation, before contact
-_RADII = 3000
+_AIR = 0.08  # of the largest indentation, on either side of the contact
+_STEPS = 600  # of a course at least; fewer samples are taken from a finer course
 _LEAST_LOADING = 8  # samples; with fewer no law can be identified
-
-Law = Callable[[Floats, bool], Floats]  # force for unit modulus at displacements, while drawn back or not
 
 
 @dataclass(frozen=True)
 class RecordedCurve:
-    """One recording: its entry in the campaign, and its force [N] before noise."""
+    """One recording.
+
+    Attributes
+    ----------
+    entry : dict
+        Its entry in the campaign.
+    exact_displacement_mm, exact_force_n : ndarray, (samples,)
+        What the instrument shows before noise and the converters' steps.
+    time_s : ndarray, (samples,)
+    zero_mm : float
+        The displacement shown at the touch of the surfaces.
+    """
 
     entry: dict[str, Any]
+    exact_displacement_mm: Floats
     exact_force_n: Floats
+    time_s: Floats
+    zero_mm: float
 
 
 def record_curves(experiment: Experiment) -> list[RecordedCurve]:
@@ -51,159 +59,124 @@ def record_curves(experiment: Experiment) -> list[RecordedCurve]:
     pairs = [
         (shape, speed) for _ in range(curves.repeats) for shape in shapes for speed in curves.speeds_mm_per_s
     ]  # fmt: skip
-    return [_curve(experiment, number, shape, speed) for number, (shape, speed) in enumerate(pairs)]
+    return [_curve(experiment, curves, number, shape, speed) for number, (shape, speed) in enumerate(pairs)]
 
 
-def _curve(experiment: Experiment, number: int, shape: dict[str, float], speed: float) -> RecordedCurve:
-    curves, on = experiment.curves, experiment.effects
-    assert curves is not None
-    random = np.random.default_rng([experiment.seed, 5, number])
-    time, pressed = _course(experiment, shape, speed)
+def true_modulus(experiment: Experiment) -> float:
+    """E before relaxation [MPa]: the declared one with its scatter, and the effect modulus_error."""
+    scatter = experiment.curves.modulus_scatter if experiment.curves else 0.0
+    error = np.exp(scatter * np.random.default_rng([experiment.seed, 6]).normal())
+    factor = effects.of(experiment.effects, "modulus_error", "factor") or 1.0
+    return float(experiment.skin.youngs_modulus_mpa * error * factor)
+
+
+def pressed_body(
+    experiment: Experiment, on: Mapping[str, Values], radius_mm: float, beyond_mm: float = 0.0
+) -> Body:  # fmt: skip
+    """The elastomer under a sphere, with the effects `on`, to the largest depth of the experiment or beyond.
+
+    Raises RigError beyond what the rig has solved.
+    """
+    assert experiment.curves is not None
+    largest = experiment.curves.largest_displacement_mm
+    law = sphere_law(on, radius_mm, experiment.skin.thickness_mm, largest, beyond_mm)
+    work = effects.of(on, "adhesion", "work_j_per_m2") * 1e-3  # J/m² = 1e-3 N/mm
+    separation = on.get("adhesion", {}).get("work_of_separation_j_per_m2")
+    leaving = work if separation is None else float(separation) * 1e-3
+    return Body(law, true_modulus(experiment), of_effects(on), work, leaving)
+
+
+def frame_compliance(on: Mapping[str, Values]) -> float:
+    """Compliance [mm/N] behind the sphere that nobody subtracts: the effect instrument_compliance."""
+    frame = effects.of(on, "instrument_compliance", "stiffness_n_per_mm")
+    return 1 / frame if frame else 0.0
+
+
+def _curve(
+    experiment: Experiment, curves: CurveDesign, number: int, shape: dict[str, float], speed: float
+) -> RecordedCurve:
     if experiment.kind == INDENTATION:
-        law, memory = _sphere(experiment, shape["indenter_radius_mm"]), True
+        time, displacement, force = _indented(experiment, curves, shape["indenter_radius_mm"], speed)
     else:
-        law, memory = _cylinder(experiment, shape), False
-    modulus = experiment.skin.youngs_modulus_mpa * (effects.of(on, "modulus_error", "factor") or 1.0)
-    force = modulus * _with_relaxation(on, law, time, pressed, memory)
-    measured = (
-        pressed + force / effects.of(on, "instrument_compliance", "stiffness_n_per_mm")
-        if ("instrument_compliance" in on)
-        else pressed.copy()
-    )
-    force = force * (1 + _ripple(on, pressed)) + effects.of(on, "force_drift", "n_per_root_s") * np.sqrt(time)
-    measured += curves.contact_point_mm * random.normal() + curves.displacement_noise_mm * random.normal(size=len(time))
-    noisy = force + curves.force_noise_n * random.normal(size=len(time))
+        time, displacement = _compressed(curves, shape, speed)
+        force = true_modulus(experiment) * cylinder_force(experiment.effects, shape, time, displacement)
+    reading = instrument.shown(experiment, number, time, displacement, force)
+    measured, noisy = instrument.noisy(experiment, number, reading)
     entry: dict[str, Any] = {"id": f"c{number + 1:02d}", "kind": experiment.kind, **shape}
-    entry |= {"displacement_mm": measured.tolist(), "force_n": noisy.tolist()}
+    entry |= {"displacement_mm": _written(measured), "force_n": _written(noisy)}
     if curves.times:
-        entry["time_s"] = time.tolist()
-    return RecordedCurve(entry, force)
+        entry["time_s"] = _written(time)
+    if curves.stage_stiffness_n_per_mm and curves.stage_declared:
+        entry["stage_stiffness_n_per_mm"] = curves.stage_stiffness_n_per_mm
+    return RecordedCurve(entry, reading.displacement_mm, reading.force_n, time, reading.zero_mm)
 
 
-def _course(experiment: Experiment, shape: Mapping[str, float], speed: float) -> tuple[Floats, Floats]:
-    """Times and displacements: loading, hold, unloading; in tension then the same to the other side."""
-    curves = experiment.curves
-    assert curves is not None
+def _written(values: Floats) -> list[float]:
+    return [float(f"{value:.9g}") for value in values]
+
+
+def _indented(
+    experiment: Experiment, curves: CurveDesign, radius: float, speed: float
+) -> tuple[Floats, Floats, Floats]:
+    """Times, depths and forces of a sphere: through the air, in, hold, back, and through the air again."""
+    on, largest = experiment.effects, curves.largest_displacement_mm
+    _check_depth(largest, 0.9 * radius)
+    body = pressed_body(experiment, on, radius)
+    stage = curves.stage_stiffness_n_per_mm
+    compliance = frame_compliance(on) + (1 / stage if stage else 0.0)
+    air = _AIR * largest
+    start = -(air if curves.approach_mm is None else curves.approach_mm)
+    peak = largest + compliance * body.elastic(largest)
+    corners, waits = [start, peak, peak], [0.0, (peak - start) / speed, curves.hold_s]
+    if curves.retract:
+        end = min(body.last_touch(compliance), 0.0) - (air if curves.retreat_mm is None else curves.retreat_mm)
+        corners, waits = [*corners, end], [*waits, (peak - end) / speed]
+    substeps = math.ceil(_STEPS / curves.samples)
+    time = np.linspace(0, sum(waits), (curves.samples - 1) * substeps + 1)
+    travel = np.interp(time, np.cumsum(waits), corners)
+    sunk = effects.of(on, "plastic_set", "ratio") * np.maximum.accumulate(np.maximum(travel, 0)) * largest / peak
+    depth, force = course(body, time, travel - sunk, compliance)
+    time, depth, force = time[::substeps], (depth + sunk)[::substeps], force[::substeps]
+    _check_loading(curves, int(((time <= waits[1]) & (depth > 0)).sum()), waits[1], float(time[-1]))
+    return time, depth, force
+
+
+def _compressed(curves: CurveDesign, shape: Mapping[str, float], speed: float) -> tuple[Floats, Floats]:
+    """Times and shortenings of a cylinder: loading, hold, unloading; in tension then the same to the other side."""
     largest = curves.largest_displacement_mm
-    deepest = 0.9 * min(shape.get("sample_height_mm", np.inf), shape.get("indenter_radius_mm", np.inf))
-    if largest >= deepest:
-        allowed = f"must be below {deepest:g} mm, 0.9 of the sphere's radius or the cylinder's height"
-        raise RigError("curves.largest_displacement_mm", largest, allowed)
-    start = -_APPROACH * largest if experiment.kind == INDENTATION else 0.0
-    corners = [start, largest, largest, start] + ([-largest, start] if curves.tension else [])
-    waits = [0.0, (largest - start) / speed, curves.hold_s, (largest - start) / speed] + (
-        [largest / speed, largest / speed] if curves.tension else []
-    )
+    _check_depth(largest, 0.9 * shape["sample_height_mm"])
+    corners = [0.0, largest, largest, 0.0] + ([-largest, 0.0] if curves.tension else [])
+    ramp = largest / speed
+    waits = [0.0, ramp, curves.hold_s, ramp] + ([ramp, ramp] if curves.tension else [])
     time = np.linspace(0, sum(waits), curves.samples)
     pressed = np.interp(time, np.cumsum(waits), corners)
-    loading = int(((time <= waits[1]) & (pressed > 0)).sum())
-    if loading < _LEAST_LOADING:
-        needed = math.ceil(curves.samples * (_LEAST_LOADING + 1) / max(loading, 1))
-        raise RigError(
-            "curves.samples",
-            curves.samples,
-            f"leaves {loading} samples while the load rises, in {waits[1]:g} s of {time[-1]:g} s: must leave at least "
-            f"{_LEAST_LOADING}; about {needed} samples do, or a shorter hold_s",
-        )
+    _check_loading(curves, int(((time <= ramp) & (pressed > 0)).sum()), ramp, float(time[-1]))
     return time, pressed
 
 
-def _with_relaxation(on: Mapping[str, Values], law: Law, time: Floats, pressed: Floats, memory: bool) -> Floats:
-    """F(t) over the modulus at rest."""
-    falling = np.diff(pressed, prepend=pressed[0]) < 0
-    back = np.cumsum(falling) > 0 if memory else np.zeros(len(time), dtype=bool)
-    elastic = np.where(back, law(pressed, True), law(pressed, False))
-    if "contact_creep" not in on:
-        return elastic
-    fraction, tau = (effects.of(on, "contact_creep", name) for name in ("fraction", "time_s"))
-    middle = (time[1:] + time[:-1]) / 2
-    elapsed = np.maximum(time[:, None] - middle, 0)
-    relaxed = np.where(middle < time[:, None], 1 - fraction * -np.expm1(-elapsed / tau), 0.0)
-    growth = np.diff(law(pressed, False))
-    if not memory:
-        return relaxed @ growth
-    # Ting: increments after t1 do not count while the sphere is drawn back.
-    depth = np.diff(np.maximum(pressed, 0))
-    since = np.cumsum((relaxed * depth)[:, ::-1], axis=1)[:, ::-1]  # ∫ from each increment to t
-    peak = int(np.argmax(pressed))
-    counted = np.ones_like(relaxed)
-    for row in np.flatnonzero(back):
-        early = np.flatnonzero(since[row, :peak] >= 0)
-        last = early[-1] if len(early) else 0
-        counted[row, last + 1 :] = 0
-        # t1 lies within this increment.
-        counted[row, last] = since[row, last] / (since[row, last] - since[row, last + 1]) if len(early) else 0
-    return (relaxed * counted) @ growth
-
-
-def _sphere(experiment: Experiment, radius: float) -> Law:
-    """Force of a sphere for E = 1, from curves over the contact radius; with adhesion it sticks on the way back."""
-    on = experiment.effects
-    nu = effects.of(on, "compressible_layer", "poisson_ratio") or 0.5
-    modulus = experiment.skin.youngs_modulus_mpa
-    work = effects.of(on, "adhesion", "work_j_per_m2") * 1e-3 / modulus  # mm, for E = 1
-    largest = experiment.curves.largest_displacement_mm if experiment.curves else 0.0
-    plane = 1 / (1 - nu**2)
-    if "layered_contact" in on:
-        h = experiment.skin.thickness_mm
-        a = np.geomspace(1e-3, min(4.0, 2.5 * np.sqrt(radius * largest) / h), _RADII)
-        contact = sphere_contact(Layer(nu))
-        force = contact.force(a, radius / h, 1.0, work / h) * h**2
-        depth = contact.depth(a, radius / h, 1.0, work / h) * h
-        a = a * h
-    else:
-        a = np.geomspace(1e-3, 2.5, _RADII) * np.sqrt(radius * largest)
-        depth = a**2 / radius - np.sqrt(2 * np.pi * work * a / plane)
-        force = 4 * plane * a**3 / (3 * radius) - np.sqrt(8 * np.pi * work * plane * a**3)
-    if depth[-1] < largest:
-        allowed = f"must be at most {depth[-1]:.3g} mm: beyond, the contact is wider than 4 thicknesses"
+def _check_depth(largest: float, deepest: float) -> None:
+    if largest >= deepest:
+        allowed = f"must be below {deepest:g} mm, 0.9 of the sphere's radius or the cylinder's height"
         raise RigError("curves.largest_displacement_mm", largest, allowed)
-    if "strain_stiffening" in on:
-        reached = depth <= 1.01 * largest
-        force = np.append(0.0, force[reached] * stiffening(on["strain_stiffening"], 0.2 * a[reached] / radius))
-        depth = np.append(0.0 if not work else depth[0], depth[reached])
-    holds = int(np.argmin(depth))  # under displacement control the contact tears at the least depth
-
-    def law(displacement: Floats, drawn_back: bool) -> Floats:
-        touching = displacement >= (depth[holds] if drawn_back and work else 0.0)
-        return np.where(touching, np.interp(displacement, depth[holds:], force[holds:]), 0.0)
-
-    return law
 
 
-def _cylinder(experiment: Experiment, shape: Mapping[str, float]) -> Law:
-    """Force of a cylinder for E = 1: area · u/H, stiffer with strain and friction, softer while a wedge closes."""
-    on = experiment.effects
-    height, diameter = shape["sample_height_mm"], shape["sample_diameter_mm"]
-    held = 1 + 2 * effects.of(on, "platen_friction", "friction") * (diameter / (4 * height)) ** 2
-    wedge = effects.of(on, "tilted_platen", "wedge_mm")
-
-    def law(displacement: Floats, drawn_back: bool) -> Floats:  # noqa: ARG001
-        touched = displacement
-        if wedge:
-            closing = np.clip(displacement, 0, wedge)
-            touched = np.where(displacement > 0, displacement - closing + closing**2 / (2 * wedge), displacement)
-        force = np.pi / 4 * diameter**2 * held * touched / height
-        if "strain_stiffening" in on:
-            force = force * stiffening(on["strain_stiffening"], np.abs(displacement) / height)
-        return np.asarray(force)
-
-    return law
-
-
-def _ripple(on: Mapping[str, Values], pressed: Floats) -> Floats:
-    if "force_ripple" not in on:
-        return np.zeros_like(pressed)
-    amplitude, pitch = (effects.of(on, "force_ripple", name) for name in ("amplitude", "pitch_mm"))
-    return amplitude * np.sin(2 * np.pi * pressed / pitch)
+def _check_loading(curves: CurveDesign, loading: int, ramp_s: float, whole_s: float) -> None:
+    if loading < _LEAST_LOADING:
+        needed = math.ceil(curves.samples * (_LEAST_LOADING + 1) / max(loading, 1))
+        allowed = (
+            f"leaves {loading} samples while the load rises, in {ramp_s:g} s of {whole_s:g} s: must leave at least "
+            f"{_LEAST_LOADING}; about {needed} samples do, or a shorter hold_s"
+        )
+        raise RigError("curves.samples", curves.samples, allowed)
 
 
 def campaign_of_curves(experiment: Experiment, curves: list[RecordedCurve]) -> dict[str, Any]:
     """The campaign (`campaign/1`) of the curves."""
-    assert experiment.curves is not None
+    design = experiment.curves
+    assert design is not None
     skin: dict[str, Any] = {
         "poisson_ratio": 0.5,
-        "youngs_modulus_mpa": experiment.skin.youngs_modulus_mpa if experiment.curves.modulus_declared else None,
+        "youngs_modulus_mpa": experiment.skin.youngs_modulus_mpa if design.modulus_declared else None,
         "d33_pc_per_n": None,
     }
     if experiment.kind != COMPRESSION:
@@ -213,6 +186,7 @@ def campaign_of_curves(experiment: Experiment, curves: list[RecordedCurve]) -> d
     return {
         "schema": "campaign/1",
         "name": experiment.name,
+        **({"units_checked": True} if design.units_checked else {}),
         "skin": skin,
         "recordings": [curve.entry for curve in curves],
     }

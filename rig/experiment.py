@@ -106,7 +106,21 @@ class CurveDesign:
     displacement_noise_mm: float = 0.0
     contact_point_mm: float = 0.02  # scatter of the zero of displacement
     modulus_declared: bool = True
+    modulus_scatter: float = 0.0  # log-normal: true E over declared E
     times: bool = True
+    approach_mm: float | None = None  # travel of the stage in the air, of a sphere
+    retreat_mm: float | None = None
+    retract: bool = True  # otherwise the recording of a sphere ends at the largest depth
+    stage_stiffness_n_per_mm: float | None = None  # its deflection is subtracted; rigid where not given
+    stage_declared: bool = True
+    gain: float = 0.0  # of the force cell, log-normal, a curve
+    cell_gain: float = 0.0  # the same for all curves
+    force_zero_n: float = 0.0  # scatter of the zero of force
+    drift_n_per_s: float = 0.0  # scatter of the baseline's slopes
+    drift_n_per_mm: float = 0.0
+    force_step_n: float = 0.0  # of the converters
+    displacement_step_mm: float = 0.0
+    units_checked: bool = False  # stated in the campaign
 
 
 @dataclass(frozen=True)

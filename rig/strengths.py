@@ -94,19 +94,15 @@ def of_frf(description: Mapping[str, Any]) -> Ranges:
     }
 
 
-def of_curves(description: Mapping[str, Any]) -> Ranges:
-    """The ranges for recordings of kind indentation and compression."""
+def of_compressions(description: Mapping[str, Any]) -> Ranges:
+    """The ranges for recordings of kind compression."""
     curves = description["curves"]
     depth = curves["largest_displacement_mm"]
     seconds = depth / curves["speeds_mm_per_s"][0]
     force = curves["force_noise_n"] / 3e-3  # N, about, the largest
     return {
-        "adhesion": {"work_j_per_m2": (0.01, 1.0)},
         "strain_stiffening": {"coefficient": (0.5, 5)},
-        "compressible_layer": {"poisson_ratio": (0.3, 0.49)},
         "contact_creep": {"fraction": (0.05, 0.6), "time_s": (0.1 * seconds, 3 * seconds)},
-        "instrument_compliance": {"stiffness_n_per_mm": (2 * force / depth, 100 * force / depth)},
-        "modulus_error": {"factor": (1.08, 1.6)},
         "platen_friction": {"friction": (0.05, 1)},
         "force_ripple": {"amplitude": (0.01, 0.15), "pitch_mm": (0.08 * depth, 0.4 * depth)},
         "force_drift": {"n_per_root_s": (0.02 * force / math.sqrt(seconds), 0.3 * force / math.sqrt(seconds))},

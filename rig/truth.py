@@ -2,13 +2,13 @@
 
 from typing import Any
 
+from rig import visible_curves
 from rig.effects import UNCATALOGUED
-from rig.elastomer import RecordedCurve
+from rig.elastomer import RecordedCurve, true_modulus
 from rig.experiment import Experiment
 from rig.identifiable import THRESHOLD, visibility
 from rig.recorded import RecordedLines
 from rig.true_response import TrueResponse
-from rig.visible_curves import chi2_gain
 
 SCHEMA = "truth/1"
 
@@ -27,7 +27,9 @@ def truth_of(experiment: Experiment) -> dict[str, Any]:
         "effects": names,
         "parameters": dict(on),
         "d33_pc_per_n": skin.d33_pc_per_n,
-        "youngs_modulus_mpa": skin.youngs_modulus_mpa * factors["modulus"],
+        "youngs_modulus_mpa": (
+            skin.youngs_modulus_mpa * factors["modulus"] if experiment.curves is None else true_modulus(experiment)
+        ),
         "thickness_mm": skin.thickness_mm * factors["thickness"],
         "experiment": dict(experiment.document),
     }
@@ -40,12 +42,24 @@ def truth_of_response(response: TrueResponse) -> dict[str, Any]:
 
 
 def truth_of_curves(experiment: Experiment, curves: list[RecordedCurve]) -> dict[str, Any]:
-    """`truth_of` with whether the effects are visible in the curves."""
-    gain = chi2_gain(experiment, curves)
+    """`truth_of` with whether each effect, and all of them together, are visible in the curves."""
+    overall = visible_curves.visibility(experiment, curves)
+    on = tuple(experiment.effects)
+    each = (
+        {on[0]: overall}
+        if len(on) == 1
+        else {
+            name: visible_curves.visibility(experiment, curves, tuple(other for other in on if other != name))
+            for name in on
+        }
+    )
     return {
         **truth_of(experiment),
-        "identifiable": gain > THRESHOLD if experiment.effects else True,
-        "chi2_gain_of_truth": round(gain, 2),
+        "identifiable": overall.identifiable if on else True,
+        "every_effect_identifiable": all(one.identifiable for one in each.values()),
+        "chi2_gain_of_truth": round(overall.chi2_gain, 2),
+        "chi2_gain_of_each": {name: round(one.chi2_gain, 2) for name, one in each.items()},
+        "base_rms_misfit_percent": round(overall.base_misfit_percent, 3),
     }
 
 

@@ -1,54 +1,148 @@
 """Visibility of effects in force–displacement curves: χ² of the base model's best fit less that of the truth.
 
-Base models: indentation F = (4/3) E/(1 − ν²) √R (u − z)^(3/2), compression F = E A (u − z)/H, with a zero z for each
-curve and one E, within 2 % of the declared one where there is one. Noise is the rig's own, that of displacement
-through dF/du.
+Base models: indentation F = (4/3) E/(1 − ν²) √R (u − z)^(3/2), compression F = E A (u − z)/H. Plain weighted least
+squares with the rig's own noise refit the modulus, which is free, and what every curve has: its zero of displacement z
+and, of an indentation, its zero of force, a linear drift (in travel where the rig drifts so, else in time) and the
+gain of the cell within its scatter. The truth is refitted alike, but for z. Effects that are `known` act in the base
+model at their true strength, along the recorded displacement.
+
+A factor on E shows as a departure from the declared modulus alone: under modulus_error and compressible_layer, and in
+compression, a declared modulus is known within 2 %.
 """
 
-import numpy as np
-from scipy.optimize import least_squares
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
-from rig.effects import INDENTATION
-from rig.elastomer import RecordedCurve
+import numpy as np
+
+from rig.contact_course import Body, course
+from rig.curve_fit import Curve, Law, Priors, least_chi2
+from rig.effects import INDENTATION, Values
+from rig.elastomer import RecordedCurve, frame_compliance, pressed_body, true_modulus
 from rig.experiment import Experiment
 from rig.layer import Floats
 
-_MODULUS = 0.02
+THRESHOLD = 30.0
+_DECLARED = 0.02
+_FACTORS_ON_E = {"modulus_error", "compressible_layer"}
+_SHIFTS = (0.0, -0.2, 0.2)  # starts of z, of the largest displacement; beside known effects the first alone
+_STEP = 1e-4  # of the largest displacement
+_POINTS = 200  # of a course along the recorded displacement
+_JUMP = 0.02  # of the largest force, between neighbouring samples
+_LEAST_NOISE = 1e-6  # of the largest force
 
 
-def chi2_gain(experiment: Experiment, recorded: list[RecordedCurve]) -> float:
-    """The gain in χ² of the truth over the base model."""
-    curves = experiment.curves
-    assert curves is not None
-    displacement = [np.array(curve.entry["displacement_mm"]) for curve in recorded]
-    force = [np.array(curve.entry["force_n"]) for curve in recorded]
-    exact = [curve.exact_force_n for curve in recorded]
-    deviation = [
-        np.hypot(curves.force_noise_n, np.gradient(f, u) * curves.displacement_noise_mm)
-        if curves.displacement_noise_mm
-        else np.full(len(f), max(curves.force_noise_n, 1e-12))
-        for f, u in zip(exact, displacement, strict=True)
-    ]
-    prior = _MODULUS if curves.modulus_declared else np.inf
+@dataclass(frozen=True)
+class Visibility:
+    """Result of `visibility`: χ² of the base model less that of the truth, and the base model's rms misfit [%]."""
 
-    def residuals(fit: Floats) -> Floats:
-        modulus = experiment.skin.youngs_modulus_mpa * np.exp(fit[0])
-        parts = [
-            (f - _base(experiment.kind, curve, u - zero, modulus)) / d
-            for f, u, d, curve, zero in zip(force, displacement, deviation, recorded, fit[1:], strict=True)
-        ]
-        return np.concatenate([*parts, [fit[0] / prior]])
+    chi2_gain: float
+    base_misfit_percent: float
 
-    start = np.zeros(1 + len(recorded))
-    scale = np.append(0.1, np.full(len(recorded), 0.1 * curves.largest_displacement_mm))
-    base = 2 * least_squares(residuals, start, x_scale=scale).cost
-    true = sum(float(np.sum(((f - e) / d) ** 2)) for f, e, d in zip(force, exact, deviation, strict=True))
-    return float(base - true)
+    @property
+    def identifiable(self) -> bool:
+        """Whether the truth gains more than the threshold."""
+        return self.chi2_gain > THRESHOLD
 
 
-def _base(kind: str, curve: RecordedCurve, displacement: Floats, modulus: float) -> Floats:
-    if kind == INDENTATION:
-        depth = np.maximum(displacement, 0)
-        return np.asarray(4 / 3 * modulus / 0.75 * np.sqrt(curve.entry["indenter_radius_mm"]) * depth**1.5)
-    area = np.pi / 4 * curve.entry["sample_diameter_mm"] ** 2
-    return np.asarray(modulus * area * displacement / curve.entry["sample_height_mm"])
+def visibility(experiment: Experiment, recorded: list[RecordedCurve], known: tuple[str, ...] = ()) -> Visibility:
+    """Visibility of the effects against a model that has only the effects `known`, at their true strength."""
+    design = experiment.curves
+    assert design is not None
+    depth, on = design.largest_displacement_mm, {name: experiment.effects[name] for name in known}
+    exact, base = [curve.exact_force_n for curve in recorded], _Base(experiment, recorded, on)
+    curves = [_Base(experiment, recorded, {}).measured(number) for number in range(len(recorded))]
+    priors = base.priors()
+    chi2, fitted = min(
+        (
+            least_chi2(base.law(), curves, priors, shift * depth, _STEP * depth)
+            for shift in (_SHIFTS[:1] if known else _SHIFTS)
+        ),
+        key=lambda result: result[0],
+    )
+    true, _ = least_chi2(
+        lambda number, log_modulus, _: exact[number] * np.exp(log_modulus),
+        curves,
+        replace(priors, log_modulus=0.0),
+        0.0,
+        _STEP * depth,
+    )
+    left = sum(float(np.sum((mine - other) ** 2)) for mine, other in zip(fitted, exact, strict=True))
+    return Visibility(chi2 - true, 100 * float(np.sqrt(left / sum(float(np.sum(force**2)) for force in exact))))
+
+
+@dataclass(frozen=True)
+class _Base:
+    """The base model of recorded curves, with the effects `on`."""
+
+    experiment: Experiment
+    recorded: list[RecordedCurve]
+    on: Mapping[str, Values]
+    bodies: dict[float, Body] = field(default_factory=dict)  # by the sphere's radius
+
+    def measured(self, number: int) -> Curve:
+        """Force, noise (that of displacement through dF/du), and columns of zero of force and drift."""
+        design, curve = self.experiment.curves, self.recorded[number]
+        assert design is not None
+        step = _STEP * design.largest_displacement_mm
+        slope = np.abs(self.law()(number, 0.0, -step) - self.law()(number, 0.0, step)) / (2 * step)
+        travel = np.hypot(design.displacement_noise_mm, design.displacement_step_mm / np.sqrt(12))
+        noise = np.sqrt(design.force_noise_n**2 + design.force_step_n**2 / 12 + (slope * travel) ** 2)
+        least = _LEAST_NOISE * np.abs(curve.exact_force_n).max() + 1e-15
+        columns = np.zeros((0, len(noise)))
+        if self.experiment.kind == INDENTATION:
+            along = curve.exact_displacement_mm if design.drift_n_per_mm else curve.time_s
+            columns = np.stack([np.ones_like(along), (along - along[0]) / np.ptp(along)])
+        return Curve(np.array(curve.entry["force_n"]), np.maximum(noise, least), columns)
+
+    def priors(self) -> Priors:
+        """Of ln E over the true modulus, and of the gains."""
+        design, skin = self.experiment.curves, self.experiment.skin
+        assert design is not None
+        compressed = self.experiment.kind != INDENTATION
+        factors = _FACTORS_ON_E & set(self.experiment.effects) - set(self.on)
+        if not (design.modulus_declared and (compressed or factors)):
+            return Priors(gain=design.gain)
+        declared = skin.youngs_modulus_mpa * float(self.on.get("modulus_error", {}).get("factor", 1.0))
+        deviation = float(np.hypot(_DECLARED, design.cell_gain))
+        return Priors(float(np.log(declared / true_modulus(self.experiment))), deviation, design.gain)
+
+    def law(self) -> Law:
+        """Force at ln E over the true modulus and a shift of the zero of displacement."""
+        if self.experiment.kind != INDENTATION:
+            return self._hooke
+        return self._course if self.on else self._hertz
+
+    def _displacement(self, number: int, shift: float) -> Floats:
+        curve = self.recorded[number]
+        return curve.exact_displacement_mm - curve.zero_mm - shift
+
+    def _modulus(self, log_modulus: float) -> float:
+        return true_modulus(self.experiment) * float(np.exp(log_modulus))
+
+    def _hooke(self, number: int, log_modulus: float, shift: float) -> Floats:
+        entry = self.recorded[number].entry
+        area = np.pi / 4 * entry["sample_diameter_mm"] ** 2
+        return self._modulus(log_modulus) * area * self._displacement(number, shift) / entry["sample_height_mm"]
+
+    def _hertz(self, number: int, log_modulus: float, shift: float) -> Floats:
+        depth = np.maximum(self._displacement(number, shift), 0)
+        radius = self.recorded[number].entry["indenter_radius_mm"]
+        return np.asarray(4 / 3 * self._modulus(log_modulus) / 0.75 * np.sqrt(radius) * depth**1.5)
+
+    def _body(self, radius: float) -> Body:
+        if radius not in self.bodies:
+            deepest = max(float((curve.exact_displacement_mm - curve.zero_mm).max()) for curve in self.recorded)
+            self.bodies[radius] = pressed_body(self.experiment, self.on, radius, 1.2 * deepest)
+        return self.bodies[radius]
+
+    def _course(self, number: int, log_modulus: float, shift: float) -> Floats:
+        """Force of the known effects, calculated at some samples and at those beside a jump."""
+        displacement, curve = self._displacement(number, shift), self.recorded[number]
+        radius = curve.entry["indenter_radius_mm"]
+        body = replace(self._body(radius), modulus=self._modulus(log_modulus))
+        jumps = np.flatnonzero(np.abs(np.diff(curve.exact_force_n)) > _JUMP * np.abs(curve.exact_force_n).max())
+        even = np.linspace(0, len(displacement) - 1, min(_POINTS, len(displacement))).astype(int)
+        at = np.unique(np.concatenate([even, jumps, jumps + 1]))
+        _, force = course(body, curve.time_s[at], displacement[at], frame_compliance(self.on))
+        return np.interp(np.arange(len(displacement)), at, force)

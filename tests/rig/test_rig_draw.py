@@ -5,8 +5,11 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from rig.description import parse
 from rig.draw import CATALOGUED, UNKNOWN, drawn, record
 from rig.draw_curves import drawn_curves
+from rig.draw_raw import CATALOGUED as RAW
+from rig.draw_raw import effect_names, raw_description
 from rig.effects import EFFECTS, UNCATALOGUED
 from rig.elastomer import campaign_of_curves
 from rig.recorded import campaign
@@ -57,12 +60,46 @@ def test_draws_are_campaigns_within_the_tables_and_their_truth_says_what_shows()
     assert sum(shows) > 12
 
 
-@pytest.mark.parametrize("kind", ["indentation", "compression"])
-def test_curves_are_drawn_too(kind: str) -> None:
-    for number in range(15):
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "count"), [("indentation", 6), ("compression", 15)])
+def test_curves_are_drawn_too(kind: str, count: int) -> None:
+    for number in range(count):
         experiment, curves = drawn_curves(2, number, kind)
         again, _ = drawn_curves(2, number, kind)
         assert experiment == again
         kept = campaigns.parse(campaign_of_curves(experiment, curves))
         assert len(kept.recordings) == len(curves)
         assert set(truth_of_curves(experiment, curves)) >= {"effects", "parameters", "identifiable"}
+
+
+@pytest.mark.parametrize(("what", "count"), [("none", 0), ("single", 1), ("pair", 2), ("unknown", 1)])
+def test_raw_curves_hide_what_is_asked_on_both_scales(what: str, count: int) -> None:
+    radii = []
+    for number in range(8):
+        random = np.random.default_rng([9, number])
+        experiment = parse(raw_description(random, "x", effect_names(random, what)))
+        assert len(experiment.effects) == count
+        assert set(experiment.effects) <= set(UNCATALOGUED if what == "unknown" else EFFECTS)
+        assert experiment.curves is not None
+        assert experiment.curves.units_checked == (max(experiment.curves.indenters_mm) < 0.5)
+        radii.append(max(experiment.curves.indenters_mm))
+    assert min(radii) < 0.1 < 1 < max(radii)
+
+
+def test_every_effect_of_raw_curves_is_drawn() -> None:
+    random = np.random.default_rng(4)
+    seen = {
+        what: {name for _ in range(120) for name in effect_names(random, what)}
+        for what in ("single", "pair", "unknown")
+    }
+    assert seen["single"] == set(RAW)
+    assert seen["pair"] == {*RAW, "compressible_layer"}
+    assert seen["unknown"] == {name for name, effect in UNCATALOGUED.items() if "indentation" in effect.kinds}
+    assert len(seen["unknown"]) >= 6
+
+
+def test_quiet_raw_curves_show_nothing() -> None:
+    for number in range(4):
+        truth = truth_of_curves(*drawn_curves(2, number, "indentation", "none"))
+        assert truth["identifiable"]
+        assert abs(truth["chi2_gain_of_truth"]) < 20

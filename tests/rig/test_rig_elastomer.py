@@ -10,21 +10,27 @@ from rig import effects
 from rig.description import parse
 from rig.elastomer import RecordedCurve, campaign_of_curves, record_curves
 from rig.errors import RigError
-from rig.visible_curves import chi2_gain
+from rig.visible_curves import visibility
 from underskin.recordings import campaign as campaigns
 
 E_MPA, R_MM = 0.5, 2.5
 LOCKING = {"coefficient": 15.0, "law": "limited"}
 INDENTATION: dict[str, dict[str, Any]] = {
     "layered_contact": {},
-    "adhesion": {"work_j_per_m2": 0.5},
+    "adhesion": {"work_j_per_m2": 1.0, "work_of_separation_j_per_m2": 2.0},
     "strain_stiffening": {"coefficient": 3.0, "law": "limited"},
     "compressible_layer": {"poisson_ratio": 0.4},
     "contact_creep": {"fraction": 0.4, "time_s": 5.0},
     "instrument_compliance": {"stiffness_n_per_mm": 5.0},
     "modulus_error": {"factor": 1.2},
     "force_ripple": {"amplitude": 0.05, "pitch_mm": 0.1},
-    "force_drift": {"n_per_root_s": 0.01},
+    "force_drift": {"n_per_root_s": 0.02},
+    "thermal_drift": {"drift_mm": 0.02, "time_s": 3.0},
+    "guide_friction": {"friction": 0.03, "slip_mm": 0.02},
+    "nonlinear_cell": {"nonlinearity": 0.05, "range_n": 2.0},
+    "plastic_set": {"ratio": 0.1},
+    "flattened_tip": {"radius_mm": 0.5},
+    "rough_surface": {"height_mm": 0.02, "force_n": 0.02},
 }
 COMPRESSION: dict[str, dict[str, Any]] = {
     "platen_friction": {"friction": 0.5},
@@ -121,14 +127,14 @@ def test_stage_that_gives_moves_further_by_force_over_stiffness() -> None:
 def test_every_effect_shows_and_is_seen_to_show(kind: str, name: str, values: dict[str, Any]) -> None:
     planned = parse(described(kind, {name: values}, force_noise_n=2e-3, contact_point_mm=0.01))
     recorded = record_curves(planned)
-    assert chi2_gain(planned, recorded) > 20
+    assert visibility(planned, recorded).identifiable
     campaigns.parse(campaign_of_curves(planned, recorded))
 
 
 def test_without_an_effect_there_is_nothing_to_see() -> None:
     for kind in ("indentation", "compression"):
         planned = parse(described(kind, {}, force_noise_n=2e-3, contact_point_mm=0.01))
-        assert -15 < chi2_gain(planned, record_curves(planned)) < 1e-3  # two fitted parameters
+        assert -15 < visibility(planned, record_curves(planned)).chi2_gain < 1e-3  # two fitted parameters
 
 
 def test_every_effect_of_these_kinds_is_tested() -> None:
