@@ -47,7 +47,7 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
         mapped = MappedBlock(rig, block, stated, file)
         recordings.append({"id": label, "kind": rig.kind, **began, **mapped.spring(), **common, **mapped.fields()})
         warnings += mapped.warnings
-        taken = {**mapped.taken, **taken}
+        taken |= {name: how for name, how in mapped.taken.items() if name not in taken}
     document = {"schema": SCHEMA, "name": stem, "skin": rig.skin, "recordings": recordings}
     return MappedFile({**document, "units_checked": rig.units_checked}, list(dict.fromkeys(warnings)), taken)
 
