@@ -140,6 +140,10 @@ def test_instrument_files_need_a_rig_and_tell_the_modulus(tmp_path: Path) -> Non
     modulus = 4 * 30 / (np.pi / 4 * 50**2)
     assert re.search(rf"block +{modulus:.4g} .* compression: straight from 0 to 13 % strain, and not seen", told.stdout)
     assert "no d33" not in told.stdout
+    assert re.search(
+        r"^read the text as: rows of \d numbers from line \d+ to \d+, separated by", told.stdout, re.MULTILINE
+    )
+    assert re.search(r"^read force_n: 'Load \(N\)' in N: .* N$", told.stdout, re.MULTILINE)
     without = run("d33", str(tmp_path / "block.csv"))
     assert without.returncode == 2
     assert "a rig description must say what its channels are; it has " in without.stderr

@@ -6,10 +6,12 @@ from dataclasses import fields
 import pytest
 
 from tests.support.repository import ROOT
-from underskin.recordings import read_file, rig_description
-from underskin.recordings.campaign import CompressionRecording, FrfRecording
+from underskin.recordings import read_contents, read_file, rig_description
+from underskin.recordings.campaign import CompressionRecording, FrfRecording, IndentationRecording
+from underskin.recordings.channel_mapping import ChannelMapping, Property
+from underskin.recordings.channels import Contents
 from underskin.recordings.readers.formats import MODULES
-from underskin.recordings.rig_description import ChannelMapping, Property
+from underskin.recordings.rig_description import CurveChannel
 
 TEXT = (ROOT / "docs" / "formats.md").read_text()
 
@@ -34,7 +36,7 @@ def test_the_template_as_documented() -> None:
 
 
 def test_the_rig_description_as_documented() -> None:
-    (text,) = examples("yaml")
+    text, _ = examples("yaml")
     rig = rig_description.parse(text.encode(), "rig.yaml")
     table = "Preload [mN];1500\n\nt [ms];Load cell;Amplifier\n0;2.25;0\n1;4.5;-0.07\n"
     channels = {**rig.document["channels"], "time_s": {"channel": "t [ms]"}}
@@ -48,6 +50,33 @@ def test_the_rig_description_as_documented() -> None:
     assert recording.charge_pc == pytest.approx([0, 7])
 
 
+def test_the_spring_as_documented() -> None:
+    _, text = examples("yaml")
+    rig = rig_description.parse(text.encode(), "rig.yaml")
+    table = "Piezo;Deflection\nnm;nm\n0;0\n-1;100\n-2;300\n"
+    reading = read_file(table.encode(), "a.csv", rig)
+    (recording,) = reading.campaign.recordings
+    assert isinstance(recording, IndentationRecording)
+    assert recording.displacement_mm == pytest.approx([0, 0.9e-3, 1.7e-3])  # 1 um less 0.1 um
+    assert recording.force_n == pytest.approx([0, 0.3e-6, 0.9e-6])  # 100 nm times 3 N/m
+    assert len(reading.warnings) == 1
+
+
+def test_a_text_of_an_instrument_as_documented() -> None:
+    (text,) = examples("text")
+    found = read_contents(text.encode("latin-1"), "a.txt")
+    assert isinstance(found, Contents)
+    assert [(one.name, one.unit, one.values.tolist()) for one in found.blocks[0].channels] == [
+        ("Depth", "µm", [0, 0.25, 0.5]),
+        ("Force", "mN", [0, 0.031, 0.088]),
+    ]
+    assert found.properties == {"Operator": "mb"}
+    assert found.layout in " ".join(TEXT.split())
+
+
 def test_every_format_and_field_is_documented() -> None:
-    for name in (*MODULES.values(), *(entry.name for model in (ChannelMapping, Property) for entry in fields(model))):
+    for name in (
+        *MODULES.values(),
+        *(entry.name for model in (ChannelMapping, Property, CurveChannel) for entry in fields(model)),
+    ):
         assert name in TEXT, name

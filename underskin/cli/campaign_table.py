@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from underskin.cli.columns import PIPED_WIDTH
+from underskin.cli.rigs import reading_notes
 from underskin.errors import InvalidInput
 from underskin.findings.formatting import significant
 from underskin.inversion.invert import Inversion
@@ -48,8 +49,8 @@ class InvertedFile:
 
     @property
     def notes(self) -> list[str]:
-        """Findings in words, and each recording or sensor that is left out."""
-        notes = [f"look at: {warning}" for warning in self.reading.warnings]
+        """What was taken for what, findings in words, and each recording or sensor that is left out."""
+        notes = reading_notes(self.reading)
         campaign = self.reading.campaign
         findings = (
             self.inversion.findings if isinstance(self.inversion, Inversion) else plausibility.implausible(campaign)

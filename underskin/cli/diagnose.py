@@ -15,12 +15,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from underskin.cli.rigs import reading_notes, rig_description_in
 from underskin.cli.store import LOCAL, KeyOption, Url, connect
 from underskin.errors import UnderskinError
 from underskin.parallel import one_blas_thread, processes
 
 if TYPE_CHECKING:
     from underskin.client.service_client import Client
+    from underskin.recordings.rig_description import RigDescription
 
 FilesArgument = Annotated[
     list[Path] | None, typer.Argument(help="Campaigns (campaign/1, JSON, or any format that is read).")
@@ -37,6 +39,7 @@ class _Outcome:
     source: str
     problem: str = ""
     verdict: str = ""
+    notes: tuple[str, ...] = ()  # what was taken for what, and what to look at
 
 
 def add_commands(app: typer.Typer) -> None:
@@ -47,6 +50,7 @@ def add_commands(app: typer.Typer) -> None:
 
 def diagnose(
     files: FilesArgument = None,
+    rig: Annotated[Path | None, typer.Option(help="Rig description, for files that hold channels.")] = None,
     output_dir: Annotated[Path, typer.Option(help="Folder for the reports; made where it does not exist.")] = _REPORTS,
     html: Annotated[bool, typer.Option("--html", help="Also write each report as a page with figures.")] = False,
     workers: Workers = 0,
@@ -67,20 +71,22 @@ def diagnose(
     one_blas_thread()
     files, campaign = files or [], campaign or []
     _refuse_overwriting(files, campaign, output_dir)
+    description = None if rig is None else rig_description_in(rig)
     output_dir.mkdir(parents=True, exist_ok=True)
     failed = False
     console = Console(stderr=True)
     with Progress(console=console) as progress:
         bar = progress.add_task("diagnosing", total=len(files) + len(campaign))
         for outcomes in (
-            _of_files(files, output_dir, html, workers or os.cpu_count() or 1, scheduler),
+            _of_files(files, description, output_dir, html, workers or os.cpu_count() or 1, scheduler),
             _of_store(campaign, output_dir, html, url, key),
         ):
             for outcome in outcomes:
                 progress.advance(bar)
                 failed |= bool(outcome.problem)
                 line = f"underskin: {outcome.problem}" if outcome.problem else f"{outcome.source}: {outcome.verdict}"
-                console.print(line, markup=False, highlight=False, soft_wrap=True)
+                for said in (line, *(f"{outcome.source}: {note}" for note in outcome.notes)):
+                    console.print(said, markup=False, highlight=False, soft_wrap=True)
     if output_dir == _REPORTS and any(output_dir.iterdir()):
         console.print(f"reports are in {output_dir}", markup=False, highlight=False)
     if failed:
@@ -107,34 +113,44 @@ def _refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_
 
 
 def _of_files(
-    files: Sequence[Path], output_dir: Path, html: bool, workers: int, scheduler: str | None
+    files: Sequence[Path],
+    rig: "RigDescription | None",
+    output_dir: Path,
+    html: bool,
+    workers: int,
+    scheduler: str | None,
 ) -> Iterator[_Outcome]:
     if scheduler is None and (len(files) <= 1 or workers == 1):
         for file in files:
-            yield _one(file, output_dir, html)
+            yield _one(file, rig, output_dir, html)
         return
     remaining = list(files)
     while remaining:
-        for file, outcome in _of_pool(remaining, output_dir, html, min(workers, len(remaining)), scheduler):
+        for file, outcome in _of_pool(remaining, rig, output_dir, html, min(workers, len(remaining)), scheduler):
             remaining.remove(file)
             yield outcome
         # A process that dies ends the pool: the files that may have caused it are diagnosed alone, one by one
         suspects = remaining[:workers]
         for file in suspects:
-            alone = dict(_of_pool([file], output_dir, html, 1, scheduler))
+            alone = dict(_of_pool([file], rig, output_dir, html, 1, scheduler))
             remaining.remove(file)
             yield alone.get(file, _Outcome(str(file), f"{file}: the process that worked it out was killed; memory?"))
 
 
 def _of_pool(
-    files: Sequence[Path], output_dir: Path, html: bool, workers: int, scheduler: str | None
+    files: Sequence[Path],
+    rig: "RigDescription | None",
+    output_dir: Path,
+    html: bool,
+    workers: int,
+    scheduler: str | None,
 ) -> Iterator[tuple[Path, _Outcome]]:
     """The outcomes of the files that were diagnosed before any process died."""
     with _executor(workers, scheduler) as pool:
         # Absolute, since a cluster's workers have a working folder of their own
         folder = output_dir.resolve()
         pending: dict[Future[_Outcome], Path] = {
-            pool.submit(_one, file if scheduler is None else file.resolve(), folder, html): file for file in files
+            pool.submit(_one, file if scheduler is None else file.resolve(), rig, folder, html): file for file in files
         }
         for done in as_completed(pending):
             file = pending[done]
@@ -166,7 +182,7 @@ def _executor(workers: int, scheduler: str | None) -> Iterator[Executor]:
         yield pool
 
 
-def _one(file: Path, output_dir: Path, html: bool) -> _Outcome:
+def _one(file: Path, rig: "RigDescription | None", output_dir: Path, html: bool) -> _Outcome:
     """Read, diagnose and write one campaign."""
     from underskin.diagnosis.pipeline import diagnose as work_out
     from underskin.diagnosis.pipeline import with_refused
@@ -175,7 +191,7 @@ def _one(file: Path, output_dir: Path, html: bool) -> _Outcome:
     from underskin.surrogate.sigma_table import load_table
 
     try:
-        reading = read_file(file, file.name)
+        reading = read_file(file, file.name, rig)
         diagnosis = with_refused(work_out(reading.campaign, load_table()), reading.problems)
     except UnderskinError as error:
         return _Outcome(str(file), f"{file}: {' '.join(str(error).split())}")
@@ -186,7 +202,7 @@ def _one(file: Path, output_dir: Path, html: bool) -> _Outcome:
         from underskin.diagnosis.reporting.html_report import page
 
         _write(page(document, figures(diagnosis, document)), output_dir / f"{file.stem}.html")
-    return _Outcome(str(file), verdict=str(document["verdict"]))
+    return _Outcome(str(file), verdict=str(document["verdict"]), notes=tuple(reading_notes(reading)))
 
 
 def _of_store(campaigns: Sequence[str], output_dir: Path, html: bool, url: str, key: str | None) -> Iterator[_Outcome]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from underskin.cli.rigs import rig_description_in
 from underskin.errors import FileError, InvalidInput, UnderskinError, not_unique, wrong_type
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def invert_files(
     if together is not None:
         validation.name("together", together, False)
     band_hz = None if band is None else _band(band)
-    description = None if rig is None else _rig_description(rig)
+    description = None if rig is None else rig_description_in(rig)
     batches = (
         [(str(file), file.name) for file in files] if together is None else [(together, together.replace("/", "-"))]
     )
@@ -129,17 +130,6 @@ def _inverted(name: str, reading: "Reading", table: "SigmaTable", band_hz: _Band
     except InvalidInput as error:
         inversion = error
     return InvertedFile(name, reading, inversion, elastomer.of_campaign(reading.campaign))
-
-
-def _rig_description(rig: Path) -> "RigDescription":
-    from underskin.recordings import rig_description
-
-    try:
-        return rig_description.parse(rig.read_bytes(), str(rig))
-    except InvalidInput as error:
-        raise UnderskinError(f"{rig}: {error}") from error
-    except OSError as error:
-        raise UnderskinError(f"{rig}: cannot be opened: {error.strerror}") from error
 
 
 def _band(text: str) -> _BandHz:

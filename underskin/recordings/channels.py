@@ -25,12 +25,14 @@ class Channel:
 @dataclass(frozen=True, eq=False)
 class Block:
     """Channels acquired together; `sample_rate_hz` where they are evenly sampled in time, `recorded_at` where the file
-    says when the acquisition began (ISO 8601)."""
+    says when the acquisition began (ISO 8601). `group_starts` are the samples at which groups of rows of a text begin,
+    which blank or comment lines part; empty where there is one group."""
 
     name: str
     channels: tuple[Channel, ...]
     sample_rate_hz: float | None = None
     recorded_at: str | None = None
+    group_starts: tuple[int, ...] = ()
 
     def channel(self, name: str) -> Channel | None:
         """The channel of that name, or None."""
@@ -39,11 +41,13 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """A file: its blocks, what it says about itself (`properties`), and what the user should know (`warnings`)."""
+    """A file: its blocks, what it says about itself (`properties`), what the user should know (`warnings`), and how it
+    was read where that had to be guessed (`layout`, in words)."""
 
     blocks: tuple[Block, ...]
     properties: Mapping[str, str | float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    layout: str = ""
 
     def described(self) -> str:
         """The channels and their units, for an error message."""

@@ -2,9 +2,9 @@
 
 import io
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -21,11 +21,13 @@ _LARGEST_TEXT = 8_000_000  # larger tables are parsed under the limits of binary
 
 @dataclass(frozen=True)
 class Reading:
-    """A file's campaign with its good recordings, what is wrong with the others, and what the user should know."""
+    """A file's campaign with its good recordings, what is wrong with the others, what the user should know, and by
+    field which channel a rig description took for it, in words (under no field how a text was read)."""
 
     campaign: Campaign
     problems: list[RecordingProblem]
     warnings: list[str]
+    taken: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_file(source: Path | str | bytes, name: str, rig: RigDescription | None = None) -> Reading:
@@ -43,10 +45,11 @@ def understood(contents: Contents | dict[str, Any], name: str, rig: RigDescripti
     if not isinstance(contents, Contents):
         return Reading(*from_dict(contents), [])
     if rig is None:
-        reason = f"a rig description must say what its channels are; it has {contents.described()}"
+        layout = f" ({contents.layout})" if contents.layout else ""
+        reason = f"a rig description must say what its channels are; it has {contents.described()}{layout}"
         raise FileError(name, "", reason)
-    document, warnings = rig_mapping.apply(rig, contents, name)
-    return Reading(*from_dict(document), warnings)
+    mapped = rig_mapping.apply(rig, contents, name)
+    return Reading(*from_dict(mapped.document), mapped.warnings, mapped.taken)
 
 
 def read_contents(source: Path | str | bytes, name: str) -> Contents | dict[str, Any]:

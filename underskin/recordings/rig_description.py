@@ -9,18 +9,18 @@
       force_n: {channel: Corrected_Force(N), sign: -1}
 
 `skin` and `recording` hold campaign fields that are the same for all files; `{property: ...}` takes one from what the
-file, or the block, says about itself. `channels` says for each campaign field which channel holds it.
+file, or the block, says about itself. `channels` says for each campaign field which channel holds it, `curves` how
+several curves in one file are told apart.
 """
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Annotated, Any
+from typing import Any
 
 import yaml
 
 from underskin.errors import (
-    ErrorCode,
     FileError,
     InvalidInput,
     Mention,
@@ -32,6 +32,7 @@ from underskin.errors import (
 )
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import COLUMNS, KINDS
+from underskin.recordings.channel_mapping import ChannelMapping, Property, SignalMapping
 from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.readers import json_file, text
 from underskin.recordings.shown_values import named, shown
@@ -40,44 +41,23 @@ from underskin.recordings.validation import mapping
 SCHEMA = "rig/1"
 LARGEST_BYTES = 1_000_000
 BLOCK_NAME = "block"  # a property that every part of a file has: a TDMS group, a MATLAB structure
+WHOLE_CURVES = ("file", "groups")  # what a curve may be, but for what a channel tells apart
 COMPLEX_FRF = "frf_pc_per_n"  # a channel of complex numbers, both parts of the FRF
 
 
-def _sign(name: str, value: Any, units_checked: bool) -> int:
-    if field.number(name, value, units_checked) not in (1, -1):
-        raise InvalidInput(name, shown(value), "must be 1 or -1", code=ErrorCode.NOT_ONE_OF)
-    return int(value)
-
-
 @dataclass(frozen=True)
-class ChannelMapping:
-    """Where a field's values are.
+class CurveChannel:
+    """A channel that tells the curves of a file apart: each value of `channel` is one, or each new rise of `segments`,
+    which counts the segments of a curve (approach 0, hold 1, way back 2)."""
 
-    `channel` is the name in the file. `unit` is its true unit; where the file's own label says another one, `labelled`
-    repeats that label, to say that it is known to be wrong. `sign` -1 turns the values round. `sensitivity`, in
-    `sensitivity_unit` (mV/N), divides a signal into the field's quantity. `stiffness_n_per_mm` (displacements only):
-    force over it is the instrument's own give and is subtracted.
-    """
-
-    channel: field.Name
-    unit: field.Name | None = None
-    labelled: field.Name | None = None
-    sign: Annotated[int, _sign] | None = None
-    sensitivity: field.Positive | None = None
-    sensitivity_unit: field.Name | None = None
-    stiffness_n_per_mm: field.Positive | None = None
-
-
-@dataclass(frozen=True)
-class Property:
-    """A field's value that the file itself states under the name `property`."""
-
-    property: field.Name
+    channel: field.Name | None = None
+    segments: field.Name | None = None
 
 
 @dataclass(frozen=True)
 class RigDescription:
-    """A rig: the kind of its recordings, fields common to them, and which channel is what. `document` is as given."""
+    """A rig: the kind of its recordings, fields common to them, which channel is what, and what a curve is in a file:
+    `"file"`, `"groups"`, the channel that tells curves apart, or None (each part is one). `document` is as given."""
 
     kind: str
     skin: Mapping[str, Any]
@@ -85,6 +65,7 @@ class RigDescription:
     channels: Mapping[str, ChannelMapping]
     units_checked: bool
     document: Mapping[str, Any]
+    curves: str | CurveChannel | None = None
 
 
 def parse(data: bytes, file: str) -> RigDescription:
@@ -109,7 +90,7 @@ def parse(data: bytes, file: str) -> RigDescription:
 
 def from_dict(document: Any) -> RigDescription:
     """The rig description of a document; raises InvalidInput that names the field."""
-    fields_known = ("schema", "name", "kind", "skin", "recording", "channels", "units_checked")
+    fields_known = ("schema", "name", "kind", "skin", "recording", "channels", "curves", "units_checked")
     document = field.of_schema("rig description", document, SCHEMA, fields_known)
     kind = document.get("kind", "frf")
     if not isinstance(kind, str) or kind not in KINDS:
@@ -127,6 +108,7 @@ def from_dict(document: Any) -> RigDescription:
         channels=_channels(kind, document.get("channels")),
         units_checked=field.flag("units_checked", document.get("units_checked", False), False),
         document=document,
+        curves=_curves(document.get("curves")),
     )
 
 
@@ -136,20 +118,55 @@ def channel_fields(kind: str) -> set[str]:
     return columns | {COMPLEX_FRF, "time_s"} if kind == "frf" else columns
 
 
+def _curves(document: Any) -> str | CurveChannel | None:
+    if document is None or document in WHOLE_CURVES:
+        return document
+    if not isinstance(document, Mapping):
+        raise not_one_of("curves", shown(document), (*WHOLE_CURVES, "{channel: NAME}", "{segments: NAME}"))
+    curves = field.build(CurveChannel, "curves", document, False)
+    if (curves.channel is None) == (curves.segments is None):
+        raise conflicting("curves", shown(list(document)), "must name either a channel or segments")
+    return curves
+
+
 def _channels(kind: str, document: Any) -> dict[str, ChannelMapping]:
     given = _known("channels", mapping("channels", document), channel_fields(kind))
     channels = {name: field.build(ChannelMapping, f"channels.{name}", value, False) for name, value in given.items()}
     for name, entry in channels.items():
-        if (entry.sensitivity is None) != (entry.sensitivity_unit is None):
-            raise conflicting(f"channels.{name}.sensitivity", entry.sensitivity, "needs a sensitivity_unit, and it one")
-        if entry.labelled is not None and entry.unit is None:
-            raise required(f"channels.{name}.unit", "required where labelled says that the label is wrong")
-        if entry.stiffness_n_per_mm is not None and (name != "displacement_mm" or "force_n" not in channels):
-            allowed = Requirement("is for ", Mention("displacement_mm"))
-            raise conflicting(f"channels.{name}.stiffness_n_per_mm", entry.stiffness_n_per_mm, allowed)
+        _require_whole(f"channels.{name}", entry)
+        if entry.deflection is not None:
+            _require_whole(f"channels.{name}.deflection", entry.deflection)
+        _require_of_its_field(name, entry, channels)
     if not channels:
         raise too_few("channels", "none", "must name at least one channel")
     return channels
+
+
+def _require_whole(place: str, signal: SignalMapping) -> None:
+    """Refuses half of what belongs together."""
+    if (signal.sensitivity is None) != (signal.sensitivity_unit is None):
+        raise conflicting(f"{place}.sensitivity", signal.sensitivity, "needs a sensitivity_unit, and it one")
+    if signal.labelled is not None and signal.unit is None:
+        raise required(f"{place}.unit", "required where labelled says that the label is wrong")
+
+
+def _require_of_its_field(name: str, entry: ChannelMapping, channels: Mapping[str, ChannelMapping]) -> None:
+    """Refuses on one field what is for another."""
+    stiffness, spring = entry.stiffness_n_per_mm, entry.spring_constant_n_per_m
+    if stiffness is not None and (name != "displacement_mm" or "force_n" not in channels):
+        raise conflicting(f"channels.{name}.stiffness_n_per_mm", stiffness, _is_for("displacement_mm"))
+    if entry.deflection is not None and name != "displacement_mm":
+        raise conflicting(f"channels.{name}.deflection", entry.deflection.channel, _is_for("displacement_mm"))
+    if entry.deflection is not None and stiffness is not None:
+        both = "must not stand beside a deflection, which is subtracted already"
+        raise conflicting(f"channels.{name}.stiffness_n_per_mm", stiffness, both)
+    if spring is not None and name != "force_n":
+        value = spring if isinstance(spring, float) else spring.property
+        raise conflicting(f"channels.{name}.spring_constant_n_per_m", value, _is_for("force_n"))
+
+
+def _is_for(name: str) -> Requirement:
+    return Requirement("is for ", Mention(name))
 
 
 def _known(prefix: str, document: Mapping[str, Any], known: set[str]) -> Mapping[str, Any]:

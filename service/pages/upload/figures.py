@@ -8,17 +8,37 @@ from service.ingest.reading import InspectedFile
 from service.pages.shared.figures import Drawn, drawn, drawn_curves
 from service.usecases.figure_data import frf_columns, measured
 from underskin.recordings.campaign import Campaign
+from underskin.recordings.rig_mapping import MappedFile
 
 _MOST_TRACES = 8
 _MOST_FRF = 12
 _MOST_CURVES = 12
 
 
-def figures(look: InspectedFile, place: str) -> list[Drawn]:
-    """What there is to see; `place`: the address of the upload's file, under which its numbers are."""
+def figures(look: InspectedFile, place: str, mapped: MappedFile | None) -> list[Drawn]:
+    """What there is to see; `place`: the address of the upload's file, under which its numbers are; `mapped`: what a
+    mapping makes of the file, whatever that still lacks."""
     campaigns = _campaigns(look)
     recordings = [recording for campaign in campaigns for recording in campaign.recordings]
-    return [*_traces(look, place), *_frf(campaigns, place), *drawn_curves(recordings, _MOST_CURVES)]
+    curves = drawn_curves(recordings, _MOST_CURVES) or _mapped_curves(mapped)
+    return [*curves, *_traces(look, place), *_frf(campaigns, place)]
+
+
+def _mapped_curves(mapped: MappedFile | None) -> list[Drawn]:
+    """Force against displacement as soon as a mapping has both, be the sphere's radius known or not."""
+    from underskin.figures import ForceCurve, force_curves
+
+    recordings = [] if mapped is None else [one for one in mapped.document["recordings"] if one["kind"] != "frf"]
+    curves = [
+        ForceCurve(one["id"], one["displacement_mm"], one["force_n"])
+        for one in recordings
+        if "displacement_mm" in one and "force_n" in one and len(one["displacement_mm"]) == len(one["force_n"])
+    ]
+    if not curves:
+        return []
+    of = min(len(curves), _MOST_CURVES)
+    about = f"Force against displacement of {of} of {len(curves)}, as the form now says what the channels are."
+    return [drawn("curves", force_curves(curves[:_MOST_CURVES]), about)]
 
 
 def trace_columns(look: InspectedFile) -> dict[str, list[Any]]:

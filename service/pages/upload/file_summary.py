@@ -60,10 +60,12 @@ class FileSummary:
     sample_rate_hz: float | None = None
     channels: Sequence[ChannelSummary] = ()
     properties: Mapping[str, str | float] = field(default_factory=dict)
+    taken: Mapping[str, str] = field(default_factory=dict)  # by field, in words; under none how a text was read
 
 
 def seen(upload: Upload, look: InspectedFile, known: Sequence[str]) -> FileSummary:
-    """A summary that is small however large the file; `known`: what to know before it is kept."""
+    """A summary that is small however large the file; `known`: what to know before it is kept. It does not say yet what
+    was taken for what."""
     arrived = [checked(campaign) for campaign in look.campaigns]
     campaigns = [one.campaign for one in arrived if one.campaign is not None]
     recordings = [recording for campaign in campaigns for recording in campaign.recordings]

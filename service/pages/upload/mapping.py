@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
+from service.pages.upload import spring_mapping
 from service.pages.upload.file_summary import ChannelSummary
 from underskin.errors import UNITS_CHECKED, ErrorCode, InvalidInput, Mention, Requirement, not_unique, wrong_type
 from underskin.recordings.readers.unit_labels import lab_field, unit
@@ -41,10 +42,12 @@ CHANNELS = {
     "frf_pc_per_n": "FRF, complex numbers",
     "coherence": "coherence γ²",
 }  # what a channel can be, of one kind or another
+CHOICES = {**CHANNELS, spring_mapping.DEFLECTION: "deflection of the spring"}  # of the form
 _RATE = "sample_rate_hz"
 _RATES = ("fs", "sample_rate", "sampling_rate", "samplerate", "sampling_frequency")  # as files call it
 _WORDS = {
-    **CHANNELS,
+    **CHOICES,
+    spring_mapping.SPRING: "spring constant [N/m]",
     **{name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in (*SKIN, *RECORDING)},
     "sensors": "layout",
     _RATE: "sample rate [Hz]",
@@ -113,7 +116,9 @@ def guessed(
         "kind": kind,
         "skin": {"poisson_ratio": 0.5, **known_skin},
         "recording": _stated(properties, kind),
-        "channels": channels_by_field,
+        "channels": spring_mapping.guessed(channels_by_field, channels, properties)
+        if kind == "indentation"
+        else channels_by_field,
     }
 
 
@@ -170,11 +175,15 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
     document["skin"] = _replaced(document["skin"], {"sensors": sensors})
     values = {name: _said(form, name) if kind in kinds else None for name, _, _, kinds in RECORDING}
     document["recording"] = _replaced(base.get("recording", {}), values)
-    document["channels"] = channels
+    document["channels"], unsaid = spring_mapping.with_spring(
+        channels, form, _said(form, spring_mapping.SPRING), base.get("channels", {})
+    )
+    curves = spring_mapping.curves_of(form, base.get("curves"))
+    document = _replaced(document, {"curves": curves})
     document.pop("units_checked", None)
     if form.get("units_checked"):
         document["units_checked"] = True
-    return document, [*strange, *twice]
+    return document, [*strange, *twice, *unsaid]
 
 
 def sensors_text(document: Mapping[str, Any]) -> str:
@@ -235,7 +244,7 @@ def _channels(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[st
         field = form.get(f"is-{number}", "")
         if field in by_field:
             first = by_field[field]["channel"]
-            allowed = f"{first[:80]} is {CHANNELS.get(field, field)} already: set one of the two to “not used”"
+            allowed = f"{first[:80]} is {CHOICES.get(field, field)} already: set one of the two to “not used”"
             twice.append(not_unique(f"channels.{field}", form[f"channel-{number}"], allowed))
         elif field:
             by_field[field] = _channel(form, number, base.get(field, {}))

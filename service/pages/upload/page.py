@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Annotated, Any
 
 import orjson
@@ -17,11 +18,12 @@ from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer
 from service.pages.shared.forms import OWN_FORM, TOKEN, Form, require_own, see
 from service.pages.shared.html import page
-from service.pages.upload import before_keeping, exported_skin, rig_in_use, similar_errors
+from service.pages.upload import before_keeping, exported_skin, rig_in_use, similar_errors, spring_mapping
 from service.pages.upload import mapping as mappings
 from service.pages.upload.figures import figures, lines_columns, trace_columns
 from service.pages.upload.file_summary import MOST_LISTED, ChannelSummary, FileSummary, seen
 from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good
+from service.pages.upload.mapped_file import mapped_file
 from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
 from service.problems import Refusal
 from service.store import Database, Missing, campaigns, skins
@@ -98,7 +100,9 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
         return exported_skin.shown(request, pending)
     file = min(file, len(pending.files) - 1)
     if file not in pending.drawn:
-        pending.draw(file, figures(_looked(request, pending, file), f"/upload/{pending.id}/{file}/"))
+        inspected = _looked(request, pending, file)
+        mapped = mapped_file(inspected, pending.seen[file], pending.rig)
+        pending.draw(file, figures(inspected, f"/upload/{pending.id}/{file}/", mapped))
     with store.reading() as connection:
         known = [row.id for row in skins.listed(connection, None, None, _MOST_SKINS)]
         about = _latest(store, pending.skin or pending.seen[file].skin)
@@ -126,7 +130,8 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
         document=document,
         layout=mappings.sensors_text(document),
         kinds=mappings.KINDS,
-        fields=mappings.CHANNELS,
+        fields=mappings.CHOICES,
+        spring=spring_mapping,
         field_words=mappings.field_words,
         what_to_do=mappings.what_to_do,
         skin_fields=mappings.SKIN,
@@ -227,11 +232,13 @@ def _look(request: Request, pending: PendingUpload) -> None:
         inspected = _looked(request, pending, number)
         recordings += sum(one.recordings for one in inspected.campaigns)
         require_few(len(summaries) + len(inspected.campaigns), recordings)
-        summaries.append(
-            seen(upload, inspected, before_keeping.worth_knowing(request, inspected, pending.skin, pending.corrects))
-        )
+        known = before_keeping.worth_knowing(request, inspected, pending.skin, pending.corrects)
+        summary = seen(upload, inspected, known)
+        mapped = mapped_file(inspected, summary, pending.rig)
+        layout = inspected.contents.layout if inspected.contents is not None else ""
+        summaries.append(replace(summary, taken=mapped.taken if mapped else {"": layout} if layout else {}))
         if number == 0:
-            drawn = figures(inspected, f"/upload/{pending.id}/0/")
+            drawn = figures(inspected, f"/upload/{pending.id}/0/", mapped)
     pending.seen, pending.drawn = summaries, {0: drawn}
 
 
@@ -261,4 +268,4 @@ def _twice(pending: PendingUpload, channels: Sequence[ChannelSummary]) -> dict[s
     """Channels that the form took for what another one is already, and that."""
     names = {channel.name for channel in channels}
     used = [(str(error["value"]), error["field"].removeprefix("channels.")) for error in pending.refused]
-    return {name: field for name, field in used if name in names and field in mappings.CHANNELS}
+    return {name: field for name, field in used if name in names and field in mappings.CHOICES}

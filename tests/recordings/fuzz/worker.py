@@ -48,7 +48,7 @@ def _read(kind: str, stream: BinaryIO) -> str:
         _detect(stream)
         contents = formats.parse(kind, stream, _FILE)  # as the format that it was before it was damaged
         if isinstance(contents, Contents):
-            contents, _ = rig_mapping.apply(_RIG, contents, _FILE)
+            contents = rig_mapping.apply(_RIG, contents, _FILE).document
         from_dict(contents)
     except FileError as error:
         return "refused" if error.file == _FILE and error.reason else f"an error that does not say what: {error}"

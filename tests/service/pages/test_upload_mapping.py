@@ -127,3 +127,30 @@ def test_a_layout_is_written_as_people_write_it(line: str) -> None:
 def test_the_time_of_a_table_is_found_so_that_no_sample_rate_is_missing() -> None:
     found = guessed([channel("Time (s)", "s"), channel("Force (N)", "N"), channel("Charge (pC)", "pC")], {}, {})
     assert found["channels"]["time_s"] == {"channel": "Time (s)"}
+
+
+SPRUNG = {
+    "displacement_mm": {"channel": "z", "sign": -1, "deflection": {"channel": "d", "unit": "nm"}},
+    "force_n": {"channel": "d", "unit": "nm", "spring_constant_n_per_m": 3.0},
+}
+
+
+def test_a_deflection_in_the_form_makes_force_and_depth() -> None:
+    form = {"kind": "indentation", "channel-0": "z", "is-0": "displacement_mm", "sign-0": "-1"}
+    form |= {"channel-1": "d", "is-1": "deflection", "unit-1": "nm", "spring_constant_n_per_m": "3"}
+    assert document_of({**form, "travel": "yes"}, {})[0]["channels"] == SPRUNG
+    as_depth = document_of({**form, "travel": ""}, {})[0]["channels"]
+    assert as_depth == {"displacement_mm": {"channel": "z", "sign": -1}, "force_n": SPRUNG["force_n"]}
+    measured = {"channel-1": "F", "is-1": "force_n", "unit-1": "mN", "travel": "yes"}
+    stiff = document_of({**form, **measured}, {})[0]["channels"]["displacement_mm"]
+    assert stiff == {"channel": "z", "sign": -1, "stiffness_n_per_mm": 0.003}
+    _, (wrong,) = document_of({**form, **measured, "spring_constant_n_per_m": ""}, {})
+    assert "say which channel is the deflection" in wrong.allowed
+    assert field_words("spring_constant_n_per_m") == "spring constant [N/m]"
+
+
+def test_curves_are_said_by_words_or_by_a_channel() -> None:
+    for said, curves in (("groups", "groups"), ("channel", {"channel": "n"}), ("segments", {"segments": "n"})):
+        assert document_of({"curves": said, "curves-by": "n"}, {})[0]["curves"] == curves
+    assert "curves" not in document_of({"curves": "", "curves-by": "n"}, {"curves": "file"})[0]
+    assert document_of({}, {"curves": "file"})[0]["curves"] == "file"

@@ -1,155 +1,148 @@
 """Tables that instruments write as text: some lines about the measurement, a line of headings, rows of numbers.
 
-The separator (tab, semicolon or comma) and the decimal mark are those that make the longest run of rows a table of
-numbers. Headings name the channels and, in brackets or behind the last underscore, their units. Lines above the
-headings and under the numbers that hold a name and a value become properties, unless the name has two values. A cell in
-quotes may hold the separator. See Also csv_template.py, our own table.
+The rows and the headings are found by table_rows.py and table_headings.py. Headings name the channels and, in brackets
+or behind the last underscore, their units. Columns of text are left out, with a warning. Lines above the headings and
+under the numbers that hold a name and a value become properties, unless the name has two values. Where the headings
+come again, what follows is a part of its own. A cell in quotes may hold the separator. See Also csv_template.py, our
+own table.
 """
 
 import re
-from dataclasses import dataclass
-from itertools import groupby
+from collections.abc import Iterable, Mapping, Sequence
 from typing import BinaryIO
 
 import numpy as np
 
 from underskin.errors import FileError
 from underskin.recordings.channels import Block, Channel, Contents, with_distinct_names
-from underskin.recordings.readers import text
-from underskin.recordings.readers.unit_labels import labelled_unit, unit
+from underskin.recordings.readers import table_headings, table_rows, text
+from underskin.recordings.readers.table_headings import Headings
+from underskin.recordings.readers.table_rows import BLANKS, Section, Table
 
-_STYLES = (("\t", "."), (";", "."), (",", "."), ("\t", ","), (";", ","))
 _SEPARATORS = re.compile(r"[\t;,]")
-
-
-@dataclass(frozen=True)
-class _Table:
-    """Where the rows of numbers start, and how they are written."""
-
-    start: int
-    separator: str
-    decimal: str
-    width: int
+_STATED = re.compile(r"(?P<name>[^:=]*[^:=\s])\s*[:=]\s*(?P<value>\S.*)")
+_SEPARATOR_WORDS = {"\t": "tabs", ";": "semicolons", ",": "commas", BLANKS: "blanks"}
+_DECIMAL_WORDS = {".": "points", ",": "commas"}
+_SHOWN = 30  # letters of a cell in a message
 
 
 def read(stream: BinaryIO, file: str) -> Contents:
     """The channels of a text table; raises FileError that names the line."""
     lines = text.lines(text.content(stream, file))
-    table = _table(lines)
+    table = table_rows.find(lines)
     if table is None:
         raise FileError(
             file,
             "",
             "holds no table of numbers alone, of at least two columns and two rows; names go into the CSV template",
         )
-    rows, end = _rows(lines, table, file)
+    headings = table_headings.find(lines, table, file)
+    repeated = frozenset(lines[line].strip() for line in headings.lines)
+    sections = table_rows.sections(lines, table, repeated, file)
+    _refuse_other_rows(lines, table, sections[-1].lines[-1] + 1, file)
+    left_out = _left_out(lines, table, headings, sections, file)
+    above, *between, under = _about(lines, sections, headings)
+    properties, warnings = _properties([*above, *under], table.separator)
+    blocks = []
+    for number, (section, own) in enumerate(zip(sections, [above, *between], strict=True), start=1):
+        name = str(number) if len(sections) > 1 else ""
+        blocks.append(Block(name, _channels(table, headings, section), group_starts=section.group_starts))
+        if name:
+            told, _ = _properties(own, table.separator)
+            properties |= {f"{name}.{of}": value for of, value in told.items()}
+    return Contents(tuple(blocks), properties, (*warnings, *left_out), _layout(table, headings, sections))
+
+
+def _channels(table: Table, headings: Headings, section: Section) -> tuple[Channel, ...]:
+    columns = np.array(section.rows, dtype=np.float64).T.copy()
+    names = [headings.names[column] for column in table.columns]
+    return with_distinct_names([Channel(*name, column) for name, column in zip(names, columns, strict=True)])
+
+
+def _refuse_other_rows(lines: Sequence[str], table: Table, end: int, file: str) -> None:
+    """Refuses numbers under the rows, and rows above them with thousands apart: they would be lost."""
     for index in range(end, len(lines)):
-        first = lines[index].split(table.separator)[0].strip().strip('"')
+        first = lines[index].strip().partition(table.separator)[0].strip().strip('"')
         if text.number(first, table.decimal) is not None:
-            raise _no_row(lines, index, table, file)
+            raise table_rows.no_row(lines, index, table, file)
     for index in range(table.start):
-        if _is_grouped_row(lines[index], table):
-            raise _no_row(lines, index, table, file)
-    columns = np.array(rows, dtype=np.float64).T.copy()
-    headings = _headings(lines, table, file)
-    channels = [Channel(*heading, column) for heading, column in zip(headings, columns, strict=True)]
-    properties, warnings = _properties(lines[: table.start] + lines[end:], table.separator)
-    return Contents((Block("", with_distinct_names(channels)),), properties, warnings)
+        cells = [cell.replace(",", "") if text.is_grouped(cell) else cell for cell in table.cells(lines[index])]
+        if len(cells) == table.width and all(text.number(cell, table.decimal) is not None for cell in cells):
+            raise table_rows.no_row(lines, index, table, file)
 
 
-def _table(lines: list[str]) -> _Table | None:
-    """The style with the longest run of rows; the table starts at its first row, though a bad one may be between."""
-    longest, best = 1, None
-    for separator, decimal in _STYLES:
-        widths = [len(_numbers(line, separator, decimal) or ()) for line in lines]
-        width, length = _longest_run(widths)
-        if length > longest:
-            longest, best = length, _Table(widths.index(width), separator, decimal, width)
-    return best
-
-
-def _longest_run(widths: list[int]) -> tuple[int, int]:
-    """Width and length of the longest run of rows of equally many numbers, at least two."""
-    runs = ((width, sum(1 for _ in run)) for width, run in groupby(widths) if width > 1)
-    return max(runs, key=lambda run: run[1], default=(0, 0))
-
-
-def _numbers(line: str, separator: str, decimal: str) -> list[float] | None:
-    numbers = []
-    for cell in _cells(line, separator):
-        value = text.number(cell, decimal)
-        if value is None:
-            return None
-        numbers.append(value)
-    return numbers
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    """The cells of a line; none where it has one at most, or quotes that do not close."""
-    try:
-        return text.cells(line, separator) if separator in line else []
-    except ValueError:
+def _left_out(
+    lines: Sequence[str], table: Table, headings: Headings, sections: Sequence[Section], file: str
+) -> list[str]:
+    """In words, the columns that hold text; raises FileError where one holds numbers in most rows."""
+    if len(table.columns) == table.width:
         return []
+    rows = [line for section in sections for line in section.lines]
+    texts: dict[int, list[tuple[int, str]]] = {
+        column: [] for column in range(table.width) if column not in table.columns
+    }
+    for line in rows:
+        cells = table.cells(lines[line])
+        for column, found in texts.items():
+            cell = cells[column] if column < len(cells) else ""
+            if text.number(cell, table.decimal) is None:
+                found.append((line, cell))
+    warnings = []
+    for column, found in texts.items():
+        if len(found) < len(rows) / 2:
+            raise table_rows.no_row(lines, found[0][0], table, file)
+        example = next((cell for _, cell in found if cell), "")
+        if example:
+            name = headings.names[column][0]
+            warnings.append(f"column {name!r} holds text, such as {example[:_SHOWN]!r}, and is left out")
+    return warnings
 
 
-def _is_grouped_row(line: str, table: _Table) -> bool:
-    """Whether a line above the table looks like a row of it but for numbers with their thousands apart."""
-    cells = _cells(line, table.separator)
-    ungrouped = [cell.replace(",", "") if text.is_grouped(cell) else cell for cell in cells]
-    return len(cells) == table.width and all(text.number(cell, table.decimal) is not None for cell in ungrouped)
+def _about(lines: Sequence[str], sections: Sequence[Section], headings: Headings) -> list[list[str]]:
+    """The lines above the first section, between each and the next, and under the last, without the headings."""
+    repeated = {lines[line].strip() for line in headings.lines}
+    starts = [section.lines[0] for section in sections]
+    ends = [section.lines[-1] + 1 for section in sections]
+    edges = zip([0, *ends], [*starts, len(lines)], strict=True)
+    return [[line for line in lines[start:end] if line.strip() not in repeated] for start, end in edges]
 
 
-def _rows(lines: list[str], table: _Table, file: str) -> tuple[list[list[float]], int]:
-    """The rows of numbers, and the line behind the last of them."""
-    rows: list[list[float]] = []
-    end = table.start
-    for index in range(table.start, len(lines)):
-        row = _numbers(lines[index], table.separator, table.decimal)
-        if row is not None and len(row) == table.width:
-            between = [line for line in range(end, index) if lines[line].strip()]
-            if between:
-                raise _no_row(lines, between[0], table, file)
-            rows.append(row)
-            end = index + 1
-    return rows, end
+def _layout(table: Table, headings: Headings, sections: Sequence[Section]) -> str:
+    """How the file was read, in words."""
+    first, last = sections[0].lines[0] + 1, sections[-1].lines[-1] + 1
+    numbers = f"rows of {len(table.columns)} numbers from line {first} to {last}"
+    written = f"separated by {_SEPARATOR_WORDS[table.separator]}, with decimal {_DECIMAL_WORDS[table.decimal]}"
+    if not headings.lines:
+        return f"{numbers}, {written}; no names above them"
+    names, *units = [line + 1 for line in headings.lines]
+    return f"{numbers}, {written}; names from line {names}" + "".join(f", units from line {line}" for line in units)
 
 
-def _no_row(lines: list[str], index: int, table: _Table, file: str) -> FileError:
-    expected = f"must be a row of {table.width} numbers, as above it; found {lines[index][:60]!r}"
-    return FileError(file, f"line {index + 1}", expected)
-
-
-def _headings(lines: list[str], table: _Table, file: str) -> list[tuple[str, str]]:
-    """Names and units of the columns, from the line above the numbers, or from two: names, and units under them."""
-    above = [index for index in range(table.start) if lines[index].strip()]
-    try:
-        last = text.cells(lines[above[-1]], table.separator) if above else []
-    except ValueError as error:
-        raise FileError(file, f"line {above[-1] + 1}", str(error)) from None
-    before = _cells(lines[above[-2]], table.separator) if len(above) > 1 else []
-    if not _is_heading(last, table.width):
-        return [(f"column {number}", "") for number in range(1, table.width + 1)]
-    if _is_heading(before, table.width) and any(unit(cell) for cell in last):
-        return list(zip(before, last, strict=True))
-    return [(cell, labelled_unit(cell)) for cell in last]
-
-
-def _is_heading(cells: list[str], width: int) -> bool:
-    return len(cells) == width and all(cells)
-
-
-def _properties(lines: list[str], separator: str) -> tuple[dict[str, str | float], tuple[str, ...]]:
+def _properties(lines: Iterable[str], separator: str) -> tuple[dict[str, str | float], list[str]]:
     """What lines that hold a name and a value say, a number as text, as written; and which have two values."""
     values: dict[str, list[str]] = {}
     for line in lines:
-        quoted = _cells(line, separator) if '"' in line else []
-        cells = quoted or [cell.strip().strip('"') for cell in _SEPARATORS.split(line)]
-        match [cell for cell in cells if cell]:
-            case [name, value] if cells[0] == name:
+        match _stated(line, separator):
+            case [name, value]:
                 values.setdefault(name, []).append(value)
     twice = {name: different for name, said in values.items() if len(different := list(dict.fromkeys(said))) > 1}
-    warnings = [
+    return {name: said[0] for name, said in values.items() if name not in twice}, _doubts(twice)
+
+
+def _doubts(twice: Mapping[str, Sequence[str]]) -> list[str]:
+    return [
         f"{name!r} is given as {different[0]!r} and as {different[1]!r}: neither is used"
         for name, different in twice.items()
     ]
-    return {name: said[0] for name, said in values.items() if name not in twice}, tuple(warnings)
+
+
+def _stated(line: str, separator: str) -> list[str]:
+    """The name and the value that a line holds, or else other cells; a comment may have a colon or = between them."""
+    bare = table_rows.uncommented(line)
+    stated = _STATED.fullmatch(bare.strip()) if bare is not line else None
+    if stated:
+        return [stated["name"], stated["value"].strip('"')]
+    quoted = table_rows.split(bare, separator) if '"' in bare and separator != BLANKS else []
+    cells = quoted or [cell.strip().strip('"') for cell in _SEPARATORS.split(bare)]
+    filled = [cell for cell in cells if cell]
+    return filled if filled and cells[0] == filled[0] else []

@@ -4,6 +4,7 @@ Another package adds a format through an entry point of the group `underskin.rea
 """
 
 import importlib
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -28,6 +29,7 @@ BINARY = ("TDMS", "UFF", "MATLAB", "HDF5")
 GROUP = "underskin.readers"
 _SUFFIXES = (".json", ".csv", ".tdms", ".lvm", ".uff", ".unv", ".mat", ".h5", ".hdf5")  # of the formats of MODULES
 _HEAD_BYTES = 4096
+_JSON_LIST = re.compile(r"\[(?!\s*[A-Za-z])")  # not [Header], which begins some instruments' texts
 _FOREIGN = {
     b"TDSh": "a TDMS index: send the .tdms file itself",
     b"PK\x03\x04": "a ZIP archive: send the files in it",
@@ -130,7 +132,7 @@ def _text_format(head: bytes, file: str) -> str:
     except FileError as error:
         known = "campaign JSON and HDF5, CSV, TDMS, LVM, UFF58 and MATLAB files"
         raise FileError(file, error.place, f"is of no format that is read here: {known}") from None
-    if start[:1] in ("{", "["):
+    if start[:1] == "{" or _JSON_LIST.match(start):
         return "JSON"
     if start.startswith(lvm_file.MAGIC):
         return "LVM"

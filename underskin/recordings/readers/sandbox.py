@@ -51,10 +51,16 @@ def parse_apart(name: str, stream: BinaryIO, file: str, limits: ParsingLimits = 
     if "document" in contents:
         return dict(contents["document"])
     blocks = [
-        Block(**{**block, "channels": tuple(Channel(**channel) for channel in block["channels"])})
+        Block(
+            **{
+                **block,
+                "channels": tuple(Channel(**channel) for channel in block["channels"]),
+                "group_starts": tuple(block["group_starts"]),
+            }
+        )
         for block in contents["blocks"]
     ]
-    return Contents(tuple(blocks), contents["properties"], tuple(contents["warnings"]))
+    return Contents(tuple(blocks), contents["properties"], tuple(contents["warnings"]), contents["layout"])
 
 
 def call_apart(

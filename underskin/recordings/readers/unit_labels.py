@@ -28,6 +28,7 @@ _WHOLE = {
     "sec": ("time", 1.0),
     "min": ("time", 60.0),
 }
+_BEHIND = re.compile(r"(?P<name>.*[^\s,])(\s*/\s*|\s+in\s+|\s*,\s*)(?P<unit>[^\s/,]+(/[^\s/,]+)?)\s*")
 _IN_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$")
 
 
@@ -67,14 +68,21 @@ def field_unit(field: str) -> Unit:
 
 
 def labelled_unit(heading: str) -> str:
-    """The unit in a column's heading: in brackets at its end, behind its last underscore, or none (empty)."""
+    """The unit in a column's heading, or none (empty): in brackets at its end; or, where it is a known one, behind its
+    last underscore, a stroke, a comma or "in" (Kraft / mN)."""
     if heading in LAB:
         return LAB[heading].unit
     bracketed = _IN_BRACKETS.match(heading[-LONGEST_NAME:])
     if bracketed:
         return bracketed["unit"].strip()
     _, underscore, last = heading.rpartition("_")
-    return last if underscore and unit(last) is not None else ""
+    if underscore and unit(last) is not None:
+        return last
+    behind = _BEHIND.fullmatch(heading[-LONGEST_NAME:])
+    if behind is None or unit(behind["unit"]) is None:
+        return ""
+    whole = heading.split()[-1]  # FRF pC/N is not in N
+    return "" if "/" in whole and unit(whole) is not None else behind["unit"]
 
 
 def lab_field(heading: str) -> tuple[str, float] | None:

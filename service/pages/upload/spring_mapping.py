@@ -1,0 +1,117 @@
+"""The part of a mapping form that is about a spring: its deflection, its constant, and what a curve is in a file."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from service.pages.upload.file_summary import ChannelSummary
+from underskin.errors import InvalidInput, wrong_type
+from underskin.recordings.readers.unit_labels import labelled_unit, unit
+
+DEFLECTION = "deflection"  # what a channel can be in the form beside a campaign's fields
+SPRING = "spring_constant_n_per_m"
+CURVES = {
+    "": "each part of the file",
+    "file": "the whole file",
+    "groups": "each group of rows, apart by blank or comment lines",
+    "channel": "the rows with one value in a channel:",
+    "segments": "the rows until a channel of segments falls:",
+}
+_OF_SPRING = ("deflection", "cantilever", "durchbiegung")
+_SIGNAL = ("channel", "unit", "labelled", "sign", "sensitivity", "sensitivity_unit")
+_DIGITS = 12  # that the conversion between N/m and N/mm leaves
+
+
+def guessed(
+    fields: dict[str, Any], channels: Sequence[ChannelSummary], properties: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The channels by field, and where none is a force, a deflection instead.
+
+    It makes the force, and the stage's travel a depth; the constant is a property of the file in N/m, if there is one.
+    """
+    lengths = [one for one in channels if (known := unit(one.unit)) and known.dimension == "length"]
+    springs = [one.name for one in lengths if any(word in one.name.lower() for word in _OF_SPRING)]
+    travel = next((one.name for one in lengths if one.name not in springs), None)
+    if "force_n" in fields or not springs or travel is None:
+        return fields
+    deflection = {"channel": springs[0]}
+    constant = next((one for one in properties if _is_stiffness(labelled_unit(one))), None)
+    force = {} if constant is None else {"force_n": {**deflection, SPRING: {"property": constant}}}
+    return {**fields, "displacement_mm": {"channel": travel, DEFLECTION: deflection}, **force}
+
+
+def _is_stiffness(label: str) -> bool:
+    known = unit(label)
+    return known is not None and known.dimension == "force/length"
+
+
+def shown_as(document: Mapping[str, Any], name: str) -> tuple[str, Mapping[str, Any]]:
+    """What a channel is in the form, and how it is read; empty where it is not used."""
+    for field, how in document.get("channels", {}).items():
+        if how.get(DEFLECTION, {}).get("channel") == name:
+            return DEFLECTION, how[DEFLECTION]
+        if how.get("channel") == name:
+            return (DEFLECTION if SPRING in how else field), how
+    return "", {}
+
+
+def spring_constant(document: Mapping[str, Any]) -> Any:
+    """The constant [N/m] that the form shows: a number, `{property: NAME}`, or None."""
+    channels = document.get("channels", {})
+    given = channels.get("force_n", {}).get(SPRING)
+    stiffness = channels.get("displacement_mm", {}).get("stiffness_n_per_mm")
+    return given if stiffness is None else _rounded(1e3 * stiffness)
+
+
+def is_travel(document: Mapping[str, Any]) -> bool:
+    """Whether the displacement is a stage's travel, from which a deflection is subtracted."""
+    how = document.get("channels", {}).get("displacement_mm", {})
+    return DEFLECTION in how or "stiffness_n_per_mm" in how
+
+
+def with_spring(
+    channels: dict[str, Any], form: Mapping[str, str], constant: Any, base: Mapping[str, Any]
+) -> tuple[dict[str, Any], list[InvalidInput]]:
+    """The channels with the deflection where it belongs, and what cannot be; `constant` is as the form says it.
+
+    A form that does not say what the displacement is leaves that as in `base`.
+    """
+    channels = {field: dict(how) for field, how in channels.items()}
+    deflection = channels.pop(DEFLECTION, None)
+    displacement = channels.get("displacement_mm")
+    if "travel" not in form:
+        for field, name in (("displacement_mm", DEFLECTION), ("force_n", SPRING)):
+            before = base.get(field, {})
+            if name in before and channels.get(field, {}).get("channel") == before.get("channel"):
+                channels[field][name] = before[name]
+        return channels, []
+    if deflection is not None and constant is not None and "force_n" not in channels:
+        channels["force_n"] = {**_signal(deflection), SPRING: constant}
+    if displacement is None:
+        return channels, []
+    displacement.pop("stiffness_n_per_mm", None)
+    if not form["travel"]:
+        return channels, []
+    if deflection is not None:
+        displacement[DEFLECTION] = _signal(deflection)
+    elif isinstance(constant, float):
+        displacement["stiffness_n_per_mm"] = _rounded(1e-3 * constant)
+    else:
+        must = "must be a number where the force is measured, or say which channel is the deflection"
+        return channels, [wrong_type(SPRING, constant and str(constant), must)]
+    return channels, []
+
+
+def _signal(how: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: how[name] for name in _SIGNAL if name in how}
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")
+
+
+def curves_of(form: Mapping[str, str], base: Any) -> Any:
+    """What a curve is, as the form says; as in `base` where it does not."""
+    said = form.get("curves")
+    if said is None:
+        return base
+    return {said: form.get("curves-by", "")} if said in ("channel", "segments") else said or None

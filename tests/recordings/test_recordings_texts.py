@@ -1,0 +1,145 @@
+"""Text tables as instruments write them: what is above the numbers, what is between them, how they are separated."""
+
+import tempfile
+
+import numpy as np
+import pytest
+
+from tests.recordings.contents_of_files import contents
+from underskin.errors import FileError
+from underskin.recordings import read_contents
+from underskin.recordings.channels import Contents
+from underskin.recordings.readers.sandbox import parse_apart
+
+DEPTH = np.concatenate([np.linspace(-0.5, 1.5, 9), np.linspace(1.25, -0.5, 8)])
+FORCE = np.where(DEPTH > 0, 0.25 * np.abs(DEPTH) ** 1.5, 0.0).round(6)
+
+
+def rows(separator: str, decimal: str = ".", extra: str = "", part: slice = slice(None)) -> list[str]:
+    """The curve, a line a sample, with cells more at its end."""
+    numbers = [f"{depth:.4f}{separator}{force:.6f}" for depth, force in zip(DEPTH[part], FORCE[part], strict=True)]
+    return [line.replace(".", decimal) + extra for line in numbers]
+
+
+BOTH = [("Depth", "um"), ("Force", "mN")]
+LABELLED = [("Depth (um)", "um"), ("Force (mN)", "mN")]
+
+TEXTS = {
+    "labview, names above the end of the header": (
+        ["Operator\tmb", "Depth (um)\tForce (mN)", "Date\t2025/05/12", "***End_of_Header***", *rows("\t")],
+        LABELLED,
+    ),
+    "a marker between names and numbers": (["Version 4", "Depth (um)\tForce (mN)", "eoh", *rows("\t")], LABELLED),
+    "a marker under the units": (["Version 4", "Depth;Force", "um;mN", "eoh", *rows(";")], BOTH),
+    "units in brackets under the names": (["TriboScan", "Depth\tForce", "(um)\t(mN)", "", *rows("\t")], BOTH),
+    "decimal commas and semicolons": (
+        ["Prüfer;Müller", "Depth / um;Force / mN", *rows(";", ",")],
+        [("Depth / um", "um"), ("Force / mN", "mN")],
+    ),
+    "blanks, one in each name": (["Indentation of PDMS", "Depth (um) Force (mN)", *rows(" ")], LABELLED),
+    "blanks, two between names": (["PDMS, 10:1", "Depth (um)   Force (mN)", *rows("   ")], LABELLED),
+    "blanks and decimal commas": (
+        ["Depth[um] Force[mN]", *rows(" ", ",")],
+        [("Depth[um]", "um"), ("Force[mN]", "mN")],
+    ),
+    "comments as a header": (
+        [
+            "# JPK export",
+            "# columns: height vDeflection",
+            '# fancyNames: "Depth" "Force"',
+            "# units: um mN",
+            *rows(" "),
+        ],
+        BOTH,
+    ),
+    "names in a comment": (["% Depth (um), Force (mN)", *rows(", ")], LABELLED),
+    "labelled lines of names and units": (["Names: Depth, Force", "Units: um, mN", *rows(",")], BOTH),
+    "an empty last column": (["Depth (um);Force (mN);", *rows(";", extra=";")], LABELLED),
+    "a section's name in brackets first": (["[Header]", "Depth (um),Force (mN)", *rows(",")], LABELLED),
+    "numbers in the header": (
+        ["Scan\t1\tX\t2", "k (N/m)\t0.019", "", "Depth (um)\tForce (mN)", *rows("\t")],
+        LABELLED,
+    ),
+}
+
+
+def the_curve(found: Contents, names: list[tuple[str, str]]) -> None:
+    (block,) = found.blocks
+    assert [(one.name, one.unit) for one in block.channels] == names
+    depth, force = block.channels
+    assert depth.values == pytest.approx(DEPTH)
+    assert force.values == pytest.approx(FORCE)
+
+
+@pytest.mark.parametrize("ends", ["\n", "\r\n", "\r", "\r\r\n"], ids=["LF", "CRLF", "CR", "CRCRLF"])
+@pytest.mark.parametrize("what", TEXTS)
+def test_names_units_and_numbers_are_found(what: str, ends: str) -> None:
+    lines, names = TEXTS[what]
+    the_curve(contents(ends.join(lines).encode(), "curve.txt"), names)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
+def test_a_byte_order_mark_is_no_part_of_a_name(encoding: str) -> None:
+    lines = ["Depth (µm)\tForce (mN)", *rows("\t")]
+    the_curve(contents("\r".join(lines).encode(encoding), "curve.txt"), [("Depth (µm)", "µm"), LABELLED[1]])
+
+
+def test_how_a_text_was_read_is_said() -> None:
+    text = "\n".join(["Prüfer;mb", "Depth;Force", "um;mN", "eoh", *rows(";", ",")]).encode()
+    written = "rows of 2 numbers from line 5 to 21, separated by semicolons, with decimal commas"
+    assert contents(text, "curve.txt").layout == f"{written}; names from line 2, units from line 3"
+    assert contents("\n".join(rows(" ")).encode(), "curve.txt").layout.endswith("no names above them")
+
+
+@pytest.mark.parametrize("cells", [("mb", "mb"), ("begin", ""), ("12:00:01", "12:00:02")])
+@pytest.mark.parametrize("place", ["first", "last"])
+def test_columns_of_text_are_left_out_with_a_warning(cells: tuple[str, str], place: str) -> None:
+    said = [cells[0], *[cells[1]] * (len(DEPTH) - 1)]
+    names = "Depth (um);Force (mN)"
+    lines = [f"Note;{names}" if place == "first" else f"{names};Note"]
+    lines += [
+        f"{note};{row}" if place == "first" else f"{row};{note}" for note, row in zip(said, rows(";"), strict=True)
+    ]
+    found = contents("\n".join(lines).encode(), "curve.txt")
+    the_curve(found, LABELLED)
+    assert found.warnings == (f"column 'Note' holds text, such as {cells[0]!r}, and is left out",)
+
+
+def test_text_among_a_columns_numbers_is_refused_by_line() -> None:
+    lines = ["Time;Depth (um);Force (mN)", *(f"{number};{row}" for number, row in enumerate(rows(";")))]
+    for place in (5, 12):
+        wrong = [*lines[:place], "x" + lines[place], *lines[place + 1 :]]
+        with pytest.raises(FileError, match=rf"line {place + 1}: must be a row of 3 numbers.*found 'x{place - 1};"):
+            read_contents("\n".join(wrong).encode(), "curve.txt")
+
+
+def test_comments_may_part_the_rows_and_state_properties() -> None:
+    there, back = slice(9), slice(9, None)
+    lines = ["# springConstant: 0.05", "# k (N/m) = 3", "# segment: extend", "# columns: Depth Force", "# units: um mN"]
+    text = [*lines, *rows(" ", part=there), "", "# segment: retract", *lines[3:], *rows(" ", part=back)]
+    found = contents("\n".join(text).encode(), "curve.txt")
+    the_curve(found, BOTH)
+    assert found.blocks[0].group_starts == (0, 9)
+    assert found.properties["springConstant"] == "0.05"
+    assert found.properties["k (N/m)"] == "3"
+
+
+def test_curves_under_headings_of_their_own_are_parts() -> None:
+    text = [line for name in ("a", "b") for line in (f"Curve;{name}", "Depth (um);Force (mN)", *rows(";"), "")]
+    found = contents("\n".join(text).encode(), "curves.txt")
+    assert [block.name for block in found.blocks] == ["1", "2"]
+    assert found.properties == {"Curve": "a", "1.Curve": "a", "2.Curve": "b"}
+    for block in found.blocks:
+        the_curve(Contents((block,)), LABELLED)
+
+
+def test_a_large_text_that_is_read_apart_says_the_same() -> None:
+    text = "\n".join(["Note;Depth (um);Force (mN)", *(f"x;{row}" for row in rows(";")), "", "x;1;2", "x;2;3"]).encode()
+    here = contents(text, "curves.txt")
+    with tempfile.TemporaryFile() as stream:
+        stream.write(text)
+        stream.flush()
+        apart = parse_apart("CSV", stream, "curves.txt")
+    assert isinstance(apart, Contents)
+    assert (apart.layout, apart.warnings) == (here.layout, here.warnings)
+    assert apart.blocks[0].group_starts == here.blocks[0].group_starts == (0, len(DEPTH))

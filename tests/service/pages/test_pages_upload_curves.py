@@ -1,0 +1,121 @@
+"""An indentation on the upload page: its curve is there at once, from a force or from a spring's deflection."""
+
+import base64
+import html
+import re
+from typing import Any
+
+import httpx
+import numpy as np
+import orjson
+import pytest
+
+from tests.service.pages.forms import BROWSING, token_of
+from tests.support.store_server import Server
+
+DEPTH_UM = np.linspace(-0.5, 1.5, 17)
+FORCE_UN = np.where(DEPTH_UM > 0, 20 * np.abs(DEPTH_UM) ** 1.5, 0.0)
+DEFLECTION_UM = FORCE_UN / 3  # 3 N/m
+
+
+def table(columns: dict[str, Any], above: str = "") -> str:
+    rows = zip(*columns.values(), strict=True)
+    return "\n".join([above, "\t".join(columns), "eoh", *("\t".join(f"{one:.9g}" for one in row) for row in rows)])
+
+
+class Upload:
+    """One file on its page, without a browser."""
+
+    def __init__(self, client: httpx.Client, content: str) -> None:
+        self.client = client
+        form = {"form_token": token_of(client.get("/upload").text)}
+        answer = client.post("/upload", data=form, files={"file": ("curve.txt", content.encode())})
+        self.address, self.page = answer.headers["location"], ""
+        self.look()
+
+    def look(self) -> None:
+        self.page = self.client.get(self.address).text
+
+    def say(self, **changes: str) -> None:
+        """Send the form as the page has it, with changes."""
+        form = dict(re.findall(r'<input type="hidden" name="((?:channel|label)-\d+)" value="([^"]*)"', self.page))
+        for name, body in re.findall(r'<select[^>]* name="([^"]+)"[^>]*>(.*?)</select>', self.page, re.DOTALL):
+            chosen = re.search(r'value="([^"]*)" selected', body)
+            form[name] = chosen[1] if chosen else ""
+        for tag in re.findall(r"<input (?!type)[^>]*>", self.page):
+            name, value = re.search(r'name="([^"]+)"', tag), re.search(r'value="([^"]*)"', tag)
+            if name and value:
+                form[name[1]] = value[1]
+        sent = {name: html.unescape(value) for name, value in form.items()} | changes
+        token = {"form_token": token_of(self.page)}
+        assert self.client.post(f"{self.address}/mapping", data=sent | token).status_code == 303
+        self.look()
+
+    @property
+    def curve(self) -> tuple[np.ndarray, np.ndarray]:
+        """Depth [mm] and force [N] of the figure."""
+        drawn = re.search(r'id="figure-curves".*?<script type="application/json">(.*?)</script>', self.page, re.DOTALL)
+        assert drawn is not None
+        (trace,) = orjson.loads(html.unescape(drawn[1]))["data"]
+        return tuple(decoded(trace[axis]) for axis in "xy")  # type: ignore[return-value]
+
+
+def decoded(values: Any) -> np.ndarray:
+    """Numbers as plotly writes them."""
+    if isinstance(values, dict):
+        return np.frombuffer(base64.b64decode(values["bdata"]), values["dtype"])
+    return np.array(values)
+
+
+@pytest.fixture
+def client(server: Server) -> Any:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as opened:
+        yield opened
+
+
+def test_a_curve_is_drawn_before_anything_else_is_known(client: httpx.Client) -> None:
+    upload = Upload(client, table({"Depth (um)": DEPTH_UM, "Force (uN)": FORCE_UN}))
+    assert "<b>No recording</b> understood yet" in upload.page
+    depth, force = upload.curve
+    assert depth == pytest.approx(1e-3 * DEPTH_UM, rel=1e-5)
+    assert force == pytest.approx(1e-6 * FORCE_UN, rel=1e-5)
+    said = html.unescape(upload.page)
+    assert "rows of 2 numbers from line 4 to 20, separated by tabs, with decimal points; names from line 2" in said
+    assert "<b>displacement</b>: 'Depth (um)' in um: -0.0005 to 0.0015 mm" in said
+    assert upload.page.index('id="figure-curves"') < upload.page.index('id="mapping"')
+
+
+def test_a_heading_s_unit_is_overridden_in_the_form(client: httpx.Client) -> None:
+    upload = Upload(client, table({"Depth (nm)": DEPTH_UM, "Force (uN)": FORCE_UN}))
+    assert upload.curve[0].max() == pytest.approx(1.5e-6)
+    upload.say(**{"unit-0": "um"})
+    assert upload.curve[0].max() == pytest.approx(1.5e-3)
+    assert "is labelled 'nm'; the rig description says 'um'" in html.unescape(upload.page)
+
+
+def test_force_and_depth_come_from_a_deflection_in_the_form(client: httpx.Client) -> None:
+    raw = {"Piezo (um)": DEPTH_UM + DEFLECTION_UM, "Deflection (nm)": 1e3 * DEFLECTION_UM}
+    stated = Upload(client, table(raw, "k (N/m)\t3"))
+    assert stated.curve[1] == pytest.approx(1e-6 * FORCE_UN, rel=1e-5)
+    upload = Upload(client, table(raw))
+    assert 'id="figure-curves"' not in upload.page
+    upload.say(spring_constant_n_per_m="3", indenter_radius_mm="0.0075", units_checked="yes")
+    assert "<b>1</b> recording understood" in upload.page
+    depth, force = upload.curve
+    assert depth == pytest.approx(1e-3 * DEPTH_UM, abs=1e-9)
+    assert force == pytest.approx(1e-6 * FORCE_UN, rel=1e-5)
+    before = client.get(f"{upload.address}/rig.json").json()
+    assert before["channels"] == {
+        "displacement_mm": {"channel": "Piezo (um)", "deflection": {"channel": "Deflection (nm)"}},
+        "force_n": {"channel": "Deflection (nm)", "spring_constant_n_per_m": 3.0},
+    }
+    upload.say(units_checked="yes")
+    assert client.get(f"{upload.address}/rig.json").json() == before
+
+
+def test_curves_of_one_file_are_told_apart_in_the_form(client: httpx.Client) -> None:
+    one = table({"Depth (um)": DEPTH_UM, "Force (uN)": FORCE_UN})
+    upload = Upload(client, one + "\n\n" + one.partition("eoh\n")[2])
+    upload.say(curves="groups", indenter_radius_mm="0.0075", units_checked="yes")
+    assert "<b>2</b> recordings understood" in upload.page
+    assert client.get(f"{upload.address}/rig.json").json()["curves"] == "groups"

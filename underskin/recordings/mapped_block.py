@@ -1,0 +1,190 @@
+"""The fields of one recording, out of the channels of one block, as a rig description has them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from underskin.errors import FileError, Mention, Requirement
+from underskin.recordings.channel_mapping import ChannelMapping, SignalMapping
+from underskin.recordings.channels import Block, Channel, Values
+from underskin.recordings.readers.unit_labels import unit
+from underskin.recordings.rig_description import COMPLEX_FRF, RigDescription
+from underskin.recordings.shown_values import shown
+from underskin.recordings.stated_values import Stated, factor, spring_constant
+from underskin.units import LAB, Floats
+
+_SAMPLING_JITTER = 0.01  # of a sample: more is not evenly sampled
+
+
+class MappedBlock:
+    """The fields of one recording, out of one block, what was `taken` for each, in words, and the `warnings` on them;
+    `stated` is what the file says about itself."""
+
+    def __init__(self, rig: RigDescription, block: Block, stated: Stated, file: str) -> None:
+        self.rig = rig
+        self.block = block
+        self.stated = stated
+        self.file = file
+        self.warnings: list[str] = []
+        self.taken: dict[str, str] = {}
+
+    def fields(self) -> dict[str, Any]:
+        """The columns."""
+        values = {field: self._values(field, mapping) for field, mapping in self.rig.channels.items()}
+        if COMPLEX_FRF in values:
+            frf = values.pop(COMPLEX_FRF)
+            values |= {"frf_re_pc_per_n": frf.real, "frf_im_pc_per_n": frf.imag}
+        if any(np.iscomplexobj(column) for column in values.values()):
+            only = Requirement("a channel of complex numbers can only be ", Mention(COMPLEX_FRF))
+            raise self._error("", only)
+        columns: dict[str, Any] = {field: np.asarray(column, dtype=float) for field, column in values.items()}
+        columns = self._without_instrument(columns)
+        self._say_ranges(columns)
+        self._require_known_sign(columns)
+        if self.rig.kind == "frf":
+            return self._frf(columns)
+        rate = self.block.sample_rate_hz
+        if rate is not None and "time_s" not in columns:
+            columns["time_s"] = np.arange(len(columns[next(iter(columns))])) / rate
+        return columns
+
+    def spring(self) -> dict[str, float]:
+        """The stiffness of the spring whose deflection was subtracted: a contact that sticks comes off by it."""
+        force = self.rig.channels.get("force_n", ChannelMapping(""))
+        displacement = self.rig.channels.get("displacement_mm", ChannelMapping(""))
+        spring = force.spring_constant_n_per_m
+        if self.rig.kind != "indentation" or displacement.deflection is None or spring is None:
+            return {}
+        return {"stage_stiffness_n_per_mm": 1e-3 * spring_constant(spring, self.stated, self.file)}
+
+    def _values(self, field: str, mapping: ChannelMapping) -> Values:
+        spring = mapping.spring_constant_n_per_m
+        if spring is not None:
+            constant = spring_constant(spring, self.stated, self.file)
+            deflection, how = self._signal("displacement_mm", mapping)
+            self.taken[field] = f"{how}, a deflection, times {constant:g} N/m"
+            return deflection * 1e-3 * constant
+        values, self.taken[field] = self._signal(field, mapping)
+        if mapping.deflection is None:
+            return values
+        deflection, how = self._signal(field, mapping.deflection)
+        if len(deflection) != len(values):
+            channels = f"{mapping.channel!r} and {mapping.deflection.channel!r}"
+            raise self._error("", f"{channels} differ in length: no deflection can be subtracted")
+        self.taken[field] += f", less the deflection {how}"
+        return values - deflection
+
+    def _signal(self, field: str, mapping: SignalMapping) -> tuple[Values, str]:
+        """A channel's values in the unit of a field, and in words what was taken."""
+        channel = self.block.channel(mapping.channel)
+        assert channel is not None
+        place = f"channel {channel.name!r}"
+        if len(channel.values) == 0:
+            raise self._error(place, "holds no values")
+        if field == "coherence":
+            return channel.values, repr(channel.name)
+        target = "frf_re_pc_per_n" if field == COMPLEX_FRF else field
+        label = self._true_unit(channel, mapping, place)
+        scale = self._scale(target, label, mapping, place)
+        through = f" through {mapping.sensitivity:g} {mapping.sensitivity_unit}" if mapping.sensitivity else ""
+        turned = ", turned round" if mapping.sign == -1 else ""
+        with np.errstate(all="ignore"):
+            return channel.values * (mapping.sign or 1) * scale, f"{channel.name!r} in {label}{through}{turned}"
+
+    def _true_unit(self, channel: Channel, mapping: SignalMapping, place: str) -> str:
+        """The rig's unit, else the file's label.
+
+        A label of the same dimension may be wrong, with a warning; one of another must be acknowledged, since then the
+        channel may be the wrong one.
+        """
+        if mapping.labelled is not None:
+            if mapping.labelled != channel.unit:
+                raise self._error(place, f"is labelled {channel.unit!r}, not {mapping.labelled!r} as the rig says")
+            self.warnings.append(f"{place} is labelled {channel.unit!r}; the rig description says {mapping.unit!r}")
+            return mapping.unit or ""
+        true, labelled = unit(mapping.unit or ""), unit(channel.unit)
+        if mapping.unit and labelled is not None and true != labelled:
+            reason = f"is labelled {channel.unit!r}, but the rig description says {mapping.unit!r}"
+            if true is None or true.dimension != labelled.dimension:
+                raise self._error(place, f"{reason}: if the label is wrong, add labelled: {channel.unit}")
+            self.warnings.append(f"{place} {reason}, which counts")
+        label = mapping.unit or channel.unit
+        if not label:
+            raise self._error(
+                place, "has no unit in the file: say it, as `unit` of the rig description or as its true unit"
+            )
+        return label
+
+    def _scale(self, field: str, label: str, mapping: SignalMapping, place: str) -> float:
+        """From the channel's unit to the field's, through the sensitivity where there is one."""
+        if mapping.sensitivity is None or mapping.sensitivity_unit is None:
+            return factor(label, field, self.file, place, "; a signal in volts needs its sensitivity")
+        above, _, below = mapping.sensitivity_unit.rpartition("/")
+        given = unit(label)
+        for signal, quantity, sensitivity in (
+            (above, below, 1 / mapping.sensitivity),
+            (below, above, mapping.sensitivity),  # nm/V, as those of cantilevers are stated
+        ):
+            divided = unit(signal)
+            if given is not None and divided is not None and given.dimension == divided.dimension:
+                return given.to_si / divided.to_si * sensitivity * factor(quantity, field, self.file, place)
+        raise self._error(place, f"its unit {label!r} is not of the sensitivity's {mapping.sensitivity_unit!r}")
+
+    def _without_instrument(self, columns: Mapping[str, Any]) -> dict[str, Any]:
+        """The columns, their displacement without the instrument's own give, force over its stiffness."""
+        stiffness = self.rig.channels.get("displacement_mm", ChannelMapping("")).stiffness_n_per_mm
+        if stiffness is None:
+            return dict(columns)
+        if len(columns["displacement_mm"]) != len(columns["force_n"]):
+            both = (Mention("displacement_mm"), " and ", Mention("force_n"))
+            reason = Requirement(*both, " differ in length: no stiffness can be applied")
+            raise self._error("", reason)
+        self.taken["displacement_mm"] += f", less the force over {stiffness:g} N/mm"
+        return {**columns, "displacement_mm": columns["displacement_mm"] - columns["force_n"] / stiffness}
+
+    def _say_ranges(self, columns: Mapping[str, Any]) -> None:
+        for field, column in columns.items():
+            finite = column[np.isfinite(column)]
+            if field in LAB and field in self.taken and len(finite):
+                self.taken[field] += f": {finite.min():.4g} to {finite.max():.4g} {LAB[field].unit}"
+
+    def _require_known_sign(self, columns: Mapping[str, Any]) -> None:
+        """Force must rise with displacement, unless the rig says a sign for both."""
+        signs = [self.rig.channels[name].sign for name in ("displacement_mm", "force_n") if name in self.rig.channels]
+        if len(signs) < 2 or None not in signs or len(columns["displacement_mm"]) != len(columns["force_n"]):
+            return
+        with np.errstate(all="ignore"):
+            together = np.mean(_centred(columns["displacement_mm"]) * _centred(columns["force_n"]))
+        if together < 0:
+            reason = "force falls as the displacement grows, and compression is positive here"
+            how = (Mention("displacement_mm"), " and ", Mention("force_n"))
+            raise self._error("channels", Requirement(f"{reason}: say sign: 1 or sign: -1 for ", *how))
+
+    def _frf(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """Without the line at 0 Hz; time series with their sample rate."""
+        time = given.get("time_s")
+        columns = {name: column for name, column in given.items() if name != "time_s"}
+        frequency = columns.get("frequency_hz")
+        if frequency is not None and len(frequency) > 1 and frequency[0] == 0:
+            self.warnings.append("the line at 0 Hz is left out")
+            return {name: column[1:] for name, column in columns.items()}
+        if "force_n" in columns and "sample_rate_hz" not in self.rig.recording:
+            rate = self.block.sample_rate_hz if time is None else self._rate(time)
+            return columns if rate is None else {**columns, "sample_rate_hz": rate}
+        return columns
+
+    def _rate(self, time: Floats) -> float:
+        with np.errstate(all="ignore"):
+            step = (time[-1] - time[0]) / max(len(time) - 1, 1)
+            jitter = np.abs(time - (time[0] + step * np.arange(len(time)))).max()
+        if not (step > 0 and jitter <= _SAMPLING_JITTER * step):
+            raise self._error("time_s", f"samples are not evenly spaced (step {shown(step)} s)")
+        return float(1 / step)
+
+    def _error(self, place: str, reason: str | Requirement) -> FileError:
+        return FileError(self.file, place, reason)
+
+
+def _centred(column: Floats) -> Floats:
+    return column - column.mean()
