@@ -4,7 +4,7 @@ The rig shares no code with the diagnosis, and its strengths and scatter are its
 by the seed; a shorter list is the beginning of the longer one.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import partial
 from typing import Any
@@ -45,11 +45,21 @@ def judge_quiet_curves(work: Work, progress: Callable[[int, int], None]) -> dict
 
 def _judge(work: Work, cases: list[DrawnCurves], progress: Callable[[int, int], None]) -> dict[str, Any]:
     truths = of_each(work, cases, partial(truth, work, sources("rig")), progress)
-    judged = [
-        judge(case.name, report, known)
-        for case, report, known in zip(cases, reports(work, cases, progress), truths, strict=True)
-    ]
-    return {"judged": [asdict(entry) for entry in judged], "truths": truths}
+    answers = reports(work, cases, progress)
+    judged = [judge(case.name, report, known) for case, report, known in zip(cases, answers, truths, strict=True)]
+    return {
+        "judged": [asdict(entry) for entry in judged],
+        "truths": truths,
+        "stated": [_stated(report) for report in answers],
+    }
+
+
+def _stated(report: Mapping[str, Any]) -> dict[str, Any]:
+    """The modulus and the work of adhesion with their intervals, as far as a report has them."""
+    parameters = [entry for mechanism in report["mechanisms"] for entry in mechanism["parameters"]]
+    work = [entry for entry in parameters if entry["name"] == "work_of_adhesion"]
+    modulus = report["fit"]["after"].get("youngs_modulus") if report["fit"] else None
+    return {"youngs_modulus": modulus, "work_of_adhesion": work[0] if work else None}
 
 
 def truth(work: Work, version: str, case: DrawnCurves) -> dict[str, Any]:

@@ -1,19 +1,18 @@
 """docs/proof.md as text: every number in it is computed from the parts that were worked out."""
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
-
-import numpy as np
 
 from proof import own_rig
 from proof.concealed import judged_of
-from proof.judge import QUIET, Judged, shown
+from proof.judge import QUIET, Judged
 from proof.markdown import table
-from proof.statistics import Share, bootstrap, calibration, share
+from proof.phrases import median_of, misses, percent, right
+from proof.statistics import Share, calibration, share
+from proof.text_curves import curves, quiet_curves
 from proof.text_real import paper_array, recordings
 from rig.identifiable import THRESHOLD
-from underskin.units import Floats
 
 Result = Mapping[str, Any]
 
@@ -40,6 +39,8 @@ def document(parts: Mapping[str, Result]) -> str:
         "sealed": _sealed,
         "mixture": lambda result: _mixture(result, parts.get("ceiling")),
         "quiet": _quiet,
+        "curves": curves,
+        "quiet_curves": quiet_curves,
         "recordings": recordings,
         "paper": paper_array,
     }
@@ -51,39 +52,16 @@ def document(parts: Mapping[str, Result]) -> str:
     return "\n".join([_HEAD, *written, tail + state])
 
 
-def _percent(share: Share) -> str:
-    if not share.count:
-        return "none there"
-    low, high = share.interval
-    return f"{share.right} of {share.count}: {100 * share.value:.0f} % [{100 * low:.0f}–{100 * high:.0f}]"
-
-
-def _right(judged: Sequence[Judged]) -> str:
-    return _percent(share([entry.right for entry in judged]))
-
-
-def _misses(judged: Sequence[Judged], identifiable: Collection[str] = ()) -> str:
-    rows = [
-        [entry.name, shown(entry.truth), shown(entry.answer), entry.verdict, f"{entry.probability:.2f}",
-         "identifiable" if entry.name in identifiable else "visible" if entry.visible else "no", f"{entry.size:.1f}"]
-        for entry in judged if not entry.right
-    ]  # fmt: skip
-    if not rows:
-        return "No misses.\n"
-    header = ["campaign", "hidden", "named", "verdict", "probability", "to be seen", "size, units of noise"]
-    return table(header, rows)
-
-
 def _concealed(result: Result) -> str:
     judged = judged_of(result)
     visible = [entry for entry in judged if entry.visible]
     return f"""\
 ## Campaigns of a rig that this project has never seen
 
-Of {len(judged)} open campaigns {len(visible)} are identifiable. Right among these: {_right(visible)}; among all:
-{_right(judged)}.
+Of {len(judged)} open campaigns {len(visible)} are identifiable. Right among these: {right(visible)}; among all:
+{right(judged)}.
 
-{_misses(judged)}"""
+{misses(judged)}"""
 
 
 def _sealed(result: Result) -> str:
@@ -101,7 +79,7 @@ def _mixture(result: Result, ceiling: Result | None) -> str:
     parts = {kind: [entry for entry in visible if entry.kind == kind] for kind in ("none", "single", "pair", "unknown")}
     parts["all"] = visible
     drawn = Counter(entry.kind for entry in judged) + Counter(all=len(judged))
-    rows = [[kind, str(drawn[kind]), _right(entries), _ideal(entries, ceiling), _right(_identifiable(entries, ceiling))]
+    rows = [[kind, str(drawn[kind]), right(entries), _ideal(entries, ceiling), right(_identifiable(entries, ceiling))]
             for kind, entries in parts.items()]  # fmt: skip
     return f"""\
 ## Campaigns of our own rig
@@ -123,7 +101,7 @@ among the rivals: for near-twins (a moving edge and a finite amplitude at one am
 {_held_out(visible)}
 ### Every miss
 
-{_misses(judged, {entry.name for entry in _identifiable(visible, ceiling)})}"""
+{misses(judged, {entry.name for entry in _identifiable(visible, ceiling)})}"""
 
 
 _CEILING = """\
@@ -137,7 +115,7 @@ its true values, so it never overlooks it. Its likelihood treats the scatter of 
 def _ideal(judged: Sequence[Judged], ceiling: Result | None) -> str:
     answers = ceiling["answers"] if ceiling else {}
     right = [tuple(answers[entry.name]["answer"]) == entry.truth for entry in judged if entry.name in answers]
-    return _percent(share(right)) if right else "not run"
+    return percent(share(right)) if right else "not run"
 
 
 def _identifiable(judged: Sequence[Judged], ceiling: Result | None) -> list[Judged]:
@@ -190,13 +168,8 @@ def _held_out(judged: Sequence[Judged]) -> str:
     ratios = [entry.held_out[0] / entry.held_out[1] for entry in judged if entry.held_out]
     if not ratios:
         return ""
-
-    def median(values: Floats) -> Floats:
-        return np.median(values, axis=-1)
-
-    value, low, high = bootstrap(ratios, median)
     return (
-        f"Error on held-out groups after the fit, over the noise floor: median {value:.2f} [{low:.2f}–{high:.2f}] over "
+        f"Error on held-out groups after the fit, over the noise floor: median {median_of(ratios)} over "
         f"{len(ratios)} campaigns (bootstrap).\n"
     )
 
@@ -208,6 +181,6 @@ def _quiet(result: Result) -> str:
 ### False alarms
 
 {len(judged)} of {own_rig.QUIET} campaigns with nothing missing (seed {own_rig.SEED + 1}): a verdict other than
-`no_mismatch` or `insufficient_data` in {_percent(Share(len(alarms), len(judged)))}.
+`no_mismatch` or `insufficient_data` in {percent(Share(len(alarms), len(judged)))}.
 
-{_misses(alarms) if alarms else ""}"""
+{misses(alarms) if alarms else ""}"""

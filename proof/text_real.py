@@ -43,8 +43,9 @@ def recordings(result: Result) -> str:
         report, fit = entry["report"], entry["report"]["fit"]
         errors = (fit["before"]["heldout_rmse_percent"], fit["after"]["heldout_rmse_percent"],
                   fit["noise_floor_percent"]) if fit else (None, None, None)  # fmt: skip
+        plain = [fit[part]["rmse_percent"] for part in ("before", "after")] if fit else [None, None]
         rows.append([entry["name"], f"{report['verdict']} {report['probability']:.2f}", _named(report), _rivals(report),
-                     _moduli(fit),
+                     _moduli(fit), " → ".join(map(_number, plain)),
                      " → ".join(_number(value) for value in errors[:2]) + f" ({_number(errors[2])})"])  # fmt: skip
     stated = table(
         ["campaign", "what the diagnosis was told"], [[entry["name"], entry["stated"]] for entry in result["campaigns"]]
@@ -52,6 +53,7 @@ def recordings(result: Result) -> str:
     where = "\n".join(f"- **{entry['name']}**: {_said(entry['report'])}" for entry in result["campaigns"])
     header = [
         "campaign", "verdict", "named", "rivals", "E before → after, MPa",
+        "least squares, in sample, before → after, %",
         "held-out error before → after (noise floor), %",
     ]  # fmt: skip
     return f"""\

@@ -1,0 +1,119 @@
+"""The page's section on raw indentation curves of this project's rig."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from proof import own_curves
+from proof.concealed import judged_of
+from proof.judge import QUIET, Judged
+from proof.markdown import table
+from proof.phrases import median_of, misses, percent, right
+from proof.statistics import Share, calibration, share
+
+Result = Mapping[str, Any]
+_SURE = 0.9
+_KINDS = ("single", "pair", "unknown")
+
+
+def curves(result: Result) -> str:
+    """Of the campaigns that hide something."""
+    judged = judged_of(result)
+    visible = [entry for entry in judged if entry.one_visible]
+    both = [entry for entry in judged if entry.visible]
+    rows = [
+        [kind, str(sum(entry.kind == kind for entry in judged)), *(_right(part, kind) for part in (visible, both))]
+        for kind in _KINDS
+    ]
+    rows.append(["all", str(len(judged)), right(visible), right(both)])
+    header = ["hidden", "drawn", "right, of the identifiable", "right, where each member is"]
+    return f"""\
+## Raw curves of our own rig
+
+{len(judged)} of {own_curves.MIXTURE} campaigns of raw indentation curves (seed {own_curves.SEED}): air, snap-in, hold,
+way back and pull-off, on the µm and the mm scale, with strengths, noise and laws of the rig's own (docs/rig.md).
+*Identifiable* is what gains more than the rig's threshold in χ² over Hertz' law, both fitted by plain least squares
+under the rig's noise, with the modulus free and a contact point, a force zero and a drift for each curve; beside it, a
+pair of which each member does.
+
+{table(header, rows)}
+{_sure(judged)}
+
+{_calibration(visible)}
+
+{_values(result, judged)}
+
+### Every miss on raw curves
+
+{misses(judged)}"""
+
+
+def quiet_curves(result: Result) -> str:
+    """Of the campaigns that hide nothing."""
+    judged = judged_of(result)
+    alarms = [entry for entry in judged if entry.verdict not in QUIET]
+    return f"""\
+### False alarms on raw curves
+
+{len(judged)} of {own_curves.QUIET} campaigns of raw curves with nothing missing (seed {own_curves.SEED + 1}): a
+verdict other than `no_mismatch` or `insufficient_data` in {percent(Share(len(alarms), len(judged)))}.
+
+{misses(alarms) if alarms else ""}"""
+
+
+def _right(judged: Sequence[Judged], kind: str) -> str:
+    return right([entry for entry in judged if entry.kind == kind])
+
+
+def _sure(judged: Sequence[Judged]) -> str:
+    sure = [entry for entry in judged if entry.probability > _SURE]
+    if not sure:
+        return ""
+    stated = float(np.mean([entry.probability for entry in sure]))
+    return f"Of the answers stated with more than {_SURE:g} (mean {stated:.3f}), right: {right(sure)}."
+
+
+def _calibration(judged: Sequence[Judged]) -> str:
+    if not judged:
+        return ""
+    told = calibration([entry.probability for entry in judged], [entry.right for entry in judged])
+    low, high = told.chance_range
+    return (
+        f"Expected calibration error of the identifiable: {told.error:.3f}; a perfectly calibrated tool would have "
+        f"{low:.3f} to {high:.3f}."
+    )
+
+
+def _values(result: Result, judged: Sequence[Judged]) -> str:
+    """How far modulus and work of adhesion are off where the answer is right, and how often their intervals hold."""
+    rows = []
+    for words, name, true in (
+        ("modulus, adhesion named", "youngs_modulus", _modulus_where_it_sticks),
+        ("work of adhesion", "work_of_adhesion", _work),
+        ("modulus, all right answers", "youngs_modulus", _modulus),
+    ):
+        errors, held = [], []
+        for entry, truth, stated in zip(judged, result["truths"], result["stated"], strict=True):
+            value, known = stated[name], true(truth)
+            if entry.right and value is not None and known is not None:
+                errors.append(100 * abs(value["value"] / known - 1))
+                held.append(value["low"] <= known <= value["high"])
+        if errors:
+            rows.append([words, str(len(errors)), median_of(errors), percent(share(held))])
+    if not rows:
+        return ""
+    header = ["value, where the answer is right", "campaigns", "median error, %", "95 % interval holds the truth"]
+    return table(header, rows)
+
+
+def _modulus(truth: Result) -> float | None:
+    return float(truth["youngs_modulus_mpa"]) if "unknown" not in truth["effects"] else None
+
+
+def _modulus_where_it_sticks(truth: Result) -> float | None:
+    return _modulus(truth) if "adhesion" in truth["effects"] else None
+
+
+def _work(truth: Result) -> float | None:
+    return float(truth["parameters"]["adhesion"]["work_j_per_m2"]) if "adhesion" in truth["effects"] else None
