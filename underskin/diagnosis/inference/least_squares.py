@@ -63,9 +63,11 @@ class LeastSquares:
         lower, upper = (np.empty((2 * _PASSED + 1, len(places))) for _ in range(2))
         for curve, travel in enumerate(self._approach):
             first = np.searchsorted(travel, x[places[curve]]) - 1 - _PASSED
-            cells = np.clip(first + np.arange(len(lower)), 0, len(travel) - 2)
-            lower[:, curve], upper[:, curve] = travel[cells], travel[cells + 1]
+            cells = np.clip(first + np.arange(len(lower)), 0, max(len(travel) - 2, 0))
+            lower[:, curve], upper[:, curve] = travel[cells], travel[np.minimum(cells + 1, len(travel) - 1)]
         lower, upper = (np.clip(edge, self._low[places], self._high[places]) for edge in (lower, upper))
+        shut = lower >= upper  # gaps beyond the contact point's bounds, which then stay as they are
+        lower, upper = np.where(shut, self._low[places], lower), np.where(shut, self._high[places], upper)
         fits = np.tile(x[:count], (len(lower), 1))
         fits[:, places] = (lower + upper) / 2
         force = (1 + x[count:][self._recording]) * self._model.forces(fits)

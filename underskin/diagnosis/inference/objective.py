@@ -50,6 +50,12 @@ class Points:
         return Points(self.owner[points], self.fit[points], self.covariance[points], self.bend[points])
 
 
+def together(one: Points, other: Points) -> Points:
+    """The points of both, which are of one hypothesis."""
+    names = "owner", "fit", "covariance", "bend"
+    return Points(*(np.concatenate([getattr(one, name), getattr(other, name)]) for name in names))
+
+
 @dataclass(frozen=True)
 class Evaluated:
     """Points with what was worked out there; `cost` is minus the log posterior density (up to what all share).

@@ -9,7 +9,7 @@ from scipy.ndimage import minimum_filter
 
 from underskin.diagnosis.inference.curve_starts import softer, with_contact_points
 from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis, own_places
-from underskin.diagnosis.inference.objective import Points
+from underskin.diagnosis.inference.objective import Points, together
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.mechanisms.base import Parameter
 from underskin.mechanisms.registry import CATALOGUE
@@ -73,7 +73,13 @@ def _of_curves(
     if fitter.lines.kind == "indentation" and (sticks or not known):
         several = with_contact_points(fitter, softer(fitter, several) if sticks else several)
     kept = _KEPT_OF_PARENT if grown else _KEPT_STARTS
-    return several.points[np.sort(_cheapest(several)[:kept])]
+    chosen = several.points[np.sort(_cheapest(several)[:kept])]
+    if not (sticks and guessed):
+        return chosen
+    # What the null hypothesis made of modulus and contact points may lead away from where the jumps are.
+    own = fitter.hypotheses[0].own_parameters
+    begun = fitter.begin(lowest.points.fit[count:, :own])
+    return together(chosen, begun.points[_cheapest(begun)[:1]])
 
 
 def _cheapest(at: Evaluated) -> NDArray[np.intp]:
