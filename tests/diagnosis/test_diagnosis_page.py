@@ -143,17 +143,20 @@ def test_it_needs_nothing_from_outside(text: str) -> None:
     assert "http" not in policy
 
 
+def drawn_by_a_browser(text: str, folder: Path) -> str:
+    """The document of a page after its scripts have run."""
+    assert CHROMIUM is not None
+    file = folder / "page.html"
+    file.write_text(text, encoding="utf-8")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=10000", "--dump-dom"]
+    command = [CHROMIUM, *options, f"--user-data-dir={folder / 'profile'}", file.as_uri()]
+    return subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
+
+
 @pytest.mark.browser
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 def test_a_browser_draws_every_figure(text: str, tmp_path: Path) -> None:
-    assert CHROMIUM is not None
-    file = tmp_path / "page.html"
-    file.write_text(text, encoding="utf-8")
-    options = ["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=10000", "--dump-dom"]
-    drawn = subprocess.run(
-        [CHROMIUM, *options, f"--user-data-dir={tmp_path / 'profile'}", file.as_uri()],
-        capture_output=True, text=True, check=True, timeout=120,
-    ).stdout  # fmt: skip
+    drawn = drawn_by_a_browser(text, tmp_path)
     for name in ("where", "before_after", "explanations", "parameters"):
         part = drawn[drawn.index(f'id="figure-{name}"') :]
         assert "main-svg" in part[: part.index("</script>")]
@@ -163,23 +166,12 @@ def test_a_browser_draws_every_figure(text: str, tmp_path: Path) -> None:
 @pytest.mark.browser
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 def test_a_list_that_keys_reach_chooses_the_recording(document: dict[str, Any], tmp_path: Path) -> None:
-    assert CHROMIUM is not None
-    file = tmp_path / "page.html"
-    text = page(document, {"curve": adhesive_figure()})
     choosing = "const list = document.querySelector('label select'); list.selectedIndex = 1; "
     choosing += "list.dispatchEvent(new Event('change')); document.title = "
     choosing += "document.getElementById('figure-curve').data.filter((t) => t.visible).map((t) => t.meta.recording);"
-    file.write_text(
-        text.replace(
-            "</html>", f"<script>addEventListener('load', () => setTimeout(() => {{{choosing}}}, 500))</script></html>"
-        ),
-        encoding="utf-8",
-    )
-    options = ["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=10000", "--dump-dom"]
-    shown = subprocess.run(
-        [CHROMIUM, *options, f"--user-data-dir={tmp_path / 'profile'}", file.as_uri()],
-        capture_output=True, text=True, check=True, timeout=120,
-    ).stdout  # fmt: skip
+    script = f"<script>addEventListener('load', () => setTimeout(() => {{{choosing}}}, 500))</script></html>"
+    text = page(document, {"curve": adhesive_figure()}).replace("</html>", script)
+    shown = drawn_by_a_browser(text, tmp_path)
     title = re.findall("<title>(.*?)</title>", shown)[0]
     menu = adhesive_figure().layout.updatemenus[0]
     assert set(title.split(",")) == {menu.buttons[1].name.partition(":")[0]}

@@ -57,7 +57,7 @@ class Upload:
         drawn = re.search(r'id="figure-curves".*?<script type="application/json">(.*?)</script>', self.page, re.DOTALL)
         assert drawn is not None
         (trace,) = orjson.loads(html.unescape(drawn[1]))["data"]
-        return tuple(decoded(trace[axis]) for axis in "xy")  # type: ignore[return-value]
+        return decoded(trace["x"]), decoded(trace["y"])
 
 
 def decoded(values: Any) -> np.ndarray:

@@ -3,7 +3,7 @@
 A mechanism would have shown if, at the noise that was found, its expected gain in log likelihood ½χ² pays for what it
 costs: the prior odds of nothing missing, those that an explanation must win by, and Occam's factor of its strength,
 ½ log(1 + χ²). χ² is what the nuisances leave of its typical signature (signatures.py), which grows as the strength
-squared. At that strength about every second campaign of this design would name it.
+squared.
 """
 
 from dataclasses import dataclass
