@@ -6,10 +6,11 @@ campaign a process, so that the reports do not depend on how many there are.
 
 import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -73,12 +74,14 @@ def diagnose(
     _refuse_overwriting(files, campaign, output_dir)
     description = None if rig is None else rig_description_in(rig)
     output_dir.mkdir(parents=True, exist_ok=True)
+    # Absolute, since a cluster's workers have a working folder of their own
+    one = partial(_one, rig=description, output_dir=output_dir.resolve(), html=html)
     failed = False
     console = Console(stderr=True)
     with Progress(console=console) as progress:
         bar = progress.add_task("diagnosing", total=len(files) + len(campaign))
         for outcomes in (
-            _of_files(files, description, output_dir, html, workers or os.cpu_count() or 1, scheduler),
+            _of_files(files, one, workers or os.cpu_count() or 1, scheduler),
             _of_store(campaign, output_dir, html, url, key),
         ):
             for outcome in outcomes:
@@ -113,44 +116,32 @@ def _refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_
 
 
 def _of_files(
-    files: Sequence[Path],
-    rig: "RigDescription | None",
-    output_dir: Path,
-    html: bool,
-    workers: int,
-    scheduler: str | None,
+    files: Sequence[Path], one: Callable[[Path], _Outcome], workers: int, scheduler: str | None
 ) -> Iterator[_Outcome]:
     if scheduler is None and (len(files) <= 1 or workers == 1):
         for file in files:
-            yield _one(file, rig, output_dir, html)
+            yield one(file)
         return
     remaining = list(files)
     while remaining:
-        for file, outcome in _of_pool(remaining, rig, output_dir, html, min(workers, len(remaining)), scheduler):
+        for file, outcome in _of_pool(remaining, one, min(workers, len(remaining)), scheduler):
             remaining.remove(file)
             yield outcome
         # A process that dies ends the pool: the files that may have caused it are diagnosed alone, one by one
         suspects = remaining[:workers]
         for file in suspects:
-            alone = dict(_of_pool([file], rig, output_dir, html, 1, scheduler))
+            alone = dict(_of_pool([file], one, 1, scheduler))
             remaining.remove(file)
             yield alone.get(file, _Outcome(str(file), f"{file}: the process that worked it out was killed; memory?"))
 
 
 def _of_pool(
-    files: Sequence[Path],
-    rig: "RigDescription | None",
-    output_dir: Path,
-    html: bool,
-    workers: int,
-    scheduler: str | None,
+    files: Sequence[Path], one: Callable[[Path], _Outcome], workers: int, scheduler: str | None
 ) -> Iterator[tuple[Path, _Outcome]]:
     """The outcomes of the files that were diagnosed before any process died."""
     with _executor(workers, scheduler) as pool:
-        # Absolute, since a cluster's workers have a working folder of their own
-        folder = output_dir.resolve()
         pending: dict[Future[_Outcome], Path] = {
-            pool.submit(_one, file if scheduler is None else file.resolve(), rig, folder, html): file for file in files
+            pool.submit(one, file if scheduler is None else file.resolve()): file for file in files
         }
         for done in as_completed(pending):
             file = pending[done]
@@ -182,7 +173,7 @@ def _executor(workers: int, scheduler: str | None) -> Iterator[Executor]:
         yield pool
 
 
-def _one(file: Path, rig: "RigDescription | None", output_dir: Path, html: bool) -> _Outcome:
+def _one(file: Path, *, rig: "RigDescription | None", output_dir: Path, html: bool) -> _Outcome:
     """Read, diagnose and write one campaign."""
     from underskin.diagnosis.pipeline import diagnose as work_out
     from underskin.diagnosis.pipeline import with_refused
