@@ -65,8 +65,7 @@ def accept(store: Database, uploads: Sequence[Upload], options: IngestOptions) -
     """
     request = options.request(uploads)
     if request is not None:
-        with store.reading() as connection:
-            before = answers.replayed(connection, request)
+        before = store.read(answers.replayed, request)
         if before is not None:
             return dict(before), True
     rig = _rig(store, uploads, options)

@@ -71,8 +71,7 @@ def look(store: Database, upload: Upload) -> CheckedExport:
                     checked = import_checks.campaign(campaign, name, skins.skins)
                 summaries.append(_campaign(checked.row, present=False, differs=False))
                 continue
-            with store.reading() as connection:
-                differs = importing.differs(connection, row, campaign)
+            differs = store.read(importing.differs, row, campaign)
             summaries.append(_campaign(row._mapping, present=True, differs=differs))
     clashes += [f"Campaign {one.name!r} ({one.id}) is there already and differs" for one in summaries if one.differs]
     return CheckedExport(overview, skins, diagnosed, summaries, diagnosed_here, clashes)

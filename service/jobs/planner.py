@@ -98,8 +98,7 @@ class Planner:
 
     def _run(self, row: AnyRow, limits: "RigLimits", planned: Planned) -> None:
         planned.state = "running"
-        with self._store.reading() as connection:
-            campaign, _ = diagnoses.campaign_of(connection, row)
+        campaign, _ = self._store.read(diagnoses.campaign_of, row)
         content = json_file.write(campaign)
         job = self._job_settings.job(content, limits=asdict(limits))
         with Worker(job, content, self._processes.take()) as worker:

@@ -93,8 +93,7 @@ class Runner:
                 self._processes.keep_ready()  # now that nothing else is going on
 
     def _claim(self) -> AnyRow | None:
-        with self._store.writing() as connection:
-            row = diagnoses.claim(connection, self._server, self._job_settings.table_sha256, __version__)
+        row = self._store.write(diagnoses.claim, self._server, self._job_settings.table_sha256, __version__)
         self._failure.is_over()
         return row
 
@@ -114,8 +113,7 @@ class Runner:
 
     def _run(self, row: AnyRow) -> None:
         """One diagnosis, until it has ended, another server has claimed it, or this server ends."""
-        with self._store.reading() as connection:
-            campaign, excluded = diagnoses.campaign_of(connection, row)
+        campaign, excluded = self._store.read(diagnoses.campaign_of, row)
         content = json_file.write(campaign)
         left_out = tuple((left.recording, left.reason) for left in excluded)
         job = self._job_settings.job(content, left_out)
@@ -138,8 +136,7 @@ class Runner:
     def _is_ours(self, row: AnyRow, worker: Worker) -> bool:
         """Renew the claim; False where it was cancelled or another server claimed it, True where the store fails."""
         try:
-            with self._store.writing() as connection:
-                ours = diagnoses.keep_alive(connection, row.number, self._server, worker.progress)
+            ours = self._store.write(diagnoses.keep_alive, row.number, self._server, worker.progress)
         except _STORE_FAILED as error:
             self._failure.log("a diagnosis cannot be kept alive", error)
             return True
@@ -165,7 +162,6 @@ class Runner:
 
     def _release(self, row: AnyRow) -> None:
         try:
-            with self._store.writing() as connection:
-                diagnoses.release(connection, row.number, self._server)
+            self._store.write(diagnoses.release, row.number, self._server)
         except _STORE_FAILED as error:
             self._failure.log("a diagnosis cannot be put back into the queue", error)

@@ -158,8 +158,7 @@ def listed(
         recorded_from=_time("recorded_from", recorded_from),
         recorded_to=_time("recorded_to", recorded_to),
     )
-    with store.reading() as connection:
-        rows = campaigns.listed(connection, filters, number_of_cursor(cursor), limit + 1)
+    rows = store.read(campaigns.listed, filters, number_of_cursor(cursor), limit + 1)
     page = [models.CampaignEntry(**usecase.entry(row)) for row in rows[:limit]]
     return models.CampaignList(campaigns=page, next=str(rows[limit - 1].number) if len(rows) > limit else None)
 
@@ -167,8 +166,7 @@ def listed(
 @router.get("/campaigns/{campaign_id}", operation_id="campaign", summary="One campaign")
 def one(campaign_id: CampaignId, store: Store) -> models.CampaignDetail:
     """With its recordings, without their arrays."""
-    with store.reading() as connection:
-        return usecase.detail(connection, campaign_id)
+    return store.read(usecase.detail, campaign_id)
 
 
 @router.get(
@@ -192,8 +190,7 @@ def document(
     file_format: Annotated[Literal["json", "hdf5"], Query(alias="format", description="JSON or HDF5.")] = "json",
 ) -> Response:
     """All recordings that were kept, arrays and all, those excluded later included."""
-    with store.reading() as connection:
-        row = campaigns.find(connection, campaign_id)
+    row = store.read(campaigns.find, campaign_id)
     if file_format == "json":
         return StreamingResponse(campaign_documents.json_parts(store, row), media_type="application/json")
     return made_file(
@@ -221,8 +218,7 @@ def d33(
     if (band_low_hz is None) != (band_high_hz is None):
         raise conflicting("band_low_hz", band_low_hz, "band_low_hz and band_high_hz go together")
     band = None if band_low_hz is None or band_high_hz is None else (band_low_hz, band_high_hz)
-    with store.reading() as connection:
-        row = campaigns.find(connection, campaign_id)
+    row = store.read(campaigns.find, campaign_id)
     if model == "adopted":
         return D33(**d33_cache.adopted_answer(store, table, row, model_in_force(store, row.skin_id), band))
     return D33(**d33_cache.answer(store, table, row, band))
@@ -247,8 +243,7 @@ def withdraw(campaign_id: CampaignId, withdrawal: models.Withdrawal, store: Stor
 def exclude(campaign_id: CampaignId, exclusion: models.Exclusion, store: Store, table: Table) -> models.CampaignDetail:
     """Figures no longer use it; it can still be read. A correction is the way back."""
     usecase.exclude(store, table, campaign_id, exclusion.recording, exclusion.reason)
-    with store.reading() as connection:
-        return usecase.detail(connection, campaign_id)
+    return store.read(usecase.detail, campaign_id)
 
 
 def _time(name: str, text: str | None) -> str | None:

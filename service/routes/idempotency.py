@@ -34,8 +34,7 @@ class Idempotency:
     def answer(self, store: Database, body: Any, act: Callable[[Connection], dict[str, Any]]) -> dict[str, Any]:
         """What `act` answers in a transaction of its own, or what it answered before; `body` is the request's."""
         if self._key is None:
-            with store.writing() as connection:
-                return act(connection)
+            return store.write(act)
         digest = hashlib.sha256(repr([self._path, body]).encode()).hexdigest()
         request = answers.KnownRequest(self.sender or "", self._key, digest)
         with store.writing() as connection:

@@ -204,10 +204,10 @@ def exclude(connection: Connection, campaign_id: str, recording_id: str, reason:
     _change(connection, row.number, excluded=campaigns.c.excluded + 1)
 
 
-def of_skin(connection: Connection, root: str) -> Iterator[AnyRow]:
+def of_skin(connection: Connection, root: str) -> Sequence[AnyRow]:
     """Rows of all campaigns of a skin and of those joined to it, in order of arrival."""
     query = select(campaigns).where(campaigns.c.skin_id.in_(skins.members(root))).order_by(campaigns.c.number)
-    yield from connection.execute(query)
+    return connection.execute(query).all()
 
 
 def _changeable(connection: Connection, campaign_id: str) -> AnyRow:

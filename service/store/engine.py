@@ -3,10 +3,10 @@
 import errno
 import fcntl
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import orjson
 from sqlalchemy import URL, Connection, Engine, Table, create_engine, event, make_url, text
@@ -20,6 +20,8 @@ SQLITE_FILE = "underskin.sqlite3"
 _PG_DISK_FULL = "53100"
 _PG_WRITING = 7236412  # any number, the same for all servers of a database; a migration has another
 _SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
+_Given = ParamSpec("_Given")
+_Answer = TypeVar("_Answer")
 
 
 class StorageFull(Exception):
@@ -85,6 +87,26 @@ class Database:
             if is_full(error):
                 raise StorageFull(str(error)) from error
             raise
+
+    def read(
+        self,
+        query: Callable[Concatenate[Connection, _Given], _Answer],
+        *given: _Given.args,
+        **named: _Given.kwargs,
+    ) -> _Answer:
+        """What one function of a connection answers in a block of `reading`."""
+        with self.reading() as connection:
+            return query(connection, *given, **named)
+
+    def write(
+        self,
+        change: Callable[Concatenate[Connection, _Given], _Answer],
+        *given: _Given.args,
+        **named: _Given.kwargs,
+    ) -> _Answer:
+        """The same in a block of `writing`."""
+        with self.writing() as connection:
+            return change(connection, *given, **named)
 
     @contextmanager
     def without_writers(self) -> Iterator[None]:

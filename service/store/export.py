@@ -19,7 +19,7 @@ def export(connection: Connection, root: str, file: Path) -> None:
     """Write the skin `root`, and all joined to it, one campaign in memory at a time."""
     of_root = select(skins_table).where(skins_table.c.root_id == root).order_by(skins_table.c.id)
     of_rigs = select(rigs).where(rigs.c.skin_id.in_(skins.members(root))).order_by(rigs.c.number)
-    rows = list(campaigns.of_skin(connection, root))
+    rows = campaigns.of_skin(connection, root)
     diagnoses, models = diagnosis_export.exported(connection, root)
     overview = Overview(
         skin=root,

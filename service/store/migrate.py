@@ -37,8 +37,7 @@ def migrate(database: Database, folder: Path) -> None:
 
 def version(database: Database) -> str | None:
     """The version of the schema; None where there is none yet."""
-    with database.reading() as connection:
-        return version_of(connection)
+    return database.read(version_of)
 
 
 def version_of(connection: Connection) -> str | None:

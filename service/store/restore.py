@@ -27,8 +27,7 @@ def restore(store: Database, file: Path, before: Path) -> None:
         backup.replace_with(store, file)
     migrate(store, before.parent.parent)
     if needed:
-        with store.writing() as connection:
-            key_requirement.require(connection)
+        store.write(key_requirement.require)
 
 
 def keys_needed(store: Database) -> bool:

@@ -31,6 +31,5 @@ def detail(connection: Connection, campaign_id: str) -> CampaignDetail:
 
 def exclude(store: Database, table: SigmaTable, campaign_id: str, recording: str, reason: str) -> None:
     """Leave a recording out of all figures, and compute the d33 of its campaign anew; raises Missing, Conflict."""
-    with store.writing() as connection:
-        campaigns.exclude(connection, campaign_id, recording, reason)
+    store.write(campaigns.exclude, campaign_id, recording, reason)
     d33_cache.derive(store, table, [campaign_id])

@@ -33,8 +33,7 @@ _EMPTY: dict[str, Any] = {"sensors": [], "cells": [], "findings": []}
 
 def answer(store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | None) -> dict[str, Any]:
     """The d33 of a campaign as it is now (fields of D33), over its flat zone or a band of the user's own."""
-    with store.reading() as connection:
-        cached = inversions.find(connection, row, table.sha256) if band_hz is None else None
+    cached = store.read(inversions.find, row, table.sha256) if band_hz is None else None
     return dict(cached) if cached is not None else _derived(store, table, row, band_hz)[0]
 
 
@@ -42,8 +41,7 @@ def with_numbers(
     store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | None
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """The same, and the numbers that its figures show (service.usecases.figure_data)."""
-    with store.reading() as connection:
-        cached = inversions.find_with_numbers(connection, row, table.sha256)
+    cached = store.read(inversions.find_with_numbers, row, table.sha256)
     if cached is not None and band_hz is None:
         return cached
     return _derived(store, table, row, band_hz, None if cached is None else cached[1]["spreads"])
@@ -76,8 +74,7 @@ def adopted_answer(
     document, _, failed = _computed(document, translated, table, band_hz, left_out)
     if band_hz is None and not failed:
         try:
-            with store.writing() as connection:
-                inversions.keep_adopted(connection, row, model_in_force.model_id, table.sha256, document)
+            store.write(inversions.keep_adopted, row, model_in_force.model_id, table.sha256, document)
         except (StorageFull, StoreMoved) as error:
             _not_kept(row, error)
     return document
@@ -87,8 +84,7 @@ def derive(store: Database, table: SigmaTable, campaign_ids: Sequence[str]) -> N
     """Compute and keep; what fails is logged, and tried again when it is asked for."""
     for campaign_id in campaign_ids:
         try:
-            with store.reading() as connection:
-                row = campaigns.find(connection, campaign_id)
+            row = store.read(campaigns.find, campaign_id)
             answer(store, table, row, None)
             _derive_adopted(store, table, row)
         except Exception:  # the campaign itself is kept, and that is what was promised
@@ -110,8 +106,7 @@ def foreseen(table: SigmaTable, campaign: Campaign) -> list[str]:
 
 def complete(store: Database, table: SigmaTable, root: str) -> None:
     """Compute and keep what is missing of a skin's current campaigns."""
-    with store.reading() as connection:
-        missing = inversions.missing_of_skin(connection, root, table.sha256)
+    missing = store.read(inversions.missing_of_skin, root, table.sha256)
     derive(store, table, [row.id for row in missing])
 
 
@@ -187,8 +182,7 @@ def _keep(store: Database, row: AnyRow, document: dict[str, Any], numbers: dict[
         if entry["d33_pc_per_n"] is not None and entry["d33_uncertainty_pc_per_n"] is not None
     }
     try:
-        with store.writing() as connection:
-            inversions.keep(connection, row, document["table_sha256"], document, numbers, sensors)
+        store.write(inversions.keep, row, document["table_sha256"], document, numbers, sensors)
     except (StorageFull, StoreMoved) as error:
         _not_kept(row, error)
 

@@ -31,8 +31,7 @@ def adopted_history(store: Database, table: SigmaTable, root: str) -> models.His
     model_in_force = adopted_models.model_in_force(store, root)
     by_sensor: dict[str, list[models.Point]] = {}
     unfit: dict[str, str] = {}
-    with store.reading() as connection:
-        rows = [row for row in campaigns.of_skin(connection, root) if campaigns.state(row) == "current"]
+    rows = [row for row in store.read(campaigns.of_skin, root) if campaigns.state(row) == "current"]
     for row in rows:
         try:
             answer = d33_cache.adopted_answer(store, table, row, model_in_force, None)
@@ -43,8 +42,7 @@ def adopted_history(store: Database, table: SigmaTable, root: str) -> models.His
             if entry["d33_pc_per_n"] is not None:
                 values = (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"])
                 by_sensor.setdefault(entry["sensor"], []).append(_point(row, values, model_in_force.model_id))
-    with store.reading() as connection:
-        return _history(connection, root, by_sensor, unfit)
+    return store.read(_history, root, by_sensor, unfit)
 
 
 def _history(

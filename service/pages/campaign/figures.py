@@ -50,8 +50,7 @@ def _keep(which: Which, drawn_now: list[Drawn]) -> list[Drawn]:
 
 
 def _loaded(store: Database, row: AnyRow) -> Campaign:
-    with store.reading() as connection:
-        return campaigns.load(connection, row, with_excluded=False)
+    return store.read(campaigns.load, row, with_excluded=False)
 
 
 def band_query(band_hz: tuple[float, float]) -> str:

@@ -86,16 +86,14 @@ def frf_csv(campaign_id: CampaignId, store: Store, show: Annotated[str, Query()]
 @router.get("/preload.csv")
 def preload_csv(campaign_id: CampaignId, store: Store, table: Table, band: BandOfQuery) -> Response:
     """The FRF in the flat zone of each recording, and the model's."""
-    with store.reading() as connection:
-        row = campaigns.find(connection, campaign_id)
+    row = store.read(campaigns.find, campaign_id)
     return csv_answer("frf-against-preload", d33_cache.with_numbers(store, table, row, band)[1]["recordings"])
 
 
 @router.get("/d33.csv")
 def d33_csv(campaign_id: CampaignId, store: Store, table: Table, band: BandOfQuery) -> Response:
     """d33 of each sensor, and of each sensor, sphere and preload."""
-    with store.reading() as connection:
-        row = campaigns.find(connection, campaign_id)
+    row = store.read(campaigns.find, campaign_id)
     answer = d33_cache.answer(store, table, row, band)
     values = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
     names = ("sensor", "indenter_radius_mm", "preload_n", "recordings", *values)
@@ -124,8 +122,7 @@ def exclude(campaign_id: CampaignId, sent: Form, store: Store, table: Table) -> 
 @router.post("/withdraw", dependencies=WRITE)
 def withdraw(campaign_id: CampaignId, sent: Form, store: Store) -> Response:
     """Leave the campaign out of all figures."""
-    with store.writing() as connection:
-        campaigns.withdraw(connection, campaign_id, reason(sent))
+    store.write(campaigns.withdraw, campaign_id, reason(sent))
     return see(f"/campaigns/{quote(campaign_id, safe='')}")
 
 

@@ -39,8 +39,7 @@ _ODD = (LookupError, TypeError, ValueError, AttributeError)  # of a report that 
 @router.post("/campaigns/{campaign_id}/diagnosis", dependencies=[*WRITE, OWN_FORM])
 def ask(request: Request, campaign_id: CampaignId, runner: RunnerInUse, store: Store, table: Table) -> Response:
     """Puts it into the queue; one that was diagnosed as it is now is shown."""
-    with store.writing() as connection:
-        row = usecase.ask(connection, campaign_id, table, sender(request))
+    row = store.write(usecase.ask, campaign_id, table, sender(request))
     runner.stir()
     return see(f"/diagnoses/{row.id}")
 
@@ -111,8 +110,7 @@ def numbers_csv(diagnosis_id: DiagnosisId, figure: str, store: Store) -> Respons
 @router.post("/diagnoses/{diagnosis_id}/cancel", dependencies=[*WRITE, OWN_FORM])
 def cancel(diagnosis_id: DiagnosisId, runner: RunnerInUse, store: Store) -> Response:
     """Ends it."""
-    with store.writing() as connection:
-        diagnoses.cancel(connection, diagnosis_id)
+    store.write(diagnoses.cancel, diagnosis_id)
     runner.stir()
     return see(f"/diagnoses/{quote(diagnosis_id, safe='')}")
 

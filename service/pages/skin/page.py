@@ -119,8 +119,7 @@ def map_csv(skin_id: SkinId, store: Store, table: Table, by: Annotated[By, Query
     """d33 of each sensor in the latest campaign, and its trend."""
     root, _ = _completed(store, table, skin_id)
     trends = {entry.sensor: entry.trend for entry in _history_by(store, table, root, by).sensors}
-    with store.reading() as connection:
-        row = campaigns.latest(connection, root)
+    row = store.read(campaigns.latest, root)
     rows: list[dict[str, Any]] = []
     if row is not None:
         answer = (
@@ -177,8 +176,7 @@ def _completed(store: Database, table: SigmaTable, skin_id: str) -> tuple[str, i
 def _history_by(store: Database, table: SigmaTable, root: str, by: By) -> History:
     if by == "adopted":
         return histories.adopted_history(store, table, root)
-    with store.reading() as connection:
-        return histories.history(connection, root, table.sha256)
+    return store.read(histories.history, root, table.sha256)
 
 
 def _map(root: str, row: AnyRow, answer: Mapping[str, Any], history: History, show: Shown, by: By) -> Drawn:

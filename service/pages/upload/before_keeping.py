@@ -32,8 +32,7 @@ def worth_knowing(request: Request, look: InspectedFile, skin_id: str | None, co
 
 
 def _kept(store: Database, campaign: Campaign, skin_id: str | None, corrects: str | None) -> Iterator[str]:
-    with store.reading() as connection:
-        earlier = repeats.already_kept(connection, campaign, skin_id, corrects)
+    earlier = store.read(repeats.already_kept, campaign, skin_id, corrects)
     if earlier is not None:
         yield earlier[0]
 

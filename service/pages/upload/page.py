@@ -46,8 +46,7 @@ def form(
     corrects: Annotated[str, Query(max_length=200)] = "",
 ) -> Response:
     """Asks for files; `corrects`: the campaign whose place they take."""
-    with store.reading() as connection:
-        known = [row.id for row in skins.listed(connection, None, None, _MOST_SKINS)]
+    known = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
     return page(
         request,
         "upload.html",

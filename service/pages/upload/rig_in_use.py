@@ -14,8 +14,7 @@ def skin_of(store: Database, corrects: str | None) -> str | None:
     """The skin of the campaign that is corrected, on which its correction stays; raises Missing."""
     if corrects is None:
         return None
-    with store.reading() as connection:
-        return str(campaigns.find(connection, corrects).skin_id)
+    return str(store.read(campaigns.find, corrects).skin_id)
 
 
 def rig(store: Database, sent: Upload | None, skin: str | None) -> tuple[RigDescription | None, list[dict[str, Any]]]:
@@ -27,5 +26,4 @@ def rig(store: Database, sent: Upload | None, skin: str | None) -> tuple[RigDesc
             return None, field_errors(error)
     if skin is None:
         return None, []
-    with store.reading() as connection:
-        return kept_rig(connection, skin), []
+    return store.read(kept_rig, skin), []
