@@ -71,14 +71,12 @@ def accept(store: Database, uploads: Sequence[Upload], options: IngestOptions) -
     rig = _rig(store, uploads, options)
     arrived = _arrived(uploads, rig, options)
     _require_keepable(arrived, options)
-    with store.writing() as connection:
-        if request is not None and not answers.claim(connection, request):
-            return dict(answers.replayed(connection, request) or {}), True
+
+    def keep(connection: Connection) -> dict[str, Any]:
         results = [_kept(connection, campaign, options, rig) for campaign in arrived]
-        answer = {"campaigns": results} if uploads[0].in_form or arrived[0].in_list else results[0]
-        if request is not None:
-            answers.keep(connection, request, answer)
-    return answer, False
+        return {"campaigns": results} if uploads[0].in_form or arrived[0].in_list else results[0]
+
+    return store.write(answers.once, request, keep)
 
 
 def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> RigDescription | None:

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Request, Response
 from service.routes.columns_endpoint import Accept, answer_json, respond
 from service.schemas.stress import StressAnswer
 from service.usecases import stress as usecase
-from service.usecases.table_loader import influence_table
+from service.usecases.tables import influence_table
 from underskin.array_stress.request import read_request
 
 router = APIRouter(prefix="/v1", tags=["stress"])

@@ -3,18 +3,17 @@
 import secrets
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from sqlalchemy import Connection, func, insert, select, update
 
+from service.schemas.campaigns import State
 from service.store import codec, digests, skins
 from service.store.engine import Database
 from service.store.errors import Conflict, Missing
 from service.store.tables import AnyRow, campaigns, recordings
 from service.store.times import now
 from underskin.recordings.campaign import Campaign, Recording
-
-State = Literal["current", "corrected", "withdrawn"]
 
 # All that lists show of a recording: not its arrays.
 _LISTED = [column for column in recordings.c if column.name not in ("campaign", "position", "arrays")]

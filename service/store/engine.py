@@ -6,7 +6,7 @@ import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeAlias, TypeVar
 
 import orjson
 from sqlalchemy import URL, Connection, Engine, Table, create_engine, event, make_url, text
@@ -22,6 +22,7 @@ _PG_WRITING = 7236412  # any number, the same for all servers of a database; a m
 _SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
 _Given = ParamSpec("_Given")
 _Answer = TypeVar("_Answer")
+_OnConnection: TypeAlias = Callable[Concatenate[Connection, _Given], _Answer]
 
 
 class StorageFull(Exception):
@@ -88,22 +89,12 @@ class Database:
                 raise StorageFull(str(error)) from error
             raise
 
-    def read(
-        self,
-        query: Callable[Concatenate[Connection, _Given], _Answer],
-        *given: _Given.args,
-        **named: _Given.kwargs,
-    ) -> _Answer:
+    def read(self, query: _OnConnection[_Given, _Answer], *given: _Given.args, **named: _Given.kwargs) -> _Answer:
         """What one function of a connection answers in a block of `reading`."""
         with self.reading() as connection:
             return query(connection, *given, **named)
 
-    def write(
-        self,
-        change: Callable[Concatenate[Connection, _Given], _Answer],
-        *given: _Given.args,
-        **named: _Given.kwargs,
-    ) -> _Answer:
+    def write(self, change: _OnConnection[_Given, _Answer], *given: _Given.args, **named: _Given.kwargs) -> _Answer:
         """The same in a block of `writing`."""
         with self.writing() as connection:
             return change(connection, *given, **named)
@@ -168,13 +159,10 @@ def upsert(connection: Connection, table: Table) -> sqlite.Insert | postgresql.I
 
 
 def _engine(url: URL, files: SqliteFiles | None) -> Engine:
-    def deserialise(document: str) -> Any:
-        return orjson.loads(document)
-
-    def serialise(value: Any) -> str:
-        return orjson.dumps(value).decode()
-
-    options: dict[str, Any] = {"json_serializer": serialise, "json_deserializer": deserialise}
+    options: dict[str, Any] = {
+        "json_serializer": lambda value: orjson.dumps(value).decode(),
+        "json_deserializer": orjson.loads,
+    }
     if files is not None:
         engine = create_engine(url, creator=files.connect, **options)
         event.listen(engine, "begin", _begin_sqlite)

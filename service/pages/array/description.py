@@ -13,7 +13,7 @@ from service.pages.shared.skin_fields import FIELDS, UNITS
 from service.pages.shared.skin_values import start
 from service.pages.shared.typed_numbers import number
 from service.store import Database, campaigns, skins
-from service.usecases.table_loader import influence_table
+from service.usecases.tables import influence_table
 from underskin.array_stress.answer import ArrayStress, answer
 from underskin.array_stress.request import read_request
 from underskin.errors import InvalidInput, UnderskinError, out_of_range, wrong_type
