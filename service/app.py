@@ -19,15 +19,14 @@ from service.pages.shared.problem import problem_page
 from service.pages.upload.pending_uploads import PendingUploads
 from service.routes import (
     campaigns,
-    d33,
     design,
     diagnoses,
     exports,
-    frf,
     health,
     metrics,
     models,
     openapi,
+    pressed_skin,
     sigma,
     skins,
     stress,
@@ -78,7 +77,7 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     api.state.planner = Planner(store, job_settings, processes)
     install_handlers(api, problem_page, _methods)
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"]), Depends(known_query)])
-    for noun in (sigma, frf, d33, stress, design, tables, campaigns, diagnoses, exports, skins, models):
+    for noun in (sigma, pressed_skin, stress, design, tables, campaigns, diagnoses, exports, skins, models):
         v1.include_router(noun.router)
     for router in (v1, umbridge.router, health.router, metrics.router, openapi.router, pages.router):
         api.include_router(router)

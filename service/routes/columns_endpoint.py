@@ -52,6 +52,7 @@ def add_columns_route(
     router.post(
         path,
         operation_id=f"{path[1:]}_columns",
+        tags=[path[1:]],
         summary=summary,
         responses={200: {"model": answer_kind, "content": {"text/csv": {}}}},
         openapi_extra=_columns_body(kind, example),

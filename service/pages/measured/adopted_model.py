@@ -9,10 +9,10 @@ from service.pages.shared.skin_fields import FIELDS
 from service.pages.shared.typed_numbers import number
 from service.problems import Refusal
 from service.schemas.columns_answer import Columns
-from service.schemas.d33 import D33Columns
+from service.schemas.pressed_skin import D33Columns
 from service.store import Conflict, Database
 from service.usecases.adopted_models import model_in_force
-from service.usecases.d33 import d33
+from service.usecases.pressed_skin import d33
 from underskin.errors import UnderskinError, required
 from underskin.surrogate.sigma_table import SigmaTable
 

@@ -20,9 +20,9 @@ from service.pages.shared.skin_values import start
 from service.pages.shared.typed_numbers import number, numbers
 from service.problems import first_refused
 from service.schemas.columns_answer import Columns
-from service.schemas.d33 import D33Columns
+from service.schemas.pressed_skin import D33Columns
 from service.store import Database
-from service.usecases.d33 import d33
+from service.usecases.pressed_skin import d33
 from underskin.errors import InvalidInput, UnderskinError, too_few, wrong_type
 from underskin.surrogate.sigma_table import SigmaTable
 
