@@ -15,7 +15,7 @@ from service.jobs import JobSettings, Planner, Runner, WorkerProcesses
 from service.middleware import request_log
 from service.middleware.asgi_middleware import AsgiMiddleware
 from service.middleware.error_handlers import install_handlers
-from service.pages.shared.problem import problem_page
+from service.pages.shared.html import problem_page
 from service.pages.upload.pending_uploads import PendingUploads
 from service.routes import (
     campaigns,

@@ -1,4 +1,4 @@
-"""A skin pressed by a sphere, in columns, and what reaches its sensor: requests and answers of `/v1/frf` and `/v1/d33`."""
+"""A skin pressed by a sphere, in columns, and what reaches its sensor: what `/v1/frf` and `/v1/d33` take and answer."""
 
 from typing import ClassVar, Literal
 

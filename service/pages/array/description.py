@@ -8,10 +8,8 @@ import numpy as np
 from fastapi import Request
 
 from service.pages.shared.figures import Drawn, drawn
-from service.pages.shared.form_errors import in_form_words
-from service.pages.shared.skin_fields import FIELDS, UNITS
-from service.pages.shared.skin_values import start
-from service.pages.shared.typed_numbers import number
+from service.pages.shared.forms import in_form_words, number
+from service.pages.shared.skin_values import FIELDS, UNITS, shown
 from service.store import Database, campaigns, skins
 from service.usecases.tables import influence_table
 from underskin.array_stress.answer import ArrayStress, answer
@@ -64,10 +62,8 @@ class Described:
 def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin_id: str | None) -> Described:
     """The array of a form's fields; raises InvalidInput where the skin has no campaign with sensors."""
     sensors = None if skin_id is None else _latest(store, skin_id)["sensors"]
-    missing = {name: (words, unit) for name, words, unit in FIELDS if not given.get(name)}
-    known, taken = start(store, table, skin_id, missing)
-    defaults = {name: known[name] for name, *_ in FIELDS} | {name: default for name, _, _, default in GRID}
-    values = {name: given.get(name) or f"{default:g}" for name, default in defaults.items()}
+    values, taken = shown(store, table, given, skin_id)
+    values |= {name: given.get(name) or f"{default:g}" for name, _, _, default in GRID}
     return Described(skin_id, values, given.get(GLUE, ""), UNITS in given, sensors, taken)
 
 

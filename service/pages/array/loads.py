@@ -9,8 +9,8 @@ from service.dependencies import Store, Table
 from service.pages.array.description import Described, answered, charge_columns, charge_figure, described, refused
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer
+from service.pages.shared.forms import numbers
 from service.pages.shared.html import page
-from service.pages.shared.typed_numbers import numbers
 from underskin.array_stress.answer import ArrayStress
 from underskin.errors import UnderskinError, wrong_type
 

@@ -13,8 +13,8 @@ from pydantic import ValidationError
 from service.dependencies import Store, Table
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer, drawn
-from service.pages.shared.form_errors import in_form_words
 from service.pages.shared.formats import short_and_exact
+from service.pages.shared.forms import in_form_words
 from service.pages.shared.html import compress, page
 from service.pages.shared.skin_values import PROTOTYPE, start
 from service.problems import first_refused

@@ -10,9 +10,8 @@ from markupsafe import Markup
 from service.dependencies import DiagnosisId, PlannerInUse, Store
 from service.jobs.planner import Planned
 from service.pages.shared import same_request
-from service.pages.shared.form_errors import in_form_words
+from service.pages.shared.forms import in_form_words, number
 from service.pages.shared.html import page
-from service.pages.shared.typed_numbers import number
 from service.problems import Refusal
 from service.store import AnyRow, Database, campaigns, diagnoses
 from underskin.errors import UnderskinError, out_of_range, required

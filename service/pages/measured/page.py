@@ -13,11 +13,10 @@ from service.pages.measured.adopted_model import ByModel, by_model
 from service.pages.measured.out_of_domain import reasons
 from service.pages.shared import same_request
 from service.pages.shared.figures import csv_answer
+from service.pages.shared.forms import number, numbers
 from service.pages.shared.html import page
-from service.pages.shared.skin_fields import FIELDS as SKIN_FIELDS
-from service.pages.shared.skin_fields import UNITS
-from service.pages.shared.skin_values import start
-from service.pages.shared.typed_numbers import number, numbers
+from service.pages.shared.skin_values import FIELDS as SKIN_FIELDS
+from service.pages.shared.skin_values import UNITS, shown
 from service.problems import first_refused
 from service.schemas.columns_answer import Columns
 from service.schemas.pressed_skin import D33Columns
@@ -42,7 +41,7 @@ SkinQuery = Annotated[str | None, Query()]
 @router.get("")
 def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, rows: RowsText = _ROWS) -> Response:
     """With the skin and the rows of the address, or else the paper's prototype under a sphere."""
-    values, taken = _values(store, table, request.query_params, skin)
+    values, taken = shown(store, table, request.query_params, skin, FIELDS)
     error: str | None = None
     document: dict[str, Any] = {}
     answer: Columns | None = None
@@ -55,7 +54,7 @@ def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, r
         error = _said(first_refused(problem))
     except UnderskinError as problem:
         error = _said(problem)
-    shown = document if adopted is None or adopted.document is None else adopted.document
+    asked = document if adopted is None or adopted.document is None else adopted.document
     return page(
         request,
         "measured.html",
@@ -72,27 +71,17 @@ def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, r
         adopted=adopted,
         outside=[] if answer is None else reasons(document, answer, table),
         query=request.url.query,
-        same=same_request.post(request, "/v1/d33", shown, f"client.d33(**{shown!r})"),
+        same=same_request.post(request, "/v1/d33", asked, f"client.d33(**{asked!r})"),
     )
 
 
 @router.get("/rows.csv")
 def rows_csv(request: Request, store: Store, table: Table, skin: SkinQuery = None, rows: RowsText = _ROWS) -> Response:
     """What was measured and what it says, a row a measurement."""
-    values, _ = _values(store, table, request.query_params, skin)
+    values, _ = shown(store, table, request.query_params, skin, FIELDS)
     document = _document(values, request.query_params, rows)
     adopted = by_model(store, table, skin, request.query_params, document)
     return csv_answer("d33", _columns(document, _answered(table, store, document), adopted))
-
-
-def _values(
-    store: Database, table: SigmaTable, given: Mapping[str, str], skin: str | None
-) -> tuple[dict[str, str], list[str]]:
-    """What the form shows: as it was sent, or else the skin's, or the prototype's; and in sentences what is not the
-    skin's own."""
-    missing = {name: (words, unit) for name, words, unit in FIELDS if not given.get(name)}
-    known, taken = start(store, table, skin, missing)
-    return {name: given.get(name) or f"{known[name]:g}" for name, *_ in FIELDS}, taken
 
 
 def _said(error: UnderskinError) -> str:
