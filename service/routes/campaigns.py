@@ -24,7 +24,6 @@ from service.store import campaigns
 from service.store.times import stored
 from service.usecases import campaign_documents, d33_cache
 from service.usecases import campaigns as usecase
-from service.usecases.adopted_models import model_in_force
 from underskin.errors import conflicting, wrong_type
 
 router = APIRouter(prefix="/v1", tags=["campaigns"], route_class=JsonRoute)
@@ -219,9 +218,7 @@ def d33(
         raise conflicting("band_low_hz", band_low_hz, "band_low_hz and band_high_hz go together")
     band = None if band_low_hz is None or band_high_hz is None else (band_low_hz, band_high_hz)
     row = store.read(campaigns.find, campaign_id)
-    if model == "adopted":
-        return D33(**d33_cache.adopted_answer(store, table, row, model_in_force(store, row.skin_id), band))
-    return D33(**d33_cache.answer(store, table, row, band))
+    return D33(**d33_cache.by_model(store, table, row, model, band))
 
 
 @router.post(

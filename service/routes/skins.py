@@ -54,7 +54,6 @@ def history(
     Campaigns that lack what an adopted model needs are left out, with the reason.
     """
     root = store.read(skins.require_root, skin_id)
-    if model == "adopted":
-        return histories.adopted_history(store, table, root)
-    d33_cache.complete(store, table, root)
-    return store.read(histories.history, root, table.sha256)
+    if model == "paper":
+        d33_cache.complete(store, table, root)
+    return histories.by_model(store, table, root, model)

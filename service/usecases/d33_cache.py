@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import orjson
 
@@ -35,6 +35,15 @@ def answer(store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | No
     """The d33 of a campaign as it is now (fields of D33), over its flat zone or a band of the user's own."""
     cached = store.read(inversions.find, row, table.sha256) if band_hz is None else None
     return dict(cached) if cached is not None else _derived(store, table, row, band_hz)[0]
+
+
+def by_model(
+    store: Database, table: SigmaTable, row: AnyRow, model: Literal["paper", "adopted"], band_hz: BandHz | None = None
+) -> dict[str, Any]:
+    """The same by the paper's model, or by the model in force of the campaign's skin."""
+    if model == "adopted":
+        return adopted_answer(store, table, row, model_in_force(store, row.skin_id), band_hz)
+    return answer(store, table, row, band_hz)
 
 
 def with_numbers(
@@ -94,7 +103,7 @@ def derive(store: Database, table: SigmaTable, campaign_ids: Sequence[str]) -> N
 def _derive_adopted(store: Database, table: SigmaTable, row: AnyRow) -> None:
     """The same by the model in force of its skin, where there is one that can tell it."""
     with suppress(Refusal, Conflict, InvalidInput):
-        adopted_answer(store, table, row, model_in_force(store, row.skin_id), None)
+        by_model(store, table, row, "adopted")
 
 
 def foreseen(table: SigmaTable, campaign: Campaign) -> list[str]:

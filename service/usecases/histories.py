@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
+from typing import Literal
 
 from sqlalchemy import Connection
 
@@ -17,8 +18,15 @@ _YEAR_S = 365.25 * 86400
 _LEAST_SPAN_S = 86400.0
 
 
-def history(connection: Connection, root: str, table_sha256: str) -> models.History:
-    """The history of a skin and of those joined to it, from what is kept."""
+def by_model(store: Database, table: SigmaTable, root: str, model: Literal["paper", "adopted"]) -> models.History:
+    """The history of a skin and of those joined to it; raises Refusal where there is no adopted model."""
+    if model == "adopted":
+        return _adopted_history(store, table, root)
+    return store.read(_paper_history, root, table.sha256)
+
+
+def _paper_history(connection: Connection, root: str, table_sha256: str) -> models.History:
+    """From what is kept."""
     by_sensor: dict[str, list[models.Point]] = {}
     for row in inversions.history(connection, root, table_sha256):
         values = (row.d33_pc_per_n, row.d33_uncertainty_pc_per_n)
@@ -26,8 +34,7 @@ def history(connection: Connection, root: str, table_sha256: str) -> models.Hist
     return _history(connection, root, by_sensor, {})
 
 
-def adopted_history(store: Database, table: SigmaTable, root: str) -> models.History:
-    """The same under the model in force; raises Refusal where there is none."""
+def _adopted_history(store: Database, table: SigmaTable, root: str) -> models.History:
     model_in_force = adopted_models.model_in_force(store, root)
     by_sensor: dict[str, list[models.Point]] = {}
     unfit: dict[str, str] = {}

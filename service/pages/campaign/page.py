@@ -11,7 +11,8 @@ from service.pages.shared import same_request, verdicts
 from service.pages.shared.figures import csv_answer, csv_of_rows
 from service.pages.shared.forms import Form, reason, see
 from service.pages.shared.html import page
-from service.store import AnyRow, Database, campaigns, diagnoses
+from service.schemas.campaign_d33 import D33Value
+from service.store import Database, campaigns, diagnoses
 from service.usecases import d33_cache
 from service.usecases.campaigns import exclude as exclude_recording
 from service.usecases.figure_data import frf_columns
@@ -80,7 +81,7 @@ def campaign(
 @router.get("/frf.csv")
 def frf_csv(campaign_id: CampaignId, store: Store, show: Annotated[str, Query()] = "") -> Response:
     """Every line of the recordings, or of those of `show`, as they came or were estimated."""
-    return csv_answer("frf", frf_columns(_loaded(store, campaign_id)[1], show))
+    return csv_answer("frf", frf_columns(_loaded(store, campaign_id), show))
 
 
 @router.get("/preload.csv")
@@ -95,8 +96,7 @@ def d33_csv(campaign_id: CampaignId, store: Store, table: Table, band: BandOfQue
     """d33 of each sensor, and of each sensor, sphere and preload."""
     row = store.read(campaigns.find, campaign_id)
     answer = d33_cache.answer(store, table, row, band)
-    values = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
-    names = ("sensor", "indenter_radius_mm", "preload_n", "recordings", *values)
+    names = ("sensor", "indenter_radius_mm", "preload_n", "recordings", *D33Value.model_fields)
     return csv_of_rows("d33", names, [*answer["sensors"], *answer["cells"]])
 
 
@@ -104,7 +104,7 @@ def d33_csv(campaign_id: CampaignId, store: Store, table: Table, band: BandOfQue
 def curves_csv(campaign_id: CampaignId, store: Store) -> Response:
     """Every sample of the indentation and compression recordings."""
     columns: dict[str, list[Any]] = {name: [] for name in ("recording", "displacement_mm", "force_n")}
-    for recording in _loaded(store, campaign_id)[1].recordings:
+    for recording in _loaded(store, campaign_id).recordings:
         if isinstance(recording, IndentationRecording | CompressionRecording):
             columns["recording"] += [recording.id] * len(recording.force_n)
             columns["displacement_mm"] += recording.displacement_mm.tolist()
@@ -126,7 +126,6 @@ def withdraw(campaign_id: CampaignId, sent: Form, store: Store) -> Response:
     return see(f"/campaigns/{quote(campaign_id, safe='')}")
 
 
-def _loaded(store: Database, campaign_id: str) -> tuple[AnyRow, Campaign]:
+def _loaded(store: Database, campaign_id: str) -> Campaign:
     with store.reading() as connection:
-        row = campaigns.find(connection, campaign_id)
-        return row, campaigns.load(connection, row, with_excluded=False)
+        return campaigns.load(connection, campaigns.find(connection, campaign_id), with_excluded=False)

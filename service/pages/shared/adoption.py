@@ -35,12 +35,10 @@ def of_rows(connection: Connection, rows: Sequence[AnyRow]) -> list[AdoptedVersi
     ]
 
 
-def answer_by_it(
-    store: Database, table: SigmaTable, root: str, row: AnyRow
-) -> tuple[Mapping[str, Any] | None, str | None]:
+def answer_by_it(store: Database, table: SigmaTable, row: AnyRow) -> tuple[Mapping[str, Any] | None, str | None]:
     """d33 of a campaign by the model in force, or why there is none."""
     try:
-        return d33_cache.adopted_answer(store, table, row, adopted_models.model_in_force(store, root), None), None
+        return d33_cache.by_model(store, table, row, "adopted"), None
     except (InvalidInput, Conflict, Refusal) as error:
         return None, str(error)
 
