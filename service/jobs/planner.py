@@ -6,6 +6,7 @@ Plans are not stored: a server remembers the latest ones, and plans again after 
 import threading
 import time
 from collections import OrderedDict
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 _REMEMBERED = 50
 _MOST_WAITING = 8
-_JOIN_S = 10.0
 _RETRY_S = 60.0  # how long a failure is answered before the plan is tried again
 
 
@@ -48,10 +48,8 @@ class Planner:
         self._processes = processes
         self._known: OrderedDict[tuple[str, str], Planned] = OrderedDict()
         self._lock = threading.Lock()
-        self._turn = threading.Lock()
+        self._one_by_one = ThreadPoolExecutor(1, "plan")
         self._ending = threading.Event()
-        self._worker: Worker | None = None
-        self._threads: set[threading.Thread] = set()
 
     def plan(self, row: AnyRow, limits: "RigLimits") -> Planned:
         """That of a diagnosis within these limits: begun where it is not known, or failed a minute ago; raises
@@ -64,37 +62,25 @@ class Planner:
                 return known
             if not self._job_settings.workers:
                 raise Refusal(503, "This server runs no diagnoses and plans nothing; use the command below.")
-            if len(self._threads) >= _MOST_WAITING:
+            if sum(one.state in ("queued", "running") for one in self._known.values()) >= _MOST_WAITING:
                 raise Refusal(503, "Many plans are being worked out: try again in a minute.")
             planned = self._known[key] = Planned()
             while len(self._known) > _REMEMBERED:
                 self._known.popitem(last=False)
-            thread = threading.Thread(target=self._job, args=(row, limits, planned), name=f"plan {row.id}", daemon=True)
-            self._threads.add(thread)
-        thread.start()
+            self._one_by_one.submit(self._job, row, limits, planned)
         return planned
 
     def stop(self) -> None:
         """End what is being worked out."""
         self._ending.set()
-        with self._lock:
-            threads = list(self._threads)
-            if self._worker is not None:
-                self._worker.news.set()
-        for thread in threads:
-            thread.join(_JOIN_S)
+        self._one_by_one.shutdown(cancel_futures=True)
 
     def _job(self, row: AnyRow, limits: "RigLimits", planned: Planned) -> None:
         try:
-            with self._turn:
-                if not self._ending.is_set():
-                    self._run(row, limits, planned)
-        except Exception as error:  # the thread has no caller to raise to
+            self._run(row, limits, planned)
+        except Exception as error:  # nobody waits for what the job raises
             logger.exception("a plan could not be made", extra={"fields": {"diagnosis": row.id}})
             planned.fail(f"{type(error).__name__}: {error}")
-        finally:
-            with self._lock:
-                self._threads.discard(threading.current_thread())
 
     def _run(self, row: AnyRow, limits: "RigLimits", planned: Planned) -> None:
         planned.state = "running"
@@ -102,14 +88,10 @@ class Planner:
         content = json_file.write(campaign)
         job = self._job_settings.job(content, limits=asdict(limits))
         with Worker(job, content, self._processes.take()) as worker:
-            with self._lock:
-                self._worker = worker
             while not (worker.ended or self._ending.is_set()):
                 worker.news.wait(0.5)
-                planned.progress = worker.progress
-            with self._lock:
-                self._worker = None
-            if worker.plan is not None:
-                planned.plan, planned.state = worker.plan, "done"
+                planned.progress = worker.said["progress"]
+            if "plan" in worker.said:
+                planned.plan, planned.state = worker.said["plan"], "done"
             else:
                 planned.fail(worker.failure if worker.ended else "the server ended")

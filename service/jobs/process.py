@@ -95,11 +95,7 @@ class Worker:
     """A worker at its job. `news` is set when it has ended. Leaving the block ends it in any case."""
 
     def __init__(self, job: Job, campaign: bytes, worker: WorkerProcess) -> None:
-        self.progress = 0.0
-        self.report: dict[str, Any] | None = None
-        self.figures: dict[str, str] | None = None
-        self.plan: dict[str, Any] | None = None
-        self.error: str | None = None
+        self.said: dict[str, Any] = {"progress": 0.0}  # the latest of each message, by its name
         self.news = threading.Event()
         self.ended = False
         self._worker, self._process, self._stderr = worker, worker.process, worker.stderr
@@ -121,8 +117,8 @@ class Worker:
     def failure(self) -> str:
         """Why there is no report, once it has ended."""
         status = self._process.returncode
-        if self.error is not None:
-            return self.error
+        if "error" in self.said:
+            return str(self.said["error"])
         if status < 0:
             return f"its process was killed by signal {-status}; where nobody did that, memory was short"
         last = self.last_words.strip().splitlines()[-1:]
@@ -145,14 +141,9 @@ class Worker:
         with self._process.stdout as lines:
             for line in lines:
                 try:
-                    message = orjson.loads(line)
+                    self.said |= orjson.loads(line)
                 except orjson.JSONDecodeError:  # killed in the midst of a line
                     break
-                self.progress = message.get("progress", self.progress)
-                self.report = message.get("report", self.report)
-                self.figures = message.get("figures", self.figures)
-                self.plan = message.get("plan", self.plan)
-                self.error = message.get("error", self.error)
         self._process.wait()
         self.ended = True
         self.news.set()

@@ -127,8 +127,8 @@ class Runner:
                     return
             if not worker.ended:
                 self._release(row)
-            elif worker.report is not None:
-                self._end(row, worker.report, "", worker.figures)
+            elif "report" in worker.said:
+                self._end(row, worker.said["report"], "", worker.said.get("figures"))
             else:
                 logger.error("a diagnosis failed", extra={"fields": {"diagnosis": row.id, "said": worker.last_words}})
                 self._end(row, None, worker.failure)
@@ -136,7 +136,7 @@ class Runner:
     def _is_ours(self, row: AnyRow, worker: Worker) -> bool:
         """Renew the claim; False where it was cancelled or another server claimed it, True where the store fails."""
         try:
-            ours = self._store.write(diagnoses.keep_alive, row.number, self._server, worker.progress)
+            ours = self._store.write(diagnoses.keep_alive, row.number, self._server, worker.said["progress"])
         except _STORE_FAILED as error:
             self._failure.log("a diagnosis cannot be kept alive", error)
             return True

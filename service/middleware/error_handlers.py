@@ -6,8 +6,10 @@ from collections.abc import Callable, Sequence
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from sqlalchemy.exc import DataError, IntegrityError, OperationalError
+from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
+from starlette.types import Scope
 
 from service.problems import RETRY_LATER, Refusal, from_validation, invalid_input, is_browsing, unexpected
 from service.store import Conflict, Missing, StorageFull, StoreMoved
@@ -27,16 +29,20 @@ def install_handlers(api: FastAPI, problem_page: ProblemPage, methods: Methods) 
     async def handle(request: Request, error: Exception) -> Response:
         refusal = _as_refusal(request, error, methods)
         request.scope["why"] = refusal.in_log()
-        path, request_id = request.scope["path"], request.scope["request_id"]
-        if is_browsing(path, request.headers.get("accept", "")):
-            return problem_page(refusal, request_id)
-        media_type = refusal.media_type(path)
-        status = refusal.status_for(path)
-        return Response(refusal.body(path, request_id), status, headers=refusal.headers, media_type=media_type)
+        return problem_response(request.scope, refusal, problem_page)
 
     ours = (Refusal, InvalidInput, RequestValidationError, HTTPException)
     for kind in (*ours, *_STATUS, StorageFull, StoreMoved, DataError, IntegrityError, OperationalError, Exception):
         api.add_exception_handler(kind, handle)
+
+
+def problem_response(scope: Scope, refusal: Refusal, problem_page: ProblemPage) -> Response:
+    """A problem as the answer to a request: as a page for who looks at pages."""
+    path, request_id = scope["path"], scope["request_id"]
+    if is_browsing(path, Headers(scope=scope).get("accept", "")):
+        return problem_page(refusal, request_id)
+    body, status = refusal.body(path, request_id), refusal.status_for(path)
+    return Response(body, status, headers=refusal.headers, media_type=refusal.media_type(path))
 
 
 def _as_refusal(request: Request, error: Exception, methods: Methods) -> Refusal:
