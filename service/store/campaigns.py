@@ -1,19 +1,20 @@
 """Campaigns and their recordings: kept, listed, read back, withdrawn, corrected; recordings excluded."""
 
 import secrets
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import Connection, func, insert, select, update
 
 from service.schemas.campaigns import State
-from service.store import codec, digests, skins
+from service.store import codec, skins
 from service.store.engine import Database
 from service.store.errors import Conflict, Missing
-from service.store.tables import AnyRow, campaigns, recordings
+from service.store.tables import AnyRow, campaigns, recording_digests, recordings
 from service.store.times import now
 from underskin.recordings.campaign import Campaign, Recording
+from underskin.recordings.repeats import digest
 
 # All that lists show of a recording: not its arrays.
 _LISTED = [column for column in recordings.c if column.name not in ("campaign", "position", "arrays")]
@@ -79,20 +80,37 @@ def add(
         "corrects": corrects,
         "correct_reason": reason,
     }
-    number = connection.execute(insert(campaigns).returning(campaigns.c.number), row).scalar_one()
-    connection.execute(insert(recordings), rows_of(number, campaign.recordings))
-    digests.keep(connection, number, campaign.recordings)
+    keep(connection, row, campaign.recordings, [{}] * len(campaign.recordings))
     if replaced is not None:
         _change(connection, replaced.number, corrected_by=campaign_id)
     return campaign_id, skin_id
 
 
-def rows_of(number: int, stored: Sequence[Recording]) -> list[dict[str, Any]]:
-    """Rows of the recordings of the campaign `number`."""
-    return [
-        {"campaign": number, "position": position, **codec.recording_columns(recording)}
-        for position, recording in enumerate(stored)
+def keep(
+    connection: Connection,
+    row: Mapping[str, Any],
+    held: Sequence[Recording],
+    exclusions: Sequence[Mapping[str, str | None]],
+) -> None:
+    """Keep a campaign by its row with its recordings in their order; `exclusions`: when and why each was excluded."""
+    number = connection.execute(insert(campaigns).returning(campaigns.c.number), row).scalar_one()
+    rows = [
+        {"campaign": number, "position": position, **codec.recording_columns(recording), **exclusion}
+        for position, (recording, exclusion) in enumerate(zip(held, exclusions, strict=True))
     ]
+    connection.execute(insert(recordings), rows)
+    keep_digests(connection, number, held)
+
+
+def keep_digests(connection: Connection, number: int, held: Sequence[Recording]) -> None:
+    """Keep those of the recordings of the campaign `number`, beside them; not all have one."""
+    rows = [
+        {"campaign": number, "position": position, "digest": made}
+        for position, recording in enumerate(held)
+        if (made := digest(recording)) is not None
+    ]
+    if rows:
+        connection.execute(insert(recording_digests), rows)
 
 
 def find(connection: Connection, campaign_id: str, *, lock: bool = False) -> AnyRow:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeAlias, TypeVar
 
 import orjson
-from sqlalchemy import URL, Connection, Engine, Table, create_engine, event, make_url, text
+from sqlalchemy import URL, Connection, Engine, Table, create_engine, event, make_url, select, text
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.exc import ArgumentError, DBAPIError
 
@@ -151,6 +151,12 @@ def is_full(error: BaseException) -> bool:
         code = getattr(original, "sqlite_errorcode", 0) & 0xFF
         return code == sqlite3.SQLITE_FULL or getattr(original, "sqlstate", None) == _PG_DISK_FULL
     return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
+def holds(connection: Connection, table: Table, **values: Any) -> bool:
+    """Whether a table has a row with these values."""
+    same = [table.c[name] == value for name, value in values.items()]
+    return connection.execute(select(1).select_from(table).where(*same).limit(1)).first() is not None
 
 
 def upsert(connection: Connection, table: Table) -> sqlite.Insert | postgresql.Insert:

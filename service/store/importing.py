@@ -8,13 +8,12 @@ from collections.abc import Sequence
 
 from sqlalchemy import Connection, insert, select, update
 
-from service.store import digests
-from service.store.campaigns import rows_of
-from service.store.engine import Database
+from service.store import campaigns
+from service.store.engine import Database, holds
 from service.store.errors import Conflict
 from service.store.export import exported
 from service.store.import_checks import CheckedOverview, ImportedCampaign, SkinRow
-from service.store.tables import AnyRow, recordings, rigs
+from service.store.tables import AnyRow, rigs
 from service.store.tables import campaigns as campaigns_table
 from service.store.tables import skins as skins_table
 from underskin.recordings.skin_export import ExportedCampaign
@@ -53,25 +52,17 @@ def add_skins(store: Database, checked: CheckedOverview) -> None:
         if clashes:
             raise Conflict(f"{clashes[0]}; nothing was imported.")
         for row in sorted(checked.skins, key=lambda row: row.id != row.root_id):  # the root first: others refer to it
-            if connection.execute(select(skins_table.c.id).where(skins_table.c.id == row.id)).first() is None:
+            if not holds(connection, skins_table, id=row.id):
                 connection.execute(insert(skins_table), {**row.model_dump(), "joined_to": None})
         for row in checked.skins:  # and to each other
             this = update(skins_table).where(skins_table.c.id == row.id)
             connection.execute(this.values(joined_to=row.joined_to))
         for rig in (row.model_dump() for row in checked.rigs):
-            same = [rigs.c[name] == value for name, value in rig.items()]
-            if connection.execute(select(rigs.c.number).where(*same)).first() is None:
+            if not holds(connection, rigs, **rig):
                 connection.execute(insert(rigs), rig)
 
 
 def add(store: Database, checked: ImportedCampaign) -> None:
     """Keep a campaign that is not there."""
-    with store.writing() as connection:
-        made = connection.execute(insert(campaigns_table).returning(campaigns_table.c.number), checked.row)
-        number = made.scalar_one()
-        stored = [
-            {**columns, **entry.model_dump()}
-            for columns, entry in zip(rows_of(number, checked.campaign.recordings), checked.exclusions, strict=True)
-        ]
-        connection.execute(insert(recordings), stored)
-        digests.keep(connection, number, checked.campaign.recordings)
+    exclusions = [entry.model_dump() for entry in checked.exclusions]
+    store.write(campaigns.keep, checked.row, checked.campaign.recordings, exclusions)
