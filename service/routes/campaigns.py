@@ -22,8 +22,8 @@ from service.schemas import campaigns as models
 from service.schemas.campaign_d33 import D33
 from service.store import campaigns
 from service.store.times import stored
-from service.usecases import campaign_documents, d33_cache
 from service.usecases import campaigns as usecase
+from service.usecases import d33_cache
 from underskin.errors import conflicting, wrong_type
 
 router = APIRouter(prefix="/v1", tags=["campaigns"], route_class=JsonRoute)
@@ -191,12 +191,12 @@ def document(
     """All recordings that were kept, arrays and all, those excluded later included."""
     row = store.read(campaigns.find, campaign_id)
     if file_format == "json":
-        return StreamingResponse(campaign_documents.json_parts(store, row), media_type="application/json")
+        return StreamingResponse(usecase.json_parts(store, row), media_type="application/json")
     return made_file(
         request.app.state.uploads,
         f"{row.id}.h5",
         "application/x-hdf5",
-        partial(campaign_documents.write_hdf5, store, row),
+        partial(usecase.write_hdf5, store, row),
     )
 
 

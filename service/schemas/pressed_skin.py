@@ -4,8 +4,16 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from service.schemas.columns import ColumnsRequest, NonNegative, Numbers, NumbersPerRow, Positive, Signed
-from service.schemas.columns_answer import AnswerInColumns, FindingModel
+from service.schemas.columns import (
+    AnswerInColumns,
+    ColumnsRequest,
+    FindingModel,
+    NonNegative,
+    Numbers,
+    NumbersPerRow,
+    Positive,
+    Signed,
+)
 
 FIELDS = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio", "indenter_radius_mm", "preload_n")
 ADOPTED_COLUMNS = ("offset_x_mm", "offset_y_mm", "dynamic_force_n", "dwell_s", "load_cycles")

@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import Connection, select
 
 from service.store import campaigns, diagnosis_export, skins
-from service.store.arrays import unpack
+from service.store.codec import unpack
 from service.store.tables import AnyRow, recordings, rigs
 from service.store.tables import skins as skins_table
 from underskin.recordings.skin_export import ExportedCampaign, Overview, write_campaign, writing

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from service.schemas.columns_answer import Columns
+from service.schemas.columns import Columns
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS, D33Columns, FrfColumns, PressedSkinColumns
 from service.store import Database
 from service.usecases.adopted_models import model_asked_for, press, require_paper

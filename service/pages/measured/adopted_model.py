@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from service.pages.shared.forms import in_form_words, number
 from service.pages.shared.skin_values import FIELDS
 from service.problems import Refusal
-from service.schemas.columns_answer import Columns
+from service.schemas.columns import Columns
 from service.schemas.pressed_skin import D33Columns
 from service.store import Conflict, Database
 from service.usecases.adopted_models import model_in_force

@@ -10,7 +10,6 @@ from pydantic import ValidationError
 from service.dependencies import Store, Table
 from service.pages.array.description import refused
 from service.pages.measured.adopted_model import ByModel, by_model
-from service.pages.measured.out_of_domain import reasons
 from service.pages.shared import same_request
 from service.pages.shared.figures import csv_answer
 from service.pages.shared.forms import number, numbers
@@ -18,11 +17,12 @@ from service.pages.shared.html import page
 from service.pages.shared.skin_values import FIELDS as SKIN_FIELDS
 from service.pages.shared.skin_values import UNITS, shown
 from service.problems import first_refused
-from service.schemas.columns_answer import Columns
+from service.schemas.columns import Columns
 from service.schemas.pressed_skin import D33Columns
 from service.store import Database
 from service.usecases.pressed_skin import d33
 from underskin.errors import InvalidInput, UnderskinError, too_few, wrong_type
+from underskin.prediction.domain_checks import RowConditions, beyond
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/d33")
@@ -116,3 +116,15 @@ def _row(place: int, line: str) -> list[float]:
     if len(parts) not in (3, 4):
         raise wrong_type(f"row {place}", line[:80], "must be R F FRF, or R F FRF and its uncertainty (mm, N, pC/N)")
     return parts
+
+
+def reasons(document: Mapping[str, Any], answer: Columns, table: SigmaTable) -> list[str]:
+    """Of each row outside the table, which value is and what is allowed; `document`: the request of the answer."""
+    numbers = [answer.full(name) for name in ("a_over_h", "rt_over_h", "load_parameter")]
+    status = answer.status()
+    skin = document["youngs_modulus_mpa"], document["poisson_ratio"]
+    return [
+        f"row {row + 1}, " + beyond(RowConditions(force, radius, *skin), [float(part[row]) for part in numbers], table)
+        for row, (force, radius) in enumerate(zip(document["preload_n"], document["indenter_radius_mm"], strict=True))
+        if status[row] != "ok"
+    ]

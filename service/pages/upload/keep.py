@@ -1,4 +1,4 @@
-"""Storing an upload that was shown, or the errors that prevent it."""
+"""Storing an upload that was shown, or the errors that prevent it; the rig description that it is read with."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,13 +8,14 @@ import orjson
 from fastapi import Request
 
 from service.dependencies import sender
-from service.ingest.accept import RIG, IngestOptions, accept
+from service.ingest.accept import RIG, IngestOptions, accept, kept_rig, sent_rig
 from service.ingest.reading import error_entry
 from service.ingest.uploads import Upload
 from service.pages.upload.pending_uploads import PendingUpload
 from service.problems import Refusal
-from service.store import Conflict, Database, Missing
+from service.store import Conflict, Database, Missing, campaigns
 from underskin.errors import ErrorCode, FileError, InvalidInput
+from underskin.recordings.rig_description import RigDescription
 
 SKIN_FIELD, CORRECTS = "skin", "corrects"
 
@@ -63,3 +64,24 @@ def field_errors(error: Exception) -> list[dict[str, Any]]:
         return [error_entry(error.file, None, f"{error.place} {error.reason}".strip(), error.code)]
     detail = error.detail if isinstance(error, Refusal) else str(error)
     return [error_entry("upload", None, detail, ErrorCode.INVALID_VALUE)]
+
+
+def skin_of(store: Database, corrects: str | None) -> str | None:
+    """The skin of the campaign that is corrected, on which its correction stays; raises Missing."""
+    if corrects is None:
+        return None
+    return str(store.read(campaigns.find, corrects).skin_id)
+
+
+def rig_in_use(
+    store: Database, sent: Upload | None, skin: str | None
+) -> tuple[RigDescription | None, list[dict[str, Any]]]:
+    """The rig description that was sent, or that is kept with the skin; and what is wrong with the one sent."""
+    if sent is not None:
+        try:
+            return sent_rig(sent), []
+        except (FileError, InvalidInput) as error:
+            return None, field_errors(error)
+    if skin is None:
+        return None, []
+    return store.read(kept_rig, skin), []

@@ -18,11 +18,11 @@ from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer
 from service.pages.shared.forms import OWN_FORM, TOKEN, Form, require_own, see
 from service.pages.shared.html import page
-from service.pages.upload import before_keeping, exported_skin, rig_in_use, similar_errors, spring_mapping
+from service.pages.upload import before_keeping, exported_skin, similar_errors, spring_mapping
 from service.pages.upload import mapping as mappings
 from service.pages.upload.figures import figures, lines_columns, trace_columns
 from service.pages.upload.file_summary import MOST_LISTED, ChannelSummary, FileSummary, seen
-from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good
+from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good, rig_in_use, skin_of
 from service.pages.upload.mapped_file import mapped_file
 from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
 from service.problems import Refusal
@@ -71,8 +71,8 @@ async def send(request: Request, store: Store) -> Response:
         if not given:
             raise Refusal(422, "No file came. Choose one, or drop it on the page.", title="No file")
         corrects = fields.get(CORRECTS) or None
-        skin = fields.get(SKIN_FIELD) or await run_in_threadpool(rig_in_use.skin_of, store, corrects)
-        rig_and_errors = await run_in_threadpool(rig_in_use.rig, store, rig, skin)
+        skin = fields.get(SKIN_FIELD) or await run_in_threadpool(skin_of, store, corrects)
+        rig_and_errors = await run_in_threadpool(rig_in_use, store, rig, skin)
         pending = pending_uploads.put(cookie, given)
     pending.skin, pending.corrects = skin, corrects
     pending.rig, pending.refused = rig_and_errors
