@@ -1,6 +1,5 @@
 """Commands on the store as a whole: backup and restore, while servers run."""
 
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -31,8 +30,7 @@ def restore(file: Annotated[Path, typer.Argument(help="A file that `underskin ba
     try:
         make_data_folder(settings.data)
         store = database(settings.database_url, settings.data)
-        stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
-        before = settings.data / "backups" / f"before-restore-{stamp}{backups.suffix(store)}"
+        before = backups.place(store, settings.data, "before-restore")
         restoring.restore(store, file, before)
         needed = store.read(key_requirement.is_needed)
     except (StoreError, OSError) as error:

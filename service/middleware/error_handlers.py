@@ -19,6 +19,8 @@ from underskin import InvalidInput
 logger = logging.getLogger("underskin")
 
 
+_STATUS = {Missing: 404, Conflict: 409, OtherRequest: 422}
+
 ProblemPage = Callable[[Refusal, str], Response]  # of a refusal and the request's id
 Methods = Callable[[FastAPI, str], Sequence[str]]  # of a path
 
@@ -68,28 +70,28 @@ def _as_refusal(request: Request, error: Exception, methods: Methods) -> Refusal
             return _of_the_store(request, error)
 
 
+def _of_the_store(request: Request, error: Exception) -> Refusal:
+    """What the store raises, and what nobody expected."""
+    match error:
+        case Missing() | Conflict() | OtherRequest():
+            return Refusal(_STATUS[type(error)], str(error))
+        case StorageFull():
+            return Refusal(507, "The disk is full: nothing of this request was kept. What is kept can be read.")
+        case StoreMoved():
+            return Refusal(503, str(error), headers=RETRY_LATER)
+        case DataError():
+            return Refusal(422, "A text has a character that cannot be kept, such as NUL.")
+        case IntegrityError():
+            wait = "look at what is there, and send it again."
+            return Refusal(409, f"Another request kept the same at the same time: {wait}")
+        case OperationalError():
+            logger.error("the store failed: %s", error, extra={"fields": {"request_id": request.scope["request_id"]}})
+            return Refusal(503, "The store does not answer; try again in a while.", headers=RETRY_LATER)
+        case _:
+            return unexpected()
+
+
 def _unreadable(error: RequestValidationError) -> Refusal | None:
     """A body that is not JSON is no question of fields."""
     reasons = [entry["ctx"]["error"] for entry in error.errors() if entry["type"] == "json_invalid"]
     return Refusal(400, f"The body is not JSON: {reasons[0]}.") if reasons else None
-
-
-_STATUS = {Missing: 404, Conflict: 409, OtherRequest: 422}
-
-
-def _of_the_store(request: Request, error: Exception) -> Refusal:
-    """What the store raises, and what nobody expected."""
-    if type(error) in _STATUS:
-        return Refusal(_STATUS[type(error)], str(error))
-    if isinstance(error, StorageFull):
-        return Refusal(507, "The disk is full: nothing of this request was kept. What is kept can be read.")
-    if isinstance(error, StoreMoved):
-        return Refusal(503, str(error), headers=RETRY_LATER)
-    if isinstance(error, DataError):
-        return Refusal(422, "A text has a character that cannot be kept, such as NUL.")
-    if isinstance(error, IntegrityError):
-        return Refusal(409, "Another request kept the same at the same time: look at what is there, and send it again.")
-    if isinstance(error, OperationalError):
-        logger.error("the store failed: %s", error, extra={"fields": {"request_id": request.scope["request_id"]}})
-        return Refusal(503, "The store does not answer; try again in a while.", headers=RETRY_LATER)
-    return unexpected()

@@ -1,5 +1,5 @@
-"""Columns. A request's field is a number for all rows, or a list with an entry a row; an answer is JSON, null where there is
-no value, or as CSV, NaN there.
+"""Columns. A field of a request is a number for all rows, or a list with an entry a row; an answer is JSON, null where
+there is no value, or CSV, NaN there.
 """
 
 from collections.abc import Mapping, Sequence

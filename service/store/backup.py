@@ -10,6 +10,7 @@ import sqlite3
 import subprocess
 import tempfile
 from contextlib import closing, suppress
+from datetime import UTC, datetime
 from pathlib import Path
 
 from service.store.engine import Database
@@ -17,9 +18,10 @@ from service.store.errors import StoreError
 from service.store.tables import metadata
 
 
-def suffix(database: Database) -> str:
-    """Of the names of backup files."""
-    return ".sqlite3" if database.is_sqlite else ".pgdump"
+def place(database: Database, folder: Path, occasion: str) -> Path:
+    """Where in the data folder a backup is written that nobody asked for, now."""
+    suffix = ".sqlite3" if database.is_sqlite else ".pgdump"
+    return folder / "backups" / f"{occasion}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}{suffix}"
 
 
 def make(database: Database, file: Path) -> None:

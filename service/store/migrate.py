@@ -3,7 +3,6 @@
 import fcntl
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import UTC, datetime
 from pathlib import Path
 
 from sqlalchemy import Connection, inspect, text
@@ -31,7 +30,7 @@ def migrate(database: Database, folder: Path) -> None:
             return
         if before is not None:
             require_known(before)
-            backup.make(database, folder / "backups" / f"before-{VERSIONS[-1]}-{_stamp()}{backup.suffix(database)}")
+            backup.make(database, backup.place(database, folder, f"before-{VERSIONS[-1]}"))
         _upgrade(database)
 
 
@@ -80,7 +79,3 @@ def _one_at_a_time(database: Database, folder: Path) -> Iterator[None]:
     else:
         with database.pg_lock(_LOCK):
             yield
-
-
-def _stamp() -> str:
-    return datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")

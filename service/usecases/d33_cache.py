@@ -1,11 +1,12 @@
 """d33 of stored campaigns, computed once for each state of a campaign and cached in the store."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Literal
 
 import orjson
+from sqlalchemy import Connection
 
 from service.problems import Refusal
 from service.schemas.campaign_d33 import D33
@@ -63,29 +64,18 @@ def adopted_answer(
 
     Raises InvalidInput where the campaign lacks what the model needs, or declares the skin otherwise.
     """
-    with store.reading() as connection:
-        cached = (
-            inversions.find_adopted(connection, row, model_in_force.model_id, table.sha256) if band_hz is None else None
-        )
-        if cached is not None:
-            return dict(cached)
-        campaign = campaigns.load(connection, row, with_excluded=False)
-        excluded = campaigns.excluded_of(connection, row.number)
-    translated, beyond = model_in_force.model.as_base_model(campaign, table)
-    left_out = [(left.recording, left.reason) for left in excluded]
+    model, model_id = model_in_force.model, model_in_force.model_id
+    cached = store.read(inversions.find_adopted, row, model_id, table.sha256) if band_hz is None else None
+    if cached is not None:
+        return dict(cached)
+    campaign, left_out = store.read(_used, row)
+    translated, beyond = model.as_base_model(campaign, table)
     left_out += [(name, "beyond the table under the adopted model") for name in beyond]
-    model = {
-        "model": "adopted",
-        "model_id": model_in_force.model_id,
-        "model_percent": 100 * model_in_force.model.unsure,
-    }
-    document = {"campaign_id": row.id, "table_sha256": table.sha256, **model}
+    origin = {"model": "adopted", "model_id": model_id, "model_percent": 100 * model.unsure}
+    document = {"campaign_id": row.id, "table_sha256": table.sha256, **origin}
     document, _, failed = _computed(document, translated, table, band_hz, left_out)
     if band_hz is None and not failed:
-        try:
-            store.write(inversions.keep_adopted, row, model_in_force.model_id, table.sha256, document)
-        except (StorageFull, StoreMoved) as error:
-            _not_kept(row, error)
+        _keep(store, row, inversions.keep_adopted, model_id, table.sha256, document)
     return document
 
 
@@ -123,16 +113,24 @@ def _derived(
     store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | None, spreads: list[dict[str, Any]] | None = None
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Answer and numbers, computed, and kept where they are of the flat zone; `spreads`: where these are known."""
-    with store.reading() as connection:
-        campaign = campaigns.load(connection, row, with_excluded=False)
-        excluded = campaigns.excluded_of(connection, row.number)
+    campaign, left_out = store.read(_used, row)
     document = {"campaign_id": row.id, "table_sha256": table.sha256, **_PAPER}
-    left_out = [(left.recording, left.reason) for left in excluded]
     document, inversion, failed = _computed(document, campaign, table, band_hz, left_out)
     numbers = figure_data.numbers(campaign, inversion, spreads)
     if band_hz is None and not failed:
-        _keep(store, row, document, numbers)
+        sensors = {
+            entry["sensor"]: (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"])
+            for entry in document["sensors"]
+            if entry["d33_pc_per_n"] is not None and entry["d33_uncertainty_pc_per_n"] is not None
+        }
+        _keep(store, row, inversions.keep, table.sha256, document, numbers, sensors)
     return document, numbers
+
+
+def _used(connection: Connection, row: AnyRow) -> tuple[Campaign, list[tuple[str, str]]]:
+    """The campaign without what is excluded; and that, with the reasons."""
+    left_out = [(left.recording, left.reason) for left in campaigns.excluded_of(connection, row.number)]
+    return campaigns.load(connection, row, with_excluded=False), left_out
 
 
 def _computed(
@@ -184,18 +182,9 @@ def _none(reason: str) -> dict[str, Any]:
     return {**_NOTHING, "status": "none", "reason": reason, **_EMPTY}
 
 
-def _keep(store: Database, row: AnyRow, document: dict[str, Any], numbers: dict[str, Any]) -> None:
-    sensors = {
-        entry["sensor"]: (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"])
-        for entry in document["sensors"]
-        if entry["d33_pc_per_n"] is not None and entry["d33_uncertainty_pc_per_n"] is not None
-    }
+def _keep(store: Database, row: AnyRow, change: Callable[..., None], *derived: Any) -> None:
+    """Where it cannot be kept, the answer is given all the same."""
     try:
-        store.write(inversions.keep, row, document["table_sha256"], document, numbers, sensors)
+        store.write(change, row, *derived)
     except (StorageFull, StoreMoved) as error:
-        _not_kept(row, error)
-
-
-def _not_kept(row: AnyRow, error: Exception) -> None:
-    """The answer is given all the same."""
-    logger.warning("the d33 of a campaign was not kept: %s", error, extra={"fields": {"campaign": row.id}})
+        logger.warning("the d33 of a campaign was not kept: %s", error, extra={"fields": {"campaign": row.id}})

@@ -11,7 +11,7 @@ from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, St
 from service.pages.diagnosis.figure_columns import columns
 from service.pages.diagnosis.plan import FIELDS, left_open
 from service.pages.shared import adoption, same_request
-from service.pages.shared.figures import Drawn, csv_answer, drawn, drawn_before
+from service.pages.shared.figures import Drawn, attachment, csv_answer, drawn, drawn_before
 from service.pages.shared.forms import OWN_FORM, see
 from service.pages.shared.html import page, render
 from service.problems import Refusal
@@ -87,12 +87,8 @@ def one_file(diagnosis_id: DiagnosisId, store: Store) -> Response:
         content = file.page(report, figures or None)
     except _ODD:
         _cannot_be_shown(row)
-    headers = {
-        "Content-Disposition": f'attachment; filename="{row.id}.html"',
-        "Content-Security-Policy": "sandbox",  # should anything open it in place
-        "X-Content-Type-Options": "nosniff",
-    }
-    return Response(content, headers=headers, media_type="text/html; charset=utf-8")
+    policy = {"Content-Security-Policy": "sandbox"}  # should anything open it in place
+    return attachment(f"{row.id}.html", content, "text/html; charset=utf-8", **policy)
 
 
 @router.get("/diagnoses/{diagnosis_id}/{figure}.csv")

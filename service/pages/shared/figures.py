@@ -72,8 +72,13 @@ def drawn_curves(recordings: Iterable[Recording], most: int, noun: str = "", num
 
 def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> Response:
     """Columns as a CSV file to be saved."""
-    headers = {"Content-Disposition": f'attachment; filename="{name}.csv"', "X-Content-Type-Options": "nosniff"}
-    return Response(csv_text(columns), headers=headers, media_type="text/csv; charset=utf-8")
+    return attachment(f"{name}.csv", csv_text(columns), "text/csv; charset=utf-8")
+
+
+def attachment(file: str, content: str | bytes, media_type: str, **headers: str) -> Response:
+    """A file to be saved."""
+    about = {"Content-Disposition": f'attachment; filename="{file}"', "X-Content-Type-Options": "nosniff", **headers}
+    return Response(content, headers=about, media_type=media_type)
 
 
 def csv_of_rows(name: str, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> Response:

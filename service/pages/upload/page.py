@@ -6,16 +6,17 @@ from dataclasses import replace
 from typing import Annotated, Any
 
 import orjson
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.auth import session
 from service.dependencies import WRITE, Store, Table
+from service.ingest import skin_imports
 from service.ingest.accept import RIG
 from service.ingest.reading import READING_SLOTS, InspectedFile, look, require_few
 from service.ingest.uploads import received
 from service.pages.shared import same_request
-from service.pages.shared.figures import Drawn, csv_answer
+from service.pages.shared.figures import Drawn, attachment, csv_answer
 from service.pages.shared.forms import OWN_FORM, TOKEN, Form, require_own, see
 from service.pages.shared.html import page
 from service.pages.upload import before_keeping, exported_skin, similar_errors, spring_mapping
@@ -36,6 +37,15 @@ router = APIRouter(prefix="/upload")
 _LONGEST_FIELD = 1000  # bytes of a field beside the files
 _MOST_SKINS = 200  # that the form offers
 _MOST_NAMED = 5  # files in the request that does the same
+
+
+def _pending(request: Request, upload_id: str) -> PendingUpload:
+    """The upload of an address; raises Missing where it is not the session's own."""
+    pending_uploads: PendingUploads = request.app.state.pending_uploads
+    return pending_uploads.find(session.cookie_in(dict(request.scope["headers"])), upload_id)
+
+
+Pending = Annotated[PendingUpload, Depends(_pending)]
 
 
 @router.get("")
@@ -79,7 +89,8 @@ async def send(request: Request, store: Store) -> Response:
     pending.rig_label = None if rig is None or pending.rig is None else rig.label
     try:
         if await run_in_threadpool(exported_skin.holds_skin, pending):
-            await exported_skin.look(store, pending)
+            async with skin_imports.one:
+                await run_in_threadpool(exported_skin.look, store, pending)
         else:
             async with READING_SLOTS:
                 await run_in_threadpool(_look, request, pending)
@@ -90,9 +101,8 @@ async def send(request: Request, store: Store) -> Response:
 
 
 @router.get("/{upload_id}")
-def understood(request: Request, upload_id: str, store: Store, file: Annotated[int, Query(ge=0)] = 0) -> Response:
+def understood(request: Request, pending: Pending, store: Store, file: Annotated[int, Query(ge=0)] = 0) -> Response:
     """What was understood, file by file."""
-    pending = _find(request, upload_id)
     if pending.kept_at is not None:
         return see(pending.kept_at)
     if pending.skin_summary is not None:
@@ -142,9 +152,8 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
 
 
 @router.post("/{upload_id}/mapping", dependencies=WRITE)
-async def mapping(request: Request, upload_id: str, sent: Form) -> Response:
+async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     """Reads the files again, as a form says what they are."""
-    pending = _find(request, upload_id)
     base = pending.draft or (pending.rig.document if pending.rig is not None else {})
     pending.skin = sent.get(SKIN_FIELD, pending.skin or "").strip() or None
     pending.draft, wrong = mappings.document_of(sent, base)
@@ -153,67 +162,58 @@ async def mapping(request: Request, upload_id: str, sent: Form) -> Response:
     except InvalidInput as error:
         wrong.append(error)
     pending.refused = [entry for error in wrong for entry in field_errors(error)]
-    if wrong:
-        return see(f"/upload/{upload_id}")
-    pending.rig, pending.draft, pending.rig_label = rig, None, "rig.json"  # as the page saves it
-    async with READING_SLOTS:
-        await run_in_threadpool(_look, request, pending)
-    return see(f"/upload/{upload_id}")
+    if not wrong:
+        pending.rig, pending.draft, pending.rig_label = rig, None, "rig.json"  # as the page saves it
+        async with READING_SLOTS:
+            await run_in_threadpool(_look, request, pending)
+    return see(f"/upload/{pending.id}")
 
 
 @router.post("/{upload_id}/keep", dependencies=WRITE)
-async def keep(request: Request, upload_id: str, sent: Form, store: Store, table: Table) -> Response:
+async def keep(request: Request, sent: Form, pending: Pending, store: Store, table: Table) -> Response:
     """Keeps what is good of it."""
-    pending = _find(request, upload_id)
     async with READING_SLOTS:
         campaign_ids = await run_in_threadpool(keep_good, request, pending, sent, store)
         await run_in_threadpool(d33_cache.derive, store, table, campaign_ids)
-    return see(pending.kept_at or f"/upload/{upload_id}")
+    return see(pending.kept_at or f"/upload/{pending.id}")
 
 
 @router.post("/{upload_id}/skin", dependencies=[*WRITE, OWN_FORM])
-async def bring_in(request: Request, upload_id: str, store: Store) -> Response:
+async def bring_in(request: Request, pending: Pending, store: Store) -> Response:
     """Brings in an exported skin."""
-    pending = _find(request, upload_id)
     if pending.skin_summary is None:
         raise Missing("There is no exported skin in this upload.")
-    await exported_skin.bring_in(request, store, pending)
-    return see(pending.kept_at or f"/upload/{upload_id}")
+    async with skin_imports.one:
+        await run_in_threadpool(exported_skin.bring_in, request, store, pending)
+    return see(pending.kept_at or f"/upload/{pending.id}")
 
 
 @router.post("/{upload_id}/discard", dependencies=[*WRITE, OWN_FORM])
-def discard(request: Request, upload_id: str) -> Response:
+def discard(request: Request, pending: Pending) -> Response:
     """Removes it."""
-    request.app.state.pending_uploads.discard(_find(request, upload_id))
+    request.app.state.pending_uploads.discard(pending)
     return see("/upload")
 
 
 @router.get("/{upload_id}/rig.json")
-def rig_json(request: Request, upload_id: str) -> Response:
+def rig_json(pending: Pending) -> Response:
     """The rig description in use."""
-    rig = _find(request, upload_id).rig
-    if rig is None:
+    if pending.rig is None:
         raise Missing("There is no rig description yet.")
-    content = orjson.dumps(rig.document, option=orjson.OPT_INDENT_2)
-    headers = {"Content-Disposition": 'attachment; filename="rig.json"', "X-Content-Type-Options": "nosniff"}
-    return Response(content, headers=headers, media_type="application/json")
+    content = orjson.dumps(pending.rig.document, option=orjson.OPT_INDENT_2)
+    return attachment("rig.json", content, "application/json")
 
 
 @router.get("/{upload_id}/{file}/traces.csv")
-def traces_csv(request: Request, upload_id: str, file: int) -> Response:
+def traces_csv(request: Request, pending: Pending, file: int) -> Response:
     """The channels of a file's first part."""
-    return csv_answer("traces", trace_columns(_looked(request, _find(request, upload_id), file)))
+    return csv_answer("traces", trace_columns(_looked(request, pending, file)))
 
 
 @router.get("/{upload_id}/{file}/frf.csv")
-def frf_csv(request: Request, upload_id: str, file: int) -> Response:
+def frf_csv(request: Request, pending: Pending, file: int) -> Response:
     """The FRFs of a file."""
-    return csv_answer("frf", lines_columns(_looked(request, _find(request, upload_id), file)))
-
-
-def _find(request: Request, upload_id: str) -> PendingUpload:
-    pending_uploads: PendingUploads = request.app.state.pending_uploads
-    return pending_uploads.find(session.cookie_in(dict(request.scope["headers"])), upload_id)
+    return csv_answer("frf", lines_columns(_looked(request, pending, file)))
 
 
 def _looked(request: Request, pending: PendingUpload, number: int) -> InspectedFile:

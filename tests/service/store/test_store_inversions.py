@@ -89,7 +89,7 @@ def test_what_was_derived_before_a_restore_is_not_kept_for_another_campaign(stor
     empty = tmp_path / "empty"
     backup.make(store, empty)
     lost = kept(store, "lost")
-    restore(store, empty, tmp_path / "data" / "backups" / f"before{backup.suffix(store)}")
+    restore(store, empty, tmp_path / "data" / "backups" / "before")
     here = kept(store, "here")
     assert here.number == lost.number
     derive(store, lost)
