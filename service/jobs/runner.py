@@ -3,6 +3,7 @@
 import logging
 import secrets
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -105,7 +106,7 @@ class Runner:
             self._release(row)
         except Exception as error:  # the thread has no caller to raise to
             logger.exception("a diagnosis could not be run", extra={"fields": {"diagnosis": row.id}})
-            self._end(row, None, f"{type(error).__name__}: {error}")
+            self._end(row, diagnoses.fail, f"{type(error).__name__}: {error}")
         finally:
             with self._lock:
                 del self._jobs[threading.current_thread()]
@@ -128,10 +129,10 @@ class Runner:
             if not worker.ended:
                 self._release(row)
             elif "report" in worker.said:
-                self._end(row, worker.said["report"], "", worker.said.get("figures"))
+                self._end(row, diagnoses.finish, worker.said["report"], worker.said.get("figures"))
             else:
                 logger.error("a diagnosis failed", extra={"fields": {"diagnosis": row.id, "said": worker.last_words}})
-                self._end(row, None, worker.failure)
+                self._end(row, diagnoses.fail, worker.failure)
 
     def _is_ours(self, row: AnyRow, worker: Worker) -> bool:
         """Renew the claim; False where it was cancelled or another server claimed it, True where the store fails."""
@@ -143,17 +144,11 @@ class Runner:
         self._failure.is_over()
         return ours
 
-    def _end(
-        self, row: AnyRow, report: dict[str, Any] | None, reason: str, figures: dict[str, str] | None = None
-    ) -> None:
+    def _end(self, row: AnyRow, change: Callable[..., bool], *outcome: Any) -> None:
         """Store the outcome, and try again where the store fails: it took long to compute."""
         while True:
             try:
-                with self._store.writing() as connection:
-                    if report is not None:
-                        diagnoses.finish(connection, row.number, self._server, report, figures)
-                    else:
-                        diagnoses.fail(connection, row.number, self._server, reason)
+                self._store.write(change, row.number, self._server, *outcome)
                 return
             except _STORE_FAILED as error:
                 self._failure.log("what came of a diagnosis cannot be kept", error)

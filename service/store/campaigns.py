@@ -20,6 +20,11 @@ from underskin.recordings.repeats import digest
 _LISTED = [column for column in recordings.c if column.name not in ("campaign", "position", "arrays")]
 _AT_A_TIME = 8  # recordings read at once for a document
 CURRENT = campaigns.c.withdrawn_at.is_(None) & campaigns.c.corrected_by.is_(None)
+_IN_STATE = {
+    "current": CURRENT,
+    "corrected": campaigns.c.withdrawn_at.is_(None) & campaigns.c.corrected_by.is_not(None),
+    "withdrawn": campaigns.c.withdrawn_at.is_not(None),
+}
 
 
 @dataclass(frozen=True)
@@ -127,12 +132,8 @@ def listed(connection: Connection, filters: CampaignFilters, before: int | None,
     query = select(campaigns)
     if filters.skin is not None:
         query = query.where(campaigns.c.skin_id.in_(skins.members(skins.root_of(filters.skin))))
-    if filters.state == "current":
-        query = query.where(CURRENT)
-    if filters.state == "corrected":
-        query = query.where(campaigns.c.corrected_by.is_not(None), campaigns.c.withdrawn_at.is_(None))
-    if filters.state == "withdrawn":
-        query = query.where(campaigns.c.withdrawn_at.is_not(None))
+    if filters.state is not None:
+        query = query.where(_IN_STATE[filters.state])
     if filters.name_contains is not None:
         query = query.where(func.lower(campaigns.c.name).contains(filters.name_contains.lower(), autoescape=True))
     if filters.recorded_from is not None:
@@ -144,9 +145,9 @@ def listed(connection: Connection, filters: CampaignFilters, before: int | None,
     return connection.execute(query.order_by(campaigns.c.number.desc()).limit(limit)).all()
 
 
-def latest(connection: Connection, root: str) -> AnyRow | None:
+def latest(connection: Connection, skin_id: str) -> AnyRow | None:
     """The row of a skin's current campaign that arrived last; None where none is current."""
-    return next(iter(listed(connection, CampaignFilters(skin=root, state="current"), None, 1)), None)
+    return next(iter(listed(connection, CampaignFilters(skin=skin_id, state="current"), None, 1)), None)
 
 
 def state(row: AnyRow) -> State:

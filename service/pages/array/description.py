@@ -1,6 +1,6 @@
 """An array under loads: the fields of the forms that ask for one, and the request of `POST /v1/stress` in them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -72,6 +72,18 @@ def refused(error: UnderskinError, lines: Sequence[int] = ()) -> str:
     return in_form_words(error, _LABELS, lines, "or tick “Take unlikely magnitudes as they are”")
 
 
+def tried(
+    request: Request, make: Callable[[], dict[str, Any]], lines: Sequence[int] = ()
+) -> tuple[dict[str, Any], ArrayStress | None, str | None]:
+    """The request that `make` makes, with its answer or what is wrong; `lines` as for `refused`."""
+    document: dict[str, Any] = {}
+    try:
+        document = make()
+        return document, answered(request, document), None
+    except UnderskinError as error:
+        return document, None, refused(error, lines)
+
+
 def answered(request: Request, document: Mapping[str, Any]) -> ArrayStress:
     """What `POST /v1/stress` answers; raises UnderskinError."""
     table = influence_table(request.app.state.settings.tables)
@@ -110,8 +122,7 @@ def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:
 def _latest(store: Database, skin_id: str) -> Mapping[str, Any]:
     """The skin as its latest campaign declares it."""
     with store.reading() as connection:
-        root = skins.require_root(connection, skin_id)
-        latest = campaigns.latest(connection, root)
+        latest = campaigns.latest(connection, skins.require_root(connection, skin_id))
     skin: dict[str, Any] = {"sensors": []} if latest is None else latest.about["skin"]
     if not skin["sensors"]:
         raise InvalidInput("skin", skin_id, "must have a current campaign that names its sensors")

@@ -59,17 +59,14 @@ async def send(request: Request, store: Store) -> Response:
 
 def _shown(request: Request, store: Database, given: Mapping[str, str], content: bytes, name: str) -> Response:
     described = description.described(store, request.app.state.table, given, given.get(_SKIN))
-    error: str | None = None
-    document: dict[str, Any] = {}
-    answer: ArrayStress | None = None
-    try:
+
+    def document_of_map() -> dict[str, Any]:
         if len(content) > _LARGEST_BYTES:
             raise out_of_range("pressure_map", name, f"must have at most {_LARGEST_BYTES / 1e6:g} MB: make it coarser")
         pressure = pressure_map.parse(content, name)
-        document = {**described.document(), "pressure_map": pressure}
-        answer = description.answered(request, document)
-    except UnderskinError as refused:
-        error = description.refused(refused)
+        return {**described.document(), "pressure_map": pressure}
+
+    document, answer, error = description.tried(request, document_of_map)
     return page(
         request,
         "pressure_map.html",

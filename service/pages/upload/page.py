@@ -1,7 +1,6 @@
 """Upload: files are read, shown channel by channel, and stored only on confirmation."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -112,9 +111,8 @@ def understood(request: Request, pending: Pending, store: Store, file: Annotated
         inspected = _looked(request, pending, file)
         mapped = mapped_file(inspected, pending.seen[file], pending.rig)
         pending.draw(file, figures(inspected, f"/upload/{pending.id}/{file}/", mapped))
-    with store.reading() as connection:
-        known = [row.id for row in skins.listed(connection, None, None, _MOST_SKINS)]
-        about = _latest(store, pending.skin or pending.seen[file].skin)
+    known = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
+    about = _latest(store, pending.skin or pending.seen[file].skin)
     channels = _channels(pending)
     stated = pending.draft or (pending.rig.document if pending.rig is not None else None)
     document = stated or mappings.guessed(channels, pending.seen[file].properties, about)
@@ -243,13 +241,8 @@ def _look(request: Request, pending: PendingUpload) -> None:
 
 def _latest(store: Database, skin: str | None) -> Mapping[str, Any]:
     """What the latest campaign of a skin says of it."""
-    if skin is None:
-        return {}
-    with store.reading() as connection, suppress(Missing):
-        root = skins.require_root(connection, skin)
-        row = campaigns.latest(connection, root)
-        return {} if row is None else dict(row.about["skin"])
-    return {}
+    row = None if skin is None else store.read(campaigns.latest, skin)
+    return {} if row is None else dict(row.about["skin"])
 
 
 def _unsaid(pending: PendingUpload, file: FileSummary) -> bool:
