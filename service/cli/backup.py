@@ -8,9 +8,8 @@ import typer
 from service.auth.keys import KeyStore, keys_missing
 from service.cli.shared import read_settings
 from service.settings import make_data_folder
-from service.store import StoreError, database, key_requirement
+from service.store import StoreError, database, key_requirement, migrate
 from service.store import backup as backups
-from service.store import restore as restoring
 from underskin import UnderskinError
 
 
@@ -31,7 +30,7 @@ def restore(file: Annotated[Path, typer.Argument(help="A file that `underskin ba
         make_data_folder(settings.data)
         store = database(settings.database_url, settings.data)
         before = backups.place(store, settings.data, "before-restore")
-        restoring.restore(store, file, before)
+        migrate.restore(store, file, before)
         needed = store.read(key_requirement.is_needed)
     except (StoreError, OSError) as error:
         raise UnderskinError(str(error)) from error

@@ -121,10 +121,7 @@ def respond(answer: Columns, accept: str, *, one: bool = False) -> Response:
     return Response(answer.csv(), media_type="text/csv", headers={"Underskin-Model": answer.model, **table})
 
 
-RequestKind = TypeVar("RequestKind", bound=ColumnsRequest)
-
-
-def parse(kind: type[RequestKind], body: bytes, content_type: str) -> RequestKind:
+def parse(kind: type[_Kind], body: bytes, content_type: str) -> _Kind:
     """The request in `body`; raises Refusal 400 (unreadable), 415 (another type) or 422 (a field is wrong)."""
     fields = (
         _from_csv(kind, body)

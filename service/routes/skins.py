@@ -8,7 +8,7 @@ from service.dependencies import WRITE, SkinId, Store, Table
 from service.middleware.unique_keys import JsonRoute
 from service.schemas import skins as models
 from service.store import skins
-from service.usecases import d33_cache, histories
+from service.usecases import d33_cache
 from service.usecases import skins as usecase
 
 router = APIRouter(prefix="/v1", tags=["skins"], route_class=JsonRoute)
@@ -56,4 +56,4 @@ def history(
     root = store.read(skins.require_root, skin_id)
     if model == "paper":
         d33_cache.complete(store, table, root)
-    return histories.by_model(store, table, root, model)
+    return usecase.history_by_model(store, table, root, model)

@@ -20,6 +20,8 @@ from underskin.recordings.campaign import KINDS, Campaign, Recording
 from underskin.recordings.conditions import Sensor, SkinDescription
 from underskin.units import Floats
 
+_LEVEL = 1  # higher levels take several times longer and save a few per cent
+
 
 def about(campaign: Campaign) -> dict[str, Any]:
     """The campaign without its recordings."""
@@ -83,9 +85,6 @@ def compressed(document: Any) -> bytes:
 def decompressed(blob: bytes) -> Any:
     """The inverse of `compressed`."""
     return orjson.loads(zlib.decompress(blob))
-
-
-_LEVEL = 1  # higher levels take several times longer and save a few per cent
 
 
 def pack(arrays: Mapping[str, Floats]) -> bytes:

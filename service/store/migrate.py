@@ -1,4 +1,6 @@
-"""The schema at start: made, or brought up to date after a verified backup; a newer one is refused."""
+"""The schema at start: made, or brought up to date after a verified backup; a newer one is refused. So is a backup that
+takes the place of the store.
+"""
 
 import fcntl
 from collections.abc import Iterator
@@ -7,7 +9,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection, inspect, text
 
-from service.store import backup
+from service.store import backup, key_requirement
 from service.store.engine import Database
 from service.store.errors import StoreError
 
@@ -79,3 +81,22 @@ def _one_at_a_time(database: Database, folder: Path) -> Iterator[None]:
     else:
         with database.pg_lock(_LOCK):
             yield
+
+
+def restore(store: Database, file: Path, before: Path) -> None:
+    """Replace the store by the backup `file`, brought up to date; what was there is in `before`.
+
+    Where keys were needed they still are, whatever the backup says.
+
+    Raises StoreError, with the store as it was.
+    """
+    require_known(backup.verify(store, file))
+    store.make()
+    with store.without_writers():  # what is acknowledged after the backup would be lost
+        needed = store.read(key_requirement.is_needed)
+        if version(store) is not None:
+            backup.make(store, before)
+        backup.replace_with(store, file)
+    migrate(store, before.parent.parent)
+    if needed:
+        store.write(key_requirement.require)

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, Store, Table, sender
 from service.pages.diagnosis.figure_columns import columns
 from service.pages.diagnosis.plan import FIELDS, left_open
-from service.pages.shared import adoption, same_request
+from service.pages.shared import same_request, verdicts
 from service.pages.shared.figures import Drawn, attachment, csv_answer, drawn, drawn_before
 from service.pages.shared.forms import OWN_FORM, see
 from service.pages.shared.html import page, render
@@ -53,7 +53,7 @@ def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Resp
         figures = diagnoses.figures_of(connection, row.number)
         of_skin = models.of_skin(connection, skins.require_root(connection, row.skin_id))
         own = next((model for model in of_skin if model.id == row.id), None)
-        adopted_as = None if own is None else adoption.of_rows(connection, [own])[0]
+        adopted_as = None if own is None else verdicts.adopted_versions(connection, [own])[0]
         campaign = campaigns.find(connection, row.campaign_id)
     place = f"/v1/diagnoses/{row.id}"
     return page(

@@ -9,16 +9,16 @@ from starlette.background import BackgroundTask
 
 from service.dependencies import WRITE, SkinId, Store, Table, number_of_cursor, sender
 from service.pages.shared import same_request, verdicts
-from service.pages.shared.adoption import answer_by_it, change_percent, of_rows
 from service.pages.shared.figures import csv_of_rows
 from service.pages.shared.forms import Form, reason, see
 from service.pages.shared.html import page
+from service.pages.shared.verdicts import adopted_versions, answer_by_it, change_percent
 from service.pages.skin.figures import By, Shown, drawn_history, drawn_map, map_rows
 from service.problems import validated
 from service.schemas.campaign_d33 import D33Value
 from service.schemas.skins import Join
 from service.store import Database, campaigns, inversions, models, overview, skins
-from service.usecases import d33_cache, histories
+from service.usecases import d33_cache
 from service.usecases import skins as usecase
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -59,7 +59,7 @@ def skin(
         medians = overview.medians(connection, numbers, table.sha256)
         diagnosed = overview.latest_diagnoses(connection, numbers)
         model_row = models.last(connection, root)
-        last_model = None if model_row is None else of_rows(connection, [model_row])[0]
+        last_model = None if model_row is None else adopted_versions(connection, [model_row])[0]
         model = last_model if last_model is not None and last_model.withdrawn_at is None else None
         adopted = [] if model is None else [model.diagnosis_id]
         verdict = verdicts.of_rows(connection, list(diagnosed.values()), adopted)
@@ -68,7 +68,7 @@ def skin(
     answer = None if last is None else d33_cache.answer(store, table, last, None)
     by_model, why_not = (None, None) if last is None or not serves else answer_by_it(store, table, last)
     by = (by or ("paper" if by_model is None else "adopted")) if serves else "paper"
-    history = histories.by_model(store, table, root, by)
+    history = usecase.history_by_model(store, table, root, by)
     sensor = sensor if sensor in {entry.sensor for entry in history.sensors} else None
     mapped = by_model if by == "adopted" else answer
     figures = []
@@ -132,7 +132,7 @@ def join(skin_id: SkinId, sent: Form, store: Store) -> Response:
 def map_csv(skin_id: SkinId, store: Store, table: Table, by: ByQuery = "paper") -> Response:
     """d33 of each sensor in the latest campaign, and its trend."""
     root, _ = _completed(store, table, skin_id)
-    history = histories.by_model(store, table, root, by)
+    history = usecase.history_by_model(store, table, root, by)
     row = store.read(campaigns.latest, root)
     rows = [] if row is None else map_rows(row, d33_cache.by_model(store, table, row, by), history)
     return csv_of_rows("map", _MAP_COLUMNS, rows)
@@ -144,7 +144,7 @@ def history_csv(skin_id: SkinId, store: Store, table: Table, by: ByQuery = "pape
     root, _ = _completed(store, table, skin_id)
     points = [
         {"sensor": entry.sensor, **point.model_dump(), "model_id": point.model_id or ""}
-        for entry in histories.by_model(store, table, root, by).sensors
+        for entry in usecase.history_by_model(store, table, root, by).sensors
         for point in entry.points
     ]
     return csv_of_rows("history", _HISTORY_COLUMNS, points)

@@ -1,6 +1,6 @@
 """Storing an upload that was shown, or the errors that prevent it; the rig description that it is read with."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 from urllib.parse import quote
 
@@ -8,13 +8,16 @@ import orjson
 from fastapi import Request
 
 from service.dependencies import sender
+from service.ingest import repeats
 from service.ingest.accept import RIG, IngestOptions, accept, kept_rig, sent_rig
-from service.ingest.reading import error_entry
+from service.ingest.reading import InspectedFile, checked, error_entry
 from service.ingest.uploads import Upload
 from service.pages.upload.pending_uploads import PendingUpload
 from service.problems import Refusal
-from service.store import Conflict, Database, Missing, campaigns
+from service.store import Conflict, Database, Missing, campaigns, skins
+from service.usecases import d33_cache
 from underskin.errors import ErrorCode, FileError, InvalidInput
+from underskin.recordings.campaign import Campaign
 from underskin.recordings.rig_description import RigDescription
 
 SKIN_FIELD, CORRECTS = "skin", "corrects"
@@ -85,3 +88,38 @@ def rig_in_use(
     if skin is None:
         return None, []
     return store.read(kept_rig, skin), []
+
+
+def worth_knowing(request: Request, look: InspectedFile, skin_id: str | None, corrects: str | None) -> list[str]:
+    """In sentences, of the campaigns of one file, sent for the skin `skin_id` where that is said; `corrects`: the
+    campaign whose place they take."""
+    store, table = request.app.state.store, request.app.state.table
+    campaigns_read = [one.campaign for one in map(checked, look.campaigns) if one.campaign is not None]
+    return [
+        sentence
+        for campaign in campaigns_read
+        for sentence in (
+            *_kept(store, campaign, skin_id, corrects),
+            *_elsewhere(store, campaign, corrects),
+            *d33_cache.foreseen(table, campaign),
+        )
+    ]
+
+
+def _kept(store: Database, campaign: Campaign, skin_id: str | None, corrects: str | None) -> Iterator[str]:
+    earlier = store.read(repeats.already_kept, campaign, skin_id, corrects)
+    if earlier is not None:
+        yield earlier[0]
+
+
+def _elsewhere(store: Database, campaign: Campaign, corrects: str | None) -> Iterator[str]:
+    if corrects is None or campaign.skin.id is None:
+        return
+    with store.reading() as connection:
+        skin_id = campaigns.find(connection, corrects).skin_id
+        same = skins.are_one(connection, campaign.skin.id, skin_id)
+    if not same:
+        yield (
+            f"the file names skin {campaign.skin.id}, not {skin_id}, that of the campaign that it corrects: the name "
+            "below decides."
+        )

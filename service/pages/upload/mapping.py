@@ -4,11 +4,23 @@ from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
+from service.ingest.reading import InspectedFile
 from service.pages.upload import spring_mapping
-from service.pages.upload.file_summary import ChannelSummary
-from underskin.errors import UNITS_CHECKED, ErrorCode, InvalidInput, Mention, Requirement, not_unique, wrong_type
+from service.pages.upload.file_summary import ChannelSummary, FileSummary
+from underskin.errors import (
+    UNITS_CHECKED,
+    ErrorCode,
+    FileError,
+    InvalidInput,
+    Mention,
+    Requirement,
+    not_unique,
+    wrong_type,
+)
+from underskin.recordings import rig_description, rig_mapping
 from underskin.recordings.readers.unit_labels import lab_field, unit
-from underskin.recordings.rig_description import SCHEMA, channel_fields
+from underskin.recordings.rig_description import SCHEMA, RigDescription, channel_fields
+from underskin.recordings.rig_mapping import MappedFile
 
 KINDS = {
     "frf": "FRF: charge against a shaken force",
@@ -268,3 +280,16 @@ def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> d
         "stiffness_n_per_mm": stiffness,
     }
     return {key: value for key, value in values.items() if value is not None}
+
+
+def mapped_file(look: InspectedFile, summary: FileSummary, rig: RigDescription | None) -> MappedFile | None:
+    """The campaign document of a file and what was taken for what, by the rig description or, without one, as the form
+    guesses it; None where that cannot be."""
+    if look.contents is None:
+        return None
+    try:
+        if rig is None:
+            rig = rig_description.from_dict(guessed(summary.channels, summary.properties, {}))
+        return rig_mapping.apply(rig, look.contents, summary.label)
+    except (FileError, InvalidInput):
+        return None

@@ -18,12 +18,12 @@ from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, attachment, csv_answer
 from service.pages.shared.forms import OWN_FORM, TOKEN, Form, require_own, see
 from service.pages.shared.html import page
-from service.pages.upload import before_keeping, exported_skin, similar_errors, spring_mapping
+from service.pages.upload import exported_skin, similar_errors, spring_mapping
 from service.pages.upload import mapping as mappings
 from service.pages.upload.figures import figures, lines_columns, trace_columns
 from service.pages.upload.file_summary import MOST_LISTED, ChannelSummary, FileSummary, seen
-from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good, rig_in_use, skin_of
-from service.pages.upload.mapped_file import mapped_file
+from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good, rig_in_use, skin_of, worth_knowing
+from service.pages.upload.mapping import mapped_file
 from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
 from service.problems import Refusal
 from service.store import Database, Missing, campaigns, skins
@@ -229,7 +229,7 @@ def _look(request: Request, pending: PendingUpload) -> None:
         inspected = _looked(request, pending, number)
         recordings += sum(one.recordings for one in inspected.campaigns)
         require_few(len(summaries) + len(inspected.campaigns), recordings)
-        known = before_keeping.worth_knowing(request, inspected, pending.skin, pending.corrects)
+        known = worth_knowing(request, inspected, pending.skin, pending.corrects)
         summary = seen(upload, inspected, known)
         mapped = mapped_file(inspected, summary, pending.rig)
         layout = inspected.contents.layout if inspected.contents is not None else ""

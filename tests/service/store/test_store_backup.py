@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from service.store import Database, backup, campaigns, open_store
-from service.store.restore import restore
+from service.store.migrate import restore
 from tests.support.store_server import Place, Server, campaign, running
 from underskin.recordings.campaign import parse
 

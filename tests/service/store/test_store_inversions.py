@@ -8,7 +8,7 @@ import pytest
 
 from service.schemas.campaign_d33 import D33
 from service.store import Database, backup, campaigns, inversions, open_store
-from service.store.restore import restore
+from service.store.migrate import restore
 from service.store.tables import AnyRow
 from service.usecases import d33_cache
 from tests.support.store_server import Place, Server, campaign
