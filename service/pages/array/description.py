@@ -8,7 +8,7 @@ import numpy as np
 from fastapi import Request
 
 from service.pages.shared.figures import Drawn, drawn
-from service.pages.shared.forms import in_form_words, number
+from service.pages.shared.forms import UNLIKELY, in_form_words, number
 from service.pages.shared.skin_values import FIELDS, UNITS, shown
 from service.store import Database, campaigns, skins
 from service.usecases.tables import influence_table
@@ -69,7 +69,7 @@ def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin
 
 def refused(error: UnderskinError, lines: Sequence[int] = ()) -> str:
     """An error in the words of these forms; `lines`: of the loads in their text."""
-    return in_form_words(error, _LABELS, lines, "or tick “Take unlikely magnitudes as they are”")
+    return in_form_words(error, _LABELS, lines, UNLIKELY)
 
 
 def tried(

@@ -3,7 +3,7 @@ words: the labels that the reader sees, not the fields of the request behind the
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated
 from urllib.parse import parse_qs
 
@@ -16,6 +16,7 @@ from underskin.errors import UNITS_CHECKED, InvalidInput, Mention, Requirement, 
 from underskin.recordings.readers import text
 
 TOKEN = "form_token"  # noqa: S105 -- the name of the field
+UNLIKELY = "or tick “Take unlikely magnitudes as they are”"
 _LARGEST_BYTES = 100_000
 _MOST_FIELDS = 500  # a file of many channels has a row of fields for each
 _BETWEEN = re.compile(r"[;\s]+|,(?:\s+|$)")  # numbers in a line: a comma without a space may be a decimal one
@@ -92,15 +93,20 @@ def in_form_words(
     the form takes an unlikely magnitude, where it does."""
     if not isinstance(error, InvalidInput):
         return str(error)
+    allowed = worded(error.allowed, lambda field: _label(field, labels, lines), unlikely)
+    value = "" if error.value is None else f": {error.value}"
+    return f"{_label(error.field, labels, lines)}{value} – {allowed}"
+
+
+def worded(allowed: str, label: Callable[[str], str], unlikely: str) -> str:
+    """What is allowed, its fields by the labels of a form; `unlikely` as for `in_form_words`."""
 
     def word(mention: Mention) -> str:
         if mention == UNITS_CHECKED:
             return f" ({unlikely})" if unlikely else ""
-        return _label(mention.field, labels, lines)
+        return label(mention.field)
 
-    allowed = error.allowed.worded(word) if isinstance(error.allowed, Requirement) else error.allowed
-    value = "" if error.value is None else f": {error.value}"
-    return f"{_label(error.field, labels, lines)}{value} – {allowed}"
+    return allowed.worded(word) if isinstance(allowed, Requirement) else allowed
 
 
 def _label(field: str, labels: Mapping[str, str], lines: Sequence[int]) -> str:

@@ -14,7 +14,7 @@ from service.ingest.reading import InspectedFile, checked, error_entry
 from service.ingest.uploads import Upload
 from service.pages.upload.pending_uploads import PendingUpload
 from service.problems import Refusal
-from service.store import Conflict, Database, Missing, campaigns, skins
+from service.store import Conflict, Database, Missing, campaigns
 from service.usecases import d33_cache
 from underskin.errors import ErrorCode, FileError, InvalidInput
 from underskin.recordings.campaign import Campaign
@@ -113,12 +113,8 @@ def _kept(store: Database, campaign: Campaign, skin_id: str | None, corrects: st
 
 
 def _elsewhere(store: Database, campaign: Campaign, corrects: str | None) -> Iterator[str]:
-    if corrects is None or campaign.skin.id is None:
-        return
-    with store.reading() as connection:
-        skin_id = campaigns.find(connection, corrects).skin_id
-        same = skins.are_one(connection, campaign.skin.id, skin_id)
-    if not same:
+    skin_id = store.read(repeats.otherwise_named, campaign, corrects)
+    if skin_id is not None:
         yield (
             f"the file names skin {campaign.skin.id}, not {skin_id}, that of the campaign that it corrects: the name "
             "below decides."

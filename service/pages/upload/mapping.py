@@ -5,18 +5,10 @@ from copy import deepcopy
 from typing import Any
 
 from service.ingest.reading import InspectedFile
+from service.pages.shared.forms import UNLIKELY, worded
 from service.pages.upload import spring_mapping
 from service.pages.upload.file_summary import ChannelSummary, FileSummary
-from underskin.errors import (
-    UNITS_CHECKED,
-    ErrorCode,
-    FileError,
-    InvalidInput,
-    Mention,
-    Requirement,
-    not_unique,
-    wrong_type,
-)
+from underskin.errors import ErrorCode, FileError, InvalidInput, not_unique, wrong_type
 from underskin.recordings import rig_description, rig_mapping
 from underskin.recordings.readers.unit_labels import lab_field, unit
 from underskin.recordings.rig_description import SCHEMA, RigDescription, channel_fields
@@ -96,20 +88,13 @@ def field_words(field: str) -> str:
 
 def what_to_do(error: Mapping[str, Any]) -> str:
     """What is allowed; for what the form asks, where to say it."""
-    allowed = error["allowed"]
     if error["code"] != ErrorCode.REQUIRED or field_words(error["field"]) == error["field"]:
-        return allowed.worded(_mention_words) if isinstance(allowed, Requirement) else str(allowed)
+        return worded(error["allowed"], field_words, UNLIKELY)
     if error["field"] == _RATE:
         return "required: fill it in below, or say which channel is the time"
     if error["field"] in CHANNELS:
         return "required: say below which channel it is"
     return "required: fill it in below"
-
-
-def _mention_words(mention: Mention) -> str:
-    if mention == UNITS_CHECKED:
-        return " (or tick “Take unlikely magnitudes as they are”)"
-    return field_words(mention.field)
 
 
 def guessed(

@@ -136,13 +136,8 @@ def understood(request: Request, pending: Pending, store: Store, file: Annotated
         twice=_twice(pending, channels),
         document=document,
         layout=mappings.sensors_text(document),
-        kinds=mappings.KINDS,
-        fields=mappings.CHOICES,
+        mapping=mappings,
         spring=spring_mapping,
-        field_words=mappings.field_words,
-        what_to_do=mappings.what_to_do,
-        skin_fields=mappings.SKIN,
-        recording_fields=mappings.RECORDING,
         same=same_request.files(
             request, [one.label for one in pending.seen[:_MOST_NAMED]], pending.rig_label, pending.skin or ""
         ),
