@@ -52,13 +52,14 @@ def add_columns_route(
             return work()
         return await _in_thread(work)
 
+    csv_body = {"schema": {"type": "string"}, "example": _as_csv(example)}
     router.post(
         path,
         operation_id=f"{path[1:]}_columns",
         tags=[path[1:]],
         summary=summary,
         responses={200: {"model": answer_kind, "content": {"text/csv": {}}}},
-        openapi_extra=_columns_body(kind, example),
+        openapi_extra=described_body(kind.model_json_schema(), example, **{"text/csv": csv_body}),
     )(endpoint)
 
 
@@ -79,16 +80,12 @@ async def _in_thread(work: Callable[[], Response]) -> Response:
         return await asyncio.to_thread(work)
 
 
-def _columns_body(kind: type[ColumnsRequest], examples: dict[str, Any]) -> dict[str, Any]:
-    """OpenAPI's description of a body in columns."""
-    schema = kind.model_json_schema()
+def described_body(schema: dict[str, Any], example: dict[str, Any], **others: dict[str, Any]) -> dict[str, Any]:
+    """OpenAPI's description of a JSON body that a route reads itself; `others`: by media type."""
     return {
         "requestBody": {
             "required": True,
-            "content": {
-                "application/json": {"schema": schema, "example": examples},
-                "text/csv": {"schema": {"type": "string"}, "example": _as_csv(examples)},
-            },
+            "content": {"application/json": {"schema": schema, "example": example}, **others},
         }
     }
 

@@ -20,6 +20,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 _YEAR_S = 365.25 * 86400
 _LEAST_SPAN_S = 86400.0
+_SensorPoint = tuple[str, models.Point]
 
 
 def join(store: Database, skin_id: str, other: str, reason: str) -> None:
@@ -60,16 +61,14 @@ def history_by_model(
 
 def _paper_history(connection: Connection, root: str, table_sha256: str) -> models.History:
     """From what is kept."""
-    by_sensor: dict[str, list[models.Point]] = {}
-    for row in inversions.history(connection, root, table_sha256):
-        values = (row.d33_pc_per_n, row.d33_uncertainty_pc_per_n)
-        by_sensor.setdefault(row.sensor, []).append(_point(row, values, None))
-    return _history(connection, root, by_sensor, {})
+    rows = inversions.history(connection, root, table_sha256)
+    points = [(row.sensor, _point(row, row.d33_pc_per_n, row.d33_uncertainty_pc_per_n, None)) for row in rows]
+    return _history(connection, root, points, {})
 
 
 def _adopted_history(store: Database, table: SigmaTable, root: str) -> models.History:
     model_in_force = adopted_models.model_in_force(store, root)
-    by_sensor: dict[str, list[models.Point]] = {}
+    points: list[_SensorPoint] = []
     unfit: dict[str, str] = {}
     rows = [row for row in store.read(campaigns.of_skin, root) if campaigns.state(row) == "current"]
     for row in rows:
@@ -79,18 +78,20 @@ def _adopted_history(store: Database, table: SigmaTable, root: str) -> models.Hi
             unfit[row.id] = f"cannot be told by the adopted model: {error}"
             continue
         for entry in answer["sensors"]:
-            if entry["d33_pc_per_n"] is not None:
-                values = (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"])
-                by_sensor.setdefault(entry["sensor"], []).append(_point(row, values, model_in_force.model_id))
-    return store.read(_history, root, by_sensor, unfit)
+            value, uncertainty = entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"]
+            if value is not None:
+                points.append((entry["sensor"], _point(row, value, uncertainty, model_in_force.model_id)))
+    return store.read(_history, root, points, unfit)
 
 
 def _history(
-    connection: Connection, root: str, by_sensor: dict[str, list[models.Point]], unfit: Mapping[str, str]
+    connection: Connection, root: str, points: Sequence[_SensorPoint], unfit: Mapping[str, str]
 ) -> models.History:
-    known = {(point.campaign_id, sensor) for sensor, points in by_sensor.items() for point in points}
-    repeated = repeats.left_out(connection, root, known)
-    by_sensor = _counted(by_sensor, repeated)
+    repeated = repeats.left_out(connection, root, {(point.campaign_id, sensor) for sensor, point in points})
+    by_sensor: dict[str, list[models.Point]] = {sensor: [] for sensor, _ in points}
+    for sensor, point in sorted(points, key=lambda entry: entry[1].time):
+        if (point.campaign_id, sensor) not in repeated:
+            by_sensor[sensor].append(point)
     names = sorted(by_sensor)
     used = {point.campaign_id for points in by_sensor.values() for point in points}
     campaigns_out, recordings_out = _left_out(connection, root, used, unfit, repeats.of_campaigns(repeated))
@@ -111,37 +112,25 @@ def _history(
     )
 
 
-def _counted(
-    by_sensor: Mapping[str, Sequence[models.Point]], repeated: Mapping[repeats.HistoryPoint, repeats.Repeat]
-) -> dict[str, list[models.Point]]:
-    """The points that count, by time."""
-    return {
-        sensor: sorted(
-            (point for point in points if (point.campaign_id, sensor) not in repeated), key=lambda point: point.time
-        )
-        for sensor, points in by_sensor.items()
-    }
-
-
 def joined(row: AnyRow) -> models.JoinedSkin:
     """A row of a skin that was joined to another."""
     return models.JoinedSkin(id=row.id, joined_to=row.joined_to, joined_at=row.joined_at, reason=row.join_reason)
 
 
-def _point(row: AnyRow, d33: tuple[float, float], model_id: str | None) -> models.Point:
+def _point(row: AnyRow, d33: float, uncertainty: float, model_id: str | None) -> models.Point:
     return models.Point(
         campaign_id=row.id,
         time=row.recorded_at or row.received_at,
         time_is="received" if row.recorded_at is None else "recorded",
         model="paper" if model_id is None else "adopted",
         model_id=model_id,
-        d33_pc_per_n=d33[0],
-        d33_uncertainty_pc_per_n=d33[1],
+        d33_pc_per_n=d33,
+        d33_uncertainty_pc_per_n=uncertainty,
     )
 
 
 def _trends(sensors: Sequence[Sequence[models.Point]]) -> list[models.TrendAnswer | None]:
-    lines = [_line(points) for points in sensors]
+    lines = [_line(points) if _no_trend(points) is None else None for points in sensors]
     adjusted = iter(holm([line.p_value for line in lines if line is not None]))
     return [None if line is None else _answer(line, next(adjusted)) for line in lines]
 
@@ -163,8 +152,6 @@ def _seconds(point: models.Point) -> float:
 
 
 def _line(points: Sequence[models.Point]) -> Trend | None:
-    if _no_trend(points) is not None:
-        return None
     return trend(
         [_seconds(point) / _YEAR_S for point in points],
         [point.d33_pc_per_n for point in points],

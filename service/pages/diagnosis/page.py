@@ -6,6 +6,7 @@ from urllib.parse import quote
 
 from fastapi import APIRouter, Request, Response
 from markupsafe import Markup
+from sqlalchemy import Connection
 
 from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, Store, Table, sender
 from service.pages.diagnosis.figure_columns import columns
@@ -48,9 +49,7 @@ def ask(request: Request, campaign_id: CampaignId, runner: RunnerInUse, store: S
 def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response:
     """How far it is, or what it found."""
     with store.reading() as connection:
-        row = diagnoses.find(connection, diagnosis_id)
-        report = diagnoses.report_of(connection, row.number)
-        figures = diagnoses.figures_of(connection, row.number)
+        row, report, figures = _kept(connection, diagnosis_id)
         of_skin = models.of_skin(connection, skins.require_root(connection, row.skin_id))
         own = next((model for model in of_skin if model.id == row.id), None)
         adopted_as = None if own is None else verdicts.adopted_versions(connection, [own])[0]
@@ -132,11 +131,13 @@ def _not_adopted(report: Mapping[str, Any]) -> str | None:
     return NOT_ADOPTED[report["verdict"]]
 
 
+def _kept(connection: Connection, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any] | None, dict[str, str]]:
+    row = diagnoses.find(connection, diagnosis_id)
+    return row, diagnoses.report_of(connection, row.number), diagnoses.figures_of(connection, row.number)
+
+
 def _done(store: Database, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any], dict[str, str]]:
-    with store.reading() as connection:
-        row = diagnoses.find(connection, diagnosis_id)
-        report = diagnoses.report_of(connection, row.number)
-        figures = diagnoses.figures_of(connection, row.number)
+    row, report, figures = store.read(_kept, diagnosis_id)
     if report is None:
         raise Refusal(404, f"Diagnosis {diagnosis_id!r} has no report: its state is {row.state}.")
     return row, report, figures

@@ -1,6 +1,6 @@
 """What to measure next within the limits of the reader's rig; planned in a worker process, and not stored."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request, Response
@@ -136,14 +136,11 @@ def _same(request: Request, campaign_id: str, limits: Mapping[str, Any]) -> same
     """The command and the library's call with these limits."""
     options: list[str] = []
     for name, value in limits.items():
-        options += _option("--" + name.replace("_", "-"), name, value)
-    return same_request.planned(
-        request, campaign_id, options, ", ".join(f"{name}={value!r}" for name, value in limits.items())
-    )
-
-
-def _option(flag: str, name: str, value: Any) -> Sequence[str]:
-    if name == "preload_n":
-        return [flag, *map(repr, value)]
-    values = value if name in _SEVERAL else [value]
-    return [text for one in values for text in (flag, repr(one))]
+        flag = "--" + name.replace("_", "-")
+        if name == "preload_n":
+            options += [flag, *map(repr, value)]
+        else:
+            values = value if name in _SEVERAL else [value]
+            options += [text for one in values for text in (flag, repr(one))]
+    call = ", ".join(f"{name}={value!r}" for name, value in limits.items())
+    return same_request.planned(request, campaign_id, options, call)
