@@ -155,9 +155,12 @@ def validated(kind: type[_Model], document: Any) -> _Model:
         raise from_validation(error) from None
 
 
-def first_refused(error: ValidationError) -> InvalidInput:
-    """The first of pydantic's errors."""
-    return _shortened(_as_invalid_input(error.errors(include_url=False)[0]))
+def parsed(kind: type[_Model], document: Any) -> _Model:
+    """The model of a document; raises InvalidInput with the first that is wrong."""
+    try:
+        return kind.model_validate(document)
+    except ValidationError as error:
+        raise _shortened(_as_invalid_input(error.errors(include_url=False)[0])) from None
 
 
 # Of pydantic's errors the code and, where a lab's words are clearer than pydantic's, those.

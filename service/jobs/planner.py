@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from service.jobs.process import Worker, WorkerProcesses
 from service.jobs.runner import JobSettings, logger
+from service.jobs.worker import Job
 from service.problems import Refusal
 from service.store import AnyRow, Database, diagnoses
 from underskin.recordings.readers import json_file
@@ -86,7 +87,8 @@ class Planner:
         planned.state = "running"
         campaign, _ = self._store.read(diagnoses.campaign_of, row)
         content = json_file.write(campaign)
-        job = self._job_settings.job(content, limits=asdict(limits))
+        settings = self._job_settings
+        job = Job(len(content), settings.table_sha256, settings.memory_bytes, limits=asdict(limits))
         with Worker(job, content, self._processes.take()) as worker:
             while not (worker.ended or self._ending.is_set()):
                 worker.news.wait(0.5)

@@ -35,12 +35,6 @@ class JobSettings:
     table: Path
     table_sha256: str
 
-    def job(
-        self, campaign: bytes, excluded: tuple[tuple[str, str], ...] = (), limits: dict[str, Any] | None = None
-    ) -> Job:
-        """A worker's, on a campaign."""
-        return Job(len(campaign), self.table_sha256, self.memory_bytes, excluded, limits)
-
 
 class Runner:
     """Runs the queue in threads of the server's process, between `start` and `stop`."""
@@ -117,7 +111,8 @@ class Runner:
         campaign, excluded = self._store.read(diagnoses.campaign_of, row)
         content = json_file.write(campaign)
         left_out = tuple((left.recording, left.reason) for left in excluded)
-        job = self._job_settings.job(content, left_out)
+        settings = self._job_settings
+        job = Job(len(content), settings.table_sha256, settings.memory_bytes, left_out)
         with Worker(job, content, self._processes.take()) as worker:
             with self._lock:
                 self._jobs[threading.current_thread()] = worker

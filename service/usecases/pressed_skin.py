@@ -1,17 +1,15 @@
 """The FRF that a skin should show, and d33 from measured FRF: by the paper's model or by the adopted one."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from service.schemas.columns import Columns
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS, D33Columns, FrfColumns, PressedSkinColumns
 from service.store import Database
 from service.usecases.adopted_models import model_asked_for, press, require_paper
 from underskin.errors import ErrorCode, InvalidInput, conflicting, out_of_range, required
-from underskin.findings.finding import Finding
 from underskin.physics import charge_response
 from underskin.prediction import answers, plausibility
 from underskin.prediction.columns import rows
@@ -31,8 +29,12 @@ def frf(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
     columns = _sent(request, *FIELDS, "d33_pc_per_n")
     count = rows(columns)
     answer = answers.frf(table, columns, request.units_checked)
-    spectra = _flat_spectra(request, answer.columns["frf_pc_per_n"], count)
-    return _frf_answer(table, request, count, answer.inside, {**answer.columns, **spectra})
+    frequency = _asked_lines(request)
+    results, shared = dict(answer.columns), {}
+    if frequency is not None:
+        results |= _flat_spectra(frequency, results["frf_pc_per_n"], count)
+        shared["frequency_hz"] = frequency
+    return Columns(count, request.model, table.sha256, answer.inside, results, shared, frequency)
 
 
 def _sent(request: PressedSkinColumns, *names: str) -> dict[str, Floats]:
@@ -47,38 +49,28 @@ def _adopted_frf(table: SigmaTable, store: Database, request: FrfColumns) -> Col
     pressed.require_lines("frequency_hz")
     d33 = checked("d33_pc_per_n", columns["d33_pc_per_n"], units_checked=request.units_checked)
     results = {**pressed.columns, "frf_pc_per_n": to_lab("frf_pc_per_n", d33 * pressed.level)}
-    if request.frequency_hz is not None:
-        response = pressed.response(non_negative("frequency_hz", request.column("frequency_hz")))
-        lines = to_lab("frf_pc_per_n", 1.0) * d33[..., None] * np.where(pressed.inside[:, None], response, np.nan + 0j)
+    inside = pressed.inside & np.isfinite(results["frf_pc_per_n"])
+    frequency = _asked_lines(request)
+    shared: dict[str, Any] = {"model_id": pressed.model_in_force.model_id}
+    if frequency is not None:
+        response = np.where(pressed.inside[:, None], pressed.response(frequency), np.nan + 0j)
+        lines = to_lab("frf_pc_per_n", 1.0) * d33[..., None] * response
         results["frf_re_pc_per_n"] = lines.real
         results["frf_im_pc_per_n"] = np.where(np.isnan(lines.real), np.nan, lines.imag)
-    inside = pressed.inside & np.isfinite(results["frf_pc_per_n"])
-    return _frf_answer(table, request, count, inside, results, model_id=pressed.model_in_force.model_id)
+        shared["frequency_hz"] = frequency
+    return Columns(count, request.model, table.sha256, inside, results, shared, frequency)
 
 
-def _frf_answer(
-    table: SigmaTable,
-    request: FrfColumns,
-    count: int,
-    inside: NDArray[np.bool_],
-    columns: Mapping[str, Floats],
-    **shared: Any,
-) -> Columns:
-    frequency = None
-    if request.frequency_hz is not None:
-        frequency = shared["frequency_hz"] = request.column("frequency_hz")
-    return Columns(count, request.model, table.sha256, inside, columns, shared, frequency)
+def _asked_lines(request: FrfColumns) -> Floats | None:
+    return None if request.frequency_hz is None else non_negative("frequency_hz", request.column("frequency_hz"))
 
 
-def _flat_spectra(request: FrfColumns, frf: Floats, count: int) -> dict[str, Floats]:
+def _flat_spectra(frequency: Floats, frf: Floats, count: int) -> dict[str, Floats]:
     """Real and imaginary part, rows × frequencies: flat and real in the paper's model."""
-    if request.frequency_hz is None:
-        return {}
-    lines = len(non_negative("frequency_hz", request.column("frequency_hz")))
-    if count * lines > _LARGEST_SPECTRA:
+    if count * len(frequency) > _LARGEST_SPECTRA:
         allowed = f"rows times frequencies must be at most {_LARGEST_SPECTRA}"
-        raise out_of_range("frequency_hz", f"{count} rows, {lines} frequencies", allowed)
-    real = np.broadcast_to(frf[..., None], (count, lines))
+        raise out_of_range("frequency_hz", f"{count} rows, {len(frequency)} frequencies", allowed)
+    real = np.broadcast_to(frf[..., None], (count, len(frequency)))
     return {"frf_re_pc_per_n": real, "frf_im_pc_per_n": np.where(np.isnan(real), np.nan, 0.0)}
 
 
@@ -94,9 +86,9 @@ def d33(table: SigmaTable, store: Database, request: D33Columns) -> Columns:
     plateau = {name: answer.columns[name] for name in ("frf_pc_per_n", "frf_uncertainty_pc_per_n")}
     results = {name: answer.columns[name] for name in _RESULTS}
     leading = {name: values for name, values in answer.columns.items() if name not in plateau | results}
-    return _d33_answer(
-        table, request, count, answer.inside, {**leading, **plateau, **measured, **results}, answer.findings
-    )
+    shared = {"findings": [finding.in_columns() for finding in answer.findings]}
+    columns = {**leading, **plateau, **measured, **results}
+    return Columns(count, request.model, table.sha256, answer.inside, columns, shared)
 
 
 def _rows(request: D33Columns, columns: Mapping[str, Floats]) -> int:
@@ -121,22 +113,10 @@ def _adopted_d33(table: SigmaTable, store: Database, request: D33Columns) -> Col
     value = measured["frf_pc_per_n"] / pressed.level
     unsure = np.hypot(measured["frf_uncertainty_pc_per_n"] / pressed.level, value * pressed.columns["rel_error"])
     columns = {**pressed.columns, **measured, **dict(zip(_RESULTS, (value, unsure), strict=True))}
-    findings = plausibility.of_rows(measured["frf_pc_per_n"], value)
+    findings = [finding.in_columns() for finding in plausibility.of_rows(measured["frf_pc_per_n"], value)]
+    shared = {"model_id": model_in_force.model_id, "findings": findings}
     inside = pressed.inside & np.isfinite(value)
-    return _d33_answer(table, request, len(pressed.level), inside, columns, findings, model_id=model_in_force.model_id)
-
-
-def _d33_answer(
-    table: SigmaTable,
-    request: D33Columns,
-    count: int,
-    inside: NDArray[np.bool_],
-    columns: Mapping[str, Floats],
-    findings: Sequence[Finding],
-    **shared: Any,
-) -> Columns:
-    shared["findings"] = [finding.in_columns() for finding in findings]
-    return Columns(count, request.model, table.sha256, inside, columns, shared)
+    return Columns(len(pressed.level), request.model, table.sha256, inside, columns, shared)
 
 
 def _given(request: D33Columns) -> dict[str, Floats]:

@@ -29,8 +29,12 @@ def figures(
     as `measured` has it; `curves`: whether it has recordings of other kinds. What was drawn lately is kept."""
     basis = (row.id, row.revision, answer["table_sha256"], _chosen(answer))
     loaded = cache(lambda: store.read(campaigns.load, row, with_excluded=False))
+
+    def draw_curves() -> list[Drawn]:
+        return drawn_curves(loaded().recordings, _MOST_CURVES, " recordings", f"/campaigns/{row.id}/curves.csv")
+
     makers: dict[str, Callable[[], list[Drawn]]] = {
-        **({"curves": lambda: _curves(row, loaded())} if curves else {}),
+        **({"curves": draw_curves} if curves else {}),
         f"lines {show}": lambda: _frf(row, loaded, answer, numbers, show),
         "d33": lambda: _d33(row, answer, numbers),
     }
@@ -127,7 +131,3 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any]) -> 
             f"{place}/d33.csv{chosen}",
         ),
     ]
-
-
-def _curves(row: AnyRow, campaign: Campaign) -> list[Drawn]:
-    return drawn_curves(campaign.recordings, _MOST_CURVES, " recordings", f"/campaigns/{row.id}/curves.csv")

@@ -8,7 +8,6 @@ from urllib.parse import urlencode
 import numpy as np
 import orjson
 from fastapi import APIRouter, Depends, Query, Request, Response
-from pydantic import ValidationError
 
 from service.dependencies import Store, Table
 from service.pages.shared import same_request
@@ -17,7 +16,7 @@ from service.pages.shared.formats import short_and_exact
 from service.pages.shared.forms import in_form_words
 from service.pages.shared.html import compress, page
 from service.pages.shared.skin_values import PROTOTYPE, start
-from service.problems import first_refused
+from service.problems import parsed
 from service.schemas.design import DesignAnswer, DesignRequest
 from service.usecases.design import design_answer, design_of
 from underskin.errors import UnderskinError, wrong_type
@@ -169,15 +168,8 @@ def _given(request: Request) -> dict[str, float]:
         raise wrong_type("address", request.url.query[:80], "must have numbers") from None
 
 
-def _asked(values: Mapping[str, float]) -> DesignRequest:
-    try:
-        return DesignRequest.model_validate(dict(values))
-    except ValidationError as error:
-        raise first_refused(error) from None
-
-
 def _computed(request: Request, table: SigmaTable) -> DesignAnswer:
-    asked = _asked({**{name: PROTOTYPE[name] for name, *_ in SLIDERS}, **_given(request)})
+    asked = parsed(DesignRequest, {**{name: PROTOTYPE[name] for name, *_ in SLIDERS}, **_given(request)})
     return design_answer(table, asked, design_of(table, asked))
 
 
@@ -186,10 +178,10 @@ def _tried(table: SigmaTable, sliders: Sliders) -> tuple[list[DesignResult], lis
     from underskin.figures import Mark, array_response, design_overview
 
     try:
-        asked = _asked(sliders.values)
+        asked = parsed(DesignRequest, sliders.values)
         with np.errstate(all="ignore"):
             designed = design_of(table, asked)
-            start = design_of(table, _asked(sliders.own)).contact
+            start = design_of(table, parsed(DesignRequest, sliders.own)).contact
         shown = results(design_answer(table, asked, designed))
     except UnderskinError as refused:
         return [], [], in_form_words(refused, _LABELS)

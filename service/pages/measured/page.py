@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
-from pydantic import ValidationError
 
 from service.dependencies import Store, Table
 from service.pages.array.description import refused
@@ -16,7 +15,7 @@ from service.pages.shared.forms import number, numbers
 from service.pages.shared.html import page
 from service.pages.shared.skin_values import FIELDS as SKIN_FIELDS
 from service.pages.shared.skin_values import UNITS, shown
-from service.problems import first_refused
+from service.problems import parsed
 from service.schemas.columns import Columns
 from service.schemas.pressed_skin import D33Columns
 from service.store import Database
@@ -50,8 +49,6 @@ def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, r
         document = _document(values, request.query_params, rows)
         answer = _answered(table, store, document)
         adopted = by_model(store, table, skin, request.query_params, document)
-    except ValidationError as problem:
-        error = _said(first_refused(problem))
     except UnderskinError as problem:
         error = _said(problem)
     asked = document if adopted is None or adopted.document is None else adopted.document
@@ -90,7 +87,7 @@ def _said(error: UnderskinError) -> str:
 
 
 def _answered(table: SigmaTable, store: Database, document: dict[str, Any]) -> Columns:
-    return d33(table, store, D33Columns.model_validate(document))
+    return d33(table, store, parsed(D33Columns, document))
 
 
 def _columns(document: Mapping[str, Any], answer: Columns, adopted: ByModel | None) -> dict[str, list[Any]]:

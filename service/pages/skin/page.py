@@ -1,7 +1,6 @@
 """A skin: its array as a map, its sensors over time, its campaigns."""
 
-from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated
 from urllib.parse import quote
 
 from fastapi import APIRouter, Query, Request, Response
@@ -94,7 +93,7 @@ def skin(
         withdrawn=last_model if model is None else None,
         by_model=by_model,
         why_not=why_not,
-        change=None if by_model is None or answer is None else change_percent(_array(answer), _array(by_model)),
+        change=change_percent(overview.of_array(answer), overview.of_array(by_model)),
         by=by,
         figures=figures,
         show=show,
@@ -148,10 +147,6 @@ def history_csv(skin_id: SkinId, store: Store, table: Table, by: ByQuery = "pape
         for point in entry.points
     ]
     return csv_of_rows("history", _HISTORY_COLUMNS, points)
-
-
-def _array(answer: Mapping[str, Any]) -> float | None:
-    return None if answer["array"] is None else answer["array"]["d33_pc_per_n"]
 
 
 def _completed(store: Database, table: SigmaTable, skin_id: str) -> tuple[str, int]:
