@@ -11,7 +11,7 @@ from service import pages
 from service.auth.access_control import AccessControl
 from service.dependencies import authorised
 from service.ingest.uploads import UploadFolder
-from service.jobs import JobSettings, Planner, Runner, WorkerProcesses
+from service.jobs import Planner, Runner, WorkerProcesses
 from service.middleware import request_log
 from service.middleware.asgi_middleware import AsgiMiddleware
 from service.middleware.error_handlers import install_handlers
@@ -71,10 +71,10 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     api.state.table = table
     api.state.access = access
     api.state.store = store
-    job_settings = job_settings_of(settings, table)
-    processes = WorkerProcesses(job_settings.table)
-    api.state.runner = Runner(store, job_settings, processes)
-    api.state.planner = Planner(store, job_settings, processes)
+    memory_bytes = int(settings.diagnosis_memory_mb * 1e6)
+    processes = WorkerProcesses(settings.tables / SIGMA_TABLE, table.sha256, memory_bytes)
+    api.state.runner = Runner(store, processes, settings.diagnosis_workers, settings.diagnosis_ready)
+    api.state.planner = Planner(store, processes, settings.diagnosis_workers)
     install_handlers(api, problem_page, _methods)
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"]), Depends(known_query)])
     for noun in (sigma, pressed_skin, stress, design, tables, campaigns, diagnoses, exports, skins, models):
@@ -86,13 +86,6 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
 
 def _methods(api: FastAPI, path: str) -> list[str]:
     return openapi.methods(api, path) or pages.methods(path)
-
-
-def job_settings_of(settings: Settings, table: SigmaTable) -> JobSettings:
-    """What diagnoses and plans are run with."""
-    memory_bytes = int(settings.diagnosis_memory_mb * 1e6)
-    path = settings.tables / SIGMA_TABLE
-    return JobSettings(settings.diagnosis_workers, memory_bytes, settings.diagnosis_ready, path, table.sha256)
 
 
 def create_app(settings: Settings, table: SigmaTable, access: AccessControl, store: Database) -> ASGIApp:

@@ -10,12 +10,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from service.jobs.process import Worker, WorkerProcesses
-from service.jobs.runner import JobSettings, logger
-from service.jobs.worker import Job
+from service.jobs.process import WorkerProcesses
+from service.jobs.runner import logger
 from service.problems import Refusal
 from service.store import AnyRow, Database, diagnoses
-from underskin.recordings.readers import json_file
 
 if TYPE_CHECKING:
     from underskin.diagnosis.planning.rig_limits import RigLimits
@@ -43,10 +41,11 @@ class Planned:
 class Planner:
     """Plans next experiments one after another, until `stop`, and remembers the latest."""
 
-    def __init__(self, store: Database, job_settings: JobSettings, processes: WorkerProcesses) -> None:
+    def __init__(self, store: Database, processes: WorkerProcesses, workers: int) -> None:
+        """`workers`: 0 where this server runs no diagnoses and plans nothing."""
         self._store = store
-        self._job_settings = job_settings
         self._processes = processes
+        self._workers = workers
         self._known: OrderedDict[tuple[str, str], Planned] = OrderedDict()
         self._lock = threading.Lock()
         self._one_by_one = ThreadPoolExecutor(1, "plan")
@@ -61,7 +60,7 @@ class Planner:
             if known is not None and (known.state != "failed" or time.monotonic() < known.failed_at + _RETRY_S):
                 self._known.move_to_end(key)
                 return known
-            if not self._job_settings.workers:
+            if not self._workers:
                 raise Refusal(503, "This server runs no diagnoses and plans nothing; use the command below.")
             if sum(one.state in ("queued", "running") for one in self._known.values()) >= _MOST_WAITING:
                 raise Refusal(503, "Many plans are being worked out: try again in a minute.")
@@ -86,10 +85,7 @@ class Planner:
     def _run(self, row: AnyRow, limits: "RigLimits", planned: Planned) -> None:
         planned.state = "running"
         campaign, _ = self._store.read(diagnoses.campaign_of, row)
-        content = json_file.write(campaign)
-        settings = self._job_settings
-        job = Job(len(content), settings.table_sha256, settings.memory_bytes, limits=asdict(limits))
-        with Worker(job, content, self._processes.take()) as worker:
+        with self._processes.at_work(campaign, limits=asdict(limits)) as worker:
             while not (worker.ended or self._ending.is_set()):
                 worker.news.wait(0.5)
                 planned.progress = worker.said["progress"]

@@ -13,6 +13,8 @@ from typing import Any, BinaryIO, Self
 import orjson
 
 from service.jobs.worker import Job
+from underskin.recordings.campaign import Campaign
+from underskin.recordings.readers import json_file
 
 _INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR")
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -51,8 +53,11 @@ class WorkerProcess:
 class WorkerProcesses:
     """Worker processes for jobs; once `keep_ready` was called, one more waits for the next job, until `stop`."""
 
-    def __init__(self, table: Path) -> None:
+    def __init__(self, table: Path, table_sha256: str, memory_bytes: int) -> None:
+        """`memory_bytes`: what a job may take beyond its program."""
+        self.table_sha256 = table_sha256
         self._table = table
+        self._memory_bytes = memory_bytes
         self._ready: WorkerProcess | None = None
         self._keeps = False
         self._lock = threading.Lock()
@@ -63,7 +68,15 @@ class WorkerProcesses:
             self._keeps = True
             self._start()
 
-    def take(self) -> WorkerProcess:
+    def at_work(
+        self, campaign: Campaign, excluded: tuple[tuple[str, str], ...] = (), limits: dict[str, Any] | None = None
+    ) -> "Worker":
+        """A worker at its job, on a campaign."""
+        content = json_file.write(campaign)
+        job = Job(len(content), self.table_sha256, self._memory_bytes, excluded, limits)
+        return Worker(job, content, self._take())
+
+    def _take(self) -> WorkerProcess:
         """The one that is ready, or a new one."""
         with self._lock:
             ready, self._ready = self._ready, None

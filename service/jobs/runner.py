@@ -4,18 +4,14 @@ import logging
 import secrets
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.jobs.process import Worker, WorkerProcesses
-from service.jobs.worker import Job
 from service.log import LastingFailure
 from service.store import AnyRow, Database, StorageFull, StoreMoved, diagnoses
 from underskin import __version__
-from underskin.recordings.readers import json_file
 
 logger = logging.getLogger("underskin")
 
@@ -25,24 +21,15 @@ _JOIN_S = 10.0
 _STORE_FAILED = (SQLAlchemyError, StorageFull, StoreMoved, OSError)
 
 
-@dataclass(frozen=True)
-class JobSettings:
-    """What a runner works with; memory is a worker's, beyond what its program takes."""
-
-    workers: int
-    memory_bytes: int
-    keeps_ready: bool
-    table: Path
-    table_sha256: str
-
-
 class Runner:
     """Runs the queue in threads of the server's process, between `start` and `stop`."""
 
-    def __init__(self, store: Database, job_settings: JobSettings, processes: WorkerProcesses) -> None:
+    def __init__(self, store: Database, processes: WorkerProcesses, workers: int, keeps_ready: bool) -> None:
+        """`workers`: how many diagnoses run at once; `keeps_ready`: whether a process waits for the next one."""
         self._store = store
-        self._job_settings = job_settings
         self._processes = processes
+        self._workers = workers
+        self._keeps_ready = keeps_ready
         self._server = secrets.token_hex(8)
         self._ending = threading.Event()
         self._stirred = threading.Event()
@@ -53,7 +40,7 @@ class Runner:
 
     def start(self) -> None:
         """Take up what is in the queue, and what was running when its server ended."""
-        if self._job_settings.workers:
+        if self._workers:
             self._dispatcher.start()
 
     def stir(self) -> None:
@@ -77,18 +64,18 @@ class Runner:
         while not self._ending.is_set():
             self._stirred.clear()
             try:
-                while len(self._jobs) < self._job_settings.workers and (row := self._claim()) is not None:
+                while len(self._jobs) < self._workers and (row := self._claim()) is not None:
                     thread = threading.Thread(target=self._job, args=(row,), name=row.id, daemon=True)
                     with self._lock:
                         self._jobs[thread] = None
                     thread.start()
             except _STORE_FAILED as error:
                 self._failure.log("no diagnosis can be claimed", error)
-            if not self._stirred.wait(_POLL_S) and self._job_settings.keeps_ready:
+            if not self._stirred.wait(_POLL_S) and self._keeps_ready:
                 self._processes.keep_ready()  # now that nothing else is going on
 
     def _claim(self) -> AnyRow | None:
-        row = self._store.write(diagnoses.claim, self._server, self._job_settings.table_sha256, __version__)
+        row = self._store.write(diagnoses.claim, self._server, self._processes.table_sha256, __version__)
         self._failure.is_over()
         return row
 
@@ -109,11 +96,8 @@ class Runner:
     def _run(self, row: AnyRow) -> None:
         """One diagnosis, until it has ended, another server has claimed it, or this server ends."""
         campaign, excluded = self._store.read(diagnoses.campaign_of, row)
-        content = json_file.write(campaign)
         left_out = tuple((left.recording, left.reason) for left in excluded)
-        settings = self._job_settings
-        job = Job(len(content), settings.table_sha256, settings.memory_bytes, left_out)
-        with Worker(job, content, self._processes.take()) as worker:
+        with self._processes.at_work(campaign, left_out) as worker:
             with self._lock:
                 self._jobs[threading.current_thread()] = worker
             while not worker.ended and not self._ending.is_set():

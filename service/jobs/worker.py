@@ -38,7 +38,7 @@ class Job:
     campaign_bytes: int
     table_sha256: str
     memory_bytes: int
-    excluded: tuple[tuple[str, str], ...] = ()
+    excluded: tuple[tuple[str, str], ...]
     limits: dict[str, Any] | None = None
 
     def line(self) -> bytes:
