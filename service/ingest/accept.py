@@ -9,7 +9,7 @@ import orjson
 from sqlalchemy import Connection
 
 from service.ingest import repeats
-from service.ingest.reading import CheckedCampaign, ReadCampaign, checked, joined, read, require_few
+from service.ingest.reading import CheckedCampaign, ReadCampaign, checked, joined, look, require_few
 from service.ingest.uploads import Upload
 from service.problems import Refusal
 from service.store import Database, answers, campaigns, skins
@@ -115,7 +115,7 @@ def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, options: Ing
     recordings = 0
     for upload in uploads:
         if upload.field != RIG:
-            more = read(upload, rig, options.most_json_bytes)
+            more = look(upload, rig, options.most_json_bytes).campaigns
             files += more
             recordings += sum(one.recordings for one in more)
             require_few(len(files), recordings)

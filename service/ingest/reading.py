@@ -64,11 +64,6 @@ class CheckedCampaign:
     unlisted: int = 0  # errors beyond those listed
 
 
-def read(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> list[ReadCampaign]:
-    """The campaigns of a file, by its content: JSON may hold one or a list of them."""
-    return look(upload, rig, most_json_bytes).campaigns
-
-
 @dataclass(frozen=True)
 class InspectedFile:
     """A file that was read and not stored: its format, its channels where it has any, and its campaigns."""
@@ -79,7 +74,7 @@ class InspectedFile:
 
 
 def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> InspectedFile:
-    """As `read`, with the format and the channels of the file."""
+    """The campaigns of a file, by its content, with its format and channels: JSON may hold one or a list of them."""
     label = upload.label or _UNNAMED
     kind, contents = "", None
     try:

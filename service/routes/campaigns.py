@@ -1,13 +1,11 @@
 """Campaigns: sent, listed, read, withdrawn, corrected, their recordings excluded, their d33."""
 
-from collections.abc import Mapping
 from functools import partial
 from typing import Annotated, Any, Literal
 
 import orjson
 from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import StreamingResponse
-from pydantic import ValidationError
 from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import WRITE, CampaignId, Store, Table, number_of_cursor, sender
@@ -16,7 +14,6 @@ from service.ingest.form_fields import FILE, split
 from service.ingest.reading import READING_SLOTS
 from service.ingest.uploads import received
 from service.middleware.unique_keys import JsonRoute
-from service.problems import from_validation
 from service.routes.temporary_files import made_file
 from service.schemas import campaigns as models
 from service.schemas.campaign_d33 import D33
@@ -118,7 +115,7 @@ async def post(
     async with received(request, request.app.state.uploads) as parts, READING_SLOTS:
         fields, uploads = split(parts, list(models.SendOptions.model_fields), [RIG])
         options = IngestOptions(
-            **_options(query, fields),
+            **query.with_form(fields).model_dump(),
             idempotency_key=idempotency_key,
             sender=sender(request),
             most_json_bytes=settings.max_body_bytes,
@@ -128,14 +125,6 @@ async def post(
         await run_in_threadpool(d33_cache.derive, store, table, kept)
     headers = {"Idempotency-Replayed": "true"} if repeats else {}
     return Response(orjson.dumps(answer), status_code=201, headers=headers, media_type="application/json")
-
-
-def _options(query: models.SendOptions, fields: Mapping[str, str]) -> dict[str, Any]:
-    """Those of the query and of the form; raises Refusal, InvalidInput."""
-    try:
-        return query.with_form(fields).model_dump()
-    except ValidationError as error:
-        raise from_validation(error) from None
 
 
 @router.get("/campaigns", operation_id="campaigns", summary="Campaigns, the latest first")

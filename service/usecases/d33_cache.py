@@ -26,10 +26,10 @@ logger = logging.getLogger("underskin")
 BandHz = tuple[float, float]
 
 _PAPER = {"model": "paper", "model_id": None, "model_percent": None}
-_NOTHING: dict[str, Any] = dict.fromkeys(
-    ("band", "array", "sensor_spread_percent", "gain_scatter_percent", "position_scatter_mm", "declared_percent")
-)
-_EMPTY: dict[str, Any] = {"sensors": [], "cells": [], "findings": []}
+_NONE: dict[str, Any] = {
+    **dict.fromkeys(("band", "array", "sensor_spread_percent", "gain_scatter_percent", "position_scatter_mm")),
+    "declared_percent": None, "status": "none", "sensors": [], "cells": [], "findings": [],
+}
 
 
 def answer(store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | None) -> dict[str, Any]:
@@ -155,7 +155,7 @@ def _computed(
     except Exception as error:
         logger.exception("no d33 from a campaign", extra={"fields": {"campaign": document["campaign_id"]}})
         reason = f"the figures cannot be computed ({type(error).__name__}: {error}); the server's log says more"
-        return {**document, **_none(reason), "moduli": [], "left_out": entries}, None, True
+        return {**document, **_NONE, "reason": reason, "moduli": [], "left_out": entries}, None, True
     return whole, inversion, False
 
 
@@ -173,13 +173,10 @@ def _inverted(
         if band_hz is not None and error.field == "band_hz":
             raise
         findings = [finding.sentence for finding in plausibility.implausible(campaign)]
-        return {**_none(str(error)), "findings": findings, "moduli": moduli, "left_out": without_modulus}, None
+        told = {"reason": str(error), "findings": findings, "moduli": moduli, "left_out": without_modulus}
+        return {**_NONE, **told}, None
     left_out = [{"recording": None, "reason": left.sentence} for left in inversion.left_out]
     return {**of_inversion(inversion), "moduli": moduli, "left_out": left_out + without_modulus}, inversion
-
-
-def _none(reason: str) -> dict[str, Any]:
-    return {**_NOTHING, "status": "none", "reason": reason, **_EMPTY}
 
 
 def _keep(store: Database, row: AnyRow, change: Callable[..., None], *derived: Any) -> None:

@@ -1,6 +1,6 @@
 """Storing an upload that was shown, or the errors that prevent it; the rig description that it is read with."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 from urllib.parse import quote
 
@@ -17,7 +17,6 @@ from service.problems import Refusal
 from service.store import Conflict, Database, Missing, campaigns
 from service.usecases import d33_cache
 from underskin.errors import ErrorCode, FileError, InvalidInput
-from underskin.recordings.campaign import Campaign
 from underskin.recordings.rig_description import RigDescription
 
 SKIN_FIELD, CORRECTS = "skin", "corrects"
@@ -94,28 +93,18 @@ def worth_knowing(request: Request, look: InspectedFile, skin_id: str | None, co
     """In sentences, of the campaigns of one file, sent for the skin `skin_id` where that is said; `corrects`: the
     campaign whose place they take."""
     store, table = request.app.state.store, request.app.state.table
-    campaigns_read = [one.campaign for one in map(checked, look.campaigns) if one.campaign is not None]
-    return [
-        sentence
-        for campaign in campaigns_read
-        for sentence in (
-            *_kept(store, campaign, skin_id, corrects),
-            *_elsewhere(store, campaign, corrects),
-            *d33_cache.foreseen(table, campaign),
-        )
-    ]
-
-
-def _kept(store: Database, campaign: Campaign, skin_id: str | None, corrects: str | None) -> Iterator[str]:
-    earlier = store.read(repeats.already_kept, campaign, skin_id, corrects)
-    if earlier is not None:
-        yield earlier[0]
-
-
-def _elsewhere(store: Database, campaign: Campaign, corrects: str | None) -> Iterator[str]:
-    skin_id = store.read(repeats.otherwise_named, campaign, corrects)
-    if skin_id is not None:
-        yield (
-            f"the file names skin {campaign.skin.id}, not {skin_id}, that of the campaign that it corrects: the name "
-            "below decides."
-        )
+    sentences: list[str] = []
+    for one in map(checked, look.campaigns):
+        if one.campaign is None:
+            continue
+        earlier = store.read(repeats.already_kept, one.campaign, skin_id, corrects)
+        if earlier is not None:
+            sentences.append(earlier[0])
+        kept_on = store.read(repeats.otherwise_named, one.campaign, corrects)
+        if kept_on is not None:
+            sentences.append(
+                f"the file names skin {one.campaign.skin.id}, not {kept_on}, that of the campaign that it corrects: "
+                "the name below decides."
+            )
+        sentences += d33_cache.foreseen(table, one.campaign)
+    return sentences
