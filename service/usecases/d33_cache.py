@@ -28,7 +28,11 @@ BandHz = tuple[float, float]
 _PAPER = {"model": "paper", "model_id": None, "model_percent": None}
 _NONE: dict[str, Any] = {
     **dict.fromkeys(("band", "array", "sensor_spread_percent", "gain_scatter_percent", "position_scatter_mm")),
-    "declared_percent": None, "status": "none", "sensors": [], "cells": [], "findings": [],
+    "declared_percent": None,
+    "status": "none",
+    "sensors": [],
+    "cells": [],
+    "findings": [],
 }
 
 

@@ -21,11 +21,10 @@ _LOADS = "10 8 4 1\n14 16 10 3 0.5 0"
 _ORDER = ("x_mm", "y_mm", "indenter_radius_mm", "normal_force_n")
 
 Loads = Annotated[str, Query(max_length=_LONGEST)]
-SkinQuery = Annotated[str | None, Query()]
 
 
 @router.get("")
-def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, loads: Loads = _LOADS) -> Response:
+def view(request: Request, store: Store, table: Table, skin: str | None = None, loads: Loads = _LOADS) -> Response:
     """With the skin and the loads of the address, or else the paper's prototype under two spheres."""
     array = described(store, table, request.query_params, skin)
     lines = [place for place, line in enumerate(loads.splitlines(), 1) if line.strip()]
@@ -43,7 +42,9 @@ def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, l
 
 
 @router.get("/charge.csv")
-def charge_csv(request: Request, store: Store, table: Table, skin: SkinQuery = None, loads: Loads = _LOADS) -> Response:
+def charge_csv(
+    request: Request, store: Store, table: Table, skin: str | None = None, loads: Loads = _LOADS
+) -> Response:
     """Charge and stress on each sensor."""
     answer = answered(request, _document(described(store, table, request.query_params, skin), loads))
     return csv_answer("charge", charge_columns(answer))

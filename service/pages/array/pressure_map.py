@@ -6,10 +6,10 @@ Nothing of it is kept: the map stays in the page's form, and what the page saves
 import base64
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import orjson
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import Store
@@ -36,7 +36,7 @@ _MAP, _FILE, _SKIN = "map", "file", "skin"
 
 
 @router.get("")
-def view(request: Request, store: Store, skin: Annotated[str | None, Query()] = None) -> Response:
+def view(request: Request, store: Store, skin: str | None = None) -> Response:
     """With an example map, which presses one finger on the skin, or on the paper's prototype."""
     example = (Path(__file__).parents[1] / "static" / _EXAMPLE).read_bytes()
     return _shown(request, store, {} if skin is None else {_SKIN: skin}, example, "the map")

@@ -43,12 +43,7 @@ BandOfQuery = Annotated[d33_cache.BandHz | None, Depends(_band)]
 
 @router.get("")
 def campaign(
-    request: Request,
-    campaign_id: CampaignId,
-    store: Store,
-    table: Table,
-    band: BandOfQuery,
-    show: Annotated[str, Query()] = "",
+    request: Request, campaign_id: CampaignId, store: Store, table: Table, band: BandOfQuery, show: str = ""
 ) -> Response:
     """All at a glance; `show` picks the sensor, or the recording, whose lines are drawn, `band` what is averaged."""
     with store.reading() as connection:
@@ -79,7 +74,7 @@ def campaign(
 
 
 @router.get("/frf.csv")
-def frf_csv(campaign_id: CampaignId, store: Store, show: Annotated[str, Query()] = "") -> Response:
+def frf_csv(campaign_id: CampaignId, store: Store, show: str = "") -> Response:
     """Every line of the recordings, or of those of `show`, as they came or were estimated."""
     return csv_answer("frf", frf_columns(_loaded(store, campaign_id), show))
 

@@ -7,7 +7,7 @@ from urllib.parse import urlencode
 
 import numpy as np
 import orjson
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Depends, Request, Response
 
 from service.dependencies import Store, Table
 from service.pages.shared import same_request
@@ -50,7 +50,7 @@ class Sliders:
     taken: Sequence[str]
 
 
-def _sliders(request: Request, store: Store, table: Table, skin: Annotated[str | None, Query()] = None) -> Sliders:
+def _sliders(request: Request, store: Store, table: Table, skin: str | None = None) -> Sliders:
     """With the values of the address, or else those of the skin, or of the paper's prototype."""
     given = _given(request)
     own, taken = start(store, table, skin, {name: words for name, words in _WORDS.items() if name not in given})

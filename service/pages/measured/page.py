@@ -34,11 +34,10 @@ _WORDS = {"frf_pc_per_n": "FRF", "d33_pc_per_n": "d33"}  # that findings are abo
 _ANSWERED = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "contact_radius_mm", "sigma", "mean_stress_mpa")
 
 RowsText = Annotated[str, Query(max_length=_LONGEST)]
-SkinQuery = Annotated[str | None, Query()]
 
 
 @router.get("")
-def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, rows: RowsText = _ROWS) -> Response:
+def view(request: Request, store: Store, table: Table, skin: str | None = None, rows: RowsText = _ROWS) -> Response:
     """With the skin and the rows of the address, or else the paper's prototype under a sphere."""
     values, taken = shown(store, table, request.query_params, skin, FIELDS)
     error: str | None = None
@@ -73,7 +72,7 @@ def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, r
 
 
 @router.get("/rows.csv")
-def rows_csv(request: Request, store: Store, table: Table, skin: SkinQuery = None, rows: RowsText = _ROWS) -> Response:
+def rows_csv(request: Request, store: Store, table: Table, skin: str | None = None, rows: RowsText = _ROWS) -> Response:
     """What was measured and what it says, a row a measurement."""
     values, _ = shown(store, table, request.query_params, skin, FIELDS)
     document = _document(values, request.query_params, rows)

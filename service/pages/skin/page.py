@@ -42,9 +42,9 @@ def skin(
     skin_id: SkinId,
     store: Store,
     table: Table,
-    show: Annotated[Shown, Query()] = "d33",
-    sensor: Annotated[str | None, Query()] = None,
-    before: Annotated[str | None, Query()] = None,
+    show: Shown = "d33",
+    sensor: str | None = None,
+    before: str | None = None,
     by: Annotated[By | None, Query(alias="model")] = None,
 ) -> Response:
     """All at a glance; `sensor` picks the one whose history is drawn, `by` the model that it rests on: without it the

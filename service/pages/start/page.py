@@ -23,7 +23,7 @@ def start(
     store: Store,
     table: Table,
     find: Annotated[str, Query(max_length=200)] = "",
-    before: Annotated[str | None, Query()] = None,
+    before: str | None = None,
 ) -> Response:
     """The skins whose campaigns came last, first."""
     with store.reading() as connection:
