@@ -12,7 +12,7 @@ import re
 import time
 from collections.abc import Callable, Iterable, Mapping
 
-from starlette.requests import ClientDisconnect
+from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.auth.access_control import AccessControl
@@ -94,7 +94,7 @@ class AsgiMiddleware:
         if hot is None or not _plain(method, headers):
             await self._api(scope, limited, exchange.send)
             return
-        body = b"" if method == "GET" else await _whole_body(limited)
+        body = b"" if method == "GET" else await Request(scope, limited).body()
         content = hot(body or scope["query_string"])
         if content is None:
             await self._api(scope, _replay(body, receive), exchange.send)
@@ -144,17 +144,6 @@ def _plain(method: str, headers: Mapping[bytes, bytes]) -> bool:
     if b"csv" in headers.get(b"accept", b""):
         return False
     return method == "GET" or headers.get(b"content-type", b"").split(b";")[0].strip().lower() == b"application/json"
-
-
-async def _whole_body(receive: Receive) -> bytes:
-    message = await receive()
-    body: bytes = message.get("body", b"")
-    while message.get("more_body", False):
-        message = await receive()
-        body += message.get("body", b"")
-    if message["type"] == "http.disconnect":
-        raise ClientDisconnect
-    return body
 
 
 def _replay(body: bytes, receive: Receive) -> Receive:

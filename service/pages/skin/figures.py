@@ -62,8 +62,8 @@ def drawn_history(root: str, history: History, sensor: str | None, by: By) -> Dr
                 by_time.setdefault(point.time, []).append(point.d33_pc_per_n)
         times = sorted(by_time)
         levels = [[pick(by_time[time]) for time in times] for pick in (min, median, max)]
-        about = "Median d33 over the sensors in each campaign"
-        about += f", {_RESTS[by]}, and the range from the lowest to the highest."
+        median_of = f"Median d33 over the sensors in each campaign, {_RESTS[by]}"
+        about = f"{median_of}, and the range from the lowest to the highest."
         return drawn("history", array_history(times, *levels), about, numbers)
     points = [
         SensorPoints(
@@ -75,12 +75,8 @@ def drawn_history(root: str, history: History, sensor: str | None, by: By) -> Dr
         )
         for entry in chosen
     ]
-    return drawn(
-        "history",
-        d33_history(points),
-        f"d33 of each sensor in every campaign, {_RESTS[by]}, ± its uncertainty.",
-        numbers,
-    )
+    about = f"d33 of each sensor in every campaign, {_RESTS[by]}, ± its uncertainty."
+    return drawn("history", d33_history(points), about, numbers)
 
 
 def _trend_in_words(entry: SensorHistory) -> str:
