@@ -6,8 +6,8 @@ Plans are not stored: a server remembers the latest ones, and plans again after 
 import threading
 import time
 from collections import OrderedDict
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Literal
 
 from service.jobs.process import WorkerProcesses
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _REMEMBERED = 50
 _MOST_WAITING = 8
+_JOIN_S = 10.0
 _RETRY_S = 60.0  # how long a failure is answered before the plan is tried again
 
 
@@ -48,8 +49,9 @@ class Planner:
         self._workers = workers
         self._known: OrderedDict[tuple[str, str], Planned] = OrderedDict()
         self._lock = threading.Lock()
-        self._one_by_one = ThreadPoolExecutor(1, "plan")
+        self._waiting: SimpleQueue[tuple[AnyRow, RigLimits, Planned] | None] = SimpleQueue()
         self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._work, name="planning", daemon=True)
 
     def plan(self, row: AnyRow, limits: "RigLimits") -> Planned:
         """That of a diagnosis within these limits: begun where it is not known, or failed a minute ago; raises
@@ -67,20 +69,26 @@ class Planner:
             planned = self._known[key] = Planned()
             while len(self._known) > _REMEMBERED:
                 self._known.popitem(last=False)
-            self._one_by_one.submit(self._job, row, limits, planned)
+            self._waiting.put((row, limits, planned))
+            if self._thread.ident is None:
+                self._thread.start()
         return planned
 
     def stop(self) -> None:
         """End what is being worked out."""
         self._ending.set()
-        self._one_by_one.shutdown(cancel_futures=True)
+        self._waiting.put(None)
+        if self._thread.ident is not None:
+            self._thread.join(_JOIN_S)
 
-    def _job(self, row: AnyRow, limits: "RigLimits", planned: Planned) -> None:
-        try:
-            self._run(row, limits, planned)
-        except Exception as error:  # nobody waits for what the job raises
-            logger.exception("a plan could not be made", extra={"fields": {"diagnosis": row.id}})
-            planned.fail(f"{type(error).__name__}: {error}")
+    def _work(self) -> None:
+        while (waiting := self._waiting.get()) is not None and not self._ending.is_set():
+            row, limits, planned = waiting
+            try:
+                self._run(row, limits, planned)
+            except Exception as error:  # the thread has no caller to raise to
+                logger.exception("a plan could not be made", extra={"fields": {"diagnosis": row.id}})
+                planned.fail(f"{type(error).__name__}: {error}")
 
     def _run(self, row: AnyRow, limits: "RigLimits", planned: Planned) -> None:
         planned.state = "running"

@@ -1,4 +1,7 @@
-"""Storing an upload that was shown, or the errors that prevent it; the rig description that it is read with."""
+"""Storing an upload that was shown, or the errors that prevent it; the rig description that it is read with.
+
+And what its reader should know before it is kept: nothing kept is ever deleted, so that afterwards is late.
+"""
 
 from collections.abc import Mapping
 from typing import Any
