@@ -18,8 +18,8 @@ from underskin.errors import InvalidInput, UnderskinError, out_of_range, wrong_t
 from underskin.surrogate.sigma_table import SigmaTable
 
 _MOST_SENSORS = 10_000
-# Field, words, unit, default.
-GRID = (("columns", "sensors along x", "", 4), ("rows", "sensors along y", "", 4), ("pitch_mm", "pitch", "mm", 8.0))
+GRID = (("columns", "sensors along x", ""), ("rows", "sensors along y", ""), ("pitch_mm", "pitch", "mm"))
+_DEFAULTS = {"columns": "4", "rows": "4", "pitch_mm": "8"}
 GLUE = "glue_stiffness"
 _LABELS = {
     **{name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in (*FIELDS, *GRID)},
@@ -43,9 +43,7 @@ class Described:
     @property
     def fields(self) -> Sequence[tuple[str, str, str]]:
         """Those that the form asks for."""
-        return (
-            FIELDS if self.sensors is not None else (*FIELDS, *[(name, words, unit) for name, words, unit, _ in GRID])
-        )
+        return FIELDS if self.sensors is not None else (*FIELDS, *GRID)
 
     def document(self) -> dict[str, Any]:
         """The request without its loads; raises InvalidInput."""
@@ -63,7 +61,7 @@ def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin
     """The array of a form's fields; raises InvalidInput where the skin has no campaign with sensors."""
     sensors = None if skin_id is None else _latest(store, skin_id)["sensors"]
     values, taken = shown(store, table, given, skin_id)
-    values |= {name: given.get(name) or f"{default:g}" for name, _, _, default in GRID}
+    values |= {name: given.get(name) or default for name, default in _DEFAULTS.items()}
     return Described(skin_id, values, given.get(GLUE, ""), UNITS in given, sensors, taken)
 
 
