@@ -11,23 +11,22 @@ from service import pages
 from service.auth.access_control import AccessControl
 from service.dependencies import authorised
 from service.ingest.uploads import UploadFolder
-from service.jobs import JobSettings, Planner, Runner, WorkerProcesses
+from service.jobs import Planner, Runner, WorkerProcesses
 from service.middleware import request_log
 from service.middleware.asgi_middleware import AsgiMiddleware
 from service.middleware.error_handlers import install_handlers
-from service.pages.shared.problem import problem_page
+from service.pages.shared.html import problem_page
 from service.pages.upload.pending_uploads import PendingUploads
 from service.routes import (
     campaigns,
-    d33,
     design,
     diagnoses,
     exports,
-    frf,
     health,
     metrics,
     models,
     openapi,
+    pressed_skin,
     sigma,
     skins,
     stress,
@@ -72,13 +71,13 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     api.state.table = table
     api.state.access = access
     api.state.store = store
-    job_settings = job_settings_of(settings, table)
-    processes = WorkerProcesses(job_settings.table)
-    api.state.runner = Runner(store, job_settings, processes)
-    api.state.planner = Planner(store, job_settings, processes)
+    memory_bytes = int(settings.diagnosis_memory_mb * 1e6)
+    processes = WorkerProcesses(settings.tables / SIGMA_TABLE, table.sha256, memory_bytes)
+    api.state.runner = Runner(store, processes, settings.diagnosis_workers, settings.diagnosis_ready)
+    api.state.planner = Planner(store, processes, settings.diagnosis_workers)
     install_handlers(api, problem_page, _methods)
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"]), Depends(known_query)])
-    for noun in (sigma, frf, d33, stress, design, tables, campaigns, diagnoses, exports, skins, models):
+    for noun in (sigma, pressed_skin, stress, design, tables, campaigns, diagnoses, exports, skins, models):
         v1.include_router(noun.router)
     for router in (v1, umbridge.router, health.router, metrics.router, openapi.router, pages.router):
         api.include_router(router)
@@ -87,13 +86,6 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
 
 def _methods(api: FastAPI, path: str) -> list[str]:
     return openapi.methods(api, path) or pages.methods(path)
-
-
-def job_settings_of(settings: Settings, table: SigmaTable) -> JobSettings:
-    """What diagnoses and plans are run with."""
-    memory_bytes = int(settings.diagnosis_memory_mb * 1e6)
-    path = settings.tables / SIGMA_TABLE
-    return JobSettings(settings.diagnosis_workers, memory_bytes, settings.diagnosis_ready, path, table.sha256)
 
 
 def create_app(settings: Settings, table: SigmaTable, access: AccessControl, store: Database) -> ASGIApp:

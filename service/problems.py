@@ -155,39 +155,30 @@ def validated(kind: type[_Model], document: Any) -> _Model:
         raise from_validation(error) from None
 
 
-def first_refused(error: ValidationError) -> InvalidInput:
-    """The first of pydantic's errors."""
-    return _shortened(_as_invalid_input(error.errors(include_url=False)[0]))
+def parsed(kind: type[_Model], document: Any) -> _Model:
+    """The model of a document; raises InvalidInput with the first that is wrong."""
+    try:
+        return kind.model_validate(document)
+    except ValidationError as error:
+        raise _shortened(_as_invalid_input(error.errors(include_url=False)[0])) from None
 
 
-# pydantic's words where a lab's are clearer; the others are shown as they are.
-_WORDS = {
-    "greater_than_equal": "must be at least 0",
-    "missing": "is required",
-    "extra_forbidden": "is not a field of this request",
-    "float_type": "must be a number (NaN and null are not)",
-    "float_parsing": "must be a number",
-    "finite_number": "must be finite",
-    "model_type": "must be a JSON object with the fields as columns",
-    "too_short": "must not be empty",
-    "bool_parsing": "must be true or false",
-    "bool_type": "must be true or false",
-}
-_CODES = {
-    "greater_than": ErrorCode.OUT_OF_RANGE,
-    "greater_than_equal": ErrorCode.OUT_OF_RANGE,
-    "less_than": ErrorCode.OUT_OF_RANGE,
-    "less_than_equal": ErrorCode.OUT_OF_RANGE,
-    "missing": ErrorCode.REQUIRED,
-    "extra_forbidden": ErrorCode.UNKNOWN_FIELD,
-    "float_type": ErrorCode.WRONG_TYPE,
-    "float_parsing": ErrorCode.WRONG_TYPE,
-    "model_type": ErrorCode.WRONG_TYPE,
-    "bool_type": ErrorCode.WRONG_TYPE,
-    "bool_parsing": ErrorCode.WRONG_TYPE,
-    "finite_number": ErrorCode.NOT_FINITE,
-    "literal_error": ErrorCode.NOT_ONE_OF,
-    "too_short": ErrorCode.TOO_FEW,
+# Of pydantic's errors the code and, where a lab's words are clearer than pydantic's, those.
+_KNOWN = {
+    "greater_than": (ErrorCode.OUT_OF_RANGE, ""),
+    "greater_than_equal": (ErrorCode.OUT_OF_RANGE, "must be at least 0"),
+    "less_than": (ErrorCode.OUT_OF_RANGE, ""),
+    "less_than_equal": (ErrorCode.OUT_OF_RANGE, ""),
+    "missing": (ErrorCode.REQUIRED, "is required"),
+    "extra_forbidden": (ErrorCode.UNKNOWN_FIELD, "is not a field of this request"),
+    "float_type": (ErrorCode.WRONG_TYPE, "must be a number (NaN and null are not)"),
+    "float_parsing": (ErrorCode.WRONG_TYPE, "must be a number"),
+    "model_type": (ErrorCode.WRONG_TYPE, "must be a JSON object with the fields as columns"),
+    "bool_type": (ErrorCode.WRONG_TYPE, "must be true or false"),
+    "bool_parsing": (ErrorCode.WRONG_TYPE, "must be true or false"),
+    "finite_number": (ErrorCode.NOT_FINITE, "must be finite"),
+    "literal_error": (ErrorCode.NOT_ONE_OF, ""),
+    "too_short": (ErrorCode.TOO_FEW, "must not be empty"),
 }
 _NOT_FIELDS = {"body", "query", "scalar", "column"}
 
@@ -197,12 +188,13 @@ def _as_invalid_input(detail: Mapping[str, Any]) -> InvalidInput:
     names = [part for part in place if isinstance(part, str)]
     indices = [part for part in place if isinstance(part, int)]
     message = str(detail["msg"])
+    code, words = _KNOWN.get(detail["type"], (ErrorCode.INVALID_VALUE, ""))
     return InvalidInput(
         names[0] if names else "body",
         None if detail["type"] == "missing" else detail.get("input"),
-        _WORDS.get(detail["type"], message[:1].lower() + message[1:]),
+        words or message[:1].lower() + message[1:],
         index=indices[0] if indices else None,
-        code=_CODES.get(detail["type"], ErrorCode.INVALID_VALUE),
+        code=code,
     )
 
 

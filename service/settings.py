@@ -9,6 +9,11 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 from underskin.surrogate.sigma_table import tables_folder
 
 
+def make_data_folder(folder: Path) -> None:
+    """Make it where it is missing, for its owner alone; one that is there keeps the mode that somebody gave it."""
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+
+
 class Settings(BaseSettings):
     """Read from variables named UNDERSKIN_ and the field in capitals."""
 

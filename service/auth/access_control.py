@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from urllib.parse import quote
 
 from service.auth import session
@@ -20,28 +21,24 @@ _MOST_OPEN_BYTES = 8000  # of a body that anybody may send: a key and a path fit
 SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
+@dataclass(kw_only=True, eq=False)
 class AccessControl:
-    """Refuses requests before they reach a route."""
+    """Refuses requests before they reach a route.
 
-    def __init__(
-        self,
-        *,
-        host_names: frozenset[str],
-        keys: KeyStore,
-        requirement: KeyRequirement,
-        keys_always: bool,
-        max_body_bytes: int,
-        max_upload_bytes: int,
-    ) -> None:
-        """`keys_always`: to be reached from other machines, so that no request passes without a key; otherwise
-        keys are needed once one has been made, by `requirement`."""
-        self._hosts = frozenset(name.encode() for name in host_names | LOOPBACK_NAMES)
-        self._keys = keys
-        self.requirement = requirement
+    `keys_always`: to be reached from other machines, so that no request passes without a key; otherwise keys are needed
+    once one has been made, by `requirement`.
+    """
+
+    host_names: frozenset[str]
+    keys: KeyStore
+    requirement: KeyRequirement
+    keys_always: bool
+    max_body_bytes: int
+    max_upload_bytes: int
+
+    def __post_init__(self) -> None:
+        self._hosts = frozenset(name.encode() for name in self.host_names | LOOPBACK_NAMES)
         self._damage = ""  # of keys.json, as it was logged last
-        self._keys_always = keys_always
-        self._max_body_bytes = max_body_bytes
-        self._max_upload_bytes = max_upload_bytes
 
     def check(self, method: str, path: str, headers: Mapping[bytes, bytes]) -> Key | None:
         """The key that came with the request, None where none is needed; raises Refusal."""
@@ -57,11 +54,11 @@ class AccessControl:
 
     def keys_needed(self) -> bool:
         """Whether a request without a key is refused."""
-        return self._keys_always or self.requirement.needed or self._keys.in_use()
+        return self.keys_always or self.requirement.needed or self.keys.in_use()
 
     def keys_missing(self) -> bool:
         """Whether keys are needed and keys.json is not there."""
-        return self.keys_needed() and not self._keys.in_use()
+        return self.keys_needed() and not self.keys.in_use()
 
     def check_size(self, size: int, path: str, headers: Mapping[bytes, bytes]) -> None:
         """Refuses a body of more bytes than `path` takes.
@@ -72,9 +69,9 @@ class AccessControl:
         if path in OPEN or path.startswith(_OPEN_PAGES):
             most, setting, smaller = _MOST_OPEN_BYTES, "", "a key and nothing else"
         elif _takes_files(path, headers):
-            most, setting, smaller = self._max_upload_bytes, " (UNDERSKIN_MAX_UPLOAD_MB)", "fewer files a request"
+            most, setting, smaller = self.max_upload_bytes, " (UNDERSKIN_MAX_UPLOAD_MB)", "fewer files a request"
         else:
-            most, setting, smaller = self._max_body_bytes, " (UNDERSKIN_MAX_BODY_MB)", "fewer rows a request"
+            most, setting, smaller = self.max_body_bytes, " (UNDERSKIN_MAX_BODY_MB)", "fewer rows a request"
         if size > most:
             limit = f"{most / 1e6:g} MB{setting}"
             raise Refusal(413, f"The body exceeds {limit}; send {smaller}.", title="Body too large")
@@ -82,7 +79,7 @@ class AccessControl:
     def key_of_login(self, token: str) -> Key | None:
         """The key that somebody typed, None where it is not known; raises Refusal."""
         with self._readable_keys():
-            return self._keys.find(token.strip().encode())
+            return self.keys.find(token.strip().encode())
 
     def _check_key(self, method: str, path: str, headers: Mapping[bytes, bytes]) -> Key | None:
         if not self.keys_needed():
@@ -105,7 +102,7 @@ class AccessControl:
     def _readable_keys(self) -> Iterator[None]:
         """Refuses a request that needs the keys while they cannot be read; the log says why, once a change."""
         try:
-            self._keys.entries()
+            self.keys.entries()
             self._damage = ""
             yield
         except KeysUnreadable as error:
@@ -118,13 +115,13 @@ class AccessControl:
 
     def _key_of(self, authorization: bytes) -> Key | None:
         scheme, _, token = authorization.partition(b" ")
-        return self._keys.find(token.strip()) if scheme.lower() == b"bearer" else None
+        return self.keys.find(token.strip()) if scheme.lower() == b"bearer" else None
 
     def _key_of_session(self, method: str, headers: Mapping[bytes, bytes]) -> Key | None:
         """A browser sends its cookie by itself, so a request that changes something must say whose page it is of."""
         if method not in SAFE and b"origin" not in headers:
             return None
-        return session.key_of(session.cookie_in(headers), self._keys)
+        return session.key_of(session.cookie_in(headers), self.keys)
 
 
 def _takes_files(path: str, headers: Mapping[bytes, bytes]) -> bool:

@@ -34,8 +34,7 @@ class KeyRequirement:
 
     def look(self) -> None:
         """Bring `needed` up to date, and the store where keys.json shows that a key was made."""
-        with self._store.reading() as connection:
-            row = key_requirement.find(connection)
+        row = self._store.read(key_requirement.find)
         if self._keys.file_exists():
             self.needed = True
         elif row is not None:

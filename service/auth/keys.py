@@ -15,7 +15,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Literal
 
-from service.store import data_folder
+from service.settings import make_data_folder
 from underskin.errors import not_one_of, not_unique
 
 # Looking at the file takes longer than checking a key.
@@ -130,7 +130,7 @@ class KeyStore:
 
     @contextmanager
     def _locked(self) -> Iterator[None]:
-        data_folder.make(self.path.parent)
+        make_data_folder(self.path.parent)
         with self.path.with_suffix(".lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             yield

@@ -1,6 +1,5 @@
 """Commands on the store as a whole: backup and restore, while servers run."""
 
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -8,9 +7,9 @@ import typer
 
 from service.auth.keys import KeyStore, keys_missing
 from service.cli.shared import read_settings
-from service.store import StoreError, data_folder, database
+from service.settings import make_data_folder
+from service.store import StoreError, database, key_requirement, migrate
 from service.store import backup as backups
-from service.store import restore as restoring
 from underskin import UnderskinError
 
 
@@ -28,12 +27,11 @@ def restore(file: Annotated[Path, typer.Argument(help="A file that `underskin ba
     """Put a backup in place of the store, while servers run; what was there is backed up first."""
     settings = read_settings()
     try:
-        data_folder.make(settings.data)
+        make_data_folder(settings.data)
         store = database(settings.database_url, settings.data)
-        stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
-        before = settings.data / "backups" / f"before-restore-{stamp}{backups.suffix(store)}"
-        restoring.restore(store, file, before)
-        needed = restoring.keys_needed(store)
+        before = backups.place(store, settings.data, "before-restore")
+        migrate.restore(store, file, before)
+        needed = store.read(key_requirement.is_needed)
     except (StoreError, OSError) as error:
         raise UnderskinError(str(error)) from error
     typer.echo(f"restored {file}" + (f"; what was there before is in {before}" if before.exists() else ""))

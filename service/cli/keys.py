@@ -11,7 +11,6 @@ from service.auth.keys import KeyStore, Scope, keys_missing
 from service.cli.shared import STORE_ERRORS, fail, read_settings
 from service.settings import Settings
 from service.store import database, key_requirement
-from service.store.restore import keys_needed
 from underskin import UnderskinError
 
 key = typer.Typer(help="API keys: create, list, revoke; open: do without.", no_args_is_help=True)
@@ -99,4 +98,4 @@ def _note(settings: Settings, change: Callable[[Connection], None]) -> None:
 def _keys_needed(settings: Settings) -> bool:
     """Whether the store says that requests need a key; one that is still to be made does not."""
     with closing(database(settings.database_url, settings.data)) as store:
-        return store.is_made() and keys_needed(store)
+        return store.is_made() and store.read(key_requirement.is_needed)

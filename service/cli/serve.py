@@ -17,7 +17,8 @@ from service.auth.keys import KeyStore
 from service.cli.shared import STORE_ERRORS, fail, read_settings
 from service.log import configure_logging
 from service.middleware.http_protocol import LimitedHttpProtocol
-from service.store import data_folder, open_store
+from service.settings import make_data_folder
+from service.store import open_store
 from underskin import ExtensionError, TableError
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.readers.formats import formats_of_other_packages
@@ -72,7 +73,7 @@ def serve(
 
 def _require_writable(folder: Path) -> None:
     try:
-        data_folder.make(folder)
+        make_data_folder(folder)
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:

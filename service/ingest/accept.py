@@ -9,7 +9,7 @@ import orjson
 from sqlalchemy import Connection
 
 from service.ingest import repeats
-from service.ingest.reading import CheckedCampaign, ReadCampaign, checked, joined, read, require_few
+from service.ingest.reading import CheckedCampaign, ReadCampaign, checked, joined, look, require_few
 from service.ingest.uploads import Upload
 from service.problems import Refusal
 from service.store import Database, answers, campaigns, skins
@@ -65,21 +65,18 @@ def accept(store: Database, uploads: Sequence[Upload], options: IngestOptions) -
     """
     request = options.request(uploads)
     if request is not None:
-        with store.reading() as connection:
-            before = answers.replayed(connection, request)
+        before = store.read(answers.replayed, request)
         if before is not None:
             return dict(before), True
     rig = _rig(store, uploads, options)
     arrived = _arrived(uploads, rig, options)
     _require_keepable(arrived, options)
-    with store.writing() as connection:
-        if request is not None and not answers.claim(connection, request):
-            return dict(answers.replayed(connection, request) or {}), True
+
+    def keep(connection: Connection) -> dict[str, Any]:
         results = [_kept(connection, campaign, options, rig) for campaign in arrived]
-        answer = {"campaigns": results} if uploads[0].in_form or arrived[0].in_list else results[0]
-        if request is not None:
-            answers.keep(connection, request, answer)
-    return answer, False
+        return {"campaigns": results} if uploads[0].in_form or arrived[0].in_list else results[0]
+
+    return store.write(answers.once, request, keep)
 
 
 def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> RigDescription | None:
@@ -118,7 +115,7 @@ def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, options: Ing
     recordings = 0
     for upload in uploads:
         if upload.field != RIG:
-            more = read(upload, rig, options.most_json_bytes)
+            more = look(upload, rig, options.most_json_bytes).campaigns
             files += more
             recordings += sum(one.recordings for one in more)
             require_few(len(files), recordings)
@@ -145,13 +142,9 @@ def _require_keepable(arrived: Sequence[CheckedCampaign], options: IngestOptions
 def _flat(campaign: CheckedCampaign, *, many: bool) -> list[dict[str, Any]]:
     """All errors of a campaign as a problem lists them."""
     prefix = f"{campaign.file}: " if many and campaign.file else ""
-    own = [{**error, "index": None, "field": prefix + error["field"]} for error in campaign.errors]
-    nested = [
-        {**error, "index": None, "field": f"{prefix}{_place(entry['id'])}.{error['field']}"}
-        for entry in campaign.refused
-        for error in entry["errors"]
-    ]
-    return nested + own
+    placed = [(f"{_place(entry['id'])}.", error) for entry in campaign.refused for error in entry["errors"]]
+    placed += [("", error) for error in campaign.errors]
+    return [{**error, "index": None, "field": f"{prefix}{place}{error['field']}"} for place, error in placed]
 
 
 def _place(recording: str) -> str:
@@ -161,41 +154,27 @@ def _place(recording: str) -> str:
 def _kept(
     connection: Connection, checked: CheckedCampaign, options: IngestOptions, rig: RigDescription | None
 ) -> dict[str, Any]:
+    campaign, notes = checked.campaign, list(checked.notes)
     refused = [{"id": entry["id"], "status": "refused", "errors": entry["errors"]} for entry in checked.refused]
-    findings = [] if checked.campaign is None else [one.sentence for one in plausibility.implausible(checked.campaign)]
-    result: dict[str, Any] = {
-        "file": checked.file,
-        "errors": checked.errors,
-        "notes": checked.notes,
-        "findings": findings,
-    }
-    if checked.campaign is None:
+    result: dict[str, Any] = {"file": checked.file, "errors": checked.errors, "notes": notes, "findings": []}
+    if campaign is None:
         return {**result, "status": "refused", "id": None, "skin_id": None, "recordings": refused}
-    notes = [
-        *checked.notes,
-        *_other_skin(connection, checked.campaign, options),
-        *_repeats(connection, checked.campaign, options),
-    ]
-    result["notes"] = notes
-    arrival = campaigns.NewCampaign(
-        checked.campaign, options.skin, refused, notes, source=checked.file, received_from=options.sender
-    )
+    result["findings"] = [finding.sentence for finding in plausibility.implausible(campaign)]
+    notes += [*_other_skin(connection, campaign, options), *_repeats(connection, campaign, options)]
+    arrival = campaigns.NewCampaign(campaign, options.skin, refused, notes, checked.file, options.sender)
     campaign_id, skin_id = campaigns.add(connection, arrival, corrects=options.corrects, reason=options.reason)
     if checked.by_rig and rig is not None:
         skins.keep_rig(connection, skin_id, orjson.dumps(rig.document).decode())
-    stored = [{"id": recording.id, "status": "ok", "errors": []} for recording in checked.campaign.recordings]
+    stored = [{"id": recording.id, "status": "ok", "errors": []} for recording in campaign.recordings]
     return {**result, "status": "ok", "id": campaign_id, "skin_id": skin_id, "recordings": stored + refused}
 
 
 def _other_skin(connection: Connection, campaign: Campaign, options: IngestOptions) -> list[str]:
     """What is said of a correction that names another skin than that of the campaign it corrects."""
-    named = campaign.skin.id
-    if options.corrects is None or options.skin is not None or named is None:
+    kept_on = None if options.skin else repeats.otherwise_named(connection, campaign, options.corrects)
+    if kept_on is None:
         return []
-    skin_id = campaigns.find(connection, options.corrects).skin_id
-    if skins.are_one(connection, named, skin_id):
-        return []
-    return [f"it names skin {named!r}, and was kept on skin {skin_id!r}, as the campaign that it corrects"]
+    return [f"it names skin {campaign.skin.id!r}, and was kept on skin {kept_on!r}, as the campaign that it corrects"]
 
 
 def _repeats(connection: Connection, campaign: Campaign, options: IngestOptions) -> list[str]:

@@ -21,6 +21,7 @@ from underskin.recordings.rig_description import RigDescription
 
 _BOM = b"\xef\xbb\xbf"
 _UNNAMED = "the upload"
+_LISTED = ("code", "field", "value", "allowed")  # of an error
 
 # Reading a campaign takes memory many times its size: few at a time, the others wait.
 READING_SLOTS = asyncio.Semaphore(2)
@@ -63,11 +64,6 @@ class CheckedCampaign:
     unlisted: int = 0  # errors beyond those listed
 
 
-def read(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> list[ReadCampaign]:
-    """The campaigns of a file, by its content: JSON may hold one or a list of them."""
-    return look(upload, rig, most_json_bytes).campaigns
-
-
 @dataclass(frozen=True)
 class InspectedFile:
     """A file that was read and not stored: its format, its channels where it has any, and its campaigns."""
@@ -78,7 +74,7 @@ class InspectedFile:
 
 
 def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> InspectedFile:
-    """As `read`, with the format and the channels of the file."""
+    """The campaigns of a file, by its content, with its format and channels: JSON may hold one or a list of them."""
     label = upload.label or _UNNAMED
     kind, contents = "", None
     try:
@@ -90,13 +86,13 @@ def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> In
         contents = held if isinstance(held, Contents) else None
         reading = understood(held, label, rig)
         _require_usable(reading.campaign)
+        campaign = ReadCampaign(upload.label, reading, by_rig=rig is not None)
     except FileError as error:
         allowed = Requirement(Mention(error.place), ": ", error.reason) if error.place else error.reason
-        errors = [error_entry("file", upload.label, allowed, error.code)]
-        return InspectedFile(kind, contents, [ReadCampaign(upload.label, errors=errors)])
+        campaign = ReadCampaign(upload.label, errors=[error_entry("file", upload.label, allowed, error.code)])
     except InvalidInput as error:
-        return InspectedFile(kind, contents, [ReadCampaign(upload.label, errors=[_invalid(error)])])
-    return InspectedFile(kind, contents, [ReadCampaign(upload.label, reading, by_rig=rig is not None)])
+        campaign = ReadCampaign(upload.label, errors=[_invalid(error)])
+    return InspectedFile(kind, contents, [campaign])
 
 
 def checked(read: ReadCampaign) -> CheckedCampaign:
@@ -156,27 +152,16 @@ def _read_json(upload: Upload, most_bytes: int) -> list[ReadCampaign]:
     content = upload.path.read_bytes().removeprefix(_BOM)
     try:
         document = orjson.loads(content)
-    except orjson.JSONDecodeError as error:
-        if not upload.in_form:
-            raise Refusal(
-                400, f"The body is not JSON: line {error.lineno}, column {error.colno}: {error.msg}."
-            ) from None
-        allowed = f"must be JSON; line {error.lineno}, column {error.colno}: {error.msg}"
-        return [
-            ReadCampaign(upload.label, errors=[error_entry("file", upload.label, allowed, ErrorCode.UNREADABLE_FILE)])
-        ]
-    try:
         require_unique_keys(content)
+    except orjson.JSONDecodeError as error:
+        wrong = f"line {error.lineno}, column {error.colno}: {error.msg}"
+        if not upload.in_form:
+            raise Refusal(400, f"The body is not JSON: {wrong}.") from None
+        entry = error_entry("file", upload.label, f"must be JSON; {wrong}", ErrorCode.UNREADABLE_FILE)
+        return [ReadCampaign(upload.label, errors=[entry])]
     except Refusal as twice:
-        return [
-            ReadCampaign(
-                upload.label,
-                errors=[
-                    error_entry(error["field"], error["value"], error["allowed"], ErrorCode.NOT_UNIQUE)
-                    for error in twice.errors
-                ],
-            )
-        ]
+        errors = [{name: error[name] for name in _LISTED} for error in twice.errors]
+        return [ReadCampaign(upload.label, errors=errors)]
     if not isinstance(document, list):
         require_few(1, _recordings_in(document))
         return [_checked(upload.label, document)]
@@ -210,4 +195,4 @@ def _invalid(error: InvalidInput) -> dict[str, Any]:
 
 def error_entry(name: str, value: Any, allowed: str, code: ErrorCode) -> dict[str, Any]:
     """An error as answers and pages list it."""
-    return {"code": str(code), "field": name, "value": value, "allowed": allowed}
+    return dict(zip(_LISTED, (str(code), name, value, allowed), strict=True))

@@ -1,11 +1,13 @@
-"""Identical recordings in several campaigns: noted when they arrive, counted once in histories."""
+"""Identical recordings in several campaigns: noted when they arrive, as is a correction that names another skin, and
+counted once in histories.
+"""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from sqlalchemy import Connection
 
-from service.store import campaigns, repeated
+from service.store import campaigns, repeated, skins
 from underskin.recordings.campaign import Campaign
 
 HistoryPoint = tuple[str, str]  # of a history: id of the campaign, sensor
@@ -47,6 +49,14 @@ def already_kept(
     row = earlier.row
     sentence = f"{which} in campaign {row.name} of skin {row.skin_id} already (kept {row.received_at[:10]})."
     return sentence, row.id
+
+
+def otherwise_named(connection: Connection, campaign: Campaign, corrects: str | None) -> str | None:
+    """The skin of the campaign that is corrected, where its correction names another one."""
+    if corrects is None or campaign.skin.id is None:
+        return None
+    skin_id = str(campaigns.find(connection, corrects).skin_id)
+    return None if skins.are_one(connection, campaign.skin.id, skin_id) else skin_id
 
 
 def left_out(connection: Connection, root: str, points: Collection[HistoryPoint]) -> dict[HistoryPoint, Repeat]:

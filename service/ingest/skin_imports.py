@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 from pydantic import BaseModel, Field, ValidationError
 
 from service.ingest.uploads import Upload
-from service.store import Conflict, Database, diagnosis_export, import_checks, importing
+from service.store import Conflict, Database, diagnosis_export, export, import_checks
 from underskin.errors import FileError, InvalidInput, unreadable
 from underskin.recordings.skin_export import ExportedCampaign, Overview, read_campaigns, read_overview
 
@@ -59,10 +59,10 @@ def look(store: Database, upload: Upload) -> CheckedExport:
             overview.diagnoses, overview.models, overview.campaigns, [row["id"] for row in overview.skins]
         )
         with store.reading() as connection:
-            clashes = importing.otherwise_joined(connection, skins.skins)
+            clashes = export.otherwise_joined(connection, skins.skins)
             clashes += diagnosis_export.clashes(connection, diagnosed)
             diagnosed_here = diagnosis_export.known(connection, diagnosed)
-            campaigns_here = importing.known(connection, overview.campaigns)
+            campaigns_here = export.known(connection, overview.campaigns)
         summaries = []
         for name, campaign in _campaigns(stream, upload, overview.campaigns):
             row = campaigns_here.get(name)
@@ -71,8 +71,7 @@ def look(store: Database, upload: Upload) -> CheckedExport:
                     checked = import_checks.campaign(campaign, name, skins.skins)
                 summaries.append(_campaign(checked.row, present=False, differs=False))
                 continue
-            with store.reading() as connection:
-                differs = importing.differs(connection, row, campaign)
+            differs = store.read(export.differs, row, campaign)
             summaries.append(_campaign(row._mapping, present=True, differs=differs))
     clashes += [f"Campaign {one.name!r} ({one.id}) is there already and differs" for one in summaries if one.differs]
     return CheckedExport(overview, skins, diagnosed, summaries, diagnosed_here, clashes)
@@ -80,17 +79,17 @@ def look(store: Database, upload: Upload) -> CheckedExport:
 
 def bring_in(store: Database, upload: Upload) -> Imported:
     """Keep what is not there; raises as `look`, and Conflict, with nothing kept, where it contradicts the store."""
-    export = look(store, upload)
-    if export.clashes:
-        more = f", and {len(export.clashes) - 1} more clashes" if len(export.clashes) > 1 else ""
-        raise Conflict(f"{export.clashes[0]}{more}; nothing was imported.")
-    missing = [campaign.id for campaign in export.campaigns if not campaign.present]
-    importing.add_skins(store, export.skins)
+    checked = look(store, upload)
+    if checked.clashes:
+        more = f", and {len(checked.clashes) - 1} more clashes" if len(checked.clashes) > 1 else ""
+        raise Conflict(f"{checked.clashes[0]}{more}; nothing was imported.")
+    missing = [campaign.id for campaign in checked.campaigns if not campaign.present]
+    export.add_skins(store, checked.skins)
     with upload.path.open("rb") as stream, _naming_the_part(upload, ""):
         for name, campaign in _campaigns(stream, upload, missing):
-            importing.add(store, import_checks.campaign(campaign, name, export.skins.skins))
-    diagnosis_export.add(store, export.diagnosed)
-    return Imported(skin_id=export.overview.skin, kept=len(missing), present=len(export.campaigns) - len(missing))
+            export.add(store, import_checks.campaign(campaign, name, checked.skins.skins))
+    diagnosis_export.add(store, checked.diagnosed)
+    return Imported(skin_id=checked.overview.skin, kept=len(missing), present=len(checked.campaigns) - len(missing))
 
 
 def _campaigns(stream: BinaryIO, upload: Upload, names: list[str]) -> Iterator[tuple[str, ExportedCampaign]]:

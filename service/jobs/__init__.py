@@ -6,6 +6,6 @@ planner.py plans next experiments within a rig's limits, which are not kept.
 
 from service.jobs.planner import Planner
 from service.jobs.process import WorkerProcesses
-from service.jobs.runner import JobSettings, Runner
+from service.jobs.runner import Runner
 
-__all__ = ["JobSettings", "Planner", "Runner", "WorkerProcesses"]
+__all__ = ["Planner", "Runner", "WorkerProcesses"]

@@ -7,13 +7,13 @@ import threading
 import time
 from collections import OrderedDict
 from dataclasses import asdict, dataclass
+from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Literal
 
-from service.jobs.process import Worker, WorkerProcesses
-from service.jobs.runner import JobSettings, logger
+from service.jobs.process import WorkerProcesses
+from service.jobs.runner import logger
 from service.problems import Refusal
 from service.store import AnyRow, Database, diagnoses
-from underskin.recordings.readers import json_file
 
 if TYPE_CHECKING:
     from underskin.diagnosis.planning.rig_limits import RigLimits
@@ -42,16 +42,16 @@ class Planned:
 class Planner:
     """Plans next experiments one after another, until `stop`, and remembers the latest."""
 
-    def __init__(self, store: Database, job_settings: JobSettings, processes: WorkerProcesses) -> None:
+    def __init__(self, store: Database, processes: WorkerProcesses, workers: int) -> None:
+        """`workers`: 0 where this server runs no diagnoses and plans nothing."""
         self._store = store
-        self._job_settings = job_settings
         self._processes = processes
+        self._workers = workers
         self._known: OrderedDict[tuple[str, str], Planned] = OrderedDict()
         self._lock = threading.Lock()
-        self._turn = threading.Lock()
+        self._waiting: SimpleQueue[tuple[AnyRow, RigLimits, Planned] | None] = SimpleQueue()
         self._ending = threading.Event()
-        self._worker: Worker | None = None
-        self._threads: set[threading.Thread] = set()
+        self._thread = threading.Thread(target=self._work, name="planning", daemon=True)
 
     def plan(self, row: AnyRow, limits: "RigLimits") -> Planned:
         """That of a diagnosis within these limits: begun where it is not known, or failed a minute ago; raises
@@ -62,55 +62,42 @@ class Planner:
             if known is not None and (known.state != "failed" or time.monotonic() < known.failed_at + _RETRY_S):
                 self._known.move_to_end(key)
                 return known
-            if not self._job_settings.workers:
+            if not self._workers:
                 raise Refusal(503, "This server runs no diagnoses and plans nothing; use the command below.")
-            if len(self._threads) >= _MOST_WAITING:
+            if sum(one.state in ("queued", "running") for one in self._known.values()) >= _MOST_WAITING:
                 raise Refusal(503, "Many plans are being worked out: try again in a minute.")
             planned = self._known[key] = Planned()
             while len(self._known) > _REMEMBERED:
                 self._known.popitem(last=False)
-            thread = threading.Thread(target=self._job, args=(row, limits, planned), name=f"plan {row.id}", daemon=True)
-            self._threads.add(thread)
-        thread.start()
+            self._waiting.put((row, limits, planned))
+            if self._thread.ident is None:
+                self._thread.start()
         return planned
 
     def stop(self) -> None:
         """End what is being worked out."""
         self._ending.set()
-        with self._lock:
-            threads = list(self._threads)
-            if self._worker is not None:
-                self._worker.news.set()
-        for thread in threads:
-            thread.join(_JOIN_S)
+        self._waiting.put(None)
+        if self._thread.ident is not None:
+            self._thread.join(_JOIN_S)
 
-    def _job(self, row: AnyRow, limits: "RigLimits", planned: Planned) -> None:
-        try:
-            with self._turn:
-                if not self._ending.is_set():
-                    self._run(row, limits, planned)
-        except Exception as error:  # the thread has no caller to raise to
-            logger.exception("a plan could not be made", extra={"fields": {"diagnosis": row.id}})
-            planned.fail(f"{type(error).__name__}: {error}")
-        finally:
-            with self._lock:
-                self._threads.discard(threading.current_thread())
+    def _work(self) -> None:
+        while (waiting := self._waiting.get()) is not None and not self._ending.is_set():
+            row, limits, planned = waiting
+            try:
+                self._run(row, limits, planned)
+            except Exception as error:  # the thread has no caller to raise to
+                logger.exception("a plan could not be made", extra={"fields": {"diagnosis": row.id}})
+                planned.fail(f"{type(error).__name__}: {error}")
 
     def _run(self, row: AnyRow, limits: "RigLimits", planned: Planned) -> None:
         planned.state = "running"
-        with self._store.reading() as connection:
-            campaign, _ = diagnoses.campaign_of(connection, row)
-        content = json_file.write(campaign)
-        job = self._job_settings.job(content, limits=asdict(limits))
-        with Worker(job, content, self._processes.take()) as worker:
-            with self._lock:
-                self._worker = worker
+        campaign, _ = self._store.read(diagnoses.campaign_of, row)
+        with self._processes.at_work(campaign, limits=asdict(limits)) as worker:
             while not (worker.ended or self._ending.is_set()):
                 worker.news.wait(0.5)
-                planned.progress = worker.progress
-            with self._lock:
-                self._worker = None
-            if worker.plan is not None:
-                planned.plan, planned.state = worker.plan, "done"
+                planned.progress = worker.said["progress"]
+            if "plan" in worker.said:
+                planned.plan, planned.state = worker.said["plan"], "done"
             else:
                 planned.fail(worker.failure if worker.ended else "the server ended")

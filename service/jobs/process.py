@@ -8,12 +8,13 @@ import threading
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, BinaryIO, Self
 
 import orjson
 
 from service.jobs.worker import Job
+from underskin.recordings.campaign import Campaign
+from underskin.recordings.readers import json_file
 
 _INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR")
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -52,8 +53,11 @@ class WorkerProcess:
 class WorkerProcesses:
     """Worker processes for jobs; once `keep_ready` was called, one more waits for the next job, until `stop`."""
 
-    def __init__(self, table: Path) -> None:
+    def __init__(self, table: Path, table_sha256: str, memory_bytes: int) -> None:
+        """`memory_bytes`: what a job may take beyond its program."""
+        self.table_sha256 = table_sha256
         self._table = table
+        self._memory_bytes = memory_bytes
         self._ready: WorkerProcess | None = None
         self._keeps = False
         self._lock = threading.Lock()
@@ -64,7 +68,15 @@ class WorkerProcesses:
             self._keeps = True
             self._start()
 
-    def take(self) -> WorkerProcess:
+    def at_work(
+        self, campaign: Campaign, excluded: tuple[tuple[str, str], ...] = (), limits: dict[str, Any] | None = None
+    ) -> "Worker":
+        """A worker at its job, on a campaign."""
+        content = json_file.write(campaign)
+        job = Job(len(content), self.table_sha256, self._memory_bytes, excluded, limits)
+        return Worker(job, content, self._take())
+
+    def _take(self) -> WorkerProcess:
         """The one that is ready, or a new one."""
         with self._lock:
             ready, self._ready = self._ready, None
@@ -95,11 +107,7 @@ class Worker:
     """A worker at its job. `news` is set when it has ended. Leaving the block ends it in any case."""
 
     def __init__(self, job: Job, campaign: bytes, worker: WorkerProcess) -> None:
-        self.progress = 0.0
-        self.report: dict[str, Any] | None = None
-        self.figures: dict[str, str] | None = None
-        self.plan: dict[str, Any] | None = None
-        self.error: str | None = None
+        self.said: dict[str, Any] = {"progress": 0.0}  # the latest of each message, by its name
         self.news = threading.Event()
         self.ended = False
         self._worker, self._process, self._stderr = worker, worker.process, worker.stderr
@@ -110,9 +118,7 @@ class Worker:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._process.kill()
         self._listener.join()
         self._worker.end()
@@ -121,8 +127,8 @@ class Worker:
     def failure(self) -> str:
         """Why there is no report, once it has ended."""
         status = self._process.returncode
-        if self.error is not None:
-            return self.error
+        if "error" in self.said:
+            return str(self.said["error"])
         if status < 0:
             return f"its process was killed by signal {-status}; where nobody did that, memory was short"
         last = self.last_words.strip().splitlines()[-1:]
@@ -145,14 +151,9 @@ class Worker:
         with self._process.stdout as lines:
             for line in lines:
                 try:
-                    message = orjson.loads(line)
+                    self.said |= orjson.loads(line)
                 except orjson.JSONDecodeError:  # killed in the midst of a line
                     break
-                self.progress = message.get("progress", self.progress)
-                self.report = message.get("report", self.report)
-                self.figures = message.get("figures", self.figures)
-                self.plan = message.get("plan", self.plan)
-                self.error = message.get("error", self.error)
         self._process.wait()
         self.ended = True
         self.news.set()

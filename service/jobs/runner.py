@@ -3,18 +3,15 @@
 import logging
 import secrets
 import threading
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.jobs.process import Worker, WorkerProcesses
-from service.jobs.worker import Job
 from service.log import LastingFailure
 from service.store import AnyRow, Database, StorageFull, StoreMoved, diagnoses
 from underskin import __version__
-from underskin.recordings.readers import json_file
 
 logger = logging.getLogger("underskin")
 
@@ -24,30 +21,15 @@ _JOIN_S = 10.0
 _STORE_FAILED = (SQLAlchemyError, StorageFull, StoreMoved, OSError)
 
 
-@dataclass(frozen=True)
-class JobSettings:
-    """What a runner works with; memory is a worker's, beyond what its program takes."""
-
-    workers: int
-    memory_bytes: int
-    keeps_ready: bool
-    table: Path
-    table_sha256: str
-
-    def job(
-        self, campaign: bytes, excluded: tuple[tuple[str, str], ...] = (), limits: dict[str, Any] | None = None
-    ) -> Job:
-        """A worker's, on a campaign."""
-        return Job(len(campaign), self.table_sha256, self.memory_bytes, excluded, limits)
-
-
 class Runner:
     """Runs the queue in threads of the server's process, between `start` and `stop`."""
 
-    def __init__(self, store: Database, job_settings: JobSettings, processes: WorkerProcesses) -> None:
+    def __init__(self, store: Database, processes: WorkerProcesses, workers: int, keeps_ready: bool) -> None:
+        """`workers`: how many diagnoses run at once; `keeps_ready`: whether a process waits for the next one."""
         self._store = store
-        self._job_settings = job_settings
         self._processes = processes
+        self._workers = workers
+        self._keeps_ready = keeps_ready
         self._server = secrets.token_hex(8)
         self._ending = threading.Event()
         self._stirred = threading.Event()
@@ -58,7 +40,7 @@ class Runner:
 
     def start(self) -> None:
         """Take up what is in the queue, and what was running when its server ended."""
-        if self._job_settings.workers:
+        if self._workers:
             self._dispatcher.start()
 
     def stir(self) -> None:
@@ -82,19 +64,18 @@ class Runner:
         while not self._ending.is_set():
             self._stirred.clear()
             try:
-                while len(self._jobs) < self._job_settings.workers and (row := self._claim()) is not None:
+                while len(self._jobs) < self._workers and (row := self._claim()) is not None:
                     thread = threading.Thread(target=self._job, args=(row,), name=row.id, daemon=True)
                     with self._lock:
                         self._jobs[thread] = None
                     thread.start()
             except _STORE_FAILED as error:
                 self._failure.log("no diagnosis can be claimed", error)
-            if not self._stirred.wait(_POLL_S) and self._job_settings.keeps_ready:
+            if not self._stirred.wait(_POLL_S) and self._keeps_ready:
                 self._processes.keep_ready()  # now that nothing else is going on
 
     def _claim(self) -> AnyRow | None:
-        with self._store.writing() as connection:
-            row = diagnoses.claim(connection, self._server, self._job_settings.table_sha256, __version__)
+        row = self._store.write(diagnoses.claim, self._server, self._processes.table_sha256, __version__)
         self._failure.is_over()
         return row
 
@@ -106,7 +87,7 @@ class Runner:
             self._release(row)
         except Exception as error:  # the thread has no caller to raise to
             logger.exception("a diagnosis could not be run", extra={"fields": {"diagnosis": row.id}})
-            self._end(row, None, f"{type(error).__name__}: {error}")
+            self._end(row, diagnoses.fail, f"{type(error).__name__}: {error}")
         finally:
             with self._lock:
                 del self._jobs[threading.current_thread()]
@@ -114,12 +95,9 @@ class Runner:
 
     def _run(self, row: AnyRow) -> None:
         """One diagnosis, until it has ended, another server has claimed it, or this server ends."""
-        with self._store.reading() as connection:
-            campaign, excluded = diagnoses.campaign_of(connection, row)
-        content = json_file.write(campaign)
+        campaign, excluded = self._store.read(diagnoses.campaign_of, row)
         left_out = tuple((left.recording, left.reason) for left in excluded)
-        job = self._job_settings.job(content, left_out)
-        with Worker(job, content, self._processes.take()) as worker:
+        with self._processes.at_work(campaign, left_out) as worker:
             with self._lock:
                 self._jobs[threading.current_thread()] = worker
             while not worker.ended and not self._ending.is_set():
@@ -129,34 +107,27 @@ class Runner:
                     return
             if not worker.ended:
                 self._release(row)
-            elif worker.report is not None:
-                self._end(row, worker.report, "", worker.figures)
+            elif "report" in worker.said:
+                self._end(row, diagnoses.finish, worker.said["report"], worker.said.get("figures"))
             else:
                 logger.error("a diagnosis failed", extra={"fields": {"diagnosis": row.id, "said": worker.last_words}})
-                self._end(row, None, worker.failure)
+                self._end(row, diagnoses.fail, worker.failure)
 
     def _is_ours(self, row: AnyRow, worker: Worker) -> bool:
         """Renew the claim; False where it was cancelled or another server claimed it, True where the store fails."""
         try:
-            with self._store.writing() as connection:
-                ours = diagnoses.keep_alive(connection, row.number, self._server, worker.progress)
+            ours = self._store.write(diagnoses.keep_alive, row.number, self._server, worker.said["progress"])
         except _STORE_FAILED as error:
             self._failure.log("a diagnosis cannot be kept alive", error)
             return True
         self._failure.is_over()
         return ours
 
-    def _end(
-        self, row: AnyRow, report: dict[str, Any] | None, reason: str, figures: dict[str, str] | None = None
-    ) -> None:
+    def _end(self, row: AnyRow, change: Callable[..., bool], *outcome: Any) -> None:
         """Store the outcome, and try again where the store fails: it took long to compute."""
         while True:
             try:
-                with self._store.writing() as connection:
-                    if report is not None:
-                        diagnoses.finish(connection, row.number, self._server, report, figures)
-                    else:
-                        diagnoses.fail(connection, row.number, self._server, reason)
+                self._store.write(change, row.number, self._server, *outcome)
                 return
             except _STORE_FAILED as error:
                 self._failure.log("what came of a diagnosis cannot be kept", error)
@@ -165,7 +136,6 @@ class Runner:
 
     def _release(self, row: AnyRow) -> None:
         try:
-            with self._store.writing() as connection:
-                diagnoses.release(connection, row.number, self._server)
+            self._store.write(diagnoses.release, row.number, self._server)
         except _STORE_FAILED as error:
             self._failure.log("a diagnosis cannot be put back into the queue", error)

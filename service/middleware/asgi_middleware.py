@@ -12,13 +12,13 @@ import re
 import time
 from collections.abc import Callable, Iterable, Mapping
 
-from starlette.requests import ClientDisconnect
+from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.auth.access_control import AccessControl
-from service.middleware.error_handlers import ProblemPage
-from service.middleware.request_log import record
-from service.problems import Refusal, is_browsing, unexpected
+from service.middleware.error_handlers import ProblemPage, problem_response
+from service.middleware.request_log import Answered, record
+from service.problems import Refusal, unexpected
 
 logger = logging.getLogger("underskin")
 
@@ -60,24 +60,23 @@ class AsgiMiddleware:
         scope["request_id"] = request_id
         scope["key"] = None
         scope["why"] = None
-        accept = headers.get(b"accept", b"").decode("latin-1")
-        exchange = _Exchange(send, request_id, scope["path"], accept, self._problem_page)
+        exchange = _Exchange(send, request_id)
         try:
             await self._answer(scope, headers, receive, exchange)
         except Refusal as refusal:
             scope["why"] = refusal.in_log()
-            await exchange.refuse(refusal)
+            await problem_response(scope, refusal, self._problem_page)(scope, receive, exchange.send)
         except ClientDisconnect:
             exchange.status = 499
             scope["why"] = "the client left"
         except Exception:
             logger.exception("request failed", extra={"fields": {"request_id": request_id}})
             if not exchange.status:
-                await exchange.refuse(unexpected())
+                await problem_response(scope, unexpected(), self._problem_page)(scope, receive, exchange.send)
         seconds = time.perf_counter() - start
-        method, path = scope["method"], scope["path"]
+        method, path, key, why = scope["method"], scope["path"], scope["key"], scope["why"]
         route = path if exchange.hot else getattr(scope.get("route"), "path", "none")
-        record(request_id, method, route, path, exchange.status, seconds, scope["key"], scope["why"])
+        record(Answered(time.time(), request_id, method, route, path, exchange.status, seconds, key, why))
 
     def _request_id(self, sent: bytes | None) -> str:
         if sent is not None and _SANE_ID.fullmatch(sent):
@@ -95,7 +94,7 @@ class AsgiMiddleware:
         if hot is None or not _plain(method, headers):
             await self._api(scope, limited, exchange.send)
             return
-        body = b"" if method == "GET" else await _whole_body(limited)
+        body = b"" if method == "GET" else await Request(scope, limited).body()
         content = hot(body or scope["query_string"])
         if content is None:
             await self._api(scope, _replay(body, receive), exchange.send)
@@ -119,12 +118,9 @@ class AsgiMiddleware:
 class _Exchange:
     """The answer on its way: puts the request id into it and remembers its status."""
 
-    def __init__(self, send: Send, request_id: str, path: str, accept: str, problem_page: ProblemPage) -> None:
+    def __init__(self, send: Send, request_id: str) -> None:
         self._send = send
-        self._request_id = request_id
-        self._path = path
-        self._accept = accept
-        self._problem_page = problem_page
+        self._request_id = request_id.encode()
         self.status = 0
         self.hot = False
 
@@ -132,32 +128,15 @@ class _Exchange:
         """What the API sends."""
         if message["type"] == "http.response.start":
             self.status = message["status"]
-            message["headers"] = [*message.get("headers", ()), (b"x-request-id", self._request_id.encode())]
+            message["headers"] = [*message.get("headers", ()), (b"x-request-id", self._request_id)]
         await self._send(message)
 
     async def answer(self, content: bytes) -> None:
         """A hot route's JSON."""
         self.hot = True
-        await self._whole(200, content, [(b"content-type", b"application/json")])
-
-    async def refuse(self, refusal: Refusal) -> None:
-        """A problem."""
-        if is_browsing(self._path, self._accept):
-            page = self._problem_page(refusal, self._request_id)
-            headers = [header for header in page.raw_headers if header[0] != b"content-length"]
-            await self._whole(page.status_code, bytes(page.body), headers)
-            return
-        headers = [(name.lower().encode(), value.encode()) for name, value in refusal.headers.items()]
-        content_type = (b"content-type", refusal.media_type(self._path).encode())
-        await self._whole(
-            refusal.status_for(self._path), refusal.body(self._path, self._request_id), [content_type, *headers]
-        )
-
-    async def _whole(self, status: int, content: bytes, headers: list[tuple[bytes, bytes]]) -> None:
-        self.status = status
-        headers += (b"content-length", b"%d" % len(content)), (b"x-request-id", self._request_id.encode())
-        await self._send({"type": "http.response.start", "status": status, "headers": headers})
-        await self._send({"type": "http.response.body", "body": content})
+        headers = [(b"content-type", b"application/json"), (b"content-length", b"%d" % len(content))]
+        await self.send({"type": "http.response.start", "status": 200, "headers": headers})
+        await self.send({"type": "http.response.body", "body": content})
 
 
 def _plain(method: str, headers: Mapping[bytes, bytes]) -> bool:
@@ -165,17 +144,6 @@ def _plain(method: str, headers: Mapping[bytes, bytes]) -> bool:
     if b"csv" in headers.get(b"accept", b""):
         return False
     return method == "GET" or headers.get(b"content-type", b"").split(b";")[0].strip().lower() == b"application/json"
-
-
-async def _whole_body(receive: Receive) -> bytes:
-    message = await receive()
-    body: bytes = message.get("body", b"")
-    while message.get("more_body", False):
-        message = await receive()
-        body += message.get("body", b"")
-    if message["type"] == "http.disconnect":
-        raise ClientDisconnect
-    return body
 
 
 def _replay(body: bytes, receive: Receive) -> Receive:

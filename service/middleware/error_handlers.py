@@ -6,8 +6,10 @@ from collections.abc import Callable, Sequence
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from sqlalchemy.exc import DataError, IntegrityError, OperationalError
+from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
+from starlette.types import Scope
 
 from service.problems import RETRY_LATER, Refusal, from_validation, invalid_input, is_browsing, unexpected
 from service.store import Conflict, Missing, StorageFull, StoreMoved
@@ -16,6 +18,8 @@ from underskin import InvalidInput
 
 logger = logging.getLogger("underskin")
 
+
+_STATUS = {Missing: 404, Conflict: 409, OtherRequest: 422}
 
 ProblemPage = Callable[[Refusal, str], Response]  # of a refusal and the request's id
 Methods = Callable[[FastAPI, str], Sequence[str]]  # of a path
@@ -27,16 +31,20 @@ def install_handlers(api: FastAPI, problem_page: ProblemPage, methods: Methods) 
     async def handle(request: Request, error: Exception) -> Response:
         refusal = _as_refusal(request, error, methods)
         request.scope["why"] = refusal.in_log()
-        path, request_id = request.scope["path"], request.scope["request_id"]
-        if is_browsing(path, request.headers.get("accept", "")):
-            return problem_page(refusal, request_id)
-        media_type = refusal.media_type(path)
-        status = refusal.status_for(path)
-        return Response(refusal.body(path, request_id), status, headers=refusal.headers, media_type=media_type)
+        return problem_response(request.scope, refusal, problem_page)
 
     ours = (Refusal, InvalidInput, RequestValidationError, HTTPException)
     for kind in (*ours, *_STATUS, StorageFull, StoreMoved, DataError, IntegrityError, OperationalError, Exception):
         api.add_exception_handler(kind, handle)
+
+
+def problem_response(scope: Scope, refusal: Refusal, problem_page: ProblemPage) -> Response:
+    """A problem as the answer to a request: as a page for who looks at pages."""
+    path, request_id = scope["path"], scope["request_id"]
+    if is_browsing(path, Headers(scope=scope).get("accept", "")):
+        return problem_page(refusal, request_id)
+    body, status = refusal.body(path, request_id), refusal.status_for(path)
+    return Response(body, status, headers=refusal.headers, media_type=refusal.media_type(path))
 
 
 def _as_refusal(request: Request, error: Exception, methods: Methods) -> Refusal:
@@ -62,28 +70,28 @@ def _as_refusal(request: Request, error: Exception, methods: Methods) -> Refusal
             return _of_the_store(request, error)
 
 
+def _of_the_store(request: Request, error: Exception) -> Refusal:
+    """What the store raises, and what nobody expected."""
+    match error:
+        case Missing() | Conflict() | OtherRequest():
+            return Refusal(_STATUS[type(error)], str(error))
+        case StorageFull():
+            return Refusal(507, "The disk is full: nothing of this request was kept. What is kept can be read.")
+        case StoreMoved():
+            return Refusal(503, str(error), headers=RETRY_LATER)
+        case DataError():
+            return Refusal(422, "A text has a character that cannot be kept, such as NUL.")
+        case IntegrityError():
+            wait = "look at what is there, and send it again."
+            return Refusal(409, f"Another request kept the same at the same time: {wait}")
+        case OperationalError():
+            logger.error("the store failed: %s", error, extra={"fields": {"request_id": request.scope["request_id"]}})
+            return Refusal(503, "The store does not answer; try again in a while.", headers=RETRY_LATER)
+        case _:
+            return unexpected()
+
+
 def _unreadable(error: RequestValidationError) -> Refusal | None:
     """A body that is not JSON is no question of fields."""
     reasons = [entry["ctx"]["error"] for entry in error.errors() if entry["type"] == "json_invalid"]
     return Refusal(400, f"The body is not JSON: {reasons[0]}.") if reasons else None
-
-
-_STATUS = {Missing: 404, Conflict: 409, OtherRequest: 422}
-
-
-def _of_the_store(request: Request, error: Exception) -> Refusal:
-    """What the store raises, and what nobody expected."""
-    if type(error) in _STATUS:
-        return Refusal(_STATUS[type(error)], str(error))
-    if isinstance(error, StorageFull):
-        return Refusal(507, "The disk is full: nothing of this request was kept. What is kept can be read.")
-    if isinstance(error, StoreMoved):
-        return Refusal(503, str(error), headers=RETRY_LATER)
-    if isinstance(error, DataError):
-        return Refusal(422, "A text has a character that cannot be kept, such as NUL.")
-    if isinstance(error, IntegrityError):
-        return Refusal(409, "Another request kept the same at the same time: look at what is there, and send it again.")
-    if isinstance(error, OperationalError):
-        logger.error("the store failed: %s", error, extra={"fields": {"request_id": request.scope["request_id"]}})
-        return Refusal(503, "The store does not answer; try again in a while.", headers=RETRY_LATER)
-    return unexpected()

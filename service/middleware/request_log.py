@@ -3,10 +3,10 @@
 import asyncio
 import os
 import re
-import time
 from contextlib import suppress
 from datetime import UTC, datetime
 from functools import cache
+from typing import NamedTuple
 
 import orjson
 from prometheus_client import Histogram
@@ -15,7 +15,7 @@ from service.auth.keys import Key
 
 # Requests are written and counted together: one by one, that would cost as much as to answer them.
 _DELAY_S = 0.2
-_waiting: list[tuple[float, str, str, str, str, int, float, Key | None, str | None]] = []
+
 _LONGEST_WHY = 300
 _KEY = re.compile(r"us_[\w-]{16,}")  # what looks like one, wherever somebody put it
 
@@ -27,20 +27,35 @@ _seconds = Histogram(
 )
 
 
-def record(
-    request_id: str, method: str, route: str, path: str, status: int, seconds: float, key: Key | None, why: str | None
-) -> None:
-    """Log a request and count it, a moment later; `route` is its path as documented, `why` the reason of an error."""
+class Answered(NamedTuple):
+    """A request that was answered; `route` is its path as documented, `why` the reason of an error."""
+
+    ended: float
+    request_id: str
+    method: str
+    route: str
+    path: str
+    status: int
+    seconds: float
+    key: Key | None
+    why: str | None
+
+
+_waiting: list[Answered] = []
+
+
+def record(request: Answered) -> None:
+    """Log a request and count it, a moment later."""
     if not _waiting:
         asyncio.get_running_loop().call_later(_DELAY_S, flush)
-    _waiting.append((time.time(), request_id, method, route, path, status, seconds, key, why))
+    _waiting.append(request)
 
 
 def flush() -> None:
     """Count and write the requests that wait."""
-    text = b"".join(_line(*entry) for entry in _waiting)
-    for _, _, method, route, _, status, seconds, *_ in _waiting:
-        _series(method, route, status).observe(seconds)
+    text = b"".join(map(_line, _waiting))
+    for request in _waiting:
+        _series(request.method, request.route, request.status).observe(request.seconds)
     _waiting.clear()
     with suppress(OSError):  # a log that nobody reads, or a full disk, must not stop the answers
         while text:
@@ -52,30 +67,21 @@ def _series(method: str, route: str, status: int) -> Histogram:
     return _seconds.labels(method, route, str(status))
 
 
-def _line(
-    ended: float,
-    request_id: str,
-    method: str,
-    route: str,
-    path: str,
-    status: int,
-    seconds: float,
-    key: Key | None,
-    why: str | None,
-) -> bytes:
+def _line(request: Answered) -> bytes:
+    path = request.path[:200]
     fields = {
-        "time": datetime.fromtimestamp(ended, UTC),
+        "time": datetime.fromtimestamp(request.ended, UTC),
         "level": "info",
         "logger": "underskin.request",
-        "message": f"{method} {path[:200]} {status}",
-        "request_id": request_id,
-        "method": method,
-        "path": path[:200],
-        "route": route,
-        "status": status,
-        "milliseconds": round(1e3 * seconds, 3),
-        "key": key.name if key else None,
+        "message": f"{request.method} {path} {request.status}",
+        "request_id": request.request_id,
+        "method": request.method,
+        "path": path,
+        "route": request.route,
+        "status": request.status,
+        "milliseconds": round(1e3 * request.seconds, 3),
+        "key": request.key.name if request.key else None,
     }
-    if why is not None:
-        fields["error"] = _KEY.sub("us_…", why)[:_LONGEST_WHY]
+    if request.why is not None:
+        fields["error"] = _KEY.sub("us_…", request.why)[:_LONGEST_WHY]
     return orjson.dumps(fields, option=orjson.OPT_APPEND_NEWLINE)

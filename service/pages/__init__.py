@@ -10,30 +10,14 @@ from service.pages.diagnosis import page as diagnosis
 from service.pages.diagnosis import plan
 from service.pages.measured import page as measured
 from service.pages.shared import assets
-from service.pages.skin import join
 from service.pages.skin import page as skin
 from service.pages.start import example, login
 from service.pages.start import page as start
 from service.pages.tables import page as tables
 from service.pages.upload import page as upload
 
-_PAGES = (
-    start,
-    skin,
-    campaign,
-    diagnosis,
-    plan,
-    upload,
-    design,
-    example,
-    join,
-    loads,
-    pressure_map,
-    measured,
-    tables,
-    login,
-    assets,
-)
+_OF_SKINS = (start, example, skin, campaign, diagnosis, plan, upload)
+_PAGES = (*_OF_SKINS, design, loads, pressure_map, measured, tables, login, assets)
 
 router = APIRouter(include_in_schema=False)
 for _page in _PAGES:

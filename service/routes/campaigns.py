@@ -1,13 +1,11 @@
 """Campaigns: sent, listed, read, withdrawn, corrected, their recordings excluded, their d33."""
 
-from collections.abc import Mapping
 from functools import partial
 from typing import Annotated, Any, Literal
 
 import orjson
 from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import StreamingResponse
-from pydantic import ValidationError
 from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import WRITE, CampaignId, Store, Table, number_of_cursor, sender
@@ -16,15 +14,13 @@ from service.ingest.form_fields import FILE, split
 from service.ingest.reading import READING_SLOTS
 from service.ingest.uploads import received
 from service.middleware.unique_keys import JsonRoute
-from service.problems import from_validation
 from service.routes.temporary_files import made_file
 from service.schemas import campaigns as models
 from service.schemas.campaign_d33 import D33
 from service.store import campaigns
 from service.store.times import stored
-from service.usecases import campaign_documents, d33_cache
 from service.usecases import campaigns as usecase
-from service.usecases.adopted_models import model_in_force
+from service.usecases import d33_cache
 from underskin.errors import conflicting, wrong_type
 
 router = APIRouter(prefix="/v1", tags=["campaigns"], route_class=JsonRoute)
@@ -119,7 +115,7 @@ async def post(
     async with received(request, request.app.state.uploads) as parts, READING_SLOTS:
         fields, uploads = split(parts, list(models.SendOptions.model_fields), [RIG])
         options = IngestOptions(
-            **_options(query, fields),
+            **query.with_form(fields).model_dump(),
             idempotency_key=idempotency_key,
             sender=sender(request),
             most_json_bytes=settings.max_body_bytes,
@@ -129,14 +125,6 @@ async def post(
         await run_in_threadpool(d33_cache.derive, store, table, kept)
     headers = {"Idempotency-Replayed": "true"} if repeats else {}
     return Response(orjson.dumps(answer), status_code=201, headers=headers, media_type="application/json")
-
-
-def _options(query: models.SendOptions, fields: Mapping[str, str]) -> dict[str, Any]:
-    """Those of the query and of the form; raises Refusal, InvalidInput."""
-    try:
-        return query.with_form(fields).model_dump()
-    except ValidationError as error:
-        raise from_validation(error) from None
 
 
 @router.get("/campaigns", operation_id="campaigns", summary="Campaigns, the latest first")
@@ -158,8 +146,7 @@ def listed(
         recorded_from=_time("recorded_from", recorded_from),
         recorded_to=_time("recorded_to", recorded_to),
     )
-    with store.reading() as connection:
-        rows = campaigns.listed(connection, filters, number_of_cursor(cursor), limit + 1)
+    rows = store.read(campaigns.listed, filters, number_of_cursor(cursor), limit + 1)
     page = [models.CampaignEntry(**usecase.entry(row)) for row in rows[:limit]]
     return models.CampaignList(campaigns=page, next=str(rows[limit - 1].number) if len(rows) > limit else None)
 
@@ -167,8 +154,7 @@ def listed(
 @router.get("/campaigns/{campaign_id}", operation_id="campaign", summary="One campaign")
 def one(campaign_id: CampaignId, store: Store) -> models.CampaignDetail:
     """With its recordings, without their arrays."""
-    with store.reading() as connection:
-        return usecase.detail(connection, campaign_id)
+    return store.read(usecase.detail, campaign_id)
 
 
 @router.get(
@@ -192,15 +178,14 @@ def document(
     file_format: Annotated[Literal["json", "hdf5"], Query(alias="format", description="JSON or HDF5.")] = "json",
 ) -> Response:
     """All recordings that were kept, arrays and all, those excluded later included."""
-    with store.reading() as connection:
-        row = campaigns.find(connection, campaign_id)
+    row = store.read(campaigns.find, campaign_id)
     if file_format == "json":
-        return StreamingResponse(campaign_documents.json_parts(store, row), media_type="application/json")
+        return StreamingResponse(usecase.json_parts(store, row), media_type="application/json")
     return made_file(
         request.app.state.uploads,
         f"{row.id}.h5",
         "application/x-hdf5",
-        partial(campaign_documents.write_hdf5, store, row),
+        partial(usecase.write_hdf5, store, row),
     )
 
 
@@ -221,11 +206,8 @@ def d33(
     if (band_low_hz is None) != (band_high_hz is None):
         raise conflicting("band_low_hz", band_low_hz, "band_low_hz and band_high_hz go together")
     band = None if band_low_hz is None or band_high_hz is None else (band_low_hz, band_high_hz)
-    with store.reading() as connection:
-        row = campaigns.find(connection, campaign_id)
-    if model == "adopted":
-        return D33(**d33_cache.adopted_answer(store, table, row, model_in_force(store, row.skin_id), band))
-    return D33(**d33_cache.answer(store, table, row, band))
+    row = store.read(campaigns.find, campaign_id)
+    return D33(**d33_cache.by_model(store, table, row, model, band))
 
 
 @router.post(
@@ -247,8 +229,7 @@ def withdraw(campaign_id: CampaignId, withdrawal: models.Withdrawal, store: Stor
 def exclude(campaign_id: CampaignId, exclusion: models.Exclusion, store: Store, table: Table) -> models.CampaignDetail:
     """Figures no longer use it; it can still be read. A correction is the way back."""
     usecase.exclude(store, table, campaign_id, exclusion.recording, exclusion.reason)
-    with store.reading() as connection:
-        return usecase.detail(connection, campaign_id)
+    return store.read(usecase.detail, campaign_id)
 
 
 def _time(name: str, text: str | None) -> str | None:

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request, Response
 
 from service.dependencies import Table
 from service.problems import validated
-from service.routes.columns_endpoint import answer_json
+from service.routes.columns_endpoint import answer_json, described_body
 from service.schemas.design import DesignAnswer, DesignRequest
 from service.usecases.design import design_answer, design_of
 
@@ -28,12 +28,7 @@ EXAMPLE = {
     operation_id="design",
     summary="A skin before it is built",
     responses={200: {"model": DesignAnswer}},
-    openapi_extra={
-        "requestBody": {
-            "required": True,
-            "content": {"application/json": {"schema": DesignRequest.model_json_schema(), "example": EXAMPLE}},
-        }
-    },
+    openapi_extra=described_body(DesignRequest.model_json_schema(), EXAMPLE),
 )
 async def post(request: Request, table: Table) -> Response:
     """How much of a load reaches a sensor, how finely the array tells where it is, and how far apart two loads must be.

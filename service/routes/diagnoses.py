@@ -51,8 +51,7 @@ def listed(
 ) -> models.DiagnosisList:
     """Without their reports; a page holds `limit` of them."""
     filters = diagnoses.DiagnosisFilters(campaign, skin, state)
-    with store.reading() as connection:
-        rows = diagnoses.listed(connection, filters, number_of_cursor(cursor), limit + 1)
+    rows = store.read(diagnoses.listed, filters, number_of_cursor(cursor), limit + 1)
     page = [models.DiagnosisEntry(**usecase.entry(row)) for row in rows[:limit]]
     return models.DiagnosisList(diagnoses=page, next=str(rows[limit - 1].number) if len(rows) > limit else None)
 

@@ -33,20 +33,9 @@ class Idempotency:
 
     def answer(self, store: Database, body: Any, act: Callable[[Connection], dict[str, Any]]) -> dict[str, Any]:
         """What `act` answers in a transaction of its own, or what it answered before; `body` is the request's."""
-        if self._key is None:
-            with store.writing() as connection:
-                return act(connection)
         digest = hashlib.sha256(repr([self._path, body]).encode()).hexdigest()
-        request = answers.KnownRequest(self.sender or "", self._key, digest)
-        with store.writing() as connection:
-            before = answers.replayed(connection, request)
-            if before is None and not answers.claim(connection, request):
-                before = answers.replayed(connection, request)
-            if before is not None:
-                return dict(before)
-            answer = act(connection)
-            answers.keep(connection, request, answer)
-        return answer
+        request = None if self._key is None else answers.KnownRequest(self.sender or "", self._key, digest)
+        return store.write(answers.once, request, act)[0]
 
 
 Idempotent = Annotated[Idempotency, Depends()]

@@ -12,7 +12,7 @@ from service.schemas.sigma import OneSigma, SigmaAnswer, SigmaColumns, SigmaQuer
 from service.usecases.sigma import sigma
 from underskin.surrogate.sigma_table import SigmaTable
 
-router = APIRouter(prefix="/v1", tags=["sigma"])
+router = APIRouter(prefix="/v1")
 
 
 def hot_route(table: SigmaTable) -> HotRoute:
@@ -37,6 +37,7 @@ def hot_route(table: SigmaTable) -> HotRoute:
 @router.get(
     "/sigma",
     operation_id="sigma_one",
+    tags=["sigma"],
     summary="σ at one point",
     responses={200: {"model": OneSigma, "content": {"text/csv": {}}}},
 )

@@ -8,7 +8,7 @@ from service.dependencies import WRITE, SkinId, Store, Table
 from service.middleware.unique_keys import JsonRoute
 from service.schemas import skins as models
 from service.store import skins
-from service.usecases import d33_cache, histories
+from service.usecases import d33_cache
 from service.usecases import skins as usecase
 
 router = APIRouter(prefix="/v1", tags=["skins"], route_class=JsonRoute)
@@ -22,8 +22,7 @@ def listed(
     cursor: Annotated[str | None, Query(description="`next` of the page before.")] = None,
 ) -> models.SkinList:
     """Those joined to another are under that one."""
-    with store.reading() as connection:
-        rows = skins.listed(connection, id_contains, cursor, limit + 1)
+    rows = store.read(skins.listed, id_contains, cursor, limit + 1)
     page = [models.SkinEntry(id=row.id, created_at=row.created_at, campaigns=row.campaigns) for row in rows[:limit]]
     return models.SkinList(skins=page, next=rows[limit - 1].id if len(rows) > limit else None)
 
@@ -31,16 +30,14 @@ def listed(
 @router.get("/skins/{skin_id}", operation_id="skin", summary="One skin")
 def one(skin_id: SkinId, store: Store) -> models.SkinDetail:
     """With what was joined to it; of a joined skin, the one that it counts as."""
-    with store.reading() as connection:
-        return usecase.detail(connection, skin_id)
+    return store.read(usecase.detail, skin_id)
 
 
 @router.post("/skins/{skin_id}/join", operation_id="join_skins", summary="Join another skin to it", dependencies=WRITE)
 def join(skin_id: SkinId, join: models.Join, store: Store) -> models.SkinDetail:
     """Two ids turned out to mean one skin: from now on figures of this one use the campaigns of both."""
     usecase.join(store, skin_id, join.skin_id, join.reason)
-    with store.reading() as connection:
-        return usecase.detail(connection, skin_id)
+    return store.read(usecase.detail, skin_id)
 
 
 @router.get("/skins/{skin_id}/history", operation_id="skin_history", summary="d33 over time")
@@ -56,10 +53,7 @@ def history(
 
     Campaigns that lack what an adopted model needs are left out, with the reason.
     """
-    with store.reading() as connection:
-        root = skins.require_root(connection, skin_id)
-    if model == "adopted":
-        return histories.adopted_history(store, table, root)
-    d33_cache.complete(store, table, root)
-    with store.reading() as connection:
-        return histories.history(connection, root, table.sha256)
+    root = store.read(skins.require_root, skin_id)
+    if model == "paper":
+        d33_cache.complete(store, table, root)
+    return usecase.history_by_model(store, table, root, model)

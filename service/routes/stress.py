@@ -4,10 +4,10 @@ from typing import Any
 
 from fastapi import APIRouter, Request, Response
 
-from service.routes.columns_endpoint import Accept, answer_json, respond
+from service.routes.columns_endpoint import Accept, answer_json, described_body, respond
 from service.schemas.stress import StressAnswer
 from service.usecases import stress as usecase
-from service.usecases.table_loader import influence_table
+from service.usecases.tables import influence_table
 from underskin.array_stress.request import read_request
 
 router = APIRouter(prefix="/v1", tags=["stress"])
@@ -25,7 +25,6 @@ EXAMPLE = {
     ],
 }
 
-_SCHEMA = {"$ref": "#/components/schemas/StressRequest"}
 _ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": StressAnswer, "content": {"text/csv": {}}}}
 
 
@@ -34,9 +33,7 @@ _ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": StressAnswer, "conten
     operation_id="stress",
     summary="Charge on every sensor of an array",
     responses=_ANSWER,
-    openapi_extra={
-        "requestBody": {"required": True, "content": {"application/json": {"schema": _SCHEMA, "example": EXAMPLE}}}
-    },
+    openapi_extra=described_body({"$ref": "#/components/schemas/StressRequest"}, EXAMPLE),
 )
 async def stress(request: Request, accept: Accept = "application/json") -> Response:
     """Linear superposition over all loads: off-centre, several, sheared, ν < 0.5, a yielding glue line."""

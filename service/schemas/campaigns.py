@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
+from service.problems import validated
 from underskin.errors import ErrorCode, conflicting
 
 State = Literal["current", "corrected", "withdrawn"]
@@ -33,8 +34,8 @@ class SendOptions(BaseModel):
     )
 
     def with_form(self, fields: Mapping[str, str]) -> "SendOptions":
-        """These, from the query, and those of a form; raises ValidationError, InvalidInput where the two differ."""
-        options = SendOptions.model_validate(fields)
+        """These, from the query, and those of a form; raises Refusal, InvalidInput where the two differ."""
+        options = validated(SendOptions, fields)
         for name in options.model_fields_set & self.model_fields_set:
             if getattr(options, name) != getattr(self, name):
                 allowed = f"must be {getattr(self, name)!r}, as in the query, or be given once"

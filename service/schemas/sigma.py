@@ -4,8 +4,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.schemas.columns import ColumnsRequest, NonNegative, Status
-from service.schemas.columns_answer import AnswerInColumns
+from service.schemas.columns import AnswerInColumns, ColumnsRequest, NonNegative, Status
 
 SigmaModelName = Literal["layer", "half_space"]
 

@@ -2,7 +2,7 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.schemas.columns_answer import AnswerInColumns, FindingModel
+from service.schemas.columns import AnswerInColumns, FindingModel
 from underskin.array_stress.request import MOST_CONTACTS
 
 

@@ -1,5 +1,6 @@
 """What was answered to requests with an Idempotency-Key, kept in the transaction that kept what they brought."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -34,18 +35,21 @@ def replayed(connection: Connection, request: KnownRequest) -> Any | None:
     return decompressed(row.answer)
 
 
-def claim(connection: Connection, request: KnownRequest) -> bool:
-    """Take the key for this transaction; False where another request has it, which by then has ended.
+def once(
+    connection: Connection, request: KnownRequest | None, act: Callable[[Connection], dict[str, Any]]
+) -> tuple[dict[str, Any], bool]:
+    """What `act` answers in this transaction, or what it answered to the same request before; True: it was before.
 
-    A second request with the same key waits here for the first one's transaction.
+    A second request with the same key waits for the first one's transaction. Raises OtherRequest.
     """
+    if request is None:
+        return act(connection), False
     claimed = upsert(connection, answers).on_conflict_do_nothing().returning(answers.c.idempotency_key)
-    return connection.execute(claimed, {**asdict(request), "answer": b"", "answered_at": now()}).first() is not None
-
-
-def keep(connection: Connection, request: KnownRequest, answer: Any) -> None:
-    """Fill in the answer of a claimed key."""
+    if connection.execute(claimed, {**asdict(request), "answer": b"", "answered_at": now()}).first() is None:
+        return dict(replayed(connection, request) or {}), True
+    answer = act(connection)
     connection.execute(answers.update().where(_is(request)).values(answer=compressed(answer)))
+    return answer, False
 
 
 def _is(request: KnownRequest) -> ColumnElement[bool]:

@@ -10,6 +10,7 @@ import sqlite3
 import subprocess
 import tempfile
 from contextlib import closing, suppress
+from datetime import UTC, datetime
 from pathlib import Path
 
 from service.store.engine import Database
@@ -17,9 +18,10 @@ from service.store.errors import StoreError
 from service.store.tables import metadata
 
 
-def suffix(database: Database) -> str:
-    """Of the names of backup files."""
-    return ".sqlite3" if database.is_sqlite else ".pgdump"
+def place(database: Database, folder: Path, occasion: str) -> Path:
+    """Where in the data folder a backup is written that nobody asked for, now."""
+    suffix = ".sqlite3" if database.is_sqlite else ".pgdump"
+    return folder / "backups" / f"{occasion}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}{suffix}"
 
 
 def make(database: Database, file: Path) -> None:
@@ -32,7 +34,9 @@ def make(database: Database, file: Path) -> None:
             _copy_sqlite(_sqlite_file(database), part)
             _make_one_file(part)
         else:
-            _pg("pg_dump", database, "--format=custom", "--no-owner", "--file", str(part))
+            address, password = _address(database)
+            options = ("--format=custom", "--no-owner", "--file", str(part))
+            _run("pg_dump", "--dbname", address, *options, environment=password)
         verify(database, part)
         with part.open("rb") as written:
             os.fsync(written.fileno())
@@ -41,27 +45,30 @@ def make(database: Database, file: Path) -> None:
         part.unlink(missing_ok=True)
 
 
-def verify(database: Database, file: Path) -> None:
-    """Read a backup through; raises StoreError where it is not one, or damaged."""
+def verify(database: Database, file: Path) -> str:
+    """The version of a backup's schema, after reading all of it; raises StoreError where it is none, or damaged."""
     if not file.is_file():
         raise StoreError(f"{file} is not a file")
     if database.is_sqlite:
         with closing(_open_sqlite(file)) as copy:
             try:
                 result = copy.execute("PRAGMA integrity_check").fetchone()[0]
-                copy.execute("SELECT version_num FROM alembic_version").fetchone()
+                versions = copy.execute("SELECT version_num FROM alembic_version").fetchall()
             except sqlite3.DatabaseError as error:
                 raise StoreError(f"{file} is not a backup of an SQLite store: {error}") from error
         if result != "ok":
             raise StoreError(f"{file} is damaged: {result}")
-        return
-    try:
-        run("pg_restore", "--file=/dev/null", str(file))
-        tables = run("pg_restore", "--list", str(file))
-    except StoreError as error:
-        raise StoreError(f"{file} is not a backup of a PostgreSQL store, or damaged: {error}") from error
-    if "alembic_version" not in tables:
+        rows = [str(number) for (number,) in versions]
+    else:
+        try:
+            _run("pg_restore", "--file=/dev/null", str(file))
+            dumped = _run("pg_restore", "--data-only", "--table=alembic_version", "--file=-", str(file)).splitlines()
+        except StoreError as error:
+            raise StoreError(f"{file} is not a backup of a PostgreSQL store, or damaged: {error}") from error
+        rows = [dumped[number + 1] for number, line in enumerate(dumped) if line.startswith("COPY ")]
+    if not rows:
         raise StoreError(f"{file} is not a backup of a store")
+    return rows[0]
 
 
 def replace_with(database: Database, file: Path) -> None:
@@ -122,11 +129,6 @@ def _replace_pg(database: Database, file: Path) -> None:
             raise StoreError(f"the restore failed: {complaints.read().decode(errors='replace').strip()[-500:]}")
 
 
-def _pg(program: str, database: Database, *arguments: str) -> None:
-    address, password = _address(database)
-    run(program, "--dbname", address, *arguments, environment=password)
-
-
 def _address(database: Database) -> tuple[str, dict[str, str]]:
     """Where the database is, and the password for the environment."""
     url = database.url.set(drivername="postgresql")
@@ -139,7 +141,7 @@ def _require(program: str) -> None:
         raise StoreError(f"{program}, which backs up and restores PostgreSQL, is not installed (postgresql-client)")
 
 
-def run(program: str, *arguments: str, environment: dict[str, str] | None = None) -> str:
+def _run(program: str, *arguments: str, environment: dict[str, str] | None = None) -> str:
     """What a program of PostgreSQL printed; raises StoreError with what it complained of."""
     _require(program)
     done = subprocess.run(

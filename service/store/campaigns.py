@@ -1,25 +1,30 @@
 """Campaigns and their recordings: kept, listed, read back, withdrawn, corrected; recordings excluded."""
 
 import secrets
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from sqlalchemy import Connection, func, insert, select, update
 
-from service.store import codec, digests, skins
+from service.schemas.campaigns import State
+from service.store import codec, skins
 from service.store.engine import Database
 from service.store.errors import Conflict, Missing
-from service.store.tables import AnyRow, campaigns, recordings
+from service.store.tables import AnyRow, campaigns, recording_digests, recordings
 from service.store.times import now
 from underskin.recordings.campaign import Campaign, Recording
-
-State = Literal["current", "corrected", "withdrawn"]
+from underskin.recordings.repeats import digest
 
 # All that lists show of a recording: not its arrays.
 _LISTED = [column for column in recordings.c if column.name not in ("campaign", "position", "arrays")]
 _AT_A_TIME = 8  # recordings read at once for a document
 CURRENT = campaigns.c.withdrawn_at.is_(None) & campaigns.c.corrected_by.is_(None)
+_IN_STATE = {
+    "current": CURRENT,
+    "corrected": campaigns.c.withdrawn_at.is_(None) & campaigns.c.corrected_by.is_not(None),
+    "withdrawn": campaigns.c.withdrawn_at.is_not(None),
+}
 
 
 @dataclass(frozen=True)
@@ -80,20 +85,37 @@ def add(
         "corrects": corrects,
         "correct_reason": reason,
     }
-    number = connection.execute(insert(campaigns).returning(campaigns.c.number), row).scalar_one()
-    connection.execute(insert(recordings), rows_of(number, campaign.recordings))
-    digests.keep(connection, number, campaign.recordings)
+    keep(connection, row, campaign.recordings, [{}] * len(campaign.recordings))
     if replaced is not None:
         _change(connection, replaced.number, corrected_by=campaign_id)
     return campaign_id, skin_id
 
 
-def rows_of(number: int, stored: Sequence[Recording]) -> list[dict[str, Any]]:
-    """Rows of the recordings of the campaign `number`."""
-    return [
-        {"campaign": number, "position": position, **codec.recording_columns(recording)}
-        for position, recording in enumerate(stored)
+def keep(
+    connection: Connection,
+    row: Mapping[str, Any],
+    held: Sequence[Recording],
+    exclusions: Sequence[Mapping[str, str | None]],
+) -> None:
+    """Keep a campaign by its row with its recordings in their order; `exclusions`: when and why each was excluded."""
+    number = connection.execute(insert(campaigns).returning(campaigns.c.number), row).scalar_one()
+    rows = [
+        {"campaign": number, "position": position, **codec.recording_columns(recording), **exclusion}
+        for position, (recording, exclusion) in enumerate(zip(held, exclusions, strict=True))
     ]
+    connection.execute(insert(recordings), rows)
+    keep_digests(connection, number, held)
+
+
+def keep_digests(connection: Connection, number: int, held: Sequence[Recording]) -> None:
+    """Keep those of the recordings of the campaign `number`, beside them; not all have one."""
+    rows = [
+        {"campaign": number, "position": position, "digest": made}
+        for position, recording in enumerate(held)
+        if (made := digest(recording)) is not None
+    ]
+    if rows:
+        connection.execute(insert(recording_digests), rows)
 
 
 def find(connection: Connection, campaign_id: str, *, lock: bool = False) -> AnyRow:
@@ -110,12 +132,8 @@ def listed(connection: Connection, filters: CampaignFilters, before: int | None,
     query = select(campaigns)
     if filters.skin is not None:
         query = query.where(campaigns.c.skin_id.in_(skins.members(skins.root_of(filters.skin))))
-    if filters.state == "current":
-        query = query.where(CURRENT)
-    if filters.state == "corrected":
-        query = query.where(campaigns.c.corrected_by.is_not(None), campaigns.c.withdrawn_at.is_(None))
-    if filters.state == "withdrawn":
-        query = query.where(campaigns.c.withdrawn_at.is_not(None))
+    if filters.state is not None:
+        query = query.where(_IN_STATE[filters.state])
     if filters.name_contains is not None:
         query = query.where(func.lower(campaigns.c.name).contains(filters.name_contains.lower(), autoescape=True))
     if filters.recorded_from is not None:
@@ -127,9 +145,9 @@ def listed(connection: Connection, filters: CampaignFilters, before: int | None,
     return connection.execute(query.order_by(campaigns.c.number.desc()).limit(limit)).all()
 
 
-def latest(connection: Connection, root: str) -> AnyRow | None:
+def latest(connection: Connection, skin_id: str) -> AnyRow | None:
     """The row of a skin's current campaign that arrived last; None where none is current."""
-    return next(iter(listed(connection, CampaignFilters(skin=root, state="current"), None, 1)), None)
+    return next(iter(listed(connection, CampaignFilters(skin=skin_id, state="current"), None, 1)), None)
 
 
 def state(row: AnyRow) -> State:
@@ -204,10 +222,10 @@ def exclude(connection: Connection, campaign_id: str, recording_id: str, reason:
     _change(connection, row.number, excluded=campaigns.c.excluded + 1)
 
 
-def of_skin(connection: Connection, root: str) -> Iterator[AnyRow]:
+def of_skin(connection: Connection, root: str) -> Sequence[AnyRow]:
     """Rows of all campaigns of a skin and of those joined to it, in order of arrival."""
     query = select(campaigns).where(campaigns.c.skin_id.in_(skins.members(root))).order_by(campaigns.c.number)
-    yield from connection.execute(query)
+    return connection.execute(query).all()
 
 
 def _changeable(connection: Connection, campaign_id: str) -> AnyRow:

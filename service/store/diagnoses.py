@@ -8,10 +8,11 @@ import secrets
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 from sqlalchemy import Connection, Select, insert, select, text, update
 
+from service.schemas.diagnoses import State
 from service.store import campaigns as kept_campaigns
 from service.store import skins
 from service.store.campaigns import Excluded
@@ -21,9 +22,7 @@ from service.store.tables import AnyRow, campaigns, diagnoses
 from service.store.times import now
 from underskin.recordings.campaign import Campaign
 
-State = Literal["queued", "running", "done", "failed", "cancelled"]
 HEARTBEAT_TIMEOUT_S = 10.0
-_ENDED = ("done", "failed", "cancelled")
 _USABLE = ("queued", "running", "done")
 
 # All but the report and its figures, and what is said of its campaign.
@@ -87,8 +86,7 @@ def find(connection: Connection, diagnosis_id: str) -> AnyRow:
 
 def report_of(connection: Connection, number: int) -> dict[str, Any] | None:
     """Its report/1, where it is done."""
-    blob = connection.execute(select(diagnoses.c.report).where(diagnoses.c.number == number)).scalar()
-    return None if blob is None else dict(decompressed(blob))
+    return reports_of(connection, [number]).get(number)
 
 
 def reports_of(connection: Connection, numbers: Sequence[int]) -> dict[int, dict[str, Any]]:

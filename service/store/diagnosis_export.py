@@ -7,17 +7,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
-from sqlalchemy import Connection, insert, select
+from pydantic import BaseModel, Field, StringConstraints
+from sqlalchemy import Connection, Table, insert, select
 
+from service.schemas.diagnoses import Verdict
 from service.store import skins
 from service.store.codec import compressed, decompressed
-from service.store.engine import Database
+from service.store.engine import Database, holds
+from service.store.import_checks import ImportedRow, Time
 from service.store.tables import AnyRow, campaigns, diagnoses, models
 
 Text = Annotated[str, StringConstraints(max_length=4000)]
 Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^/\x00-\x1f]+$")]
-Time = Annotated[str, StringConstraints(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z$")]
+
 Share = Annotated[float, Field(ge=0, le=1, strict=False)]
 Number = Annotated[float, Field(allow_inf_nan=False, strict=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=False)]
@@ -25,10 +27,6 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=False)]
 _ENDED = ("done", "failed", "cancelled")
 _DIAGNOSES = select(diagnoses, campaigns.c.id.label("campaign_id")).join(campaigns)
 _MODELS = select(models, diagnoses.c.id.label("diagnosis_id")).join(diagnoses)
-
-
-class _ExportedModel(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
 
 
 class _Parameter(BaseModel):
@@ -58,7 +56,7 @@ class _Report(BaseModel):
     """What is read again of a report; the rest is handed on."""
 
     document: Literal["report/1"] = Field(alias="schema")
-    verdict: Literal["no_mismatch", "explained", "ambiguous", "unexplained", "insufficient_data"]
+    verdict: Verdict
     probability: Share
     statement: str
     mechanisms: list[_Mechanism]
@@ -68,7 +66,7 @@ class _Report(BaseModel):
     provenance: dict[str, Any]
 
 
-class DiagnosisRow(_ExportedModel):
+class DiagnosisRow(ImportedRow):
     """A row of diagnoses."""
 
     id: Annotated[str, StringConstraints(pattern=r"^d-[0-9a-f]{16}$")]
@@ -88,7 +86,7 @@ class DiagnosisRow(_ExportedModel):
     report: dict[str, Any] | None
 
 
-class ModelRow(_ExportedModel):
+class ModelRow(ImportedRow):
     """A row of models."""
 
     id: Annotated[str, StringConstraints(pattern=r"^m-[0-9a-f]{16}$")]
@@ -144,11 +142,8 @@ def checked(
 
 def known(connection: Connection, file: Checked) -> set[str]:
     """Ids of those diagnoses and models that are in the store, the same or not."""
-    ids: set[str] = set()
-    for table, rows in ((diagnoses, file.diagnoses), (models, file.models)):
-        for row in rows:
-            ids.update(connection.execute(select(table.c.id).where(table.c.id == row.id)).scalars())
-    return ids
+    found = {row.id for row in file.diagnoses if holds(connection, diagnoses, id=row.id)}
+    return found | {row.id for row in file.models if holds(connection, models, id=row.id)}
 
 
 def clashes(connection: Connection, file: Checked) -> list[str]:
@@ -169,17 +164,20 @@ def add(store: Database, file: Checked) -> None:
     """Keep what is not there; the skins and campaigns are."""
     with store.writing() as connection:
         for row in file.diagnoses:
-            if connection.execute(select(diagnoses.c.number).where(diagnoses.c.id == row.id)).first() is None:
-                number = select(campaigns.c.number).where(campaigns.c.id == row.campaign_id)
+            if not holds(connection, diagnoses, id=row.id):
                 values = row.model_dump(exclude={"campaign_id", "report"})
-                report = None if row.report is None else compressed(row.report)
-                campaign = connection.execute(number).scalar_one()
-                connection.execute(insert(diagnoses), {**values, "campaign": campaign, "report": report})
+                values["campaign"] = _number(connection, campaigns, row.campaign_id)
+                values["report"] = None if row.report is None else compressed(row.report)
+                connection.execute(insert(diagnoses), values)
         for model in file.models:
-            if connection.execute(select(models.c.number).where(models.c.id == model.id)).first() is None:
-                number = select(diagnoses.c.number).where(diagnoses.c.id == model.diagnosis_id)
+            if not holds(connection, models, id=model.id):
                 values = model.model_dump(exclude={"diagnosis_id"})
-                connection.execute(insert(models), {**values, "diagnosis": connection.execute(number).scalar_one()})
+                values["diagnosis"] = _number(connection, diagnoses, model.diagnosis_id)
+                connection.execute(insert(models), values)
+
+
+def _number(connection: Connection, table: Table, name: str) -> int:
+    return int(connection.execute(select(table.c.number).where(table.c.id == name)).scalar_one())
 
 
 def _diagnosis(row: AnyRow) -> dict[str, Any]:

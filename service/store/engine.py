@@ -3,13 +3,13 @@
 import errno
 import fcntl
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, Concatenate, ParamSpec, TypeAlias, TypeVar
 
 import orjson
-from sqlalchemy import URL, Connection, Engine, Table, create_engine, event, make_url, text
+from sqlalchemy import URL, Connection, Engine, Table, create_engine, event, make_url, select, text
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.exc import ArgumentError, DBAPIError
 
@@ -20,6 +20,9 @@ SQLITE_FILE = "underskin.sqlite3"
 _PG_DISK_FULL = "53100"
 _PG_WRITING = 7236412  # any number, the same for all servers of a database; a migration has another
 _SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
+_Given = ParamSpec("_Given")
+_Answer = TypeVar("_Answer")
+_OnConnection: TypeAlias = Callable[Concatenate[Connection, _Given], _Answer]
 
 
 class StorageFull(Exception):
@@ -86,6 +89,16 @@ class Database:
                 raise StorageFull(str(error)) from error
             raise
 
+    def read(self, query: _OnConnection[_Given, _Answer], *given: _Given.args, **named: _Given.kwargs) -> _Answer:
+        """What one function of a connection answers in a block of `reading`."""
+        with self.reading() as connection:
+            return query(connection, *given, **named)
+
+    def write(self, change: _OnConnection[_Given, _Answer], *given: _Given.args, **named: _Given.kwargs) -> _Answer:
+        """The same in a block of `writing`."""
+        with self.writing() as connection:
+            return change(connection, *given, **named)
+
     @contextmanager
     def without_writers(self) -> Iterator[None]:
         """While the block lasts nobody writes, in this process or another: what is under way ends, the others wait."""
@@ -140,19 +153,22 @@ def is_full(error: BaseException) -> bool:
     return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
+def holds(connection: Connection, table: Table, **values: Any) -> bool:
+    """Whether a table has a row with these values."""
+    same = [table.c[name] == value for name, value in values.items()]
+    return connection.execute(select(1).select_from(table).where(*same).limit(1)).first() is not None
+
+
 def upsert(connection: Connection, table: Table) -> sqlite.Insert | postgresql.Insert:
     """An insert that may say what to do where the row is there already, as each database has its own."""
     return (sqlite if connection.dialect.name == "sqlite" else postgresql).insert(table)
 
 
 def _engine(url: URL, files: SqliteFiles | None) -> Engine:
-    def deserialise(document: str) -> Any:
-        return orjson.loads(document)
-
-    def serialise(value: Any) -> str:
-        return orjson.dumps(value).decode()
-
-    options: dict[str, Any] = {"json_serializer": serialise, "json_deserializer": deserialise}
+    options: dict[str, Any] = {
+        "json_serializer": lambda value: orjson.dumps(value).decode(),
+        "json_deserializer": orjson.loads,
+    }
     if files is not None:
         engine = create_engine(url, creator=files.connect, **options)
         event.listen(engine, "begin", _begin_sqlite)

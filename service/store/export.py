@@ -1,25 +1,35 @@
-"""All that is kept of a skin into one file (underskin/recordings/skin_export.py).
+"""All that is kept of a skin into one file (underskin/recordings/skin_export.py), and back to the same state.
 
 Derived figures are not in it: they are computed again. Neither are answers kept for Idempotency-Key.
+
+Campaign by campaign: an import that was cut short is finished by importing the file again. What is there already and
+the same is left as it is; what is there and differs refuses the file before anything is kept.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection, insert, select, update
 
 from service.store import campaigns, diagnosis_export, skins
-from service.store.arrays import unpack
+from service.store.codec import unpack
+from service.store.engine import Database, holds
+from service.store.errors import Conflict
+from service.store.import_checks import CheckedOverview, ImportedCampaign, SkinRow
 from service.store.tables import AnyRow, recordings, rigs
+from service.store.tables import campaigns as campaigns_table
 from service.store.tables import skins as skins_table
 from underskin.recordings.skin_export import ExportedCampaign, Overview, write_campaign, writing
+
+_AT_A_TIME = 1000  # names in one query: databases limit their number
 
 
 def export(connection: Connection, root: str, file: Path) -> None:
     """Write the skin `root`, and all joined to it, one campaign in memory at a time."""
     of_root = select(skins_table).where(skins_table.c.root_id == root).order_by(skins_table.c.id)
     of_rigs = select(rigs).where(rigs.c.skin_id.in_(skins.members(root))).order_by(rigs.c.number)
-    rows = list(campaigns.of_skin(connection, root))
+    rows = campaigns.of_skin(connection, root)
     diagnoses, models = diagnosis_export.exported(connection, root)
     overview = Overview(
         skin=root,
@@ -48,3 +58,50 @@ def exported(connection: Connection, row: AnyRow) -> ExportedCampaign:
 def _without(row: AnyRow, *names: str) -> dict[str, Any]:
     """A row by its columns' names, as plain text: SQLAlchemy's own are of a type that JSON writers refuse."""
     return {str(name): value for name, value in row._mapping.items() if name not in names}
+
+
+def otherwise_joined(connection: Connection, skins: Sequence[SkinRow]) -> list[str]:
+    """What clashes: skins that are there already and were joined otherwise."""
+    clashes = []
+    for row in skins:
+        stored = connection.execute(select(skins_table).where(skins_table.c.id == row.id)).first()
+        if stored is not None and (stored.root_id, stored.joined_to) != (row.root_id, row.joined_to):
+            clashes.append(f"Skin {row.id!r} is there already and was joined otherwise")
+    return clashes
+
+
+def known(connection: Connection, names: Sequence[str]) -> dict[str, AnyRow]:
+    """Rows, by id, of those of the file's campaigns that the store has."""
+    rows: dict[str, AnyRow] = {}
+    for start in range(0, len(names), _AT_A_TIME):
+        these = campaigns_table.c.id.in_(names[start : start + _AT_A_TIME])
+        rows.update((row.id, row) for row in connection.execute(select(campaigns_table).where(these)))
+    return rows
+
+
+def differs(connection: Connection, row: AnyRow, campaign: ExportedCampaign) -> bool:
+    """Whether a campaign of the store, by its row, says something else."""
+    return not exported(connection, row).same_as(campaign)
+
+
+def add_skins(store: Database, checked: CheckedOverview) -> None:
+    """Keep the skins, joined as they were, and their rigs; raises Conflict as others may have joined them meanwhile."""
+    with store.writing() as connection:
+        clashes = otherwise_joined(connection, checked.skins)
+        if clashes:
+            raise Conflict(f"{clashes[0]}; nothing was imported.")
+        for row in sorted(checked.skins, key=lambda row: row.id != row.root_id):  # the root first: others refer to it
+            if not holds(connection, skins_table, id=row.id):
+                connection.execute(insert(skins_table), {**row.model_dump(), "joined_to": None})
+        for row in checked.skins:  # and to each other
+            this = update(skins_table).where(skins_table.c.id == row.id)
+            connection.execute(this.values(joined_to=row.joined_to))
+        for rig in (row.model_dump() for row in checked.rigs):
+            if not holds(connection, rigs, **rig):
+                connection.execute(insert(rigs), rig)
+
+
+def add(store: Database, checked: ImportedCampaign) -> None:
+    """Keep a campaign that is not there."""
+    exclusions = [entry.model_dump() for entry in checked.exclusions]
+    store.write(campaigns.keep, checked.row, checked.campaign.recordings, exclusions)

@@ -23,11 +23,13 @@ CampaignId = Annotated[str, StringConstraints(pattern=r"^c-[0-9a-f]{16}$")]
 Time = Annotated[str, StringConstraints(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z$")]
 
 
-class _Row(BaseModel):
+class ImportedRow(BaseModel):
+    """A row as an export has it."""
+
     model_config = ConfigDict(extra="forbid", strict=True)
 
 
-class SkinRow(_Row):
+class SkinRow(ImportedRow):
     """A row of skins."""
 
     id: str
@@ -38,7 +40,7 @@ class SkinRow(_Row):
     join_reason: Text | None
 
 
-class RigRow(_Row):
+class RigRow(ImportedRow):
     """A row of rigs."""
 
     skin_id: str
@@ -46,7 +48,7 @@ class RigRow(_Row):
     created_at: Time
 
 
-class CampaignRow(_Row):
+class CampaignRow(ImportedRow):
     """A row of campaigns, but for its number and what its recordings say."""
 
     id: CampaignId
@@ -68,7 +70,7 @@ class CampaignRow(_Row):
     withdraw_reason: Text | None
 
 
-class ExclusionRow(_Row):
+class ExclusionRow(ImportedRow):
     """Whether a recording is excluded."""
 
     excluded_at: Time | None

@@ -14,9 +14,7 @@ from service.store.tables import AnyRow, adopted_inversions, campaigns, inversio
 
 def find(connection: Connection, campaign: AnyRow, table_sha256: str) -> Any | None:
     """The answer kept for a campaign as it is now, with this table, by this software; None where there is none."""
-    query = select(inversions.c.document).where(_now(inversions, campaign, table_sha256))
-    blob = connection.execute(query).scalar()
-    return None if blob is None else decompressed(blob)
+    return _document(connection, inversions, _now(inversions, campaign, table_sha256))
 
 
 def find_with_numbers(connection: Connection, campaign: AnyRow, table_sha256: str) -> tuple[Any, Any] | None:
@@ -60,9 +58,12 @@ def keep(
 
 def find_adopted(connection: Connection, campaign: AnyRow, model_id: str, table_sha256: str) -> Any | None:
     """The answer kept for a campaign as it is now, with this model and table; None where there is none."""
-    now = _now(adopted_inversions, campaign, table_sha256)
-    query = select(adopted_inversions.c.document).where(now, adopted_inversions.c.model_id == model_id)
-    blob = connection.execute(query).scalar()
+    of_model = adopted_inversions.c.model_id == model_id
+    return _document(connection, adopted_inversions, _now(adopted_inversions, campaign, table_sha256) & of_model)
+
+
+def _document(connection: Connection, table: Table, which: ColumnElement[bool]) -> Any | None:
+    blob = connection.execute(select(table.c.document).where(which)).scalar()
     return None if blob is None else decompressed(blob)
 
 

@@ -20,8 +20,8 @@ def find(connection: Connection) -> AnyRow | None:
 
 
 def is_needed(connection: Connection) -> bool:
-    """Whether keys are needed, as far as the store knows."""
-    row = find(connection)
+    """Whether keys are needed, as far as the store knows, of whatever version it is."""
+    row = find(connection) if is_known(connection) else None
     return row is not None and row.lifted_at is None
 
 

@@ -1,14 +1,15 @@
-"""The schema at start: made, or brought up to date after a verified backup; a newer one is refused."""
+"""The schema at start: made, or brought up to date after a verified backup; a newer one is refused. So is a backup that
+takes the place of the store.
+"""
 
 import fcntl
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import UTC, datetime
 from pathlib import Path
 
 from sqlalchemy import Connection, inspect, text
 
-from service.store import backup
+from service.store import backup, key_requirement
 from service.store.engine import Database
 from service.store.errors import StoreError
 
@@ -31,14 +32,13 @@ def migrate(database: Database, folder: Path) -> None:
             return
         if before is not None:
             require_known(before)
-            backup.make(database, folder / "backups" / f"before-{VERSIONS[-1]}-{_stamp()}{backup.suffix(database)}")
+            backup.make(database, backup.place(database, folder, f"before-{VERSIONS[-1]}"))
         _upgrade(database)
 
 
 def version(database: Database) -> str | None:
     """The version of the schema; None where there is none yet."""
-    with database.reading() as connection:
-        return version_of(connection)
+    return database.read(version_of)
 
 
 def version_of(connection: Connection) -> str | None:
@@ -83,5 +83,20 @@ def _one_at_a_time(database: Database, folder: Path) -> Iterator[None]:
             yield
 
 
-def _stamp() -> str:
-    return datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+def restore(store: Database, file: Path, before: Path) -> None:
+    """Replace the store by the backup `file`, brought up to date; what was there is in `before`.
+
+    Where keys were needed they still are, whatever the backup says.
+
+    Raises StoreError, with the store as it was.
+    """
+    require_known(backup.verify(store, file))
+    store.make()
+    with store.without_writers():  # what is acknowledged after the backup would be lost
+        needed = store.read(key_requirement.is_needed)
+        if version(store) is not None:
+            backup.make(store, before)
+        backup.replace_with(store, file)
+    migrate(store, before.parent.parent)
+    if needed:
+        store.write(key_requirement.require)

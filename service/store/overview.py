@@ -1,6 +1,6 @@
 """Skins at a glance: how many campaigns, the latest, d33 over the last few, and what was diagnosed last."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from statistics import median
 from typing import Any
@@ -61,8 +61,8 @@ def glances(
         glance.model = adopted.get(glance.skin_id)
         if glance.model is not None and glance.last is not None:
             by_model = inversions.find_adopted(connection, glance.last, glance.model.model_id, table_sha256)
-            glance.adopted_d33 = _of_array(by_model)
-            glance.paper_d33 = _of_array(inversions.find(connection, glance.last, table_sha256))
+            glance.adopted_d33 = of_array(by_model)
+            glance.paper_d33 = of_array(inversions.find(connection, glance.last, table_sha256))
     return list(by_skin.values())
 
 
@@ -95,7 +95,7 @@ def medians(connection: Connection, numbers: Sequence[int], table_sha256: str) -
     return {number: median(values) for number, values in by_campaign.items()}
 
 
-def _of_array(answer: Any | None) -> float | None:
+def of_array(answer: Mapping[str, Any] | None) -> float | None:
     """d33 of the array [pC/N] of an answer that is kept."""
     return None if answer is None or answer["array"] is None else float(answer["array"]["d33_pc_per_n"])
 

@@ -1,4 +1,4 @@
-"""Recordings that come a second time, by their digests (service/store/digests.py)."""
+"""Recordings that come a second time, by the digests that are kept beside them."""
 
 from collections import Counter
 from collections.abc import Sequence

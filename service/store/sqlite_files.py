@@ -30,23 +30,20 @@ class SqliteFiles:
 
     def make(self) -> None:
         """Make the database, empty, where it is missing; raises StoreError where its write-ahead log is there."""
-        self._require_whole()
-        if not self.is_made():
-            self._path.touch()
-
-    def is_made(self) -> bool:
-        """Whether the database is there."""
-        return self._path.exists()
-
-    def _require_whole(self) -> None:
-        """Raises StoreError where a write-ahead log has lost its database: an empty one in its place overwrites it."""
         log = Path(f"{self._path}-wal")
-        if log.exists() and not self._path.exists():
+        if self.is_made():
+            return
+        if log.exists():  # an empty database in the place of the one that it has lost would overwrite it
             raise StoreError(
                 f"{self._path} is missing, and its write-ahead log {log.name}, which may hold what was kept last, is "
                 f"there: put {self._path.name} back beside it. To start without it, empty or from a backup, move "
                 f"{log.name} and {self._path.name}-shm out of {self._path.parent}."
             )
+        self._path.touch()
+
+    def is_made(self) -> bool:
+        """Whether the database is there."""
+        return self._path.exists()
 
     def connect(self) -> sqlite3.Connection:
         """A connection to the files that were opened first; raises StoreMoved where the disk has others."""

@@ -88,7 +88,7 @@ recordings = Table(
     Column("excluded_at", String),
     Column("exclude_reason", Text),
     Column("scalars", JSON, nullable=False),  # the recording's document without its arrays
-    Column("arrays", LargeBinary, nullable=False),  # service/store/arrays.py; last, so that lists never read it
+    Column("arrays", LargeBinary, nullable=False),  # service/store/codec.py; last, so that lists never read it
     UniqueConstraint("campaign", "id", name="recording_of_campaign"),
 )
 

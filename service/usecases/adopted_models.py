@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +28,7 @@ _LARGEST_LINES = 100_000  # distinct rows times frequencies: some seconds
 _MOST_KNOWN = 100
 _known: "dict[str, AdoptedModel]" = {}  # by diagnosis, which do not change once done
 _ANY_LINE = np.array([1.0])
+_Responses = tuple[Complexes, NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
@@ -114,15 +116,12 @@ class RowsUnderModel:
     level: Floats  # (rows,) FRF over d33 on the plateau [-]
     inside: NDArray[np.bool_]  # (rows,)
     _request: PressedSkinColumns
-    _table: SigmaTable
-    _rows: Mapping[str, Floats]  # the distinct ones
+    _respond: "partial[_Responses]"  # of the distinct rows, at frequencies
     _which: NDArray[np.intp]  # of each row
 
     def response(self, frequency_hz: Floats) -> Complexes:
         """FRF over d33 (rows, lines) [-]."""
-        return _response(self.model_in_force.model, self._request, self._table, self._rows, frequency_hz)[0][
-            self._which
-        ]
+        return self._respond(frequency_hz)[0][self._which]
 
     def require_lines(self, field: str) -> None:
         """Raises InvalidInput that names `field` where the model depends on frequency and it was not given."""
@@ -143,7 +142,8 @@ def press(model_in_force: ModelInForce, table: SigmaTable, request: PressedSkinC
     stacked = np.column_stack([np.broadcast_to(column, (count,)) for column in rows.values()])
     distinct, which = np.unique(stacked, axis=0, return_inverse=True)
     each = dict(zip(rows, distinct.T, strict=True))
-    level, inside = _response(model_in_force.model, request, table, each, None)
+    respond = partial(_response, model_in_force.model, request, table, each)
+    level, inside = respond(None)
     which = which.reshape(-1)
     on_plateau = level[:, 0].real[which]
     on_plateau = np.where(inside[which], on_plateau, np.nan)
@@ -157,7 +157,7 @@ def press(model_in_force: ModelInForce, table: SigmaTable, request: PressedSkinC
         "rel_error": np.hypot(transmitted.rel_error, model_in_force.model.unsure),
         "mean_stress_mpa": none,
     }
-    return RowsUnderModel(model_in_force, columns, on_plateau, inside[which], request, table, each, which)
+    return RowsUnderModel(model_in_force, columns, on_plateau, inside[which], request, respond, which)
 
 
 def _distinct_columns(request: PressedSkinColumns, given: Mapping[str, Floats]) -> dict[str, Floats]:
@@ -176,7 +176,7 @@ def _response(
     table: SigmaTable,
     rows: Mapping[str, Floats],
     frequency_hz: Floats | None,
-) -> tuple[Complexes, NDArray[np.bool_]]:
+) -> _Responses:
     """FRF over d33 (rows, lines), on the plateau where there are no frequencies, and which rows are inside."""
     lines = _ANY_LINE if frequency_hz is None else frequency_hz
     count = len(rows["preload_n"])

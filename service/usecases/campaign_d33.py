@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def of_inversion(inversion: "Inversion") -> dict[str, Any]:
     """The fields of `D33` that come from an inversion."""
     zone, cells, array = inversion.zone, inversion.cells, inversion.campaign_d33
-    flags = _flags(inversion)
+
     radii = to_lab("indenter_radius_mm", cells.indenter_radius).tolist()
     return {
         "status": "ok",
@@ -36,7 +36,7 @@ def of_inversion(inversion: "Inversion") -> dict[str, Any]:
         "position_scatter_mm": _scatter(inversion.position, 1e3),
         "declared_percent": _finite(inversion.declared_percent),
         "sensors": [
-            {"sensor": name, "flags": flags.get(name, []), **d33}
+            {"sensor": name, "flags": _flags(inversion, name), **d33}
             for name, d33 in zip(inversion.sensor_ids, _d33(inversion.sensors), strict=True)
         ],
         "cells": [
@@ -86,11 +86,8 @@ def _scatter(estimate: "Estimate | None", factor: float) -> dict[str, float] | N
     return {name: factor * float(getattr(estimate, name)) for name in ("value", "low", "high")}
 
 
-def _flags(inversion: "Inversion") -> dict[str, list[dict[str, str]]]:
-    by_sensor: dict[str, list[dict[str, str]]] = {}
-    for flag in inversion.flags:
-        by_sensor.setdefault(flag.sensor, []).append({"code": flag.code, "reason": flag.reason})
-    return by_sensor
+def _flags(inversion: "Inversion", sensor: str) -> list[dict[str, str]]:
+    return [{"code": flag.code, "reason": flag.reason} for flag in inversion.flags if flag.sensor == sensor]
 
 
 def _finite(value: float) -> float | None:

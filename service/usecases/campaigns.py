@@ -1,12 +1,17 @@
-"""Campaigns of the store: described, and recordings left out of their figures."""
+"""Campaigns of the store: described, read as campaign/1 with few recordings in memory, recordings left out."""
 
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+import orjson
 from sqlalchemy import Connection
 
 from service.schemas.campaigns import CampaignDetail, CampaignEntry, RecordingEntry, RecordingResult
-from service.store import AnyRow, Database, campaigns
+from service.store import AnyRow, Database, campaigns, codec
 from service.usecases import d33_cache
+from underskin.recordings.campaign import to_dict
+from underskin.recordings.readers import hdf5_file
 from underskin.surrogate.sigma_table import SigmaTable
 
 
@@ -31,6 +36,26 @@ def detail(connection: Connection, campaign_id: str) -> CampaignDetail:
 
 def exclude(store: Database, table: SigmaTable, campaign_id: str, recording: str, reason: str) -> None:
     """Leave a recording out of all figures, and compute the d33 of its campaign anew; raises Missing, Conflict."""
-    with store.writing() as connection:
-        campaigns.exclude(connection, campaign_id, recording, reason)
+    store.write(campaigns.exclude, campaign_id, recording, reason)
     d33_cache.derive(store, table, [campaign_id])
+
+
+def json_parts(store: Database, row: AnyRow) -> Iterator[bytes]:
+    """The JSON text, a recording at a time."""
+    yield orjson.dumps(_head(row))[:-1] + b',"recordings":['
+    for number, recording in enumerate(campaigns.documents(store, row.number)):
+        if number:
+            yield b","
+        yield orjson.dumps(recording, option=orjson.OPT_SERIALIZE_NUMPY)
+    yield b"]}"
+
+
+def write_hdf5(store: Database, row: AnyRow, file: Path) -> None:
+    """The same as HDF5."""
+    hdf5_file.write_document(_head(row), campaigns.documents(store, row.number), file)
+
+
+def _head(row: AnyRow) -> dict[str, Any]:
+    document = to_dict(codec.campaign_of(row.about, ()))
+    del document["recordings"]
+    return document

@@ -1,11 +1,12 @@
 """d33 of stored campaigns, computed once for each state of a campaign and cached in the store."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import orjson
+from sqlalchemy import Connection
 
 from service.problems import Refusal
 from service.schemas.campaign_d33 import D33
@@ -25,25 +26,36 @@ logger = logging.getLogger("underskin")
 BandHz = tuple[float, float]
 
 _PAPER = {"model": "paper", "model_id": None, "model_percent": None}
-_NOTHING: dict[str, Any] = dict.fromkeys(
-    ("band", "array", "sensor_spread_percent", "gain_scatter_percent", "position_scatter_mm", "declared_percent")
-)
-_EMPTY: dict[str, Any] = {"sensors": [], "cells": [], "findings": []}
+_NONE: dict[str, Any] = {
+    **dict.fromkeys(("band", "array", "sensor_spread_percent", "gain_scatter_percent", "position_scatter_mm")),
+    "declared_percent": None,
+    "status": "none",
+    "sensors": [],
+    "cells": [],
+    "findings": [],
+}
 
 
 def answer(store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | None) -> dict[str, Any]:
     """The d33 of a campaign as it is now (fields of D33), over its flat zone or a band of the user's own."""
-    with store.reading() as connection:
-        cached = inversions.find(connection, row, table.sha256) if band_hz is None else None
+    cached = store.read(inversions.find, row, table.sha256) if band_hz is None else None
     return dict(cached) if cached is not None else _derived(store, table, row, band_hz)[0]
+
+
+def by_model(
+    store: Database, table: SigmaTable, row: AnyRow, model: Literal["paper", "adopted"], band_hz: BandHz | None = None
+) -> dict[str, Any]:
+    """The same by the paper's model, or by the model in force of the campaign's skin."""
+    if model == "adopted":
+        return adopted_answer(store, table, row, model_in_force(store, row.skin_id), band_hz)
+    return answer(store, table, row, band_hz)
 
 
 def with_numbers(
     store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | None
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """The same, and the numbers that its figures show (service.usecases.figure_data)."""
-    with store.reading() as connection:
-        cached = inversions.find_with_numbers(connection, row, table.sha256)
+    cached = store.read(inversions.find_with_numbers, row, table.sha256)
     if cached is not None and band_hz is None:
         return cached
     return _derived(store, table, row, band_hz, None if cached is None else cached[1]["spreads"])
@@ -56,30 +68,18 @@ def adopted_answer(
 
     Raises InvalidInput where the campaign lacks what the model needs, or declares the skin otherwise.
     """
-    with store.reading() as connection:
-        cached = (
-            inversions.find_adopted(connection, row, model_in_force.model_id, table.sha256) if band_hz is None else None
-        )
-        if cached is not None:
-            return dict(cached)
-        campaign = campaigns.load(connection, row, with_excluded=False)
-        excluded = campaigns.excluded_of(connection, row.number)
-    translated, beyond = model_in_force.model.as_base_model(campaign, table)
-    left_out = [(left.recording, left.reason) for left in excluded]
+    model, model_id = model_in_force.model, model_in_force.model_id
+    cached = store.read(inversions.find_adopted, row, model_id, table.sha256) if band_hz is None else None
+    if cached is not None:
+        return dict(cached)
+    campaign, left_out = store.read(_used, row)
+    translated, beyond = model.as_base_model(campaign, table)
     left_out += [(name, "beyond the table under the adopted model") for name in beyond]
-    model = {
-        "model": "adopted",
-        "model_id": model_in_force.model_id,
-        "model_percent": 100 * model_in_force.model.unsure,
-    }
-    document = {"campaign_id": row.id, "table_sha256": table.sha256, **model}
+    origin = {"model": "adopted", "model_id": model_id, "model_percent": 100 * model.unsure}
+    document = {"campaign_id": row.id, "table_sha256": table.sha256, **origin}
     document, _, failed = _computed(document, translated, table, band_hz, left_out)
     if band_hz is None and not failed:
-        try:
-            with store.writing() as connection:
-                inversions.keep_adopted(connection, row, model_in_force.model_id, table.sha256, document)
-        except (StorageFull, StoreMoved) as error:
-            _not_kept(row, error)
+        _keep(store, row, inversions.keep_adopted, model_id, table.sha256, document)
     return document
 
 
@@ -87,8 +87,7 @@ def derive(store: Database, table: SigmaTable, campaign_ids: Sequence[str]) -> N
     """Compute and keep; what fails is logged, and tried again when it is asked for."""
     for campaign_id in campaign_ids:
         try:
-            with store.reading() as connection:
-                row = campaigns.find(connection, campaign_id)
+            row = store.read(campaigns.find, campaign_id)
             answer(store, table, row, None)
             _derive_adopted(store, table, row)
         except Exception:  # the campaign itself is kept, and that is what was promised
@@ -98,7 +97,7 @@ def derive(store: Database, table: SigmaTable, campaign_ids: Sequence[str]) -> N
 def _derive_adopted(store: Database, table: SigmaTable, row: AnyRow) -> None:
     """The same by the model in force of its skin, where there is one that can tell it."""
     with suppress(Refusal, Conflict, InvalidInput):
-        adopted_answer(store, table, row, model_in_force(store, row.skin_id), None)
+        by_model(store, table, row, "adopted")
 
 
 def foreseen(table: SigmaTable, campaign: Campaign) -> list[str]:
@@ -110,8 +109,7 @@ def foreseen(table: SigmaTable, campaign: Campaign) -> list[str]:
 
 def complete(store: Database, table: SigmaTable, root: str) -> None:
     """Compute and keep what is missing of a skin's current campaigns."""
-    with store.reading() as connection:
-        missing = inversions.missing_of_skin(connection, root, table.sha256)
+    missing = store.read(inversions.missing_of_skin, root, table.sha256)
     derive(store, table, [row.id for row in missing])
 
 
@@ -119,16 +117,24 @@ def _derived(
     store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | None, spreads: list[dict[str, Any]] | None = None
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Answer and numbers, computed, and kept where they are of the flat zone; `spreads`: where these are known."""
-    with store.reading() as connection:
-        campaign = campaigns.load(connection, row, with_excluded=False)
-        excluded = campaigns.excluded_of(connection, row.number)
+    campaign, left_out = store.read(_used, row)
     document = {"campaign_id": row.id, "table_sha256": table.sha256, **_PAPER}
-    left_out = [(left.recording, left.reason) for left in excluded]
     document, inversion, failed = _computed(document, campaign, table, band_hz, left_out)
     numbers = figure_data.numbers(campaign, inversion, spreads)
     if band_hz is None and not failed:
-        _keep(store, row, document, numbers)
+        sensors = {
+            entry["sensor"]: (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"])
+            for entry in document["sensors"]
+            if entry["d33_pc_per_n"] is not None and entry["d33_uncertainty_pc_per_n"] is not None
+        }
+        _keep(store, row, inversions.keep, table.sha256, document, numbers, sensors)
     return document, numbers
+
+
+def _used(connection: Connection, row: AnyRow) -> tuple[Campaign, list[tuple[str, str]]]:
+    """The campaign without what is excluded; and that, with the reasons."""
+    left_out = [(left.recording, left.reason) for left in campaigns.excluded_of(connection, row.number)]
+    return campaigns.load(connection, row, with_excluded=False), left_out
 
 
 def _computed(
@@ -153,7 +159,7 @@ def _computed(
     except Exception as error:
         logger.exception("no d33 from a campaign", extra={"fields": {"campaign": document["campaign_id"]}})
         reason = f"the figures cannot be computed ({type(error).__name__}: {error}); the server's log says more"
-        return {**document, **_none(reason), "moduli": [], "left_out": entries}, None, True
+        return {**document, **_NONE, "reason": reason, "moduli": [], "left_out": entries}, None, True
     return whole, inversion, False
 
 
@@ -171,28 +177,15 @@ def _inverted(
         if band_hz is not None and error.field == "band_hz":
             raise
         findings = [finding.sentence for finding in plausibility.implausible(campaign)]
-        return {**_none(str(error)), "findings": findings, "moduli": moduli, "left_out": without_modulus}, None
+        told = {"reason": str(error), "findings": findings, "moduli": moduli, "left_out": without_modulus}
+        return {**_NONE, **told}, None
     left_out = [{"recording": None, "reason": left.sentence} for left in inversion.left_out]
     return {**of_inversion(inversion), "moduli": moduli, "left_out": left_out + without_modulus}, inversion
 
 
-def _none(reason: str) -> dict[str, Any]:
-    return {**_NOTHING, "status": "none", "reason": reason, **_EMPTY}
-
-
-def _keep(store: Database, row: AnyRow, document: dict[str, Any], numbers: dict[str, Any]) -> None:
-    sensors = {
-        entry["sensor"]: (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"])
-        for entry in document["sensors"]
-        if entry["d33_pc_per_n"] is not None and entry["d33_uncertainty_pc_per_n"] is not None
-    }
+def _keep(store: Database, row: AnyRow, change: Callable[..., None], *derived: Any) -> None:
+    """Where it cannot be kept, the answer is given all the same."""
     try:
-        with store.writing() as connection:
-            inversions.keep(connection, row, document["table_sha256"], document, numbers, sensors)
+        store.write(change, row, *derived)
     except (StorageFull, StoreMoved) as error:
-        _not_kept(row, error)
-
-
-def _not_kept(row: AnyRow, error: Exception) -> None:
-    """The answer is given all the same."""
-    logger.warning("the d33 of a campaign was not kept: %s", error, extra={"fields": {"campaign": row.id}})
+        logger.warning("the d33 of a campaign was not kept: %s", error, extra={"fields": {"campaign": row.id}})

@@ -26,9 +26,11 @@ def numbers(
 ) -> dict[str, Any]:
     """`recordings`: columns of FRF against preload; `spreads`: FRFs of recordings alike, over all lines, whatever the
     band, and so perhaps `known`; None where they are few."""
+    lines = [] if known else measured(campaign)
+    alike = [_plain(spread) for spread in spreads_of(lines)] if len(lines) > MOST_SINGLE else None
     return {
         "recordings": {} if inversion is None else _preload_columns(campaign, inversion),
-        "spreads": known or _kept_spreads(measured(campaign)),
+        "spreads": known or alike,
     }
 
 
@@ -99,10 +101,6 @@ def spreads_of(measured_frfs: "Sequence[tuple[FrfRecording, Frf]]") -> "list[Frf
 
     conditions = [(recording.indenter_radius_mm, recording.preload_n) for recording, _ in measured_frfs]
     return summary.spreads([frf for _, frf in measured_frfs], conditions)
-
-
-def _kept_spreads(lines: "Sequence[tuple[FrfRecording, Frf]]") -> list[dict[str, Any]] | None:
-    return None if len(lines) <= MOST_SINGLE else [_plain(spread) for spread in spreads_of(lines)]
 
 
 def _plain(spread: "FrfSpread") -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """σ of points in columns."""
 
-from service.schemas.columns_answer import Columns
+from service.schemas.columns import Columns
 from service.schemas.sigma import SigmaColumns
 from underskin.prediction import answers
 from underskin.prediction.columns import rows

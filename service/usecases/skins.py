@@ -1,13 +1,26 @@
-"""Skins: described, and joined where two ids mean one."""
+"""Skins: described, joined where two ids mean one; d33 of their sensors over time, with trends and what they omit."""
+
+from collections.abc import Collection, Mapping, Sequence
+from datetime import datetime
+from typing import Literal
 
 import orjson
 from sqlalchemy import Connection
 
+from service.ingest import repeats
 from service.problems import Refusal
+from service.schemas import skins as models
 from service.schemas.skins import SkinDetail
-from service.store import Database, Missing, skins
-from service.usecases import histories
+from service.store import AnyRow, Database, Missing, campaigns, inversions, skins
+from service.usecases import adopted_models, d33_cache
+from underskin import InvalidInput
 from underskin.errors import conflicting
+from underskin.inversion.trend import FEWEST, SIGNIFICANT, Trend, holm, trend
+from underskin.surrogate.sigma_table import SigmaTable
+
+_YEAR_S = 365.25 * 86400
+_LEAST_SPAN_S = 86400.0
+_SensorPoint = tuple[str, models.Point]
 
 
 def join(store: Database, skin_id: str, other: str, reason: str) -> None:
@@ -32,6 +45,150 @@ def detail(connection: Connection, skin_id: str) -> SkinDetail:
     return SkinDetail(
         id=row.id,
         created_at=row.created_at,
-        joined=[histories.joined(other) for other in skins.joined_to(connection, row.id)],
+        joined=[joined(other) for other in skins.joined_to(connection, row.id)],
         rig=None if rig is None else orjson.loads(rig),
     )
+
+
+def history_by_model(
+    store: Database, table: SigmaTable, root: str, model: Literal["paper", "adopted"]
+) -> models.History:
+    """The history of a skin and of those joined to it; raises Refusal where there is no adopted model."""
+    if model == "adopted":
+        return _adopted_history(store, table, root)
+    return store.read(_paper_history, root, table.sha256)
+
+
+def _paper_history(connection: Connection, root: str, table_sha256: str) -> models.History:
+    """From what is kept."""
+    rows = inversions.history(connection, root, table_sha256)
+    points = [(row.sensor, _point(row, row.d33_pc_per_n, row.d33_uncertainty_pc_per_n, None)) for row in rows]
+    return _history(connection, root, points, {})
+
+
+def _adopted_history(store: Database, table: SigmaTable, root: str) -> models.History:
+    model_in_force = adopted_models.model_in_force(store, root)
+    points: list[_SensorPoint] = []
+    unfit: dict[str, str] = {}
+    rows = [row for row in store.read(campaigns.of_skin, root) if campaigns.state(row) == "current"]
+    for row in rows:
+        try:
+            answer = d33_cache.adopted_answer(store, table, row, model_in_force, None)
+        except InvalidInput as error:
+            unfit[row.id] = f"cannot be told by the adopted model: {error}"
+            continue
+        for entry in answer["sensors"]:
+            value, uncertainty = entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"]
+            if value is not None:
+                points.append((entry["sensor"], _point(row, value, uncertainty, model_in_force.model_id)))
+    return store.read(_history, root, points, unfit)
+
+
+def _history(
+    connection: Connection, root: str, points: Sequence[_SensorPoint], unfit: Mapping[str, str]
+) -> models.History:
+    repeated = repeats.left_out(connection, root, {(point.campaign_id, sensor) for sensor, point in points})
+    by_sensor: dict[str, list[models.Point]] = {sensor: [] for sensor, _ in points}
+    for sensor, point in sorted(points, key=lambda entry: entry[1].time):
+        if (point.campaign_id, sensor) not in repeated:
+            by_sensor[sensor].append(point)
+    names = sorted(by_sensor)
+    used = {point.campaign_id for points in by_sensor.values() for point in points}
+    campaigns_out, recordings_out = _left_out(connection, root, used, unfit, repeats.of_campaigns(repeated))
+    return models.History(
+        skin_id=root,
+        joined=[joined(row) for row in skins.joined_to(connection, root)],
+        sensors=[
+            models.SensorHistory(sensor=name, points=by_sensor[name], trend=line, no_trend=_no_trend(by_sensor[name]))
+            for name, line in zip(names, _trends([by_sensor[name] for name in names]), strict=True)
+        ],
+        left_out_campaigns=campaigns_out,
+        left_out_points=[
+            models.LeftOutPoint(campaign_id=campaign_id, sensor=sensor, repeats=repeat.campaign_id, reason=repeat.words)
+            for (campaign_id, sensor), repeat in sorted(repeated.items())
+            if campaign_id in used
+        ],
+        left_out_recordings=recordings_out,
+    )
+
+
+def joined(row: AnyRow) -> models.JoinedSkin:
+    """A row of a skin that was joined to another."""
+    return models.JoinedSkin(id=row.id, joined_to=row.joined_to, joined_at=row.joined_at, reason=row.join_reason)
+
+
+def _point(row: AnyRow, d33: float, uncertainty: float, model_id: str | None) -> models.Point:
+    return models.Point(
+        campaign_id=row.id,
+        time=row.recorded_at or row.received_at,
+        time_is="received" if row.recorded_at is None else "recorded",
+        model="paper" if model_id is None else "adopted",
+        model_id=model_id,
+        d33_pc_per_n=d33,
+        d33_uncertainty_pc_per_n=uncertainty,
+    )
+
+
+def _trends(sensors: Sequence[Sequence[models.Point]]) -> list[models.TrendAnswer | None]:
+    lines = [_line(points) if _no_trend(points) is None else None for points in sensors]
+    adjusted = iter(holm([line.p_value for line in lines if line is not None]))
+    return [None if line is None else _answer(line, next(adjusted)) for line in lines]
+
+
+def _no_trend(points: Sequence[models.Point]) -> str | None:
+    """Why these points, by time, have no trend."""
+    arrived = sum(point.time_is == "received" for point in points)
+    if len(points) < FEWEST:
+        return f"a trend needs {FEWEST} campaigns, and there {'is' if len(points) == 1 else 'are'} {len(points)}"
+    if arrived:
+        return f"{arrived} of {len(points)} points are timed by arrival: their recordings have no recorded_at"
+    if _seconds(points[-1]) - _seconds(points[0]) < _LEAST_SPAN_S:
+        return "the points span less than a day"
+    return None
+
+
+def _seconds(point: models.Point) -> float:
+    return datetime.fromisoformat(point.time).timestamp()
+
+
+def _line(points: Sequence[models.Point]) -> Trend | None:
+    return trend(
+        [_seconds(point) / _YEAR_S for point in points],
+        [point.d33_pc_per_n for point in points],
+        [point.d33_uncertainty_pc_per_n for point in points],
+    )
+
+
+def _answer(line: Trend, adjusted: float) -> models.TrendAnswer:
+    return models.TrendAnswer(
+        slope_pc_per_n_per_year=line.slope,
+        slope_uncertainty_pc_per_n_per_year=line.slope_uncertainty,
+        p_value=line.p_value,
+        p_value_adjusted=adjusted,
+        significant=adjusted < SIGNIFICANT,
+    )
+
+
+def _left_out(
+    connection: Connection,
+    root: str,
+    used: Collection[str],
+    unfit: Mapping[str, str],
+    repeated: Mapping[str, repeats.Repeat],
+) -> tuple[list[models.LeftOutCampaign], list[models.LeftOutRecording]]:
+    whole, single = [], []
+    for row in campaigns.of_skin(connection, root):
+        if row.id in repeated and row.id not in used:
+            repeat = repeated[row.id]
+            whole.append(models.LeftOutCampaign(campaign_id=row.id, reason=repeat.words, repeats=repeat.campaign_id))
+            continue
+        not_told = None if row.id in used else "no d33 of it is kept; its /d33 says why"
+        reason = unfit.get(row.id) or campaigns.unused(row) or not_told
+        if reason is not None:
+            whole.append(models.LeftOutCampaign(campaign_id=row.id, reason=reason))
+        elif row.excluded:
+            single += [
+                models.LeftOutRecording(campaign_id=row.id, recording=left.recording, reason=left.reason)
+                for left in campaigns.excluded_of(connection, row.number)
+            ]
+    return whole, single

@@ -1,6 +1,6 @@
 """Charge on every sensor of an array under several contacts or a pressure map."""
 
-from service.schemas.columns_answer import Columns
+from service.schemas.columns import Columns
 from underskin.array_stress.answer import answer
 from underskin.array_stress.request import LoadCase
 from underskin.surrogate.influence_table import InfluenceTable

@@ -1,21 +1,41 @@
-"""The tables in use: domain and origin of each."""
+"""The tables in use: domain and origin of each; those beside σ's are read when a request first needs them."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
+from service.problems import Refusal
 from service.schemas.tables import TableAxis, TableEntry, Tables
-from service.usecases.table_loader import contact_table, influence_table
-from underskin.surrogate.contact_table import ContactTable
-from underskin.surrogate.influence_table import InfluenceTable
+from underskin.errors import TableError
+from underskin.surrogate.contact_table import CONTACT_TABLE, ContactTable, load_contact
+from underskin.surrogate.influence_table import INFLUENCE_TABLE, InfluenceTable, load_influence
 from underskin.surrogate.sigma_table import SigmaTable
 
 _NAMED = {"schema", "data_sha256", "default"}
 
 
+@cache
+def influence_table(folder: Path) -> InfluenceTable:
+    """γ_n and γ_t; raises Refusal 503 with the reason when the table cannot be read."""
+    try:
+        return load_influence(folder / INFLUENCE_TABLE)
+    except TableError as error:
+        raise Refusal(503, str(error)) from error
+
+
+@cache
+def _contact_table(folder: Path) -> ContactTable:
+    """The finite-strain contact; raises Refusal 503 with the reason when the table cannot be read."""
+    try:
+        return load_contact(folder / CONTACT_TABLE)
+    except TableError as error:
+        raise Refusal(503, str(error)) from error
+
+
 def tables(sigma_table: SigmaTable, folder: Path) -> Tables:
     """The tables that answers come from; those of `folder` beside that of σ."""
-    return Tables(tables=[_entry(sigma_table), _entry(influence_table(folder)), _entry(contact_table(folder))])
+    return Tables(tables=[_entry(sigma_table), _entry(influence_table(folder)), _entry(_contact_table(folder))])
 
 
 def _entry(table: SigmaTable | InfluenceTable | ContactTable) -> TableEntry:

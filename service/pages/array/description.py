@@ -1,6 +1,6 @@
 """An array under loads: the fields of the forms that ask for one, and the request of `POST /v1/stress` in them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,20 +8,18 @@ import numpy as np
 from fastapi import Request
 
 from service.pages.shared.figures import Drawn, drawn
-from service.pages.shared.form_errors import in_form_words
-from service.pages.shared.skin_fields import FIELDS, UNITS
-from service.pages.shared.skin_values import start
-from service.pages.shared.typed_numbers import number
+from service.pages.shared.forms import UNLIKELY, in_form_words, number
+from service.pages.shared.skin_values import FIELDS, UNITS, shown
 from service.store import Database, campaigns, skins
-from service.usecases.table_loader import influence_table
+from service.usecases.tables import influence_table
 from underskin.array_stress.answer import ArrayStress, answer
 from underskin.array_stress.request import read_request
 from underskin.errors import InvalidInput, UnderskinError, out_of_range, wrong_type
 from underskin.surrogate.sigma_table import SigmaTable
 
 _MOST_SENSORS = 10_000
-# Field, words, unit, default.
-GRID = (("columns", "sensors along x", "", 4), ("rows", "sensors along y", "", 4), ("pitch_mm", "pitch", "mm", 8.0))
+GRID = (("columns", "sensors along x", ""), ("rows", "sensors along y", ""), ("pitch_mm", "pitch", "mm"))
+_DEFAULTS = {"columns": "4", "rows": "4", "pitch_mm": "8"}
 GLUE = "glue_stiffness"
 _LABELS = {
     **{name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in (*FIELDS, *GRID)},
@@ -45,9 +43,7 @@ class Described:
     @property
     def fields(self) -> Sequence[tuple[str, str, str]]:
         """Those that the form asks for."""
-        return (
-            FIELDS if self.sensors is not None else (*FIELDS, *[(name, words, unit) for name, words, unit, _ in GRID])
-        )
+        return FIELDS if self.sensors is not None else (*FIELDS, *GRID)
 
     def document(self) -> dict[str, Any]:
         """The request without its loads; raises InvalidInput."""
@@ -64,16 +60,26 @@ class Described:
 def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin_id: str | None) -> Described:
     """The array of a form's fields; raises InvalidInput where the skin has no campaign with sensors."""
     sensors = None if skin_id is None else _latest(store, skin_id)["sensors"]
-    missing = {name: (words, unit) for name, words, unit in FIELDS if not given.get(name)}
-    known, taken = start(store, table, skin_id, missing)
-    defaults = {name: known[name] for name, *_ in FIELDS} | {name: default for name, _, _, default in GRID}
-    values = {name: given.get(name) or f"{default:g}" for name, default in defaults.items()}
+    values, taken = shown(store, table, given, skin_id)
+    values |= {name: given.get(name) or default for name, default in _DEFAULTS.items()}
     return Described(skin_id, values, given.get(GLUE, ""), UNITS in given, sensors, taken)
 
 
 def refused(error: UnderskinError, lines: Sequence[int] = ()) -> str:
     """An error in the words of these forms; `lines`: of the loads in their text."""
-    return in_form_words(error, _LABELS, lines, "or tick “Take unlikely magnitudes as they are”")
+    return in_form_words(error, _LABELS, lines, UNLIKELY)
+
+
+def tried(
+    request: Request, make: Callable[[], dict[str, Any]], lines: Sequence[int] = ()
+) -> tuple[dict[str, Any], ArrayStress | None, str | None]:
+    """The request that `make` makes, with its answer or what is wrong; `lines` as for `refused`."""
+    document: dict[str, Any] = {}
+    try:
+        document = make()
+        return document, answered(request, document), None
+    except UnderskinError as error:
+        return document, None, refused(error, lines)
 
 
 def answered(request: Request, document: Mapping[str, Any]) -> ArrayStress:
@@ -114,8 +120,7 @@ def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:
 def _latest(store: Database, skin_id: str) -> Mapping[str, Any]:
     """The skin as its latest campaign declares it."""
     with store.reading() as connection:
-        root = skins.require_root(connection, skin_id)
-        latest = campaigns.latest(connection, root)
+        latest = campaigns.latest(connection, skins.require_root(connection, skin_id))
     skin: dict[str, Any] = {"sensors": []} if latest is None else latest.about["skin"]
     if not skin["sensors"]:
         raise InvalidInput("skin", skin_id, "must have a current campaign that names its sensors")

@@ -6,13 +6,13 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request, Response
 
 from service.dependencies import Store, Table
-from service.pages.array.description import Described, answered, charge_columns, charge_figure, described, refused
+from service.pages.array.description import Described, answered, charge_columns, charge_figure, described, tried
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer
+from service.pages.shared.forms import numbers
 from service.pages.shared.html import page
-from service.pages.shared.typed_numbers import numbers
 from underskin.array_stress.answer import ArrayStress
-from underskin.errors import UnderskinError, wrong_type
+from underskin.errors import wrong_type
 
 router = APIRouter(prefix="/loads")
 
@@ -21,21 +21,14 @@ _LOADS = "10 8 4 1\n14 16 10 3 0.5 0"
 _ORDER = ("x_mm", "y_mm", "indenter_radius_mm", "normal_force_n")
 
 Loads = Annotated[str, Query(max_length=_LONGEST)]
-SkinQuery = Annotated[str | None, Query()]
 
 
 @router.get("")
-def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, loads: Loads = _LOADS) -> Response:
+def view(request: Request, store: Store, table: Table, skin: str | None = None, loads: Loads = _LOADS) -> Response:
     """With the skin and the loads of the address, or else the paper's prototype under two spheres."""
     array = described(store, table, request.query_params, skin)
-    error: str | None = None
-    document: dict[str, Any] = {}
-    answer: ArrayStress | None = None
-    try:
-        document = _document(array, loads)
-        answer = answered(request, document)
-    except UnderskinError as found_wrong:
-        error = refused(found_wrong, [place for place, line in enumerate(loads.splitlines(), 1) if line.strip()])
+    lines = [place for place, line in enumerate(loads.splitlines(), 1) if line.strip()]
+    document, answer, error = tried(request, lambda: _document(array, loads), lines)
     return page(
         request,
         "loads.html",
@@ -49,7 +42,9 @@ def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, l
 
 
 @router.get("/charge.csv")
-def charge_csv(request: Request, store: Store, table: Table, skin: SkinQuery = None, loads: Loads = _LOADS) -> Response:
+def charge_csv(
+    request: Request, store: Store, table: Table, skin: str | None = None, loads: Loads = _LOADS
+) -> Response:
     """Charge and stress on each sensor."""
     answer = answered(request, _document(described(store, table, request.query_params, skin), loads))
     return csv_answer("charge", charge_columns(answer))

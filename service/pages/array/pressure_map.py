@@ -6,10 +6,10 @@ Nothing of it is kept: the map stays in the page's form, and what the page saves
 import base64
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import orjson
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import Store
@@ -36,7 +36,7 @@ _MAP, _FILE, _SKIN = "map", "file", "skin"
 
 
 @router.get("")
-def view(request: Request, store: Store, skin: Annotated[str | None, Query()] = None) -> Response:
+def view(request: Request, store: Store, skin: str | None = None) -> Response:
     """With an example map, which presses one finger on the skin, or on the paper's prototype."""
     example = (Path(__file__).parents[1] / "static" / _EXAMPLE).read_bytes()
     return _shown(request, store, {} if skin is None else {_SKIN: skin}, example, "the map")
@@ -59,17 +59,14 @@ async def send(request: Request, store: Store) -> Response:
 
 def _shown(request: Request, store: Database, given: Mapping[str, str], content: bytes, name: str) -> Response:
     described = description.described(store, request.app.state.table, given, given.get(_SKIN))
-    error: str | None = None
-    document: dict[str, Any] = {}
-    answer: ArrayStress | None = None
-    try:
+
+    def document_of_map() -> dict[str, Any]:
         if len(content) > _LARGEST_BYTES:
             raise out_of_range("pressure_map", name, f"must have at most {_LARGEST_BYTES / 1e6:g} MB: make it coarser")
         pressure = pressure_map.parse(content, name)
-        document = {**described.document(), "pressure_map": pressure}
-        answer = description.answered(request, document)
-    except UnderskinError as refused:
-        error = description.refused(refused)
+        return {**described.document(), "pressure_map": pressure}
+
+    document, answer, error = description.tried(request, document_of_map)
     return page(
         request,
         "pressure_map.html",

@@ -6,12 +6,12 @@ from threading import Lock
 from typing import Any
 from urllib.parse import quote
 
-from service.pages.shared.figures import Drawn, drawn, drawn_curves
+from service.pages.shared.figures import Drawn, columns_of, drawn, drawn_curves, sensors_of
+from service.schemas.campaign_d33 import D33Value
 from service.store import AnyRow, Database, campaigns
 from service.usecases.figure_data import MOST_SINGLE, measured, spreads, spreads_of
 from underskin.recordings.campaign import Campaign, FrfRecording
 
-_D33 = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
 _AGAINST_PRELOAD = (
     "indenter_radius_mm", "preload_n", "frf_pc_per_n", "frf_uncertainty_pc_per_n", "model_frf_pc_per_n",
 )  # fmt: skip
@@ -28,9 +28,13 @@ def figures(
     """All that can be drawn of a campaign as it is now; `answer`: its d33, as `/d33` has it, with its `numbers`. `show`
     as `measured` has it; `curves`: whether it has recordings of other kinds. What was drawn lately is kept."""
     basis = (row.id, row.revision, answer["table_sha256"], _chosen(answer))
-    loaded = cache(lambda: _loaded(store, row))
+    loaded = cache(lambda: store.read(campaigns.load, row, with_excluded=False))
+
+    def draw_curves() -> list[Drawn]:
+        return drawn_curves(loaded().recordings, _MOST_CURVES, " recordings", f"/campaigns/{row.id}/curves.csv")
+
     makers: dict[str, Callable[[], list[Drawn]]] = {
-        **({"curves": lambda: _curves(row, loaded())} if curves else {}),
+        **({"curves": draw_curves} if curves else {}),
         f"lines {show}": lambda: _frf(row, loaded, answer, numbers, show),
         "d33": lambda: _d33(row, answer, numbers),
     }
@@ -47,11 +51,6 @@ def _keep(which: Which, drawn_now: list[Drawn]) -> list[Drawn]:
             del _kept[next(iter(_kept))]
         _kept[which] = drawn_now
     return drawn_now
-
-
-def _loaded(store: Database, row: AnyRow) -> Campaign:
-    with store.reading() as connection:
-        return campaigns.load(connection, row, with_excluded=False)
 
 
 def band_query(band_hz: tuple[float, float]) -> str:
@@ -103,12 +102,9 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any]) -> 
 
     if answer["band"] is None:
         return []
-    places = {sensor["id"]: sensor for sensor in row.about["skin"]["sensors"]}
-    sensors = answer["sensors"]
-    names = [entry["sensor"] for entry in sensors]
-    reasons = ["; ".join(flag["reason"] for flag in entry["flags"]) for entry in sensors]
-    d33, uncertainty, low, high = ([entry[name] for entry in sensors] for name in _D33)
-    x_mm, y_mm = ([places[name][axis] for name in names] for axis in ("x_mm", "y_mm"))
+    names, d33, uncertainty, low, high, x_mm, y_mm, reasons = columns_of(
+        sensors_of(row, answer), "sensor", *D33Value.model_fields, "x_mm", "y_mm", "reasons"
+    )
     array = answer["array"]
     limits = None if array is None else (array["d33_low_pc_per_n"], array["d33_high_pc_per_n"])
     rows = numbers["recordings"]
@@ -135,7 +131,3 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any]) -> 
             f"{place}/d33.csv{chosen}",
         ),
     ]
-
-
-def _curves(row: AnyRow, campaign: Campaign) -> list[Drawn]:
-    return drawn_curves(campaign.recordings, _MOST_CURVES, " recordings", f"/campaigns/{row.id}/curves.csv")

@@ -11,7 +11,8 @@ from service.pages.shared import same_request, verdicts
 from service.pages.shared.figures import csv_answer, csv_of_rows
 from service.pages.shared.forms import Form, reason, see
 from service.pages.shared.html import page
-from service.store import AnyRow, Database, campaigns, diagnoses
+from service.schemas.campaign_d33 import D33Value
+from service.store import Database, campaigns, diagnoses
 from service.usecases import d33_cache
 from service.usecases.campaigns import exclude as exclude_recording
 from service.usecases.figure_data import frf_columns
@@ -42,12 +43,7 @@ BandOfQuery = Annotated[d33_cache.BandHz | None, Depends(_band)]
 
 @router.get("")
 def campaign(
-    request: Request,
-    campaign_id: CampaignId,
-    store: Store,
-    table: Table,
-    band: BandOfQuery,
-    show: Annotated[str, Query()] = "",
+    request: Request, campaign_id: CampaignId, store: Store, table: Table, band: BandOfQuery, show: str = ""
 ) -> Response:
     """All at a glance; `show` picks the sensor, or the recording, whose lines are drawn, `band` what is averaged."""
     with store.reading() as connection:
@@ -78,27 +74,24 @@ def campaign(
 
 
 @router.get("/frf.csv")
-def frf_csv(campaign_id: CampaignId, store: Store, show: Annotated[str, Query()] = "") -> Response:
+def frf_csv(campaign_id: CampaignId, store: Store, show: str = "") -> Response:
     """Every line of the recordings, or of those of `show`, as they came or were estimated."""
-    return csv_answer("frf", frf_columns(_loaded(store, campaign_id)[1], show))
+    return csv_answer("frf", frf_columns(_loaded(store, campaign_id), show))
 
 
 @router.get("/preload.csv")
 def preload_csv(campaign_id: CampaignId, store: Store, table: Table, band: BandOfQuery) -> Response:
     """The FRF in the flat zone of each recording, and the model's."""
-    with store.reading() as connection:
-        row = campaigns.find(connection, campaign_id)
+    row = store.read(campaigns.find, campaign_id)
     return csv_answer("frf-against-preload", d33_cache.with_numbers(store, table, row, band)[1]["recordings"])
 
 
 @router.get("/d33.csv")
 def d33_csv(campaign_id: CampaignId, store: Store, table: Table, band: BandOfQuery) -> Response:
     """d33 of each sensor, and of each sensor, sphere and preload."""
-    with store.reading() as connection:
-        row = campaigns.find(connection, campaign_id)
+    row = store.read(campaigns.find, campaign_id)
     answer = d33_cache.answer(store, table, row, band)
-    values = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
-    names = ("sensor", "indenter_radius_mm", "preload_n", "recordings", *values)
+    names = ("sensor", "indenter_radius_mm", "preload_n", "recordings", *D33Value.model_fields)
     return csv_of_rows("d33", names, [*answer["sensors"], *answer["cells"]])
 
 
@@ -106,7 +99,7 @@ def d33_csv(campaign_id: CampaignId, store: Store, table: Table, band: BandOfQue
 def curves_csv(campaign_id: CampaignId, store: Store) -> Response:
     """Every sample of the indentation and compression recordings."""
     columns: dict[str, list[Any]] = {name: [] for name in ("recording", "displacement_mm", "force_n")}
-    for recording in _loaded(store, campaign_id)[1].recordings:
+    for recording in _loaded(store, campaign_id).recordings:
         if isinstance(recording, IndentationRecording | CompressionRecording):
             columns["recording"] += [recording.id] * len(recording.force_n)
             columns["displacement_mm"] += recording.displacement_mm.tolist()
@@ -124,12 +117,10 @@ def exclude(campaign_id: CampaignId, sent: Form, store: Store, table: Table) -> 
 @router.post("/withdraw", dependencies=WRITE)
 def withdraw(campaign_id: CampaignId, sent: Form, store: Store) -> Response:
     """Leave the campaign out of all figures."""
-    with store.writing() as connection:
-        campaigns.withdraw(connection, campaign_id, reason(sent))
+    store.write(campaigns.withdraw, campaign_id, reason(sent))
     return see(f"/campaigns/{quote(campaign_id, safe='')}")
 
 
-def _loaded(store: Database, campaign_id: str) -> tuple[AnyRow, Campaign]:
+def _loaded(store: Database, campaign_id: str) -> Campaign:
     with store.reading() as connection:
-        row = campaigns.find(connection, campaign_id)
-        return row, campaigns.load(connection, row, with_excluded=False)
+        return campaigns.load(connection, campaigns.find(connection, campaign_id), with_excluded=False)

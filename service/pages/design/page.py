@@ -1,23 +1,22 @@
 """The design view: sliders, and at once what the skin would tell."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 from urllib.parse import urlencode
 
 import numpy as np
 import orjson
-from fastapi import APIRouter, Query, Request, Response
-from pydantic import ValidationError
+from fastapi import APIRouter, Depends, Request, Response
 
 from service.dependencies import Store, Table
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer, drawn
-from service.pages.shared.form_errors import in_form_words
 from service.pages.shared.formats import short_and_exact
+from service.pages.shared.forms import in_form_words
 from service.pages.shared.html import compress, page
 from service.pages.shared.skin_values import PROTOTYPE, start
-from service.problems import first_refused
+from service.problems import parsed
 from service.schemas.design import DesignAnswer, DesignRequest
 from service.usecases.design import design_answer, design_of
 from underskin.errors import UnderskinError, wrong_type
@@ -41,53 +40,59 @@ _WORDS = {name: (words, unit) for name, words, unit, *_ in SLIDERS if name != "d
 BLIND_PERCENT = 10.0  # of the response above a sensor: what lies below goes unseen
 
 
-@router.get("")
-def view(request: Request, store: Store, table: Table, skin: Annotated[str | None, Query()] = None) -> Response:
+@dataclass(frozen=True)
+class Sliders:
+    """Where they start and stand; `taken`: in sentences what of it, beyond what the address gives, nobody declared."""
+
+    skin_id: str | None
+    own: Mapping[str, float]
+    values: Mapping[str, float]
+    taken: Sequence[str]
+
+
+def _sliders(request: Request, store: Store, table: Table, skin: str | None = None) -> Sliders:
     """With the values of the address, or else those of the skin, or of the paper's prototype."""
     given = _given(request)
-    own, taken = _start(store, table, skin, given)
-    values = {**own, **given}
-    error: str | None = None
-    answer: DesignAnswer | None = None
-    figures: list[Drawn] = []
-    try:
-        asked = _asked(values)
-        answer, figures = _answered(table, asked, own, skin)
-    except UnderskinError as refused:
-        error = in_form_words(refused, _LABELS)
+    own, taken = start(store, table, skin, {name: words for name, words in _WORDS.items() if name not in given})
+    own = {name: own[name] for name, *_ in SLIDERS}
+    return Sliders(skin, own, {**own, **given}, taken)
+
+
+SlidersOfQuery = Annotated[Sliders, Depends(_sliders)]
+
+
+@router.get("")
+def view(request: Request, table: Table, sliders: SlidersOfQuery) -> Response:
+    """The page."""
+    shown, figures, error = _tried(table, sliders)
     return page(
         request,
         "design.html",
-        skin_id=skin,
-        values=values,
+        skin_id=sliders.skin_id,
+        values=sliders.values,
         sliders=SLIDERS,
-        results=[] if answer is None else results(answer),
+        results=shown,
         figures=figures,
         error=error,
-        taken=taken,
-        same=same_request.post(request, "/v1/design", values, _call(values)),
+        taken=sliders.taken,
+        same=_same(request, sliders.values),
     )
 
 
 @router.get("/answer")
-def at_once(request: Request, store: Store, table: Table, skin: Annotated[str | None, Query()] = None) -> Response:
+def at_once(request: Request, table: Table, sliders: SlidersOfQuery) -> Response:
     """What changes in the page when a slider moves, as JSON."""
-    given = _given(request)
-    own, _ = _start(store, table, skin, given)
-    values = {**own, **given}
-    try:
-        answer, figures = _answered(table, _asked(values), own, skin)
-    except UnderskinError as refused:
-        return _json(request, {"error": in_form_words(refused, _LABELS)})
-    same = same_request.post(request, "/v1/design", values, _call(values))
-    return _json(
-        request,
-        {
-            "results": {entry.name: [entry.text, entry.exact, entry.note] for entry in results(answer)},
-            "figures": {figure.name: figure.json for figure in figures},
-            "same": [same.curl, same.python],
-        },
-    )
+    shown, figures, error = _tried(table, sliders)
+    same = _same(request, sliders.values)
+    changed = {
+        "results": {entry.name: [entry.text, entry.exact, entry.note] for entry in shown},
+        "figures": {figure.name: figure.json for figure in figures},
+        "same": [same.curl, same.python],
+    }
+    content = orjson.dumps(changed if error is None else {"error": error})
+    answer = Response(content, media_type="application/json", headers={"Cache-Control": "no-store"})
+    compress(request, answer)
+    return answer
 
 
 @router.get("/sweeps.csv")
@@ -154,14 +159,6 @@ def results(answer: DesignAnswer) -> list[DesignResult]:
     ]  # fmt: skip
 
 
-def _start(
-    store: Store, table: Table, skin: str | None, given: Mapping[str, float]
-) -> tuple[dict[str, float], list[str]]:
-    """Where the sliders start, and what of it, beyond what is given, nobody declared."""
-    own, taken = start(store, table, skin, {name: words for name, words in _WORDS.items() if name not in given})
-    return {name: own[name] for name, *_ in SLIDERS}, taken
-
-
 def _given(request: Request) -> dict[str, float]:
     """The numbers of the address."""
     names = {name for name, *_ in SLIDERS}
@@ -171,30 +168,27 @@ def _given(request: Request) -> dict[str, float]:
         raise wrong_type("address", request.url.query[:80], "must have numbers") from None
 
 
-def _asked(values: Mapping[str, float]) -> DesignRequest:
-    try:
-        return DesignRequest.model_validate(dict(values))
-    except ValidationError as error:
-        raise first_refused(error) from None
-
-
 def _computed(request: Request, table: SigmaTable) -> DesignAnswer:
-    asked = _asked({**{name: PROTOTYPE[name] for name, *_ in SLIDERS}, **_given(request)})
+    asked = parsed(DesignRequest, {**{name: PROTOTYPE[name] for name, *_ in SLIDERS}, **_given(request)})
     return design_answer(table, asked, design_of(table, asked))
 
 
-def _answered(
-    table: SigmaTable, asked: DesignRequest, own: Mapping[str, float], skin: str | None
-) -> tuple[DesignAnswer, list[Drawn]]:
+def _tried(table: SigmaTable, sliders: Sliders) -> tuple[list[DesignResult], list[Drawn], str | None]:
+    """What the design tells, in numbers and figures, or what is wrong with it."""
     from underskin.figures import Mark, array_response, design_overview
 
-    with np.errstate(all="ignore"):
-        designed = design_of(table, asked)
-        start = design_of(table, _asked(own)).contact
-    name = "the paper's prototype" if skin is None else "the skin as it is"
+    try:
+        asked = parsed(DesignRequest, sliders.values)
+        with np.errstate(all="ignore"):
+            designed = design_of(table, asked)
+            start = design_of(table, parsed(DesignRequest, sliders.own)).contact
+        shown = results(design_answer(table, asked, designed))
+    except UnderskinError as refused:
+        return [], [], in_form_words(refused, _LABELS)
+    name = "the paper's prototype" if sliders.skin_id is None else "the skin as it is"
     mark = Mark(name, float(start.a_over_h), float(start.rt_over_h), float(start.load_parameter), float(start.sigma))
     query = urlencode({name: getattr(asked, name) for name, *_ in SLIDERS})
-    return design_answer(table, asked, designed), [
+    figures = [
         drawn(
             "design",
             design_overview(designed, mark),
@@ -209,13 +203,9 @@ def _answered(
             f"/design/response.csv?{query}",
         ),
     ]
+    return shown, figures, None
 
 
-def _call(values: Mapping[str, float]) -> str:
-    return f"client.design({', '.join(f'{name}={value:.6g}' for name, value in values.items())})"
-
-
-def _json(request: Request, document: Any) -> Response:
-    answer = Response(orjson.dumps(document), media_type="application/json", headers={"Cache-Control": "no-store"})
-    compress(request, answer)
-    return answer
+def _same(request: Request, values: Mapping[str, float]) -> same_request.SameRequest:
+    call = f"client.design({', '.join(f'{name}={value:.6g}' for name, value in values.items())})"
+    return same_request.post(request, "/v1/design", values, call)

@@ -6,12 +6,13 @@ from urllib.parse import quote
 
 from fastapi import APIRouter, Request, Response
 from markupsafe import Markup
+from sqlalchemy import Connection
 
 from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, Store, Table, sender
 from service.pages.diagnosis.figure_columns import columns
 from service.pages.diagnosis.plan import FIELDS, left_open
-from service.pages.shared import adoption, same_request
-from service.pages.shared.figures import Drawn, csv_answer, drawn, drawn_before
+from service.pages.shared import same_request, verdicts
+from service.pages.shared.figures import Drawn, attachment, csv_answer, drawn, drawn_before
 from service.pages.shared.forms import OWN_FORM, see
 from service.pages.shared.html import page, render
 from service.problems import Refusal
@@ -39,8 +40,7 @@ _ODD = (LookupError, TypeError, ValueError, AttributeError)  # of a report that 
 @router.post("/campaigns/{campaign_id}/diagnosis", dependencies=[*WRITE, OWN_FORM])
 def ask(request: Request, campaign_id: CampaignId, runner: RunnerInUse, store: Store, table: Table) -> Response:
     """Puts it into the queue; one that was diagnosed as it is now is shown."""
-    with store.writing() as connection:
-        row = usecase.ask(connection, campaign_id, table, sender(request))
+    row = store.write(usecase.ask, campaign_id, table, sender(request))
     runner.stir()
     return see(f"/diagnoses/{row.id}")
 
@@ -49,12 +49,10 @@ def ask(request: Request, campaign_id: CampaignId, runner: RunnerInUse, store: S
 def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response:
     """How far it is, or what it found."""
     with store.reading() as connection:
-        row = diagnoses.find(connection, diagnosis_id)
-        report = diagnoses.report_of(connection, row.number)
-        figures = diagnoses.figures_of(connection, row.number)
+        row, report, figures = _kept(connection, diagnosis_id)
         of_skin = models.of_skin(connection, skins.require_root(connection, row.skin_id))
         own = next((model for model in of_skin if model.id == row.id), None)
-        adopted_as = None if own is None else adoption.of_rows(connection, [own])[0]
+        adopted_as = None if own is None else verdicts.adopted_versions(connection, [own])[0]
         campaign = campaigns.find(connection, row.campaign_id)
     place = f"/v1/diagnoses/{row.id}"
     return page(
@@ -88,12 +86,8 @@ def one_file(diagnosis_id: DiagnosisId, store: Store) -> Response:
         content = file.page(report, figures or None)
     except _ODD:
         _cannot_be_shown(row)
-    headers = {
-        "Content-Disposition": f'attachment; filename="{row.id}.html"',
-        "Content-Security-Policy": "sandbox",  # should anything open it in place
-        "X-Content-Type-Options": "nosniff",
-    }
-    return Response(content, headers=headers, media_type="text/html; charset=utf-8")
+    policy = {"Content-Security-Policy": "sandbox"}  # should anything open it in place
+    return attachment(f"{row.id}.html", content, "text/html; charset=utf-8", **policy)
 
 
 @router.get("/diagnoses/{diagnosis_id}/{figure}.csv")
@@ -111,8 +105,7 @@ def numbers_csv(diagnosis_id: DiagnosisId, figure: str, store: Store) -> Respons
 @router.post("/diagnoses/{diagnosis_id}/cancel", dependencies=[*WRITE, OWN_FORM])
 def cancel(diagnosis_id: DiagnosisId, runner: RunnerInUse, store: Store) -> Response:
     """Ends it."""
-    with store.writing() as connection:
-        diagnoses.cancel(connection, diagnosis_id)
+    store.write(diagnoses.cancel, diagnosis_id)
     runner.stir()
     return see(f"/diagnoses/{quote(diagnosis_id, safe='')}")
 
@@ -138,11 +131,13 @@ def _not_adopted(report: Mapping[str, Any]) -> str | None:
     return NOT_ADOPTED[report["verdict"]]
 
 
+def _kept(connection: Connection, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any] | None, dict[str, str]]:
+    row = diagnoses.find(connection, diagnosis_id)
+    return row, diagnoses.report_of(connection, row.number), diagnoses.figures_of(connection, row.number)
+
+
 def _done(store: Database, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any], dict[str, str]]:
-    with store.reading() as connection:
-        row = diagnoses.find(connection, diagnosis_id)
-        report = diagnoses.report_of(connection, row.number)
-        figures = diagnoses.figures_of(connection, row.number)
+    row, report, figures = store.read(_kept, diagnosis_id)
     if report is None:
         raise Refusal(404, f"Diagnosis {diagnosis_id!r} has no report: its state is {row.state}.")
     return row, report, figures

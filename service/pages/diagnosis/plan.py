@@ -1,6 +1,6 @@
 """What to measure next within the limits of the reader's rig; planned in a worker process, and not stored."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request, Response
@@ -10,9 +10,8 @@ from markupsafe import Markup
 from service.dependencies import DiagnosisId, PlannerInUse, Store
 from service.jobs.planner import Planned
 from service.pages.shared import same_request
-from service.pages.shared.form_errors import in_form_words
+from service.pages.shared.forms import in_form_words, number
 from service.pages.shared.html import page
-from service.pages.shared.typed_numbers import number
 from service.problems import Refusal
 from service.store import AnyRow, Database, campaigns, diagnoses
 from underskin.errors import UnderskinError, out_of_range, required
@@ -137,14 +136,11 @@ def _same(request: Request, campaign_id: str, limits: Mapping[str, Any]) -> same
     """The command and the library's call with these limits."""
     options: list[str] = []
     for name, value in limits.items():
-        options += _option("--" + name.replace("_", "-"), name, value)
-    return same_request.planned(
-        request, campaign_id, options, ", ".join(f"{name}={value!r}" for name, value in limits.items())
-    )
-
-
-def _option(flag: str, name: str, value: Any) -> Sequence[str]:
-    if name == "preload_n":
-        return [flag, *map(repr, value)]
-    values = value if name in _SEVERAL else [value]
-    return [text for one in values for text in (flag, repr(one))]
+        flag = "--" + name.replace("_", "-")
+        if name == "preload_n":
+            options += [flag, *map(repr, value)]
+        else:
+            values = value if name in _SEVERAL else [value]
+            options += [text for one in values for text in (flag, repr(one))]
+    call = ", ".join(f"{name}={value!r}" for name, value in limits.items())
+    return same_request.planned(request, campaign_id, options, call)

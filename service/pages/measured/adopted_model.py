@@ -4,15 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from service.pages.shared.form_errors import in_form_words
-from service.pages.shared.skin_fields import FIELDS
-from service.pages.shared.typed_numbers import number
+from service.pages.shared.forms import in_form_words, number
+from service.pages.shared.skin_values import FIELDS
 from service.problems import Refusal
-from service.schemas.columns_answer import Columns
-from service.schemas.d33 import D33Columns
+from service.schemas.columns import Columns
+from service.schemas.pressed_skin import D33Columns
 from service.store import Conflict, Database
 from service.usecases.adopted_models import model_in_force
-from service.usecases.d33 import d33
+from service.usecases.pressed_skin import d33
 from underskin.errors import UnderskinError, required
 from underskin.surrogate.sigma_table import SigmaTable
 

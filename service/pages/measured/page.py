@@ -5,25 +5,23 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
-from pydantic import ValidationError
 
 from service.dependencies import Store, Table
 from service.pages.array.description import refused
 from service.pages.measured.adopted_model import ByModel, by_model
-from service.pages.measured.out_of_domain import reasons
 from service.pages.shared import same_request
 from service.pages.shared.figures import csv_answer
+from service.pages.shared.forms import number, numbers
 from service.pages.shared.html import page
-from service.pages.shared.skin_fields import FIELDS as SKIN_FIELDS
-from service.pages.shared.skin_fields import UNITS
-from service.pages.shared.skin_values import start
-from service.pages.shared.typed_numbers import number, numbers
-from service.problems import first_refused
-from service.schemas.columns_answer import Columns
-from service.schemas.d33 import D33Columns
+from service.pages.shared.skin_values import FIELDS as SKIN_FIELDS
+from service.pages.shared.skin_values import UNITS, shown
+from service.problems import parsed
+from service.schemas.columns import Columns
+from service.schemas.pressed_skin import D33Columns
 from service.store import Database
-from service.usecases.d33 import d33
+from service.usecases.pressed_skin import d33
 from underskin.errors import InvalidInput, UnderskinError, too_few, wrong_type
+from underskin.prediction.domain_checks import RowConditions, beyond
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/d33")
@@ -36,13 +34,12 @@ _WORDS = {"frf_pc_per_n": "FRF", "d33_pc_per_n": "d33"}  # that findings are abo
 _ANSWERED = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "contact_radius_mm", "sigma", "mean_stress_mpa")
 
 RowsText = Annotated[str, Query(max_length=_LONGEST)]
-SkinQuery = Annotated[str | None, Query()]
 
 
 @router.get("")
-def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, rows: RowsText = _ROWS) -> Response:
+def view(request: Request, store: Store, table: Table, skin: str | None = None, rows: RowsText = _ROWS) -> Response:
     """With the skin and the rows of the address, or else the paper's prototype under a sphere."""
-    values, taken = _values(store, table, request.query_params, skin)
+    values, taken = shown(store, table, request.query_params, skin, FIELDS)
     error: str | None = None
     document: dict[str, Any] = {}
     answer: Columns | None = None
@@ -51,11 +48,9 @@ def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, r
         document = _document(values, request.query_params, rows)
         answer = _answered(table, store, document)
         adopted = by_model(store, table, skin, request.query_params, document)
-    except ValidationError as problem:
-        error = _said(first_refused(problem))
     except UnderskinError as problem:
         error = _said(problem)
-    shown = document if adopted is None or adopted.document is None else adopted.document
+    asked = document if adopted is None or adopted.document is None else adopted.document
     return page(
         request,
         "measured.html",
@@ -72,27 +67,17 @@ def view(request: Request, store: Store, table: Table, skin: SkinQuery = None, r
         adopted=adopted,
         outside=[] if answer is None else reasons(document, answer, table),
         query=request.url.query,
-        same=same_request.post(request, "/v1/d33", shown, f"client.d33(**{shown!r})"),
+        same=same_request.post(request, "/v1/d33", asked, f"client.d33(**{asked!r})"),
     )
 
 
 @router.get("/rows.csv")
-def rows_csv(request: Request, store: Store, table: Table, skin: SkinQuery = None, rows: RowsText = _ROWS) -> Response:
+def rows_csv(request: Request, store: Store, table: Table, skin: str | None = None, rows: RowsText = _ROWS) -> Response:
     """What was measured and what it says, a row a measurement."""
-    values, _ = _values(store, table, request.query_params, skin)
+    values, _ = shown(store, table, request.query_params, skin, FIELDS)
     document = _document(values, request.query_params, rows)
     adopted = by_model(store, table, skin, request.query_params, document)
     return csv_answer("d33", _columns(document, _answered(table, store, document), adopted))
-
-
-def _values(
-    store: Database, table: SigmaTable, given: Mapping[str, str], skin: str | None
-) -> tuple[dict[str, str], list[str]]:
-    """What the form shows: as it was sent, or else the skin's, or the prototype's; and in sentences what is not the
-    skin's own."""
-    missing = {name: (words, unit) for name, words, unit in FIELDS if not given.get(name)}
-    known, taken = start(store, table, skin, missing)
-    return {name: given.get(name) or f"{known[name]:g}" for name, *_ in FIELDS}, taken
 
 
 def _said(error: UnderskinError) -> str:
@@ -101,7 +86,7 @@ def _said(error: UnderskinError) -> str:
 
 
 def _answered(table: SigmaTable, store: Database, document: dict[str, Any]) -> Columns:
-    return d33(table, store, D33Columns.model_validate(document))
+    return d33(table, store, parsed(D33Columns, document))
 
 
 def _columns(document: Mapping[str, Any], answer: Columns, adopted: ByModel | None) -> dict[str, list[Any]]:
@@ -127,3 +112,15 @@ def _row(place: int, line: str) -> list[float]:
     if len(parts) not in (3, 4):
         raise wrong_type(f"row {place}", line[:80], "must be R F FRF, or R F FRF and its uncertainty (mm, N, pC/N)")
     return parts
+
+
+def reasons(document: Mapping[str, Any], answer: Columns, table: SigmaTable) -> list[str]:
+    """Of each row outside the table, which value is and what is allowed; `document`: the request of the answer."""
+    numbers = [answer.full(name) for name in ("a_over_h", "rt_over_h", "load_parameter")]
+    status = answer.status()
+    skin = document["youngs_modulus_mpa"], document["poisson_ratio"]
+    return [
+        f"row {row + 1}, " + beyond(RowConditions(force, radius, *skin), [float(part[row]) for part in numbers], table)
+        for row, (force, radius) in enumerate(zip(document["preload_n"], document["indenter_radius_mm"], strict=True))
+        if status[row] != "ok"
+    ]

@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from service.pages.shared.assets import LIBRARY, gzipped
 from service.pages.shared.formats import json_inside
+from service.store import AnyRow
 from underskin.prediction.columns import to_csv
 from underskin.recordings.campaign import FrfRecording, Recording
 
@@ -71,13 +72,32 @@ def drawn_curves(recordings: Iterable[Recording], most: int, noun: str = "", num
 
 def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> Response:
     """Columns as a CSV file to be saved."""
-    headers = {"Content-Disposition": f'attachment; filename="{name}.csv"', "X-Content-Type-Options": "nosniff"}
-    return Response(csv_text(columns), headers=headers, media_type="text/csv; charset=utf-8")
+    return attachment(f"{name}.csv", csv_text(columns), "text/csv; charset=utf-8")
+
+
+def attachment(file: str, content: str | bytes, media_type: str, **headers: str) -> Response:
+    """A file to be saved."""
+    about = {"Content-Disposition": f'attachment; filename="{file}"', "X-Content-Type-Options": "nosniff", **headers}
+    return Response(content, headers=about, media_type=media_type)
 
 
 def csv_of_rows(name: str, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> Response:
     """Rows as a CSV file of these columns; a cell is NaN where a row lacks it."""
-    return csv_answer(name, {column: [row.get(column) for row in rows] for column in names})
+    return csv_answer(name, dict(zip(names, columns_of(rows, *names), strict=True)))
+
+
+def columns_of(rows: Sequence[Mapping[str, Any]], *names: str) -> list[list[Any]]:
+    """Columns of rows; None where a row lacks it."""
+    return [[row.get(name) for row in rows] for name in names]
+
+
+def sensors_of(row: AnyRow, answer: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Each sensor of the d33 of a campaign, with its place and in words why it stands out (`reasons`)."""
+    places = {sensor["id"]: sensor for sensor in row.about["skin"]["sensors"]}
+    return [
+        {**entry, **places[entry["sensor"]], "reasons": "; ".join(flag["reason"] for flag in entry["flags"])}
+        for entry in answer["sensors"]
+    ]
 
 
 def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:

@@ -8,10 +8,8 @@ from typing import Any
 import orjson
 from markupsafe import Markup, escape
 
-from service.pages.shared.templates import macro
 from underskin.findings.formatting import in_percent, significant
 
-_VALUES = "values.html"
 _UNSAFE = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026", 0x2028: "\\u2028", 0x2029: "\\u2029"}
 
 
@@ -35,7 +33,8 @@ def short_and_exact(value: float | None, unit: str, digits: int) -> tuple[str, s
 
 
 def _with_unit(shown: str, exact: str, unit: str) -> Markup:
-    return macro(_VALUES, "number", shown, exact, unit)
+    text = Markup('<span class="number" title="{}">{}</span>').format(exact, shown)
+    return text + Markup('&nbsp;<span class="unit">{}</span>').format(unit) if unit else text
 
 
 def moment(text: str | None, *, date_only: bool = False) -> Markup:
@@ -44,7 +43,8 @@ def moment(text: str | None, *, date_only: bool = False) -> Markup:
         return Markup("–")
     when = datetime.fromisoformat(text)
     shown = when.strftime("%Y-%m-%d" if date_only else "%Y-%m-%d %H:%M UTC")
-    return macro(_VALUES, "moment", text, shown, date_only)
+    form = Markup(' data-form="date"') if date_only else ""
+    return Markup('<time datetime="{}"{}>{}</time>').format(text, form, shown)
 
 
 def json_inside(document: Any) -> Markup:
@@ -62,7 +62,7 @@ def short(text: str, most: int = 60) -> Markup:
     """A name that may be long: cut, the whole under the pointer."""
     if len(text) <= most:
         return escape(text)
-    return macro(_VALUES, "cut", text[:1000], text[: most - 1])
+    return Markup('<span title="{}">{}…</span>').format(text[:1000], text[: most - 1])
 
 
 FILTERS: Mapping[str, Callable[..., Any]] = {

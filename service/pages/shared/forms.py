@@ -1,5 +1,9 @@
-"""Forms: read, and refused unless they were made for this session."""
+"""Forms: read, and refused unless they were made for this session; what was typed into them, and errors in their own
+words: the labels that the reader sees, not the fields of the request behind them.
+"""
 
+import re
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated
 from urllib.parse import parse_qs
 
@@ -8,11 +12,17 @@ from fastapi.responses import RedirectResponse
 
 from service.auth import session
 from service.problems import Refusal
-from underskin.errors import out_of_range
+from underskin.errors import UNITS_CHECKED, InvalidInput, Mention, Requirement, UnderskinError, out_of_range, wrong_type
+from underskin.recordings.readers import text
 
 TOKEN = "form_token"  # noqa: S105 -- the name of the field
+UNLIKELY = "or tick “Take unlikely magnitudes as they are”"
 _LARGEST_BYTES = 100_000
 _MOST_FIELDS = 500  # a file of many channels has a row of fields for each
+_BETWEEN = re.compile(r"[;\s]+|,(?:\s+|$)")  # numbers in a line: a comma without a space may be a decimal one
+_LOAD_PATH = re.compile(r"contacts\[(\d+)\](?:\.(\w+))?(?:\[(\d)\])?")  # of `POST /v1/stress`
+_OF_LOAD = {"x_mm": "x", "y_mm": "y", "indenter_radius_mm": "R", "normal_force_n": "F"}
+_TANGENTIAL = ("Fx", "Fy")
 
 
 async def _fields(request: Request) -> dict[str, str]:
@@ -52,3 +62,64 @@ def reason(sent: dict[str, str]) -> str:
 def see(path: str) -> RedirectResponse:
     """After a form, the page that shows what it did."""
     return RedirectResponse(path, 303)
+
+
+def number(name: str, typed: str) -> float:
+    """A number that somebody typed; raises InvalidInput."""
+    try:
+        return float(typed)
+    except ValueError:
+        raise wrong_type(name, typed[:80]) from None
+
+
+def numbers(name: str, line: str) -> list[float]:
+    """The numbers of a line that somebody typed, with decimal points or with decimal commas; raises InvalidInput.
+
+    Between them are spaces, tabs, semicolons, or commas and a space: `7,06` is one number.
+    """
+    typed = [cell for cell in _BETWEEN.split(line) if cell]
+    decimal = "," if any("," in cell for cell in typed) else "."
+    values = [text.number(cell, decimal) for cell in typed]
+    if decimal == "," and None in values:
+        allowed = "must be numbers with spaces between them, with decimal points or with decimal commas, not both"
+        raise wrong_type(name, line[:80], allowed)
+    return [number(name, cell) if value is None else value for cell, value in zip(typed, values, strict=True)]
+
+
+def in_form_words(
+    error: UnderskinError, labels: Mapping[str, str], lines: Sequence[int] = (), unlikely: str = ""
+) -> str:
+    """An error; `labels`: of fields as the form has them, `lines`: of the loads in its text, from 1; `unlikely`: how
+    the form takes an unlikely magnitude, where it does."""
+    if not isinstance(error, InvalidInput):
+        return str(error)
+    allowed = worded(error.allowed, lambda field: _label(field, labels, lines), unlikely)
+    value = "" if error.value is None else f": {error.value}"
+    return f"{_label(error.field, labels, lines)}{value} – {allowed}"
+
+
+def worded(allowed: str, label: Callable[[str], str], unlikely: str) -> str:
+    """What is allowed, its fields by the labels of a form; `unlikely` as for `in_form_words`."""
+
+    def word(mention: Mention) -> str:
+        if mention == UNITS_CHECKED:
+            return f" ({unlikely})" if unlikely else ""
+        return label(mention.field)
+
+    return allowed.worded(word) if isinstance(allowed, Requirement) else allowed
+
+
+def _label(field: str, labels: Mapping[str, str], lines: Sequence[int]) -> str:
+    """A field as the form calls it; of a path its known parts."""
+    load = _LOAD_PATH.fullmatch(field)
+    return _load(load, lines) if load else ".".join(labels.get(part, part) for part in field.split("."))
+
+
+def _load(path: re.Match[str], lines: Sequence[int]) -> str:
+    """`contacts[0].normal_force_n` as `load in line 1, F`."""
+    number, field, part = int(path[1]), path[2], path[3]
+    place = f"load in line {lines[number] if number < len(lines) else number + 1}"
+    if field is None:
+        return place
+    name = _TANGENTIAL[int(part)] if field == "tangential_force_n" and part is not None else _OF_LOAD.get(field, field)
+    return f"{place}, {name}"

@@ -1,20 +1,21 @@
-"""Templates into answers: every page goes through here, and gets its policy here."""
+"""Templates into answers: every page goes through here, one that shows an error too, and gets its policy here."""
 
 import gzip
 from functools import cache
+from pathlib import Path
 from typing import Any
-from urllib.parse import quote
+from urllib.parse import quote, urlsplit
 
 from fastapi import Request, Response
-from fastapi.responses import HTMLResponse
-from jinja2 import Environment
+from fastapi.responses import HTMLResponse, RedirectResponse
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from service.auth import session
 from service.auth.keys import Key
 from service.pages.shared import formats
 from service.pages.shared.assets import address, library_style_hash
 from service.pages.shared.same_request import scheme
-from service.pages.shared.templates import environment
+from service.problems import Refusal
 from underskin import __version__
 
 # Of the empty style element that plotly fills through the object model.
@@ -48,7 +49,15 @@ def headers() -> dict[str, str]:
 
 @cache
 def _templates() -> Environment:
-    templates = environment()
+    """All templates; every value that they show is escaped."""
+    templates = Environment(
+        loader=FileSystemLoader(Path(__file__).parents[1] / "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        auto_reload=False,
+    )
     templates.filters.update(formats.FILTERS)
     templates.globals.update(static=address, version=__version__, segment=lambda text: quote(text, safe=""))
     return templates
@@ -77,6 +86,15 @@ def page(
     if current != cookie_sent:
         set_session(request, answer, current)
     return answer
+
+
+def problem_page(refusal: Refusal, request_id: str) -> Response:
+    """What happened and what to do; where the gate sends elsewhere, the way there."""
+    place = refusal.headers.get("Location")
+    if place is not None and not urlsplit(place).netloc:
+        return RedirectResponse(place, refusal.status)
+    text = render("problem.html", refusal=refusal, request_id=request_id, viewer=None)
+    return HTMLResponse(text, refusal.status, {**headers(), **refusal.headers})
 
 
 def compress(request: Request, answer: Response) -> None:

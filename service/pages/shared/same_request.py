@@ -26,33 +26,30 @@ def get(request: Request, path: str, call: str) -> SameRequest:
 def post(request: Request, path: str, document: Mapping[str, Any], call: str) -> SameRequest:
     """POST a JSON document."""
     body = shlex.quote(json.dumps(document, ensure_ascii=False))
-    return SameRequest(
-        f"{_curl(request, path)} \\\n  -H 'Content-Type: application/json' -d {body}", _python(request, call)
-    )
+    return SameRequest(_curl(request, path, f"-H 'Content-Type: application/json' -d {body}"), _python(request, call))
 
 
 def from_file(request: Request, path: str, file: str, call: str) -> SameRequest:
     """POST a JSON document that is in a file; `call` has {} for the document."""
-    send = f" \\\n  -H 'Content-Type: application/json' -d @{file}"
-    document = f"json.loads(pathlib.Path({file!r}).read_text())"
-    python = _python(request, call.format(document))
-    return SameRequest(_curl(request, path) + send, f"import json\nimport pathlib\n{python}")
+    curl = _curl(request, path, f"-H 'Content-Type: application/json' -d @{file}")
+    python = _python(request, call.format(f"json.loads(pathlib.Path({file!r}).read_text())"))
+    return SameRequest(curl, f"import json\nimport pathlib\n{python}")
 
 
 def files(request: Request, labels: Sequence[str], rig: str | None, skin: str) -> SameRequest:
     """POST files as a form, with a rig description where they need one."""
     query = f"?skin={quote(skin, safe='')}" if skin else ""
     parts = [f"file=@{label}" for label in labels] + ([] if rig is None else [f"rig=@{rig}"])
-    shown = "".join(f" \\\n  -F {shlex.quote(part)}" for part in parts)
+    curl = _curl(request, f"/v1/campaigns{query}", *(f"-F {shlex.quote(part)}" for part in parts))
     arguments = [repr(list(labels)), *([f"skin={skin!r}"] if skin else []), *([] if rig is None else [f"rig={rig!r}"])]
     call = f"client.campaigns.post_files({', '.join(arguments)})"
-    return SameRequest(_curl(request, f"/v1/campaigns{query}") + shown, _python(request, call))
+    return SameRequest(curl, _python(request, call))
 
 
 def exported_skin(request: Request, label: str) -> SameRequest:
     """POST a file that holds an exported skin."""
-    send = f" \\\n  -H 'Content-Type: application/x-hdf5' --data-binary {shlex.quote('@' + label)}"
-    return SameRequest(_curl(request, "/v1/skins/import") + send, _python(request, f"client.skins.load({label!r})"))
+    send = f"-H 'Content-Type: application/x-hdf5' --data-binary {shlex.quote('@' + label)}"
+    return SameRequest(_curl(request, "/v1/skins/import", send), _python(request, f"client.skins.load({label!r})"))
 
 
 def planned(request: Request, campaign_id: str, options: Sequence[str], limits: str) -> SameRequest:
@@ -71,9 +68,10 @@ def planned(request: Request, campaign_id: str, options: Sequence[str], limits: 
     return SameRequest(f"{fetch}\n{shlex.join(['underskin', 'plan', file, *options])}", python)
 
 
-def _curl(request: Request, path: str) -> str:
+def _curl(request: Request, path: str, *sent: str) -> str:
+    """`sent`: options that send something, each on a line of its own."""
     key = ' -H "Authorization: Bearer $UNDERSKIN_API_KEY"' if request.scope["key"] is not None else ""
-    return f"curl -s {shlex.quote(_origin(request) + path)}{key}"
+    return " \\\n  ".join([f"curl -s {shlex.quote(_origin(request) + path)}{key}", *sent])
 
 
 def _python(request: Request, call: str) -> str:

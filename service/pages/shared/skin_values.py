@@ -1,4 +1,6 @@
-"""The numbers that a view starts from: a skin's own, and which of them nobody declared."""
+"""The skin's fields that several forms ask for, and the numbers that a view starts from: a skin's own, and which of
+them nobody declared.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,6 +10,15 @@ import numpy as np
 from service.store import Database, campaigns, overview, skins
 from underskin.surrogate.sigma_table import SigmaTable
 
+# Field, words, unit.
+FIELDS = (
+    ("thickness_mm", "thickness h", "mm"),
+    ("youngs_modulus_mpa", "Young's modulus E", "MPa"),
+    ("sensor_radius_mm", "sensor radius rT", "mm"),
+    ("d33_pc_per_n", "d33", "pC/N"),
+    ("poisson_ratio", "Poisson's ratio ν", ""),
+)
+UNITS = "units_checked"
 PROTOTYPE = {
     "thickness_mm": 2.5,
     "sensor_radius_mm": 1.5,
@@ -52,6 +63,19 @@ def start(
     if lacking:
         taken.append(f"Not declared, so taken from the paper's prototype: {sentence}")
     return {**PROTOTYPE, **known}, taken
+
+
+def shown(
+    store: Database,
+    table: SigmaTable,
+    given: Mapping[str, str],
+    skin_id: str | None,
+    fields: Sequence[tuple[str, str, str]] = FIELDS,
+) -> tuple[dict[str, str], list[str]]:
+    """What a form with these fields shows: as it was sent, or else where the view starts, with `start`'s sentences."""
+    missing = {name: (words, unit) for name, words, unit in fields if not given.get(name)}
+    known, taken = start(store, table, skin_id, missing)
+    return {name: given.get(name) or f"{known[name]:g}" for name, *_ in fields}, taken
 
 
 def _pressed(scalars: Sequence[Mapping[str, Any]]) -> dict[str, float]:

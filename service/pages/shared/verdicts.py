@@ -1,4 +1,7 @@
-"""What a diagnosis came to, in the few words that a list has room for: what it says, how sure it is, what rivals it."""
+"""What a diagnosis came to, in the few words that a list has room for: what it says, how sure it is, what rivals it.
+
+And the model adopted from one, as pages head it: what it adds, since when and until when, d33 by it beside the paper's.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -6,9 +9,14 @@ from typing import Any, Literal
 
 from sqlalchemy import Connection
 
-from service.store import AnyRow, diagnoses
+from service.problems import Refusal
+from service.schemas.diagnoses import ModelVersion
+from service.store import AnyRow, Conflict, Database, diagnoses
+from service.usecases import adopted_models, d33_cache
+from underskin import InvalidInput
 from underskin.diagnosis.data.names import EXPLAINED, in_words
 from underskin.findings.formatting import in_percent
+from underskin.surrogate.sigma_table import SigmaTable
 
 _WORTH_NAMING = 0.02  # probability of a rival, as in a report
 _MOST_RIVALS = 3
@@ -72,3 +80,36 @@ def _beside(report: Mapping[str, Any]) -> str:
     if verdict == "no_mismatch":
         return f"not ruled out: {', '.join(rivals)}" if rivals else ""
     return " or ".join([*leader, *rivals])
+
+
+class AdoptedVersion(ModelVersion):
+    """A model that was adopted; `outdated`: why it serves no figures, None where it does."""
+
+    mechanisms: str
+    outdated: str | None
+
+
+def adopted_versions(connection: Connection, rows: Sequence[AnyRow]) -> list[AdoptedVersion]:
+    """Of rows of models."""
+    reports = diagnoses.reports_of(connection, [row.number for row in rows])
+    return [
+        AdoptedVersion(
+            **adopted_models.version(row).model_dump(),
+            mechanisms=in_words(mechanisms_of(reports[row.number])),
+            outdated=diagnoses.outdated(row),
+        )
+        for row in rows
+    ]
+
+
+def answer_by_it(store: Database, table: SigmaTable, row: AnyRow) -> tuple[Mapping[str, Any] | None, str | None]:
+    """d33 of a campaign by the model in force, or why there is none."""
+    try:
+        return d33_cache.by_model(store, table, row, "adopted"), None
+    except (InvalidInput, Conflict, Refusal) as error:
+        return None, str(error)
+
+
+def change_percent(by_paper: float | None, by_model: float | None) -> float | None:
+    """How far d33 by the adopted model lies above the paper's [%]."""
+    return None if not by_paper or by_model is None else 100 * (by_model / by_paper - 1)

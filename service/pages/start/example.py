@@ -24,8 +24,7 @@ _MOST = 1000  # campaigns of it that are looked at
 @router.post("/example", dependencies=[*WRITE, OWN_FORM])
 async def load(request: Request, store: Store, table: Table) -> Response:
     """Keeps the example's campaigns, once however often it is asked for; afresh where all were withdrawn."""
-    with store.reading() as connection:
-        withdrawn = _withdrawn(connection)
+    withdrawn = store.read(_withdrawn)
     if withdrawn is None:
         return see(f"/skins/{SKIN}")
     uploads = [_upload(file) for file in sorted(_FOLDER.glob("*.json"))]

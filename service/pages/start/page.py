@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query, Request, Response
 from starlette.background import BackgroundTask
 
 from service.dependencies import Store, Table, number_of_cursor
-from service.pages.shared import adoption, same_request, verdicts
+from service.pages.shared import same_request, verdicts
 from service.pages.shared.figures import prepare
 from service.pages.shared.html import page
 from service.pages.start.sparkline import sparkline
@@ -23,7 +23,7 @@ def start(
     store: Store,
     table: Table,
     find: Annotated[str, Query(max_length=200)] = "",
-    before: Annotated[str | None, Query()] = None,
+    before: str | None = None,
 ) -> Response:
     """The skins whose campaigns came last, first."""
     with store.reading() as connection:
@@ -32,7 +32,7 @@ def start(
         diagnosed = [glance.diagnosis for glance in shown if glance.diagnosis is not None]
         models = [glance.model for glance in shown if glance.model is not None]
         verdict = verdicts.of_rows(connection, diagnosed, [row.id for row in models])
-        adoptions = {one.diagnosis_id: one for one in adoption.of_rows(connection, models)}
+        adoptions = {one.diagnosis_id: one for one in verdicts.adopted_versions(connection, models)}
     answer = page(
         request,
         "start.html",
@@ -42,7 +42,7 @@ def start(
                 sparkline(glance.d33),
                 None if glance.diagnosis is None else verdict[glance.diagnosis.id],
                 None if glance.model is None else adoptions[glance.model.id],
-                adoption.change_percent(glance.paper_d33, glance.adopted_d33),
+                verdicts.change_percent(glance.paper_d33, glance.adopted_d33),
             )
             for glance in shown
         ],

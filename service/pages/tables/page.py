@@ -1,6 +1,5 @@
 """The tables that ship: what each holds, over which range, how wrong it may be, and how it was made."""
 
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -60,15 +59,11 @@ _MADE = {
 }
 
 
-@dataclass(frozen=True)
-class DescribedTable:
+class DescribedTable(TableEntry):
     """One table in words."""
 
-    name: str
     title: str
     holds: str
-    sha256: str
-    schema: str
     domain: list[tuple[str, TableAxis, str]]  # words, the axis, what it is on the prototype
     errors: list[tuple[str, float, float]]  # of what, median and largest
     made: list[tuple[str, Any]]
@@ -92,15 +87,13 @@ def _described(folder: Path, entry: TableEntry) -> DescribedTable:
     file, title, holds = _HELD[entry.name]
     versions = {name.removeprefix("version_"): value for name, value in entry.about.items() if "version_" in name}
     return DescribedTable(
-        entry.name,
-        title,
-        holds,
-        entry.table_sha256,
-        entry.table_schema,
-        [(_AXES[axis.name][0], axis, _in_lab_units(axis)) for axis in entry.axes],
-        _errors(folder / file),
-        [(words, entry.about[name]) for name, words in _MADE.items() if name in entry.about],
-        ", ".join(f"{name} {value}" for name, value in versions.items()),
+        **entry.model_dump(),
+        title=title,
+        holds=holds,
+        domain=[(_AXES[axis.name][0], axis, _in_lab_units(axis)) for axis in entry.axes],
+        errors=_errors(folder / file),
+        made=[(words, entry.about[name]) for name, words in _MADE.items() if name in entry.about],
+        versions=", ".join(f"{name} {value}" for name, value in versions.items()),
     )
 
 

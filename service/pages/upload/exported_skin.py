@@ -3,7 +3,6 @@
 from urllib.parse import quote
 
 from fastapi import Request, Response
-from starlette.concurrency import run_in_threadpool
 
 from service.ingest import skin_imports
 from service.pages.shared import same_request
@@ -28,10 +27,14 @@ def holds_skin(pending: PendingUpload) -> bool:
         return is_export(stream, first.label or "the file")
 
 
-async def look(store: Database, pending: PendingUpload) -> None:
-    """Summarise it; where it cannot be read, list the errors as for any other file."""
-    async with skin_imports.one:
-        await run_in_threadpool(_look, store, pending)
+def look(store: Database, pending: PendingUpload) -> None:
+    """Summarise it; where it cannot be read, list the errors as for any other file. One at a time."""
+    try:
+        pending.skin_summary = skin_summary(skin_imports.look(store, pending.files[0]))
+    except InvalidInput as error:
+        label = pending.files[0].label or "the file"
+        pending.seen = [FileSummary(label, KIND, 0, (), (), field_errors(error), (), (), None)]
+        pending.drawn = {0: []}
 
 
 def shown(request: Request, pending: PendingUpload) -> Response:
@@ -47,29 +50,15 @@ def shown(request: Request, pending: PendingUpload) -> Response:
     )
 
 
-async def bring_in(request: Request, store: Database, pending: PendingUpload) -> None:
+def bring_in(request: Request, store: Database, pending: PendingUpload) -> None:
     """Keep what is not here; errors are shown on the upload's page. A second request stores nothing again."""
-    async with skin_imports.one:
-        await run_in_threadpool(_bring_in, request, store, pending)
-
-
-def _look(store: Database, pending: PendingUpload) -> None:
-    try:
-        pending.skin_summary = skin_summary(skin_imports.look(store, pending.files[0]))
-    except InvalidInput as error:
-        label = pending.files[0].label or "the file"
-        pending.seen = [FileSummary(label, KIND, 0, (), (), field_errors(error), (), (), None)]
-        pending.drawn = {0: []}
-
-
-def _bring_in(request: Request, store: Database, pending: PendingUpload) -> None:
     with pending.lock:
         if pending.kept_at is not None:
             return
         try:
             brought = skin_imports.bring_in(store, pending.files[0])
         except Conflict:  # somebody changed what is here since it was looked at
-            _look(store, pending)
+            look(store, pending)
             return
         pending.kept_at = f"/skins/{quote(brought.skin_id, safe='')}"
         request.app.state.pending_uploads.empty(pending)

@@ -10,7 +10,7 @@ from service.ingest.reading import InspectedFile, checked
 from service.ingest.uploads import Upload
 from underskin import InvalidInput
 from underskin.recordings.campaign import CompressionRecording, FrfRecording, Recording
-from underskin.recordings.channels import Contents
+from underskin.recordings.channels import Channel, Contents
 from underskin.units import to_lab
 
 MOST_LISTED = 60
@@ -89,25 +89,26 @@ def seen(upload: Upload, look: InspectedFile, known: Sequence[str]) -> FileSumma
 
 
 def _about(contents: Contents) -> dict[str, Any]:
-    by_name: dict[str, ChannelSummary] = {}
+    by_name: dict[str, list[Channel]] = {}
     for block in contents.blocks:
         for channel in block.channels:
             if channel.name in by_name or len(by_name) < _MOST_CHANNELS:
-                low, high = _range(channel.values)
-                before = by_name.get(channel.name)
-                if before is not None:
-                    low, high = (
-                        _either(pick, *pair) for pick, pair in ((min, (before.low, low)), (max, (before.high, high)))
-                    )
-                samples = len(channel.values) if before is None else before.samples
-                complex_numbers = bool(np.iscomplexobj(channel.values))
-                by_name[channel.name] = ChannelSummary(channel.name, channel.unit, samples, low, high, complex_numbers)
+                by_name.setdefault(channel.name, []).append(channel)
     return {
         "parts": len(contents.blocks),
         "sample_rate_hz": contents.blocks[0].sample_rate_hz if contents.blocks else None,
-        "channels": list(by_name.values()),
+        "channels": [_channel(parts) for parts in by_name.values()],
         "properties": _properties(contents),
     }
+
+
+def _channel(parts: Sequence[Channel]) -> ChannelSummary:
+    """One channel, from all parts of the file that have it."""
+    first, last = parts[0], parts[-1]
+    limits = [limit for part in parts for limit in _range(part.values)]
+    low, high = min(limits, default=None), max(limits, default=None)
+    complex_numbers = bool(np.iscomplexobj(last.values))
+    return ChannelSummary(first.name, last.unit, len(first.values), low, high, complex_numbers)
 
 
 def _properties(contents: Contents) -> dict[str, str | float]:
@@ -123,16 +124,11 @@ def _properties(contents: Contents) -> dict[str, str | float]:
     return dict(list(properties.items())[:_MOST_PROPERTIES])
 
 
-def _range(values: Any) -> tuple[float | None, float | None]:
-    """Of the finite values; of complex ones their magnitude."""
+def _range(values: Any) -> list[float]:
+    """Lowest and highest of the finite values, if there are any; of complex ones of their magnitude."""
     real = np.abs(values) if np.iscomplexobj(values) else values
     finite = real[np.isfinite(real)]
-    return (float(finite.min()), float(finite.max())) if len(finite) else (None, None)
-
-
-def _either(pick: Any, first: float | None, second: float | None) -> float | None:
-    known = [value for value in (first, second) if value is not None]
-    return pick(known) if known else None
+    return [float(finite.min()), float(finite.max())] if len(finite) else []
 
 
 def _recording(recording: Recording) -> RecordingSummary:

@@ -1,4 +1,7 @@
-"""Storing an upload that was shown, or the errors that prevent it."""
+"""Storing an upload that was shown, or the errors that prevent it; the rig description that it is read with.
+
+And what its reader should know before it is kept: nothing kept is ever deleted, so that afterwards is late.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,13 +11,16 @@ import orjson
 from fastapi import Request
 
 from service.dependencies import sender
-from service.ingest.accept import RIG, IngestOptions, accept
-from service.ingest.reading import error_entry
+from service.ingest import repeats
+from service.ingest.accept import RIG, IngestOptions, accept, kept_rig, sent_rig
+from service.ingest.reading import InspectedFile, checked, error_entry
 from service.ingest.uploads import Upload
 from service.pages.upload.pending_uploads import PendingUpload
 from service.problems import Refusal
-from service.store import Conflict, Database, Missing
+from service.store import Conflict, Database, Missing, campaigns
+from service.usecases import d33_cache
 from underskin.errors import ErrorCode, FileError, InvalidInput
+from underskin.recordings.rig_description import RigDescription
 
 SKIN_FIELD, CORRECTS = "skin", "corrects"
 
@@ -63,3 +69,45 @@ def field_errors(error: Exception) -> list[dict[str, Any]]:
         return [error_entry(error.file, None, f"{error.place} {error.reason}".strip(), error.code)]
     detail = error.detail if isinstance(error, Refusal) else str(error)
     return [error_entry("upload", None, detail, ErrorCode.INVALID_VALUE)]
+
+
+def skin_of(store: Database, corrects: str | None) -> str | None:
+    """The skin of the campaign that is corrected, on which its correction stays; raises Missing."""
+    if corrects is None:
+        return None
+    return str(store.read(campaigns.find, corrects).skin_id)
+
+
+def rig_in_use(
+    store: Database, sent: Upload | None, skin: str | None
+) -> tuple[RigDescription | None, list[dict[str, Any]]]:
+    """The rig description that was sent, or that is kept with the skin; and what is wrong with the one sent."""
+    if sent is not None:
+        try:
+            return sent_rig(sent), []
+        except (FileError, InvalidInput) as error:
+            return None, field_errors(error)
+    if skin is None:
+        return None, []
+    return store.read(kept_rig, skin), []
+
+
+def worth_knowing(request: Request, look: InspectedFile, skin_id: str | None, corrects: str | None) -> list[str]:
+    """In sentences, of the campaigns of one file, sent for the skin `skin_id` where that is said; `corrects`: the
+    campaign whose place they take."""
+    store, table = request.app.state.store, request.app.state.table
+    sentences: list[str] = []
+    for one in map(checked, look.campaigns):
+        if one.campaign is None:
+            continue
+        earlier = store.read(repeats.already_kept, one.campaign, skin_id, corrects)
+        if earlier is not None:
+            sentences.append(earlier[0])
+        kept_on = store.read(repeats.otherwise_named, one.campaign, corrects)
+        if kept_on is not None:
+            sentences.append(
+                f"the file names skin {one.campaign.skin.id}, not {kept_on}, that of the campaign that it corrects: "
+                "the name below decides."
+            )
+        sentences += d33_cache.foreseen(table, one.campaign)
+    return sentences

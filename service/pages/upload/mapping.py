@@ -4,11 +4,15 @@ from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
+from service.ingest.reading import InspectedFile
+from service.pages.shared.forms import UNLIKELY, worded
 from service.pages.upload import spring_mapping
-from service.pages.upload.file_summary import ChannelSummary
-from underskin.errors import UNITS_CHECKED, ErrorCode, InvalidInput, Mention, Requirement, not_unique, wrong_type
+from service.pages.upload.file_summary import ChannelSummary, FileSummary
+from underskin.errors import ErrorCode, FileError, InvalidInput, not_unique, wrong_type
+from underskin.recordings import rig_description, rig_mapping
 from underskin.recordings.readers.unit_labels import lab_field, unit
-from underskin.recordings.rig_description import SCHEMA, channel_fields
+from underskin.recordings.rig_description import SCHEMA, RigDescription, channel_fields
+from underskin.recordings.rig_mapping import MappedFile
 
 KINDS = {
     "frf": "FRF: charge against a shaken force",
@@ -84,20 +88,13 @@ def field_words(field: str) -> str:
 
 def what_to_do(error: Mapping[str, Any]) -> str:
     """What is allowed; for what the form asks, where to say it."""
-    allowed = error["allowed"]
     if error["code"] != ErrorCode.REQUIRED or field_words(error["field"]) == error["field"]:
-        return allowed.worded(_mention_words) if isinstance(allowed, Requirement) else str(allowed)
+        return worded(error["allowed"], field_words, UNLIKELY)
     if error["field"] == _RATE:
         return "required: fill it in below, or say which channel is the time"
     if error["field"] in CHANNELS:
         return "required: say below which channel it is"
     return "required: fill it in below"
-
-
-def _mention_words(mention: Mention) -> str:
-    if mention == UNITS_CHECKED:
-        return " (or tick “Take unlikely magnitudes as they are”)"
-    return field_words(mention.field)
 
 
 def guessed(
@@ -268,3 +265,16 @@ def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> d
         "stiffness_n_per_mm": stiffness,
     }
     return {key: value for key, value in values.items() if value is not None}
+
+
+def mapped_file(look: InspectedFile, summary: FileSummary, rig: RigDescription | None) -> MappedFile | None:
+    """The campaign document of a file and what was taken for what, by the rig description or, without one, as the form
+    guesses it; None where that cannot be."""
+    if look.contents is None:
+        return None
+    try:
+        if rig is None:
+            rig = rig_description.from_dict(guessed(summary.channels, summary.properties, {}))
+        return rig_mapping.apply(rig, look.contents, summary.label)
+    except (FileError, InvalidInput):
+        return None

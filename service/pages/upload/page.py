@@ -1,29 +1,29 @@
 """Upload: files are read, shown channel by channel, and stored only on confirmation."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from typing import Annotated, Any
 
 import orjson
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.auth import session
 from service.dependencies import WRITE, Store, Table
+from service.ingest import skin_imports
 from service.ingest.accept import RIG
 from service.ingest.reading import READING_SLOTS, InspectedFile, look, require_few
 from service.ingest.uploads import received
 from service.pages.shared import same_request
-from service.pages.shared.figures import Drawn, csv_answer
+from service.pages.shared.figures import Drawn, attachment, csv_answer
 from service.pages.shared.forms import OWN_FORM, TOKEN, Form, require_own, see
 from service.pages.shared.html import page
-from service.pages.upload import before_keeping, exported_skin, rig_in_use, similar_errors, spring_mapping
+from service.pages.upload import exported_skin, similar_errors, spring_mapping
 from service.pages.upload import mapping as mappings
 from service.pages.upload.figures import figures, lines_columns, trace_columns
 from service.pages.upload.file_summary import MOST_LISTED, ChannelSummary, FileSummary, seen
-from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good
-from service.pages.upload.mapped_file import mapped_file
+from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good, rig_in_use, skin_of, worth_knowing
+from service.pages.upload.mapping import mapped_file
 from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
 from service.problems import Refusal
 from service.store import Database, Missing, campaigns, skins
@@ -38,6 +38,15 @@ _MOST_SKINS = 200  # that the form offers
 _MOST_NAMED = 5  # files in the request that does the same
 
 
+def _pending(request: Request, upload_id: str) -> PendingUpload:
+    """The upload of an address; raises Missing where it is not the session's own."""
+    pending_uploads: PendingUploads = request.app.state.pending_uploads
+    return pending_uploads.find(session.cookie_in(dict(request.scope["headers"])), upload_id)
+
+
+Pending = Annotated[PendingUpload, Depends(_pending)]
+
+
 @router.get("")
 def form(
     request: Request,
@@ -46,8 +55,7 @@ def form(
     corrects: Annotated[str, Query(max_length=200)] = "",
 ) -> Response:
     """Asks for files; `corrects`: the campaign whose place they take."""
-    with store.reading() as connection:
-        known = [row.id for row in skins.listed(connection, None, None, _MOST_SKINS)]
+    known = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
     return page(
         request,
         "upload.html",
@@ -72,15 +80,16 @@ async def send(request: Request, store: Store) -> Response:
         if not given:
             raise Refusal(422, "No file came. Choose one, or drop it on the page.", title="No file")
         corrects = fields.get(CORRECTS) or None
-        skin = fields.get(SKIN_FIELD) or await run_in_threadpool(rig_in_use.skin_of, store, corrects)
-        rig_and_errors = await run_in_threadpool(rig_in_use.rig, store, rig, skin)
+        skin = fields.get(SKIN_FIELD) or await run_in_threadpool(skin_of, store, corrects)
+        rig_and_errors = await run_in_threadpool(rig_in_use, store, rig, skin)
         pending = pending_uploads.put(cookie, given)
     pending.skin, pending.corrects = skin, corrects
     pending.rig, pending.refused = rig_and_errors
     pending.rig_label = None if rig is None or pending.rig is None else rig.label
     try:
         if await run_in_threadpool(exported_skin.holds_skin, pending):
-            await exported_skin.look(store, pending)
+            async with skin_imports.one:
+                await run_in_threadpool(exported_skin.look, store, pending)
         else:
             async with READING_SLOTS:
                 await run_in_threadpool(_look, request, pending)
@@ -91,9 +100,8 @@ async def send(request: Request, store: Store) -> Response:
 
 
 @router.get("/{upload_id}")
-def understood(request: Request, upload_id: str, store: Store, file: Annotated[int, Query(ge=0)] = 0) -> Response:
+def understood(request: Request, pending: Pending, store: Store, file: Annotated[int, Query(ge=0)] = 0) -> Response:
     """What was understood, file by file."""
-    pending = _find(request, upload_id)
     if pending.kept_at is not None:
         return see(pending.kept_at)
     if pending.skin_summary is not None:
@@ -103,9 +111,8 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
         inspected = _looked(request, pending, file)
         mapped = mapped_file(inspected, pending.seen[file], pending.rig)
         pending.draw(file, figures(inspected, f"/upload/{pending.id}/{file}/", mapped))
-    with store.reading() as connection:
-        known = [row.id for row in skins.listed(connection, None, None, _MOST_SKINS)]
-        about = _latest(store, pending.skin or pending.seen[file].skin)
+    known = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
+    about = _latest(store, pending.skin or pending.seen[file].skin)
     channels = _channels(pending)
     stated = pending.draft or (pending.rig.document if pending.rig is not None else None)
     document = stated or mappings.guessed(channels, pending.seen[file].properties, about)
@@ -129,13 +136,8 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
         twice=_twice(pending, channels),
         document=document,
         layout=mappings.sensors_text(document),
-        kinds=mappings.KINDS,
-        fields=mappings.CHOICES,
+        mapping=mappings,
         spring=spring_mapping,
-        field_words=mappings.field_words,
-        what_to_do=mappings.what_to_do,
-        skin_fields=mappings.SKIN,
-        recording_fields=mappings.RECORDING,
         same=same_request.files(
             request, [one.label for one in pending.seen[:_MOST_NAMED]], pending.rig_label, pending.skin or ""
         ),
@@ -143,9 +145,8 @@ def understood(request: Request, upload_id: str, store: Store, file: Annotated[i
 
 
 @router.post("/{upload_id}/mapping", dependencies=WRITE)
-async def mapping(request: Request, upload_id: str, sent: Form) -> Response:
+async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     """Reads the files again, as a form says what they are."""
-    pending = _find(request, upload_id)
     base = pending.draft or (pending.rig.document if pending.rig is not None else {})
     pending.skin = sent.get(SKIN_FIELD, pending.skin or "").strip() or None
     pending.draft, wrong = mappings.document_of(sent, base)
@@ -154,67 +155,58 @@ async def mapping(request: Request, upload_id: str, sent: Form) -> Response:
     except InvalidInput as error:
         wrong.append(error)
     pending.refused = [entry for error in wrong for entry in field_errors(error)]
-    if wrong:
-        return see(f"/upload/{upload_id}")
-    pending.rig, pending.draft, pending.rig_label = rig, None, "rig.json"  # as the page saves it
-    async with READING_SLOTS:
-        await run_in_threadpool(_look, request, pending)
-    return see(f"/upload/{upload_id}")
+    if not wrong:
+        pending.rig, pending.draft, pending.rig_label = rig, None, "rig.json"  # as the page saves it
+        async with READING_SLOTS:
+            await run_in_threadpool(_look, request, pending)
+    return see(f"/upload/{pending.id}")
 
 
 @router.post("/{upload_id}/keep", dependencies=WRITE)
-async def keep(request: Request, upload_id: str, sent: Form, store: Store, table: Table) -> Response:
+async def keep(request: Request, sent: Form, pending: Pending, store: Store, table: Table) -> Response:
     """Keeps what is good of it."""
-    pending = _find(request, upload_id)
     async with READING_SLOTS:
         campaign_ids = await run_in_threadpool(keep_good, request, pending, sent, store)
         await run_in_threadpool(d33_cache.derive, store, table, campaign_ids)
-    return see(pending.kept_at or f"/upload/{upload_id}")
+    return see(pending.kept_at or f"/upload/{pending.id}")
 
 
 @router.post("/{upload_id}/skin", dependencies=[*WRITE, OWN_FORM])
-async def bring_in(request: Request, upload_id: str, store: Store) -> Response:
+async def bring_in(request: Request, pending: Pending, store: Store) -> Response:
     """Brings in an exported skin."""
-    pending = _find(request, upload_id)
     if pending.skin_summary is None:
         raise Missing("There is no exported skin in this upload.")
-    await exported_skin.bring_in(request, store, pending)
-    return see(pending.kept_at or f"/upload/{upload_id}")
+    async with skin_imports.one:
+        await run_in_threadpool(exported_skin.bring_in, request, store, pending)
+    return see(pending.kept_at or f"/upload/{pending.id}")
 
 
 @router.post("/{upload_id}/discard", dependencies=[*WRITE, OWN_FORM])
-def discard(request: Request, upload_id: str) -> Response:
+def discard(request: Request, pending: Pending) -> Response:
     """Removes it."""
-    request.app.state.pending_uploads.discard(_find(request, upload_id))
+    request.app.state.pending_uploads.discard(pending)
     return see("/upload")
 
 
 @router.get("/{upload_id}/rig.json")
-def rig_json(request: Request, upload_id: str) -> Response:
+def rig_json(pending: Pending) -> Response:
     """The rig description in use."""
-    rig = _find(request, upload_id).rig
-    if rig is None:
+    if pending.rig is None:
         raise Missing("There is no rig description yet.")
-    content = orjson.dumps(rig.document, option=orjson.OPT_INDENT_2)
-    headers = {"Content-Disposition": 'attachment; filename="rig.json"', "X-Content-Type-Options": "nosniff"}
-    return Response(content, headers=headers, media_type="application/json")
+    content = orjson.dumps(pending.rig.document, option=orjson.OPT_INDENT_2)
+    return attachment("rig.json", content, "application/json")
 
 
 @router.get("/{upload_id}/{file}/traces.csv")
-def traces_csv(request: Request, upload_id: str, file: int) -> Response:
+def traces_csv(request: Request, pending: Pending, file: int) -> Response:
     """The channels of a file's first part."""
-    return csv_answer("traces", trace_columns(_looked(request, _find(request, upload_id), file)))
+    return csv_answer("traces", trace_columns(_looked(request, pending, file)))
 
 
 @router.get("/{upload_id}/{file}/frf.csv")
-def frf_csv(request: Request, upload_id: str, file: int) -> Response:
+def frf_csv(request: Request, pending: Pending, file: int) -> Response:
     """The FRFs of a file."""
-    return csv_answer("frf", lines_columns(_looked(request, _find(request, upload_id), file)))
-
-
-def _find(request: Request, upload_id: str) -> PendingUpload:
-    pending_uploads: PendingUploads = request.app.state.pending_uploads
-    return pending_uploads.find(session.cookie_in(dict(request.scope["headers"])), upload_id)
+    return csv_answer("frf", lines_columns(_looked(request, pending, file)))
 
 
 def _looked(request: Request, pending: PendingUpload, number: int) -> InspectedFile:
@@ -232,7 +224,7 @@ def _look(request: Request, pending: PendingUpload) -> None:
         inspected = _looked(request, pending, number)
         recordings += sum(one.recordings for one in inspected.campaigns)
         require_few(len(summaries) + len(inspected.campaigns), recordings)
-        known = before_keeping.worth_knowing(request, inspected, pending.skin, pending.corrects)
+        known = worth_knowing(request, inspected, pending.skin, pending.corrects)
         summary = seen(upload, inspected, known)
         mapped = mapped_file(inspected, summary, pending.rig)
         layout = inspected.contents.layout if inspected.contents is not None else ""
@@ -244,13 +236,8 @@ def _look(request: Request, pending: PendingUpload) -> None:
 
 def _latest(store: Database, skin: str | None) -> Mapping[str, Any]:
     """What the latest campaign of a skin says of it."""
-    if skin is None:
-        return {}
-    with store.reading() as connection, suppress(Missing):
-        root = skins.require_root(connection, skin)
-        row = campaigns.latest(connection, root)
-        return {} if row is None else dict(row.about["skin"])
-    return {}
+    row = None if skin is None else store.read(campaigns.latest, skin)
+    return {} if row is None else dict(row.about["skin"])
 
 
 def _unsaid(pending: PendingUpload, file: FileSummary) -> bool:

@@ -10,7 +10,6 @@ import httpx
 import pytest
 
 from service.store import database, key_requirement, open_store
-from service.store.restore import keys_needed
 from tests.support.store_server import Place, Server, campaign, running
 
 on_sqlite = pytest.mark.parametrize("place", ["sqlite"], indirect=True)  # what no database does otherwise
@@ -215,7 +214,7 @@ def test_what_is_noted_stays_noted_from_when_it_was(place: Place) -> None:
             change(connection)
         with store.reading() as connection:
             noted.append(key_requirement.find(connection))
-        assert keys_needed(store) == (change is key_requirement.require)
+        assert store.read(key_requirement.is_needed) == (change is key_requirement.require)
     store.close()
     assert noted[0] == noted[1]
     assert database(place.database_url, place.folder).is_made()

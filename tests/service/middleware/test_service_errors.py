@@ -14,7 +14,7 @@ from service.auth.access_control import AccessControl
 from service.auth.key_requirement import KeyRequirement
 from service.auth.keys import KeyStore
 from service.middleware.asgi_middleware import AsgiMiddleware
-from service.pages.shared.problem import problem_page
+from service.pages.shared.html import problem_page
 from service.settings import Settings
 from service.store import open_store
 from tests.service.requests import D33, FRF, SIGMA, all_routes, problem_of

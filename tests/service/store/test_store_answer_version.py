@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import insert, select, text, update
 
 from service.schemas.campaign_d33 import ANSWER_VERSION, D33
-from service.store import campaigns, database, digests, migrate, open_store
+from service.store import campaigns, database, migrate, open_store
 from service.store.codec import compressed, decompressed
 from service.store.tables import inversions, sensor_d33
 from service.usecases import d33_cache
@@ -82,7 +82,7 @@ def test_what_a_store_of_the_first_schema_kept_is_computed_anew(place: Place, mo
         earlier.setattr(migrate, "VERSIONS", ("0001",))
         migrate.migrate(store, place.folder)
     with store.writing() as connection, monkeypatch.context() as earlier:
-        earlier.setattr(digests, "keep", lambda *_: None)  # a table of a later schema
+        earlier.setattr(campaigns, "keep_digests", lambda *_: None)  # a table of a later schema
         campaign_id, _ = campaigns.add(connection, campaigns.NewCampaign(parse(campaign("one")), "palm"))
         row = campaigns.find(connection, campaign_id)
         old = "INSERT INTO inversions (campaign, revision, table_sha256, document) VALUES (:campaign, 0, :table, :old)"

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from service.store import Database, backup, campaigns, open_store
-from service.store.restore import restore
+from service.store.migrate import restore
 from tests.support.store_server import Place, Server, campaign, running
 from underskin.recordings.campaign import parse
 
@@ -53,7 +53,7 @@ def test_what_is_acknowledged_during_a_restore_is_in_the_store_or_in_its_backup(
     place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = open_store(place.database_url, place.folder)
-    file, undo = (tmp_path / f"{name}{backup.suffix(store)}" for name in ("file", "undo"))
+    file, undo = (tmp_path / f"{name}" for name in ("file", "undo"))
     undo = place.folder / "backups" / undo.name
     backup.make(store, file)
     make = backup.make

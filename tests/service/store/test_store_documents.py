@@ -12,7 +12,7 @@ import pytest
 
 from service.store import Database, campaigns, open_store
 from service.store.tables import AnyRow
-from service.usecases import campaign_documents
+from service.usecases import campaigns as usecase
 from tests.support.store_server import Place, Server, campaign
 from underskin.recordings.campaign import parse, to_dict
 from underskin.recordings.readers import hdf5_file
@@ -51,7 +51,7 @@ def peak(work: Callable[[], object]) -> int:
 
 
 def consume(store: Database, row: AnyRow) -> None:
-    for _ in campaign_documents.json_parts(store, row):
+    for _ in usecase.json_parts(store, row):
         pass
 
 
@@ -62,10 +62,10 @@ def test_a_document_takes_the_memory_of_a_few_recordings(place: Place, tmp_path:
     with store.writing() as connection:
         campaign_id, _ = campaigns.add(connection, campaigns.NewCampaign(sent, "palm"))
         row = campaigns.find(connection, campaign_id)
-    assert orjson.loads(b"".join(campaign_documents.json_parts(store, row))) == to_dict(sent)
+    assert orjson.loads(b"".join(usecase.json_parts(store, row))) == to_dict(sent)
     assert peak(lambda: consume(store, row)) < RECORDINGS / 2 * ONE
     file = tmp_path / "large.h5"
-    assert peak(lambda: campaign_documents.write_hdf5(store, row, file)) < RECORDINGS / 2 * ONE
+    assert peak(lambda: usecase.write_hdf5(store, row, file)) < RECORDINGS / 2 * ONE
     with file.open("rb") as stream:
         assert to_dict(parse(hdf5_file.read(stream, ""))) == to_dict(sent)
     store.close()

@@ -8,7 +8,7 @@ import pytest
 
 from service.schemas.campaign_d33 import D33
 from service.store import Database, backup, campaigns, inversions, open_store
-from service.store.restore import restore
+from service.store.migrate import restore
 from service.store.tables import AnyRow
 from service.usecases import d33_cache
 from tests.support.store_server import Place, Server, campaign
@@ -89,7 +89,7 @@ def test_what_was_derived_before_a_restore_is_not_kept_for_another_campaign(stor
     empty = tmp_path / "empty"
     backup.make(store, empty)
     lost = kept(store, "lost")
-    restore(store, empty, tmp_path / "data" / "backups" / f"before{backup.suffix(store)}")
+    restore(store, empty, tmp_path / "data" / "backups" / "before")
     here = kept(store, "here")
     assert here.number == lost.number
     derive(store, lost)

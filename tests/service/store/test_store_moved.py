@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from service.routes.d33 import EXAMPLE as D33
-from service.routes.frf import EXAMPLE as FRF
+from service.routes.pressed_skin import D33_EXAMPLE as D33
+from service.routes.pressed_skin import FRF_EXAMPLE as FRF
 from tests.support.store_server import Place, Server, campaign, running
 
 DATABASE = "underskin.sqlite3"

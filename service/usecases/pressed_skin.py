@@ -1,44 +1,94 @@
-"""d33 of each sensor from its measured FRF, by the paper's model or by the adopted one."""
+"""The FRF that a skin should show, and d33 from measured FRF: by the paper's model or by the adopted one."""
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
-from service.schemas.columns_answer import Columns
-from service.schemas.d33 import D33Columns
-from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS
+from service.schemas.columns import Columns
+from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS, D33Columns, FrfColumns, PressedSkinColumns
 from service.store import Database
 from service.usecases.adopted_models import model_asked_for, press, require_paper
-from underskin.errors import ErrorCode, InvalidInput, conflicting, required
+from underskin.errors import ErrorCode, InvalidInput, conflicting, out_of_range, required
 from underskin.physics import charge_response
 from underskin.prediction import answers, plausibility
 from underskin.prediction.columns import rows
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Complexes, Floats, finite, non_negative
+from underskin.units import Complexes, Floats, checked, finite, non_negative, to_lab
 
+# A spectrum a row multiplies the answer; this is some 20 MB of JSON.
+_LARGEST_SPECTRA = 1_000_000
 _RESULTS = ("d33_pc_per_n", "d33_uncertainty_pc_per_n")
+
+
+def frf(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
+    """FRF for each row."""
+    if request.model == "adopted":
+        return _adopted_frf(table, store, request)
+    require_paper(request)
+    columns = _sent(request, *FIELDS, "d33_pc_per_n")
+    count = rows(columns)
+    answer = answers.frf(table, columns, request.units_checked)
+    frequency = _asked_lines(request)
+    results, shared = dict(answer.columns), {}
+    if frequency is not None:
+        results |= _flat_spectra(frequency, results["frf_pc_per_n"], count)
+        shared["frequency_hz"] = frequency
+    return Columns(count, request.model, table.sha256, answer.inside, results, shared, frequency)
+
+
+def _sent(request: PressedSkinColumns, *names: str) -> dict[str, Floats]:
+    """Those of these columns that the request has."""
+    return {name: request.column(name) for name in names if getattr(request, name) is not None}
+
+
+def _adopted_frf(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
+    columns = _sent(request, *FIELDS, "d33_pc_per_n", *ADOPTED_COLUMNS)
+    count = rows(columns)
+    pressed = press(model_asked_for(store, request), table, request, count)
+    pressed.require_lines("frequency_hz")
+    d33 = checked("d33_pc_per_n", columns["d33_pc_per_n"], units_checked=request.units_checked)
+    results = {**pressed.columns, "frf_pc_per_n": to_lab("frf_pc_per_n", d33 * pressed.level)}
+    inside = pressed.inside & np.isfinite(results["frf_pc_per_n"])
+    frequency = _asked_lines(request)
+    shared: dict[str, Any] = {"model_id": pressed.model_in_force.model_id}
+    if frequency is not None:
+        response = np.where(pressed.inside[:, None], pressed.response(frequency), np.nan + 0j)
+        lines = to_lab("frf_pc_per_n", 1.0) * d33[..., None] * response
+        results["frf_re_pc_per_n"] = lines.real
+        results["frf_im_pc_per_n"] = np.where(np.isnan(lines.real), np.nan, lines.imag)
+        shared["frequency_hz"] = frequency
+    return Columns(count, request.model, table.sha256, inside, results, shared, frequency)
+
+
+def _asked_lines(request: FrfColumns) -> Floats | None:
+    return None if request.frequency_hz is None else non_negative("frequency_hz", request.column("frequency_hz"))
+
+
+def _flat_spectra(frequency: Floats, frf: Floats, count: int) -> dict[str, Floats]:
+    """Real and imaginary part, rows × frequencies: flat and real in the paper's model."""
+    if count * len(frequency) > _LARGEST_SPECTRA:
+        allowed = f"rows times frequencies must be at most {_LARGEST_SPECTRA}"
+        raise out_of_range("frequency_hz", f"{count} rows, {len(frequency)} frequencies", allowed)
+    real = np.broadcast_to(frf[..., None], (count, len(frequency)))
+    return {"frf_re_pc_per_n": real, "frf_im_pc_per_n": np.where(np.isnan(real), np.nan, 0.0)}
 
 
 def d33(table: SigmaTable, store: Database, request: D33Columns) -> Columns:
     """d33 for each row."""
     if request.model == "adopted":
-        return _by_adopted_model(table, store, request)
+        return _adopted_d33(table, store, request)
     require_paper(request)
     measured = _plateau(request) if request.frf_pc_per_n is None else _given(request)
-    columns = {name: request.column(name) for name in FIELDS} | measured
+    columns = _sent(request, *FIELDS) | measured
     count = _rows(request, columns)
     answer = answers.d33(table, columns, request.units_checked)
     plateau = {name: answer.columns[name] for name in ("frf_pc_per_n", "frf_uncertainty_pc_per_n")}
     results = {name: answer.columns[name] for name in _RESULTS}
     leading = {name: values for name, values in answer.columns.items() if name not in plateau | results}
-    return Columns(
-        rows=count,
-        model=request.model,
-        table_sha256=table.sha256,
-        inside=answer.inside,
-        shared={"findings": [finding.in_columns() for finding in answer.findings]},
-        columns={**leading, **plateau, **measured, **results},
-    )
+    shared = {"findings": [finding.in_columns() for finding in answer.findings]}
+    columns = {**leading, **plateau, **measured, **results}
+    return Columns(count, request.model, table.sha256, answer.inside, columns, shared)
 
 
 def _rows(request: D33Columns, columns: Mapping[str, Floats]) -> int:
@@ -47,8 +97,8 @@ def _rows(request: D33Columns, columns: Mapping[str, Floats]) -> int:
     return rows({sent.get(name, name): values for name, values in columns.items()})
 
 
-def _by_adopted_model(table: SigmaTable, store: Database, request: D33Columns) -> Columns:
-    given = {name: request.column(name) for name in (*FIELDS, *ADOPTED_COLUMNS) if getattr(request, name) is not None}
+def _adopted_d33(table: SigmaTable, store: Database, request: D33Columns) -> Columns:
+    given = _sent(request, *FIELDS, *ADOPTED_COLUMNS)
     model_in_force = model_asked_for(store, request)
     if request.frf_pc_per_n is None:
         _require_lines(request)
@@ -62,15 +112,11 @@ def _by_adopted_model(table: SigmaTable, store: Database, request: D33Columns) -
         pressed.require_lines("frequency_hz")
     value = measured["frf_pc_per_n"] / pressed.level
     unsure = np.hypot(measured["frf_uncertainty_pc_per_n"] / pressed.level, value * pressed.columns["rel_error"])
+    columns = {**pressed.columns, **measured, **dict(zip(_RESULTS, (value, unsure), strict=True))}
     findings = [finding.in_columns() for finding in plausibility.of_rows(measured["frf_pc_per_n"], value)]
-    return Columns(
-        rows=len(pressed.level),
-        model=request.model,
-        table_sha256=table.sha256,
-        inside=pressed.inside & np.isfinite(value),
-        shared={"model_id": model_in_force.model_id, "findings": findings},
-        columns={**pressed.columns, **measured, "d33_pc_per_n": value, "d33_uncertainty_pc_per_n": unsure},
-    )
+    shared = {"model_id": model_in_force.model_id, "findings": findings}
+    inside = pressed.inside & np.isfinite(value)
+    return Columns(len(pressed.level), request.model, table.sha256, inside, columns, shared)
 
 
 def _given(request: D33Columns) -> dict[str, Floats]:
@@ -78,8 +124,7 @@ def _given(request: D33Columns) -> dict[str, Floats]:
     for name in sorted(request.json_only):
         if getattr(request, name) is not None:
             raise conflicting(name, "given", "goes with lines; leave it out, or leave out frf_pc_per_n")
-    sent = ("frf_pc_per_n", "frf_uncertainty_pc_per_n")
-    return {name: request.column(name) for name in sent if getattr(request, name) is not None}
+    return _sent(request, "frf_pc_per_n", "frf_uncertainty_pc_per_n")
 
 
 def _require_lines(request: D33Columns) -> None:
