@@ -51,11 +51,11 @@ _SPHERE = (
         unit="-",
         low=1.0,
         high=2.0,
-        prior=Uniform(),
+        prior=Normal(2.0, 0.3),
         scale="linear",
         limit=None,
         shown=2.0,
-        reason="m of J = 3 (I/3)^(m/2): 2 for laws of the invariant, 1 where the modulus grows with the strain itself",
+        reason="m of J = 3 (I/3)^(m/2): 2 for most elastomers, 1 where the modulus grows with the strain itself",
     ),
 )
 _YEOH = (
