@@ -175,6 +175,23 @@ def test_plain_least_squares_leaves_what_scipy_leaves(table: SigmaTable) -> None
     assert ours == pytest.approx(plain, rel=0.02)
 
 
+@pytest.mark.slow
+def test_a_drift_in_time_is_no_mismatch_where_the_file_has_no_times(table: SigmaTable) -> None:
+    """Way in, hold and way back at a steady rate; the zero runs off by 3 % of the largest force."""
+    random = np.random.default_rng(5)
+    depth = np.concatenate([np.linspace(-0.3, 0.2, 250), np.full(80, 0.2), np.linspace(0.2, -0.3, 250)])
+    hertz = 16 / 9 * 2.0 * np.sqrt(5.0) * np.maximum(depth, 0) ** 1.5
+    recordings = []
+    for number in range(3):
+        drift = 0.03 * hertz.max() * np.linspace(0, 1, len(depth)) + random.normal(0, 1e-3 * hertz.max(), len(depth))
+        curve = {"displacement_mm": (depth + 0.05 * number).tolist(), "force_n": (hertz + drift).tolist()}
+        recordings.append({"id": f"c{number}", "kind": "indentation", "indenter_radius_mm": 5.0, **curve})
+    skin = {"thickness_mm": 80.0, "youngs_modulus_mpa": 2.0, "poisson_ratio": 0.5}
+    document = {"schema": "campaign/1", "name": "drift", "skin": skin, "recordings": recordings}
+    report = diagnosis_report(parse(document), table)
+    assert (report["verdict"], report["probability"] > 0.95) == ("no_mismatch", True)
+
+
 def test_a_sensor_s_radius_is_no_matter_of_an_indentation(table: SigmaTable) -> None:
     displacement = np.linspace(-0.05, 0.3, 300)
     force = 2.0 * np.maximum(displacement, 0.0) ** 1.5 + 1e-4 * np.random.default_rng(5).normal(size=300)

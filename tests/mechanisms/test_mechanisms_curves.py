@@ -103,26 +103,28 @@ def test_the_stage_gives_by_force_over_stiffness() -> None:
 
 
 @pytest.mark.parametrize(
-    ("form", "law"),
+    ("form", "exponent", "law"),
     [
-        (1.0, lambda x: 1 + x),  # Yeoh
-        (0.0, np.exp),  # Demiray
-        (-1.0, lambda x: 1 / (1 - x)),  # Gent
-        (0.5, lambda x: (1 + 0.5 * x) ** 2),
+        (1.0, 2.0, lambda x: 1 + x),  # Yeoh
+        (0.0, 2.0, np.exp),  # Demiray
+        (-1.0, 2.0, lambda x: 1 / (1 - x)),  # Gent
+        (0.5, 2.0, lambda x: (1 + 0.5 * x) ** 2),
+        (1.0, 1.0, lambda x: 1 + np.sqrt(3 * 8.0 * x)),  # grows with the strain itself
     ],
 )
 def test_a_stiffening_contact_follows_the_law_s_secant_at_its_strain(
-    form: float, law: Callable[[Floats], Floats]
+    form: float, exponent: float, law: Callable[[Floats], Floats]
 ) -> None:
     depth = np.linspace(0.01, 0.5, 50)
     strain = 0.2 * np.sqrt(depth / R_MM)
     stretch = 1 - strain
     invariant = stretch**2 + 2 / stretch - 3
     ratio = (stretch**-2 - stretch) / (3 * strain) * law(8.0 * invariant)
-    found = force_at(["strain_stiffening"], depth, stiffening_coefficient=8.0, stiffening_form=form)
+    values = {"stiffening_coefficient": 8.0, "stiffening_form": form, "stiffening_exponent": exponent}
+    found = force_at(["strain_stiffening"], depth, **values)
     assert found == pytest.approx(ratio * hertz_force(depth, R_MM, E_MPA))
-    small = force_at(["strain_stiffening"], 1e-5 * depth + 1e-7, stiffening_coefficient=8.0, stiffening_form=form)
-    assert small == pytest.approx(hertz_force(1e-5 * depth + 1e-7, R_MM, E_MPA), rel=1e-3)
+    small = force_at(["strain_stiffening"], 1e-7 * depth + 1e-9, **values)
+    assert small == pytest.approx(hertz_force(1e-7 * depth + 1e-9, R_MM, E_MPA), rel=1e-3)
 
 
 def test_a_held_indentation_relaxes_to_what_is_left() -> None:

@@ -1,6 +1,7 @@
 """Documents of campaigns: whole, whatever their size, and with little of them in memory."""
 
 import io
+import time
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
@@ -83,5 +84,7 @@ def test_documents_of_any_number_of_recordings_are_whole(server: Server, count: 
     assert to_dict(parse(hdf5_file.read(io.BytesIO(answer.content), ""))) == sent
     with h5py.File(io.BytesIO(answer.content)) as file:
         assert len(file["recordings"]) == count
-    left = server.place.folder.glob("uploads/*/tmp*")
-    assert list(left) == []
+    deadline = time.monotonic() + 5  # the file goes once the answer is sent
+    while (left := list(server.place.folder.glob("uploads/*/tmp*"))) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert left == []

@@ -1,6 +1,7 @@
 """The mechanism `contact_creep`."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from underskin.units import Floats
 
 _RETURN = 0.05  # of the range of displacement: smaller returns are noise
 _FRACTION = "from a few percent in a well cured silicone to most of the modulus in a gel"
-_CURVE_TIME = "mean of the logarithms; an instrument sees milliseconds to hours"
+_CURVE_TIME = "mean of the logarithms; no shorter than the time between two samples; an instrument sees up to hours"
+_SHORTEST = 1e-3  # s, where the recordings have no times
 _SPREAD = "logarithm of the ratio of the two times: 0 is one pair; two times seldom lie a factor of 100 apart"
 _SHARE = "of the faster pair in the relaxed fraction"
 _TIME = "what a bench can see lies between seconds and an hour; 40 s within a factor of 4.5"
@@ -25,7 +27,9 @@ _ONE_PAIR = (
 )
 _TWO_PAIRS = (
     Parameter("relaxed_fraction", "-", 0.0, 0.95, Uniform(), "linear", limit=0.0, shown=0.4, reason=_FRACTION),
-    Parameter("relaxation_time", "s", 1e-3, 5e4, Normal(2.0, 2.5), "log", limit=None, shown=40.0, reason=_CURVE_TIME),
+    Parameter(
+        "relaxation_time", "s", _SHORTEST, 5e4, Normal(2.0, 2.5), "log", limit=None, shown=40.0, reason=_CURVE_TIME
+    ),
     Parameter("time_spread", "-", 0.0, 6.0, Normal(0.0, 1.5), "linear", limit=None, shown=0.0, reason=_SPREAD),
     Parameter("first_share", "-", 0.05, 0.95, Uniform(), "linear", limit=None, shown=0.5, reason=_SHARE),
 )
@@ -77,18 +81,17 @@ class ContactCreep(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """One Prony pair, or for indentations two: their sum, mean time, how far apart they lie, and their shares."""
-        return _TWO_PAIRS if kind == "indentation" else _ONE_PAIR
+        if kind != "indentation":
+            return _ONE_PAIR
+        fraction, time, *shares = _TWO_PAIRS
+        intervals = [np.median(np.diff(times)) for times in _times(conditions)]
+        return fraction, replace(time, low=max(float(min(intervals, default=0.0)), _SHORTEST)), *shares
 
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
         """Times that the recordings show, from a fiftieth of the longest to all of it."""
         if kind != "indentation":
             return ()
-        spans = [
-            float(np.ptp(entry.time_s))
-            for entry in conditions.recordings
-            if isinstance(entry, IndentationConditions) and entry.time_s is not None
-        ]
-        longest = max(spans, default=0.0)
+        longest = max((float(np.ptp(times)) for times in _times(conditions)), default=0.0)
         if not longest > 0:
             return ()
         return [(0.3, share * longest, spread, 0.5) for share in (0.02, 0.1, 0.4) for spread in (0.3, 2.0)]
@@ -128,6 +131,12 @@ class ContactCreep(Mechanism):
         spread, share = values["time_spread"], values["first_share"]
         fast, slow = time * exp(-spread * (1.0 - share)), time * exp(spread * share)
         curve.relaxation = (fraction * share, fast), (fraction * (1.0 - share), slow)
+
+
+def _times(conditions: Conditions) -> list[Floats]:
+    """Those of the indentations that have them [s]."""
+    indentations = (entry for entry in conditions.recordings if isinstance(entry, IndentationConditions))
+    return [entry.time_s for entry in indentations if entry.time_s is not None and len(entry.time_s) > 1]
 
 
 def _again(conditions: Conditions) -> str | None:

@@ -33,18 +33,29 @@ _SPHERE = (
         scale="log",
         limit=None,
         shown=5.0,
-        reason="c of (1 + q c I)^(1/q): 0.1 for a silicone (2 C20/C10), 1/Jm of Gent's law, 40 for tissue-like gels",
+        reason="c of (1 + q c J)^(1/q): 0.1 for a silicone (2 C20/C10), 1/Jm of Gent's law, 40 for tissue-like gels",
     ),
     Parameter(
         name="stiffening_form",
         unit="-",
-        low=-1.0,
-        high=1.0,
+        low=-2.0,
+        high=2.0,
         prior=Uniform(),
         scale="linear",
         limit=None,
         shown=1.0,
-        reason="q of (1 + q c I)^(1/q): 1 is Yeoh's law, 0 an exponential, -1 Gent's",
+        reason="q of (1 + q c J)^(1/q): 1 is Yeoh's law, 0 an exponential, -1 Gent's",
+    ),
+    Parameter(
+        name="stiffening_exponent",
+        unit="-",
+        low=1.0,
+        high=2.0,
+        prior=Normal(2.0, 0.3),
+        scale="linear",
+        limit=None,
+        shown=2.0,
+        reason="m of J = 3 (I/3)^(m/2): 2 for most elastomers, 1 where the modulus grows with the strain itself",
     ),
 )
 _YEOH = (
@@ -84,7 +95,8 @@ class StrainStiffening(Mechanism):
     law = (
         "FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved "
         "together. Curves: nominal stress (E/3)(λ⁻² − λ) f(I), I = λ² + 2/λ − 3, λ = 1 − strain; compression f = 1 + "
-        "2 c2 I + 3 c3 I² (Yeoh); under a sphere f = (1 + q c I)^(1/q), the secant ratio at ε multiplying the modulus."
+        "2 c2 I + 3 c3 I² (Yeoh); under a sphere f = (1 + q c J)^(1/q), J = 3 (I/3)^(m/2), the secant ratio "
+        "at ε multiplying the modulus."
     )
     assumptions = (
         "incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative strain; for "
@@ -116,7 +128,7 @@ class StrainStiffening(Mechanism):
     def on_curve(self, curve: Curve, values: Values) -> None:
         """Take the law."""
         if "stiffening_form" in values:
-            curve.stiffening = values["stiffening_coefficient"], values["stiffening_form"]
+            curve.stiffening = tuple(values[f"stiffening_{name}"] for name in ("coefficient", "form", "exponent"))
         else:
             curve.yeoh = values["second_over_first"], values["third_over_first"]
 

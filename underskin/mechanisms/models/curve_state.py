@@ -19,7 +19,7 @@ class Curve:
     layered: bool = False
     work_of_adhesion: Differentiated | None = None  # [J/m²]
     work_of_separation: Differentiated | None = None  # the same where it is no larger
-    stiffening: tuple[Differentiated, Differentiated] | None = None  # of an indentation: c and q (Stiffening)
+    stiffening: tuple[Differentiated, ...] | None = None  # of an indentation: c, q and m (Stiffening)
     yeoh: tuple[Differentiated, Differentiated] | None = None  # of a compression: c2 = C20/C10 and c3 = C30/C10
     relaxation: tuple[tuple[Differentiated, Differentiated], ...] = ()  # g and τ [s] of each Prony pair
     stage_stiffness: Differentiated | None = None  # [N/m]

@@ -41,19 +41,24 @@ _LARGEST_RATIO = 100.0  # of stiffening: Gent's law ends at its limit
 
 @dataclass(frozen=True)
 class Stiffening:
-    """(1 + q c I)^(1/q) of the invariant I = I1 − 3: Yeoh's law at q = 1, Demiray's exponential at 0, Gent's at −1."""
+    """(1 + q c J)^(1/q), J = 3 (I/3)^(m/2) of the invariant I = I1 − 3, about 3 ε^m at a strain ε.
+
+    At m = 2 Yeoh's law (q = 1), Demiray's exponential (0) and Gent's (−1); at m = 1 the modulus grows with the strain.
+    """
 
     coefficient: Floats  # c (points, 1, 1)
     form: Floats  # q
+    exponent: Floats  # m
 
     def secant_ratio(self, strain: Floats) -> Floats:
         """Nominal uniaxial stress at a compressive strain, over E times the strain."""
         safe = np.maximum(strain, 1e-9)
         stretch = 1.0 - safe
-        invariant = self.coefficient * (stretch * stretch + 2.0 / stretch - 3.0)
+        third = np.maximum(stretch * stretch + 2.0 / stretch - 3.0, 1e-18) / 3.0
+        growth = 3.0 * self.coefficient * third ** (0.5 * self.exponent)
         small = np.abs(self.form) < _EXPONENTIAL
         q = np.where(small, 1.0, self.form)
-        logarithm = np.where(small, invariant, np.log(np.maximum(1.0 + q * invariant, 1e-9)) / q)
+        logarithm = np.where(small, growth, np.log(np.maximum(1.0 + q * growth, 1e-9)) / q)
         excess = np.exp(np.minimum(logarithm, np.log(_LARGEST_RATIO)))
         return np.asarray((1.0 / stretch**2 - stretch) / (3.0 * safe) * excess)
 
