@@ -1,7 +1,7 @@
 """The mechanism `mains_pickup`."""
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,10 @@ _REACHED = 0.05  # of the shape
 _LEAST_LINES = 3
 _BESIDE = 9  # lines, the next in frequency, that say what is usual
 _LEAST_STRAY = 1e-6  # relative; of recordings without noise
+_CHARGE = "unshielded leads of some pF to mains at 230 V collect hundredths to tenths of a pC"
+_WIDTH = "the analyser's window and the mains' drift make lines a few Hz wide"
+_SHARE = "the n-th harmonic has about 1/n of the charge; a sine has none, rectifiers have more"
+_of_lines = partial(Parameter, scale="log", acts_on="line_variance")
 
 
 class MainsPickup(Mechanism):
@@ -50,42 +54,9 @@ class MainsPickup(Mechanism):
     moves_predictions = False
     figure = ("mains",)
     parameters_stated = (
-        Parameter(
-            name="pickup_charge",
-            unit="pC",
-            low=1e-4,
-            high=1e3,
-            prior=Normal(-3.0, 1.5),
-            scale="log",
-            limit=0.0,
-            shown=0.05,
-            acts_on="line_variance",
-            reason="unshielded leads of some pF to mains at 230 V collect hundredths to tenths of a pC",
-        ),
-        Parameter(
-            name="pickup_width",
-            unit="Hz",
-            low=0.2,
-            high=6.0,
-            prior=Normal(0.4, 0.6),
-            scale="log",
-            limit=None,
-            shown=1.5,
-            acts_on="line_variance",
-            reason="the analyser's window and the mains' drift make lines a few Hz wide",
-        ),
-        Parameter(
-            name="pickup_harmonics",
-            unit="-",
-            low=1e-3,
-            high=10.0,
-            prior=Normal(0.0, 1.5),
-            scale="log",
-            limit=None,
-            shown=1.0,
-            acts_on="line_variance",
-            reason="the n-th harmonic has about 1/n of the charge; a sine has none, rectifiers have more",
-        ),
+        _of_lines("pickup_charge", "pC", 1e-4, 1e3, Normal(-3.0, 1.5), limit=0.0, shown=0.05, reason=_CHARGE),
+        _of_lines("pickup_width", "Hz", 0.2, 6.0, Normal(0.4, 0.6), limit=None, shown=1.5, reason=_WIDTH),
+        _of_lines("pickup_harmonics", "-", 1e-3, 10.0, Normal(0.0, 1.5), limit=None, shown=1.0, reason=_SHARE),
     )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:

@@ -10,6 +10,7 @@ from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage,
 from underskin.recordings.conditions import Conditions, frf_of, offsets
 
 _LARGEST_MM = 2.0
+_REASON = "a tip centred by eye is off by some tenths of a millimetre to a millimetre"
 
 
 class Misalignment(Mechanism):
@@ -47,17 +48,7 @@ class Misalignment(Mechanism):
         directed = offsets(conditions).any() or any(other.needs_neighbours for other in others)
         shown, low = ({"offset_x": 0.6, "offset_y": 0.3}, -_LARGEST_MM) if directed else ({"offset": 0.7}, 0.0)
         return tuple(
-            Parameter(
-                name=name,
-                unit="mm",
-                low=low,
-                high=_LARGEST_MM,
-                prior=Normal(0.0, 0.7),
-                scale="linear",
-                limit=0.0,
-                shown=value,
-                reason="a tip centred by eye is off by some tenths of a millimetre to a millimetre",
-            )
+            Parameter(name, "mm", low, _LARGEST_MM, Normal(0.0, 0.7), "linear", limit=0.0, shown=value, reason=_REASON)
             for name, value in shown.items()
         )
 

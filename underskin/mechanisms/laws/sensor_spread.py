@@ -4,6 +4,8 @@ from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.recordings.conditions import Conditions, frf_of
 
+_REASON = "poled films and printed electrodes vary by some to 30 percent; 8 % within a factor of 2.5"
+
 
 class SensorSpread(Mechanism):
     """Sensors with different d33."""
@@ -29,16 +31,16 @@ class SensorSpread(Mechanism):
     moves_predictions = False
     parameters_stated = (
         Parameter(
-            name="spread",
-            unit="-",
-            low=0.02,
-            high=0.8,
-            prior=Normal(-2.5, 0.9),
-            scale="log",
-            limit=SENSOR_SPREAD,
-            shown=0.12,
+            "spread",
+            "-",
+            0.02,
+            0.8,
+            Normal(-2.5, 0.9),
+            "log",
+            SENSOR_SPREAD,
+            _REASON,
             acts_on="gain_spread",
-            reason="poled films and printed electrodes vary by some to 30 percent; 8 % within a factor of 2.5",
+            shown=0.12,
         ),
     )
 

@@ -46,7 +46,8 @@ class FrfDesign:
     row_frequency: Floats
 
     @classmethod
-    def of(cls, conditions: Conditions, fields: Collection[str], *, neighbours: bool) -> "FrfDesign":
+    @lru_cache(maxsize=8)  # by the conditions' identity: a diagnosis composes dozens of models of one campaign
+    def of(cls, conditions: Conditions, fields: frozenset[str], neighbours: bool) -> "FrfDesign":
         """The design; `fields` may name what else tells contacts apart: "dwell_s", "dynamic_force_n"."""
         recordings = frf_of(conditions)
         sensor_ids = tuple(sensor.id for sensor in conditions.skin.sensors)
@@ -100,12 +101,7 @@ class FrfDesign:
 
 def frf_design(conditions: Conditions, fields: Collection[str], *, neighbours: bool) -> FrfDesign:
     """`FrfDesign.of`, kept for the next model of the same conditions."""
-    return _kept(conditions, frozenset(fields) & {"dwell_s", "dynamic_force_n"}, neighbours)
-
-
-@lru_cache(maxsize=8)  # by the conditions' identity: a diagnosis composes dozens of models of one campaign
-def _kept(conditions: Conditions, fields: frozenset[str], neighbours: bool) -> FrfDesign:
-    return FrfDesign.of(conditions, fields, neighbours=neighbours)
+    return FrfDesign.of(conditions, frozenset(fields) & {"dwell_s", "dynamic_force_n"}, neighbours)
 
 
 def frequencies(entry: FrfConditions) -> Floats:

@@ -149,9 +149,7 @@ def offset_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_of
     return _kept(table, rt_over_h, stretch, min(PROFILE_END, float(np.ceil(2 * largest_offset) / 2)))
 
 
-@lru_cache(maxsize=8)
-def _kept(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> OffsetSigma:
-    return OffsetSigma(table, rt_over_h, stretch, largest_offset)
+_kept = lru_cache(maxsize=8)(OffsetSigma)
 
 
 def _windows(values: Floats) -> Floats:
