@@ -7,7 +7,6 @@ import pytest
 from underskin.errors import InvalidInput
 from underskin.figures import (
     SensorPoints,
-    Trace,
     array_map,
     d33_history,
     frf_recordings,
@@ -15,6 +14,7 @@ from underskin.figures import (
     raw_traces,
     response_per_sensor,
 )
+from underskin.recordings.channels import Channel
 from underskin.recordings.frf.summary import FrfLines
 
 SENSORS = ("s1", "s2", "s3")
@@ -64,7 +64,7 @@ def test_a_column_of_another_length_is_refused_by_name() -> None:
 def test_a_raw_trace_of_many_samples_keeps_its_extremes() -> None:
     values = np.sin(np.arange(100_000) / 50)
     values[[4_321, 77_777]] = 9.0, -8.0
-    figure = raw_traces([Trace("Load cell", "V", values), Trace("<b>", "", np.arange(5.0))], 1000.0)
+    figure = raw_traces([Channel("Load cell", "V", values), Channel("<b>", "", np.arange(5.0))], 1000.0)
     long, short = figure.data
     assert len(long.x) < 2_000
     assert dict(zip(long.x.tolist(), long.y.tolist(), strict=True))[4.321] == 9.0

@@ -168,15 +168,10 @@ def diagnosis_report(
 
 def with_refused(diagnosis: DiagnosisResult, refused: Sequence[RecordingProblem]) -> DiagnosisResult:
     """The diagnosis with recordings that were refused when they were read named first among its findings."""
-    problems = [
-        Finding(
-            Reason.REFUSED,
-            entry.recording,
-            entry.field,
-            {"field": entry.field, "value": entry.value, "allowed": entry.allowed},
-        )
-        for entry in refused
-    ]
+    problems = []
+    for entry in refused:
+        arguments = {"field": entry.field, "value": entry.value, "allowed": entry.allowed}
+        problems.append(Finding(Reason.REFUSED, entry.recording, entry.field, arguments))
     lacking = diagnosis.lacking
     if lacking and problems:
         lacking = replace(

@@ -10,14 +10,13 @@ from underskin.figures.design import Mark, array_response, design_overview
 from underskin.figures.frf import frf_overview, frf_recordings
 from underskin.figures.history import SensorPoints, array_history, d33_history
 from underskin.figures.loads import loaded_array, pressure_on_array
-from underskin.figures.traces import Trace, raw_traces
+from underskin.figures.traces import raw_traces
 
 __all__ = [
     "ForceCurve",
     "Mark",
     "Quantity",
     "SensorPoints",
-    "Trace",
     "array_history",
     "array_map",
     "array_response",

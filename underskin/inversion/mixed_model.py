@@ -59,13 +59,7 @@ class LevelRows:
 
     def part(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> "LevelRows":
         """Some of the rows."""
-        return LevelRows(
-            self.z[chosen],
-            self.line[chosen],
-            self.pilot[chosen],
-            self.position_mean[:, chosen],
-            self.position_variance[:, chosen],
-        )
+        return LevelRows(*(column[..., chosen] for column in vars(self).values()))
 
     def moments(self) -> tuple[Floats, Floats]:
         """E z over its sensor's d33, and 1/variance about it, each (positions, gains, rows)."""

@@ -28,9 +28,8 @@ from underskin.units import Floats
 SCHEMA = "skin-export/1"
 _ANY_SCHEMA = "skin-export/"
 _NOTHING = np.empty(0)
-_LIMITS = ParsingLimits(
-    unfolding=1000.0
-)  # a column of a simulated campaign may hold one value, and its gzip next to nothing
+# A column of a simulated campaign may hold one value, and its gzip next to nothing.
+_LIMITS = ParsingLimits(unfolding=1000.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +65,8 @@ def writing(file: Path, overview: Overview) -> Iterator[Any]:
     """A new file; the block adds the campaigns by `write_campaign`, one in memory at a time."""
     with h5py.File(file, "w", libver="latest") as target:
         target.attrs["schema"], target.attrs["skin"] = SCHEMA, overview.skin
-        _write_text(target, "skins", overview.skins)
-        _write_text(target, "rigs", overview.rigs)
-        _write_text(target, "diagnoses", overview.diagnoses)
-        _write_text(target, "models", overview.models)
+        for name in ("skins", "rigs", "diagnoses", "models"):
+            _write_text(target, name, getattr(overview, name))
         target.create_group("campaigns", track_order=True)
         yield target
 

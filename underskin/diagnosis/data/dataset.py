@@ -162,8 +162,7 @@ def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None, expect
         entries.append(FrfRecording.of_lines(entry, frequency, value))
         values.append(value)
         frequencies.append(frequency)
-        coherence = measured.coherence
-        coherences.append(np.full(len(order), np.nan) if coherence is None else coherence[order])
+        coherences.append(measured.coherence_or_nan[order])
         unevens.append((uneven or {}).get(entry.id, np.ones(len(measured.values)))[order])
         sensors.append(numbers[entry.sensor])
     recording = np.repeat(np.arange(len(values)), [len(value) for value in values]).astype(np.intp)

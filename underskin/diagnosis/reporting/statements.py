@@ -115,11 +115,7 @@ def power_statement(power: Sequence[Power], kind: Kind) -> str:
     if not shown:
         return f"None of the {all_of_them} known mechanisms would have shown with {_SMALL:g} % of the response."
     which = f"these {len(shown)} would each have shown with {_SMALL:g} % of the response"
-    return f"Of the {all_of_them} known mechanisms {which}: {_separated(shown)}."
-
-
-def _separated(names: Sequence[str]) -> str:
-    return ", ".join(in_words([name]) for name in names)
+    return f"Of the {all_of_them} known mechanisms {which}: {', '.join(in_words([name]) for name in shown)}."
 
 
 def _laws(names: Sequence[str]) -> str:

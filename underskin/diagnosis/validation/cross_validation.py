@@ -8,7 +8,7 @@ sensors' gains where the sensor was not seen.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from underskin.diagnosis.inference.curve_nuisances import cell_response
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.noise.noise_levels import NoiseLevels
 from underskin.diagnosis.selection.search import log_prior
-from underskin.mechanisms.models.composed import Prediction, compose
+from underskin.mechanisms.models.composed import compose
 from underskin.recordings.conditions import curves_of, frf_of
 from underskin.units import Floats
 
@@ -43,14 +43,7 @@ class PredictionScore:
     pickup: float = 0.0  # that part of `noise` which is mains pick-up
 
     def __add__(self, other: "PredictionScore") -> "PredictionScore":
-        return PredictionScore(
-            self.square + other.square,
-            self.size + other.size,
-            self.noise + other.noise,
-            self.log_score + other.log_score,
-            self.recordings + other.recordings,
-            self.pickup + other.pickup,
-        )
+        return PredictionScore(*(one + more for one, more in zip(astuple(self), astuple(other), strict=True)))
 
     @property
     def rmse_percent(self) -> float:
@@ -154,21 +147,20 @@ def _predict(
     whole = model.predict(point.fit)
     if left.curves:
         return _predict_curves(problem.lines, levels, whole.value.real, rows, smaller)
-    prediction, pickup_variance = _some(whole, rows), whole.pickup_variance
     seen = np.isin(left.sensor, smaller.lines.sensor)
     gains = np.zeros(max(int(left.sensor.max()), int(smaller.lines.sensor.max())) + 1)
     fitted_gains = explanation.best.sensor_gains
     gains[: len(fitted_gains)] = fitted_gains
     # A contact on an extremum of σ feels positioning scatter in second order, as in the likelihood
     p2, curvature, recording = levels.position**2, problem.curvature, problem.lines.recording[rows]
-    value = prediction.value * np.exp(gains[left.sensor])[left.recording]
+    value = whole.value[rows] * np.exp(gains[left.sensor])[left.recording]
     value = value * np.exp(0.5 * p2 * curvature.laplacian)[recording]
     scatter = levels.gain**2 + np.where(seen, 0.0, levels.spread**2)
     noise = scatter[left.recording] * np.abs(value) ** 2 + 2 * (levels.level * left.deviation) ** 2
-    if prediction.position_slopes is not None:
-        noise = noise + p2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
+    if whole.position_slopes is not None:
+        noise = noise + p2 * (np.abs(whole.position_slopes[:, rows]) ** 2).sum(axis=0)
         noise = noise + 0.5 * p2**2 * curvature.square[recording] * np.abs(value) ** 2
-    pickup_noise = 2 * pickup_variance[rows]
+    pickup_noise = 2 * whole.pickup_variance[rows]
     noise = noise + pickup_noise
     square = np.abs(left.value - value) ** 2
     return replace(_scored(left.first, square, noise, np.abs(value) ** 2), pickup=float(pickup_noise.sum()))
@@ -199,20 +191,10 @@ def _scored(first: NDArray[np.intp], square: Floats, noise: Floats, size: Floats
 
 def total(held_out: Sequence[HeldOut]) -> tuple[PredictionScore, PredictionScore]:
     """Before and after, over all groups."""
-    before, after = PredictionScore(), PredictionScore()
-    for entry in held_out:
-        before, after = before + entry.before, after + entry.after
-    return before, after
+    none = PredictionScore()
+    return sum((entry.before for entry in held_out), none), sum((entry.after for entry in held_out), none)
 
 
 def in_sample(problem: FittingProblem, explanation: Explanation) -> PredictionScore:
     """The recordings that the explanation was fitted to."""
     return _predict(problem, explanation, problem, np.ones(len(problem.lines.value), dtype=bool))
-
-
-def _some(whole: Prediction, rows: NDArray[np.bool_]) -> Prediction:
-    return replace(
-        whole,
-        value=whole.value[rows],
-        position_slopes=None if whole.position_slopes is None else whole.position_slopes[:, rows],
-    )

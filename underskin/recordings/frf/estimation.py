@@ -47,6 +47,11 @@ class Frf:
     passes: Floats | None = None
 
     @property
+    def coherence_or_nan(self) -> Floats:
+        """γ² of each line, NaN where it is not known."""
+        return np.full(len(self.values), np.nan) if self.coherence is None else self.coherence
+
+    @property
     def relative_uncertainty(self) -> Floats | None:
         """Standard uncertainty of log|FRF|, and of the phase in radians; None where n is not known."""
         if self.coherence is None or self.averages is None:

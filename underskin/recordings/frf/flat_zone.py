@@ -63,18 +63,8 @@ def stacked(frfs: Sequence[Frf]) -> list[Stack]:
         members.setdefault(frf.frequency.tobytes(), []).append(row)
     stacks = []
     for rows in members.values():
-        coherence = [
-            np.full(len(frfs[row].values), np.nan) if frfs[row].coherence is None else frfs[row].coherence
-            for row in rows
-        ]
-        stacks.append(
-            Stack(
-                np.array(rows),
-                frfs[rows[0]].frequency,
-                np.array([frfs[row].values for row in rows]),
-                np.array(coherence),
-            )
-        )
+        values, coherence = ([frfs[row].values for row in rows], [frfs[row].coherence_or_nan for row in rows])
+        stacks.append(Stack(np.array(rows), frfs[rows[0]].frequency, np.array(values), np.array(coherence)))
     return stacks
 
 
@@ -111,20 +101,16 @@ def flat_zone(
     if band_hz is not None:
         inside = (frequencies >= band_hz[0]) & (frequencies <= band_hz[1])
         if not inside.any():
-            raise too_few(
-                "band_hz",
-                list(band_hz),
-                f"must hold at least one line; they lie at {frequencies[0]:g} to {frequencies[-1]:g} Hz",
-            )
+            allowed = f"must hold at least one line; they lie at {frequencies[0]:g} to {frequencies[-1]:g} Hz"
+            raise too_few("band_hz", list(band_hz), allowed)
         return FlatZone(*band_hz, "the band given by the user", mains, chosen_by_user=True)
     edges = _edges(frequencies)
     ratio = _binned(stacks, edges, mains)
     names, curves, noise = _by_condition(ratio, conditions)
     filled = np.flatnonzero(np.isfinite(curves).any(axis=0))
     if len(filled) < 2:
-        return FlatZone(
-            frequencies[0], frequencies[-1], "the whole recorded range: too few lines to look for less", mains
-        )
+        reason = "the whole recorded range: too few lines to look for less"
+        return FlatZone(frequencies[0], frequencies[-1], reason, mains)
     middle = np.sqrt(edges[1:] * edges[:-1])[filled]
     curves, noise = curves[:, filled], noise[:, filled]
     first, last, slope = _widest(np.log(middle), curves, noise)
@@ -199,10 +185,10 @@ def _mains_lines(stacks: Sequence[Stack]) -> tuple[float, ...]:
         near = np.abs(stack.frequency[:, None] - harmonics).min(axis=1) <= HARMONIC_WIDTH_HZ
         if not near.any() or len(near) < _NEIGHBOURS:
             continue
-        smooth = median_filter(stack.values.real, (1, _NEIGHBOURS), mode="nearest") + 1j * median_filter(
-            stack.values.imag, (1, _NEIGHBOURS), mode="nearest"
+        real, imaginary = (
+            median_filter(part, (1, _NEIGHBOURS), mode="nearest") for part in (stack.values.real, stack.values.imag)
         )
-        scatter = np.median(np.abs(stack.values - smooth), axis=0)
+        scatter = np.median(np.abs(stack.values - (real + 1j * imaginary)), axis=0)
         beside = median_filter(np.where(near, np.median(scatter[~near]), scatter), _NEIGHBOURS, mode="nearest")
         few = 1 + 1.5 / np.sqrt(len(stack.rows))  # scatter over few recordings is itself unsure
         lines = stack.frequency[near & (scatter > _OUTSTANDING * few * beside)]
@@ -227,9 +213,8 @@ def _binned(stacks: Sequence[Stack], edges: Floats, mains: tuple[float, ...]) ->
         kept = ~np.isin(np.round(stack.frequency, 6), mains)
         bins = np.clip(np.searchsorted(edges, stack.frequency, side="right") - 1, 0, len(edges) - 2)
         for number in np.unique(bins[kept]):
-            ratio[stack.rows[plain], number] = np.median(
-                real[np.ix_(plain, kept & (bins == number))] / level[plain, None], axis=1
-            )
+            lines = real[np.ix_(plain, kept & (bins == number))]
+            ratio[stack.rows[plain], number] = np.median(lines / level[plain, None], axis=1)
     return ratio
 
 
@@ -274,10 +259,9 @@ def _widest(log_frequency: Floats, curves: Floats, noise: Floats) -> tuple[int, 
         for last in range(bins - 1, first - 1, -1):
             if log_frequency[last] - log_frequency[first] <= width:
                 break
-            slope = _slope(log_frequency[first : last + 1], curves[-1, first : last + 1])
-            if _is_flat(
-                log_frequency[first : last + 1], curves[:, first : last + 1], noise[:, first : last + 1], slope
-            ):
+            part = slice(first, last + 1)
+            slope = _slope(log_frequency[part], curves[-1, part])
+            if _is_flat(log_frequency[part], curves[:, part], noise[:, part], slope):
                 best, width = (first, last, slope), float(log_frequency[last] - log_frequency[first])
                 break
     return best

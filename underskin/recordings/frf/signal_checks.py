@@ -108,7 +108,9 @@ def _overload(signal: Floats) -> NDArray[np.bool_]:
         return mask
     for end, neighbour in ((0, 1), (-1, -2)):
         if counts[end] > _CLIPPED_RATIO * counts[neighbour]:
-            mask |= _in_long_runs(signal == levels[end], _CLIPPED_RUN)
+            for first, count in _runs(signal == levels[end]):
+                if count >= _CLIPPED_RUN:
+                    mask[first : first + count] = True
     return mask
 
 
@@ -140,14 +142,6 @@ def _jumps(signal: Floats) -> NDArray[np.bool_]:
     scale = np.repeat(around, [len(part) for part in parts])
     mask[1:-1] = (bend > _JUMP * scale) & (scale > 0)
     return mask
-
-
-def _in_long_runs(mask: NDArray[np.bool_], shortest: int) -> NDArray[np.bool_]:
-    long = np.zeros_like(mask)
-    for first, count in _runs(mask):
-        if count >= shortest:
-            long[first : first + count] = True
-    return long
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -135,8 +135,8 @@ def _rising_crossings(signal: Floats) -> Floats:
     threshold = 0.3 * np.quantile(np.abs(middle), 0.9)
     state = np.where(middle > threshold, 1, np.where(middle < -threshold, -1, 0))
     marks = np.flatnonzero(state)
-    rises = marks[1:][(state[marks[1:]] == 1) & (state[marks[:-1]] == -1)]
-    before = marks[:-1][(state[marks[1:]] == 1) & (state[marks[:-1]] == -1)]
+    rising = (state[marks[1:]] == 1) & (state[marks[:-1]] == -1)
+    before, rises = marks[:-1][rising], marks[1:][rising]
     low, high = middle[before], middle[rises]
     return before + (rises - before) * low / (low - high)
 

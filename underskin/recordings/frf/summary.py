@@ -11,13 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.recordings.frf.estimation import Frf
-from underskin.recordings.frf.flat_zone import Stack, stacked
+from underskin.recordings.frf.flat_zone import Condition, Stack, stacked
 from underskin.units import Complexes, Floats, to_lab
 
 MOST_LINES = 240  # of one recording
 MOST_BINS = 80  # of a spread
-
-Condition = tuple[float, float]  # indenter radius [mm], preload [N]
 
 
 @dataclass(frozen=True)
@@ -46,10 +44,9 @@ class FrfSpread:
 
 def lines_of(name: str, frf: Frf) -> FrfLines:
     """A recording's lines, thinned to MOST_LINES: of each bin those of the smallest and the largest magnitude."""
-    coherence = np.full(len(frf.values), np.nan) if frf.coherence is None else frf.coherence
     magnitude, phase = _polar(frf.values)
     chosen = _extremes(frf.frequency, magnitude)
-    return FrfLines(name, frf.frequency[chosen], magnitude[chosen], phase[chosen], coherence[chosen])
+    return FrfLines(name, frf.frequency[chosen], magnitude[chosen], phase[chosen], frf.coherence_or_nan[chosen])
 
 
 def spreads(frfs: Sequence[Frf], conditions: Sequence[Condition]) -> list[FrfSpread]:

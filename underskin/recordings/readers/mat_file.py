@@ -25,7 +25,8 @@ def read(stream: BinaryIO, file: str) -> Contents:
     is_73 = stream.read(len(MAGIC_73)) == MAGIC_73
     stream.seek(0)
     with damage_said(file, "", lambda error: f"no MATLAB file: {type(error).__name__}: {error}"):
-        variables = _variables_73(stream, file) if is_73 else _variables_5(stream)
+        # SciPy's stubs know paths alone
+        variables = _variables_73(stream, file) if is_73 else scipy.io.loadmat(stream, simplify_cells=True)  # type: ignore[arg-type]
     return _contents({name: value for name, value in variables.items() if not name.startswith("__")})
 
 
@@ -55,10 +56,6 @@ def _channels(name: str, value: Any) -> Iterator[Channel]:
     elif values.ndim == 2 and values.shape[1] <= _MOST_COLUMNS:
         for column in range(values.shape[1]):
             yield Channel(f"{name}(:,{column + 1})", "", values[:, column])
-
-
-def _variables_5(stream: Any) -> dict[str, Any]:
-    return scipy.io.loadmat(stream, simplify_cells=True)
 
 
 def _variables_73(stream: BinaryIO, file: str) -> dict[str, Any]:
