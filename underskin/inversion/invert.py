@@ -8,6 +8,7 @@ declared and the base model as it stands: `declared_percent` says by how much d3
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +62,12 @@ class RecordingD33:
     d33: Floats
     d33_uncertainty: Floats
     inside: NDArray[np.bool_]  # contact within the table's domain, and a line in the band with a charge that can be
+
+    @cached_property
+    def condition(self) -> NDArray[np.intp]:
+        """The number of each one's indenter and preload together."""
+        both = np.column_stack([self.indenter_radius, self.preload])
+        return np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
 
 
 @dataclass(frozen=True)
@@ -273,9 +280,8 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
 def _outliers(rows: RecordingD33, position: Floats) -> NDArray[np.intp]:
     """The rows inside whose d33 is far off all others; `position` as for `outlying`."""
     good = np.flatnonzero(rows.inside)
-    condition = np.unique(np.column_stack([rows.indenter_radius, rows.preload])[good], axis=0, return_inverse=True)[1]
-    far = outlying(rows.sensor[good], condition.reshape(-1), rows.d33[good], rows.d33_uncertainty[good], position[good])
-    return good[far]
+    d33, noise = rows.d33[good], rows.d33_uncertainty[good]
+    return good[outlying(rows.sensor[good], rows.condition[good], d33, noise, position[good])]
 
 
 def _expected_scatter(model: MixedModel, rows: LevelRows) -> Floats:

@@ -125,7 +125,7 @@ def scatter_flags(
     lines = rows.line_scatter[good] * np.abs(level)
     line_of = np.array([np.median(lines[member == index]) for index in range(len(numbers))])
     usual = float(np.median(line_of))
-    rest = _beyond_common(level, member, rows.indenter_radius[good], rows.preload[good])
+    rest = _beyond_common(level, member, rows.condition[good])
     alarm = _FALSE_ALARMS / len(numbers)
     flags = []
     for index, name in enumerate(ids[number] for number in numbers):
@@ -140,14 +140,13 @@ def scatter_flags(
     return flags
 
 
-def _beyond_common(level: Floats, member: NDArray[np.intp], radius: Floats, preload: Floats) -> Floats:
+def _beyond_common(level: Floats, member: NDArray[np.intp], condition: NDArray[np.intp]) -> Floats:
     """Each recording over its sensor's median, less what its condition does to all sensors (three or more)."""
     median = np.array([np.median(level[member == index]) for index in range(member.max() + 1)])
     own = level / median[member]
     rest = own - 1
-    conditions = np.unique(np.column_stack([radius, preload]), axis=0, return_inverse=True)[1].reshape(-1)
-    for number in range(conditions.max() + 1):
-        alike = conditions == number
+    for number in np.unique(condition):
+        alike = condition == number
         if len(np.unique(member[alike])) > 2:
             rest[alike] = own[alike] - np.median(own[alike])
     return rest

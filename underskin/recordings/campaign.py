@@ -55,9 +55,9 @@ class FrfRecording(FrfConditions):
         cls, conditions: FrfConditions, frequency: Floats, values: Complexes, coherence: Floats | None = None
     ) -> Self:
         """The recording of an FRF `values` [C/N] at lines `frequency` [Hz], in other conditions as these."""
-        known = {entry.name: getattr(conditions, entry.name) for entry in fields(FrfConditions)}
-        lines = {"frf_re_pc_per_n": 1e12 * values.real, "frf_im_pc_per_n": 1e12 * values.imag, "coherence": coherence}
-        return cls(**{**known, "frequency_hz": frequency, **lines})
+        known = vars(conditions.without_measurements(frequency_hz=frequency))
+        real, imaginary = 1e12 * values.real, 1e12 * values.imag
+        return cls(**known, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary, coherence=coherence)
 
 
 @dataclass(frozen=True, eq=False)
