@@ -25,12 +25,12 @@ from underskin.physics.charge_response import gain
 from underskin.physics.skin import Indenter, Skin
 from underskin.prediction import domain_checks
 from underskin.prediction.domain_checks import usable
-from underskin.prediction.pressed_skin import Transmission, frf_gradient, transmission
+from underskin.prediction.pressed_skin import frf_gradient, transmission
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.recordings.frf.flat_zone import FlatZone, band_average, flat_zone, stacked
 from underskin.recordings.plausibility import implausible
-from underskin.surrogate.off_centre_sigma import PositionedSigma, positioned_sigma
+from underskin.surrogate.off_centre_sigma import positioned_sigma
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_lab, to_si
 
@@ -138,7 +138,7 @@ def invert(
     frfs = stacked(measured)
     zone = zone or flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
-    contact = _Contact.of(campaign, recorded, table)
+    contact = _Contact(campaign, recorded, table)
     inside = usable(level, noise, contact.positioned.sigma, contact.transmitted)
     reasons = domain_checks.reasons(recorded, campaign.skin, contact.transmitted, level, table)
     left_out += [reason for reason, good in zip(reasons, inside, strict=True) if not good]
@@ -190,17 +190,10 @@ def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfReco
     return frfs, with_frf, left_out
 
 
-@dataclass(frozen=True)
 class _Contact:
-    """What the base model says of each recording's contact."""
+    """What the base model says of each recording's contact; `declared`: relative change of FRF for E and h off."""
 
-    transmitted: Transmission
-    positioned: PositionedSigma
-    thickness: float
-    declared: Floats  # relative change of FRF for E and h off
-
-    @classmethod
-    def of(cls, campaign: Campaign, recorded: Sequence[FrfRecording], table: SigmaTable) -> "_Contact":
+    def __init__(self, campaign: Campaign, recorded: Sequence[FrfRecording], table: SigmaTable) -> None:
         described = campaign.skin
         assert described.thickness_mm is not None
         assert described.youngs_modulus_mpa is not None
@@ -214,13 +207,13 @@ class _Contact:
         )
         indenter = Indenter(to_si("indenter_radius_mm", [item.indenter_radius_mm for item in recorded]))
         preload = to_si("preload_n", [item.preload_n for item in recorded])
-        transmitted = transmission(table, skin, indenter, preload)
+        self.transmitted = transmitted = transmission(table, skin, indenter, preload)
         centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in described.sensors}
         offset = [
             np.hypot(*np.subtract(item.position_mm or centres[item.sensor], centres[item.sensor])) for item in recorded
         ]
-        thickness = float(skin.thickness)
-        positioned = positioned_sigma(
+        self.thickness = thickness = float(skin.thickness)
+        self.positioned = positioned_sigma(
             table,
             transmitted.a_over_h,
             float(skin.rt_over_h),
@@ -230,11 +223,10 @@ class _Contact:
         )
         slopes = frf_gradient(table, skin, indenter, preload, 1.0)
         size = transmitted.frf(1.0)
-        declared = np.hypot(
+        self.declared = np.hypot(
             slopes["youngs_modulus"] * skin.youngs_modulus * _MODULUS_UNSURE / size,
             slopes["thickness"] * thickness * _THICKNESS_UNSURE / size,
         )
-        return cls(transmitted, positioned, thickness, declared)
 
 
 def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone: FlatZone) -> Inversion:
