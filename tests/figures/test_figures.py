@@ -5,15 +5,10 @@ import plotly.graph_objects as go
 import pytest
 
 from underskin.errors import InvalidInput
-from underskin.figures import (
-    SensorPoints,
-    array_map,
-    d33_history,
-    frf_recordings,
-    frf_versus_preload,
-    raw_traces,
-    response_per_sensor,
-)
+from underskin.figures.array import array_map, frf_versus_preload, response_per_sensor
+from underskin.figures.frf import frf_recordings
+from underskin.figures.history import SensorPoints, d33_history
+from underskin.figures.traces import raw_traces
 from underskin.recordings.channels import Channel
 from underskin.recordings.frf.summary import FrfLines
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from underskin.figures import array_map, frf_versus_preload, response_per_sensor
+from underskin.figures.array import array_map, frf_versus_preload, response_per_sensor
 from underskin.inversion.invert import Inversion
 from underskin.physics.charge_response import gain
 from underskin.recordings.campaign import Campaign

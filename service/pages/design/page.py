@@ -186,7 +186,7 @@ def _computed(request: Request, table: SigmaTable) -> DesignAnswer:
 def _answered(
     table: SigmaTable, asked: DesignRequest, own: Mapping[str, float], skin: str | None
 ) -> tuple[DesignAnswer, list[Drawn]]:
-    from underskin.figures import Mark, array_response, design_overview
+    from underskin.figures.design import Mark, array_response, design_overview
 
     with np.errstate(all="ignore"):
         designed = design_of(table, asked)

@@ -182,7 +182,7 @@ def _history_by(store: Database, table: SigmaTable, root: str, by: By) -> Histor
 
 
 def _map(root: str, row: AnyRow, answer: Mapping[str, Any], history: History, show: Shown, by: By) -> Drawn:
-    from underskin.figures import Quantity, array_map
+    from underskin.figures.array import Quantity, array_map
 
     places = {entry["id"]: entry for entry in row.about["skin"]["sensors"]}
     entries = answer["sensors"]
@@ -222,7 +222,7 @@ def _range(known: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _history(root: str, history: History, sensor: str | None, by: By) -> Drawn:
-    from underskin.figures import SensorPoints, array_history, d33_history
+    from underskin.figures.history import SensorPoints, array_history, d33_history
 
     numbers = f"/skins/{quote(root, safe='')}/history.csv?model={by}"
     rests = "by the adopted model" if by == "adopted" else "by the paper's model"

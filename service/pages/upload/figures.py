@@ -26,7 +26,7 @@ def figures(look: InspectedFile, place: str, mapped: MappedFile | None) -> list[
 
 def _mapped_curves(mapped: MappedFile | None) -> list[Drawn]:
     """Force against displacement as soon as a mapping has both, be the sphere's radius known or not."""
-    from underskin.figures import ForceCurve, force_curves
+    from underskin.figures.curves import ForceCurve, force_curves
 
     recordings = [] if mapped is None else [one for one in mapped.document["recordings"] if one["kind"] != "frf"]
     curves = [
@@ -66,7 +66,7 @@ def _campaigns(look: InspectedFile) -> list[Campaign]:
 
 
 def _traces(look: InspectedFile, place: str) -> list[Drawn]:
-    from underskin.figures import raw_traces
+    from underskin.figures.traces import raw_traces
 
     if look.contents is None or not look.contents.blocks:
         return []
@@ -85,7 +85,7 @@ def _traces(look: InspectedFile, place: str) -> list[Drawn]:
 
 
 def _frf(campaigns: list[Campaign], place: str) -> list[Drawn]:
-    from underskin.figures import frf_recordings
+    from underskin.figures.frf import frf_recordings
     from underskin.recordings.frf import summary
 
     measured_frfs = [entry for campaign in campaigns for entry in measured(campaign)]
