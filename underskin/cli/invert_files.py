@@ -69,7 +69,7 @@ def invert_files(
     from rich.console import Console
     from rich.progress import Progress
 
-    from underskin.recordings import validation
+    from underskin.recordings import join, validation
 
     if together is not None:
         validation.name("together", together, False)
@@ -88,8 +88,12 @@ def invert_files(
     console = Console(stderr=True)
     errors = _FileErrors(console)
     with Progress(console=console, redirect_stdout=False, disable=not console.is_terminal) as progress:
-        readings = _readings(progress.track(files, description="inverting"), description, errors)
-        for name, reading in readings if together is None else _joined(together, list(readings)):
+        readings: Iterable[tuple[str, Reading]] = _readings(
+            progress.track(files, description="inverting"), description, errors
+        )
+        if together is not None and (every := list(readings)):
+            readings = [(together, join(together, every))]
+        for name, reading in readings:
             with errors.about(name):
                 result = _inverted(name, reading, table, band_hz)
                 _write_page(result, pages.get(name))
@@ -109,13 +113,6 @@ def _readings(
         with errors.about(str(file)):
             reading = read_file(file, str(file), rig)
             yield str(file), reading
-
-
-def _joined(name: str, readings: "Sequence[tuple[str, Reading]]") -> "list[tuple[str, Reading]]":
-    """All of them as one; none where there is none."""
-    from underskin.recordings import join
-
-    return [(name, join(name, readings))] if readings else []
 
 
 def _inverted(name: str, reading: "Reading", table: "SigmaTable", band_hz: _BandHz | None) -> "InvertedFile":

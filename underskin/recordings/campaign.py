@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from underskin.errors import (
     ErrorCode,
@@ -74,7 +75,8 @@ class CompressionRecording(CompressionConditions):
     force_n: field.Series
 
 
-Recording = FrfRecording | IndentationRecording | CompressionRecording
+CurveRecording = IndentationRecording | CompressionRecording
+Recording = FrfRecording | CurveRecording
 KINDS: dict[str, type[Recording]] = {
     "frf": FrfRecording,
     "indentation": IndentationRecording,
@@ -113,6 +115,12 @@ class RecordingProblem:
     def as_error(self, field: str) -> InvalidInput:
         """The problem as an error of a field."""
         return InvalidInput(field, self.value, self.allowed, code=self.code)
+
+
+def samples_of(curve: CurveRecording, rows: NDArray[Any]) -> CurveRecording:
+    """A curve with only some of its samples."""
+    time = None if curve.time_s is None else curve.time_s[rows]
+    return replace(curve, displacement_mm=curve.displacement_mm[rows], force_n=curve.force_n[rows], time_s=time)
 
 
 def frf_recordings(campaign: Campaign) -> list[FrfRecording]:

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from underskin.errors import InvalidInput, too_few, unequal_lengths, unusable
-from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
 from underskin.units import Floats, to_lab, to_si
 
 _STRAIGHT = 0.02  # largest departure from a straight line, of the stress it spans
@@ -78,22 +78,20 @@ class RecordingModulus:
 
 def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
     """What each recording of kind `compression` or `indentation` says of the elastomer."""
-    return [
-        RecordingModulus(recording.id, recording.kind, _result(recording, campaign.skin.poisson_ratio))
-        for recording in campaign.recordings
-        if not isinstance(recording, FrfRecording)
-    ]
-
-
-def _result(
-    recording: CompressionRecording | IndentationRecording, poisson_ratio: float
-) -> CompressionModulus | IndentationModulus | InvalidInput:
-    try:
-        if isinstance(recording, CompressionRecording):
-            return of_compression(recording)
-        return of_indentation(recording, poisson_ratio)
-    except InvalidInput as error:
-        return error
+    moduli = []
+    for recording in campaign.recordings:
+        result: CompressionModulus | IndentationModulus | InvalidInput
+        try:
+            if isinstance(recording, CompressionRecording):
+                result = of_compression(recording)
+            elif isinstance(recording, IndentationRecording):
+                result = of_indentation(recording, campaign.skin.poisson_ratio)
+            else:
+                continue
+        except InvalidInput as error:
+            result = error
+        moduli.append(RecordingModulus(recording.id, recording.kind, result))
+    return moduli
 
 
 def of_compression(recording: CompressionRecording) -> CompressionModulus:

@@ -16,7 +16,7 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.noise.correlated_error import CurveError, instrument_columns
 from underskin.diagnosis.noise.line_noise import LineNoise
 from underskin.mechanisms.base import Kind
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.campaign import Campaign, CurveRecording
 from underskin.recordings.curve_course import Course, course, roughness
 from underskin.units import Floats
 
@@ -34,15 +34,13 @@ _STEP, _RESTS = 0.2, 1e-3  # of the usual step: the smaller way's, and that betw
 _IN_THE_AIR, _AT_CONTACT = 0.2, 0.7  # of the largest force, what the smooth error counts where there is less
 _FEW_FOR_ZERO = 0.01  # of the largest force: how well a cell's zero is known that no sample shows
 
-CurveRecording = IndentationRecording | CompressionRecording
-
 
 def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
     """The thinned curves of one kind; curves with fewer than five finite samples are left out."""
     entries: list[CurveRecording] = []
     forces, deviations, places, errors = [], [], [], []
     for entry in campaign.recordings:
-        if not isinstance(entry, IndentationRecording | CompressionRecording) or entry.kind != kind:
+        if not isinstance(entry, CurveRecording) or entry.kind != kind:
             continue
         columns = finite_samples(entry)
         if len(columns[0]) < _LEAST_SAMPLES:

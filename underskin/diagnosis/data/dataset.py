@@ -17,7 +17,7 @@ from underskin.diagnosis.noise.correlated_error import CurveError, Whitening
 from underskin.diagnosis.noise.line_noise import LineNoise, line_noise
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.models.composition import kind_of
-from underskin.recordings.campaign import Campaign, FrfRecording, Recording, frf_recordings
+from underskin.recordings.campaign import Campaign, FrfRecording, Recording, frf_recordings, samples_of
 from underskin.recordings.frf.estimation import lines_of
 from underskin.units import Complexes, Floats
 
@@ -191,6 +191,4 @@ def _with_rows(entry: Recording, lines: Lines, own: NDArray[np.intp]) -> Recordi
     """A recording with only some of its rows, given by their places among all rows."""
     if isinstance(entry, FrfRecording):
         return FrfRecording.of_lines(entry, lines.frequency[own], lines.value[own])
-    rows = own - int(np.searchsorted(lines.recording, lines.recording[own[0]]))
-    time = None if entry.time_s is None else entry.time_s[rows]
-    return replace(entry, displacement_mm=entry.displacement_mm[rows], force_n=entry.force_n[rows], time_s=time)
+    return samples_of(entry, own - int(np.searchsorted(lines.recording, lines.recording[own[0]])))

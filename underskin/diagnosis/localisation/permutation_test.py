@@ -79,24 +79,19 @@ def locate(lines: Lines, residuals: Residuals) -> list[AxisResult]:
     total = gain_misfit + line_misfit
     results: list[AxisResult] = []
     statistics: dict[str, Floats] = {}
-    shares: dict[str, float] = {}
     for name, basis in bases.items():
         others = [other for key, other in bases.items() if key != name]
         reason = _undecidable(basis, others, blocks[name])
         if reason:
             results.append(AxisResult(name, None, 0.0, reason))
-            continue
-        explained = _freedman_lane(residuals.gain, weight, basis, others, blocks[name], random)
-        statistics[name] = explained
-        shares[name] = explained[0] / total
-    for name, explained in _sign_flips(lines, residuals, random).items():
-        statistics[name] = explained
-        shares[name] = explained[0] / total
-    largest = [_standardised(values) for values in statistics.values()]
-    highest = np.max(largest, axis=0)[1:] if largest else np.zeros(0)
-    for name, values in zip(statistics, largest, strict=True):
+        else:
+            statistics[name] = _freedman_lane(residuals.gain, weight, basis, others, blocks[name], random)
+    statistics |= _sign_flips(lines, residuals, random)
+    standardised = [_standardised(values) for values in statistics.values()]
+    highest = np.max(standardised, axis=0)[1:] if standardised else np.zeros(0)
+    for (name, explained), values in zip(statistics.items(), standardised, strict=True):
         beyond = int((highest >= values[0] - 1e-12).sum())
-        results.append(AxisResult(name, (beyond + 1) / (PERMUTATIONS + 1), min(shares[name], 1.0)))
+        results.append(AxisResult(name, (beyond + 1) / (PERMUTATIONS + 1), min(explained[0] / total, 1.0)))
     if lines.recordings < 6:
         results += [AxisResult(name, None, 0.0, Undecidable.FEW_SIGNS) for name in lines.row_axes]
     return results

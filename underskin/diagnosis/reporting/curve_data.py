@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.diagnosis.data.curve_samples import CurveRecording, finite_samples, way_along
+from underskin.diagnosis.data.curve_samples import finite_samples, way_along
 from underskin.diagnosis.inference.curve_nuisances import cell_response
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.reporting.numbers import place_of
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.campaign import Campaign, CurveRecording
 from underskin.recordings.curve_course import course
 from underskin.units import Floats
 
@@ -70,7 +70,7 @@ def shown_curves(
     raw = {
         entry.id: entry
         for entry in recorded.recordings
-        if isinstance(entry, IndentationRecording | CompressionRecording) and entry.kind == problem.kind
+        if isinstance(entry, CurveRecording) and entry.kind == problem.kind
     }
     rows = zip(
         problem.lines.campaign.recordings,
@@ -81,7 +81,7 @@ def shown_curves(
     )
     curves = []
     for entry, own, *predicted in rows:
-        assert isinstance(entry, IndentationRecording | CompressionRecording)
+        assert isinstance(entry, CurveRecording)
         curves.append(_shown(raw[entry.id], entry.displacement_mm, problem.lines.value.real[own], *predicted))
     return sorted(curves, key=lambda curve: -curve.left_percent)
 
@@ -94,7 +94,7 @@ def _predictions(problem: FittingProblem, explanation: Explanation) -> list[Curv
     reading = cell.reading(lines, force)
     predicted = []
     for entry, own in zip(lines.campaign.recordings, lines.spans, strict=True):
-        assert isinstance(entry, IndentationRecording | CompressionRecording)
+        assert isinstance(entry, CurveRecording)
         contact = float(explanation.point.fit[place_of(explanation, f"contact_point {entry.id}")])
         nearest = int(np.abs(entry.displacement_mm - contact).argmin())
         predicted.append(CurvePrediction(reading[own], Mark(contact, float(cell.offset[own][nearest]))))

@@ -20,7 +20,7 @@ from underskin.diagnosis.reporting import next_experiment
 from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
-from underskin.diagnosis.reporting.numbers import parameter, place_of, probability, rounded, without_effect
+from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded, without_effect
 from underskin.diagnosis.reporting.statements import (
     CONFOUNDED,
     UNDECIDABLE,
@@ -127,7 +127,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     )
     return {
         **document,
-        "probability": probability(leader.probability),
+        "probability": round(leader.probability, 3),
         "statement": statement,
         "location": _location(diagnosis, problem, stated == "no_mismatch"),
         "mechanisms": [] if named is None else _mechanisms(search, problem, named),
@@ -182,7 +182,7 @@ def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanatio
     return [
         {
             "name": name,
-            "probability": probability(sum(answer.probability for answer in sets if name in answer.names)),
+            "probability": round(sum(answer.probability for answer in sets if name in answer.names), 3),
             "parameters": [parameter(explanation, place) for place in range(places[name].start, places[name].stop)],
             "explains_percent": explains_percent(search, problem, explanation, name, whole),
         }
@@ -200,7 +200,7 @@ def _alternatives(answers: Sequence[Answer]) -> list[dict[str, Any]]:
         alternatives.append(
             {
                 "mechanisms": list(answer.names),
-                "probability": probability(answer.probability),
+                "probability": round(answer.probability, 3),
                 "why_not": why_not(answer, leader),
             }
         )

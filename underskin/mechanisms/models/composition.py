@@ -88,11 +88,8 @@ class Composition:
                 other = self.parameters[place].relative_to
                 if other is not None:
                     own[name][key] = own[name][key] * own[name][other]
-        return (
-            dict(own),
-            {name: seeds[place] for name, place in self._nuisances.items()},
-            seeds[count:],
-        )
+        nuisances = {name: seeds[place] for name, place in self._nuisances.items()}
+        return dict(own), nuisances, seeds[count:]
 
     def sensor_spread(self, fit: Floats) -> tuple[float, Floats]:
         """The spread that a mechanism frees, or the usual one."""

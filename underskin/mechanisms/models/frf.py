@@ -78,7 +78,18 @@ class FrfModel:
     @cached_property
     def valid(self) -> NDArray[np.bool_]:
         """Which rows lie inside the table as declared."""
-        return self._declared_inside(self._table)[self.design.point][self.recording]
+        none = np.zeros((0, 1))
+        modulus, thickness, poisson_ratio = (
+            Differentiated(np.array([v]), none) for v in (self._modulus, self._thickness, self._poisson_ratio)
+        )
+        design = self.design
+        contacts = Contacts(design.force, design.indenter_radius, design.dwell, modulus, thickness, poisson_ratio)
+        a_over_h = contacts.hertz_radius.value / self._thickness
+        a, x = self._table.axes[0], self._table.axes[2]
+        inside = (a_over_h <= a[-1]) & (contacts.cbrt_load.value <= x[-1])
+        distance = np.hypot(design.point_x, design.point_y) + self._sensor_radius
+        near: NDArray[np.bool_] = inside[design.point_contact] & (distance <= PROFILE_END * self._thickness)
+        return near[design.point][self.recording]
 
     def predict(self, fit: Floats) -> Prediction:
         """The FRF on every row with its derivatives.
@@ -104,15 +115,12 @@ class FrfModel:
         response = self.respond(fit, place=True)
         value, slopes = response.on_rows(self.design)
         count = len(self.parameters)
-        own, _, _ = self._composition.values(fit)
-        return Prediction(
-            value=value,
-            slopes=slopes[:count],
-            position_slopes=slopes[count:],
-            pickup=None if self.pickup is None else self.pickup.deviation(_by_name(own)),
-            pickup_rows=None if self.pickup is None else self.pickup.rows,
-            inside=response.inside[self.recording],
-        )
+        pickup = rows = None
+        if self.pickup is not None:
+            own, _, _ = self._composition.values(fit)
+            by_name = {name: one.value for values in own.values() for name, one in values.items()}
+            pickup, rows = self.pickup.deviation(by_name), self.pickup.rows
+        return Prediction(value, slopes[:count], slopes[count:], pickup, rows, response.inside[self.recording])
 
     @property
     def numbers(self) -> int:
@@ -243,21 +251,6 @@ class FrfModel:
                 product = factor if product is None else product * factor
         return product
 
-    def _declared_inside(self, table: SigmaTable) -> NDArray[np.bool_]:
-        """Which points lie inside the table as declared."""
-        none = np.zeros((0, 1))
-        modulus, thickness, poisson_ratio = (
-            Differentiated(np.array([v]), none) for v in (self._modulus, self._thickness, self._poisson_ratio)
-        )
-        design = self.design
-        contacts = Contacts(design.force, design.indenter_radius, design.dwell, modulus, thickness, poisson_ratio)
-        a_over_h = contacts.hertz_radius.value / self._thickness
-        a, x = table.axes[0], table.axes[2]
-        inside = (a_over_h <= a[-1]) & (contacts.cbrt_load.value <= x[-1])
-        distance = np.hypot(design.point_x, design.point_y) + self._sensor_radius
-        near: NDArray[np.bool_] = inside[design.point_contact] & (distance <= PROFILE_END * self._thickness)
-        return near
-
 
 def _force_nodes(
     mechanisms: Sequence[Mechanism], design: FrfDesign
@@ -277,11 +270,6 @@ def _on_one_layer(contacts: Contacts) -> bool:
     """Whether the contacts at several points of the fit coordinates all are on the same linear layer."""
     layers = [x.value for x in (contacts.poisson_ratio, contacts.slip) if x is not None]
     return all(bool((value == value.flat[0]).all()) for value in layers)
-
-
-def _by_name(own: dict[str, Values]) -> dict[str, Floats]:
-    """The mechanisms' parameters (1,), whosever they are."""
-    return {name: value.value for values in own.values() for name, value in values.items()}
 
 
 def _required(name: str, value: float | None) -> float:

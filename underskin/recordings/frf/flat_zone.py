@@ -104,7 +104,8 @@ def flat_zone(
             allowed = f"must hold at least one line; they lie at {frequencies[0]:g} to {frequencies[-1]:g} Hz"
             raise too_few("band_hz", list(band_hz), allowed)
         return FlatZone(*band_hz, "the band given by the user", mains, chosen_by_user=True)
-    edges = _edges(frequencies)
+    decades = float(np.log10(frequencies[-1] / frequencies[0]))
+    edges = np.geomspace(frequencies[0], frequencies[-1], max(1, round(_BINS_PER_DECADE * decades)) + 1)
     ratio = _binned(stacks, edges, mains)
     names, curves, noise = _by_condition(ratio, conditions)
     filled = np.flatnonzero(np.isfinite(curves).any(axis=0))
@@ -194,12 +195,6 @@ def _mains_lines(stacks: Sequence[Stack]) -> tuple[float, ...]:
         lines = stack.frequency[near & (scatter > _OUTSTANDING * few * beside)]
         lines_hz.update(np.round(lines, 6).tolist())
     return tuple(sorted(lines_hz))
-
-
-def _edges(frequencies: Floats) -> Floats:
-    decades = np.log10(frequencies[-1] / frequencies[0])
-    bins = max(1, round(_BINS_PER_DECADE * float(decades)))
-    return np.geomspace(frequencies[0], frequencies[-1], bins + 1)
 
 
 def _binned(stacks: Sequence[Stack], edges: Floats, mains: tuple[float, ...]) -> Floats:
