@@ -157,13 +157,9 @@ def _work_out(
     )
 
 
-def diagnosis_report(
-    campaign: Campaign, table: SigmaTable, progress: Progress = lambda _: None, refused: Sequence[RecordingProblem] = ()
-) -> dict[str, Any]:
+def diagnosis_report(campaign: Campaign, table: SigmaTable, refused: Sequence[RecordingProblem] = ()) -> dict[str, Any]:
     """The report of a campaign's diagnosis (`report/1`); `refused` recordings are named among the findings."""
-    diagnosis = with_refused(diagnose(campaign, table, progress), refused)
-    progress(1.0)
-    return report(diagnosis)
+    return report(with_refused(diagnose(campaign, table), refused))
 
 
 def with_refused(diagnosis: DiagnosisResult, refused: Sequence[RecordingProblem]) -> DiagnosisResult:

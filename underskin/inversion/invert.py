@@ -101,9 +101,7 @@ class Inversion:
     declared_percent: float  # change of d33 for E 2 % and h 1 % off, in quadrature
 
 
-def invert(
-    campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] | None = None, zone: FlatZone | None = None
-) -> Inversion:
+def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] | None = None) -> Inversion:
     """The d33 of an array, Re FRF / ((3/2) ρ² σ) with ρ = rT/h, from the `frf` recordings of a campaign.
 
     Parameters
@@ -114,8 +112,6 @@ def invert(
         σ of a/h, rT/h and the load parameter L.
     band_hz : (low, high), optional
         The band that Re FRF is averaged over [Hz]; without it the flat zone.
-    zone : FlatZone, optional
-        The flat zone, where it is known.
 
     Returns
     -------
@@ -136,7 +132,7 @@ def invert(
     if not recorded:
         raise _none_usable(campaign, left_out)
     frfs = stacked(measured)
-    zone = zone or flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
+    zone = flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
     contact = _Contact(campaign, recorded, table)
     inside = usable(level, noise, contact.positioned.sigma, contact.transmitted)

@@ -55,7 +55,6 @@ class Composition:
             for (name, group), start in zip(own.items(), starts[:-1], strict=True)
         }
         self._nuisances = {parameter.name: int(starts[-1]) + index for index, parameter in enumerate(nuisances)}
-        self._gain_spreads = {entry.name for entry in self.parameters if entry.acts_on == "gain_spread"}
         self._log = np.array([parameter.scale == "log" for parameter in self.parameters])
 
     def values(
@@ -90,15 +89,6 @@ class Composition:
                     own[name][key] = own[name][key] * own[name][other]
         nuisances = {name: seeds[place] for name, place in self._nuisances.items()}
         return dict(own), nuisances, seeds[count:]
-
-    def sensor_spread(self, fit: Floats) -> tuple[float, Floats]:
-        """The spread that a mechanism frees, or the usual one."""
-        own, _, _ = self.values(fit)
-        for values in own.values():
-            for name, value in values.items():
-                if name in self._gain_spreads:
-                    return float(value.value[0]), value.slopes[:, 0]
-        return SENSOR_SPREAD, np.zeros(len(self.parameters))
 
 
 def parameters_together(

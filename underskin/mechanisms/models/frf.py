@@ -153,10 +153,6 @@ class FrfModel:
             inside[..., self.design.point],
         )
 
-    def sensor_spread_of(self, fit: Floats) -> tuple[float, Floats]:
-        """The sd of the sensors' log gains, and its derivative (parameters,)."""
-        return self._composition.sensor_spread(np.asarray(fit, dtype=float))
-
     def _contacts(self, own: dict[str, Values], nuisances: Values, points: tuple[int, ...], variables: int) -> Contacts:
         """The contacts at all force nodes, one node after another, as declared and as the mechanisms change them."""
         nodes = len(self._force)
