@@ -93,13 +93,9 @@ class Campaigns:
         recorded_to: str | None = None,
     ) -> Iterator[Document]:
         """Campaigns, the latest arrival first, without their recordings."""
-        filters = {
-            "skin": skin,
-            "name_contains": name_contains,
-            "recorded_from": recorded_from,
-            "recorded_to": recorded_to,
-        }
-        yield from pages(self._session, "/v1/campaigns", "campaigns", state=state, **filters)
+        filters = {"skin": skin, "name_contains": name_contains, "state": state}
+        moments = {"recorded_from": recorded_from, "recorded_to": recorded_to}
+        yield from pages(self._session, "/v1/campaigns", "campaigns", **filters, **moments)
 
     def get(self, campaign_id: str) -> Document:
         """A campaign and its recordings, without their arrays."""

@@ -5,7 +5,7 @@ gives the same report on one machine; on a processor that rounds differently a l
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING
@@ -63,6 +63,10 @@ class DiagnosisResult:
     shape: Shape | None = None  # of what remains, where no mechanism describes it
     plan: NextRecordings | None = None
     curves: Campaign | None = None  # with every sample, where curves were diagnosed
+
+    def with_findings(self, *further: Finding) -> "DiagnosisResult":
+        """The same with further findings behind the others."""
+        return replace(self, findings=(*self.findings, *further))
 
     @property
     def next_experiment(self) -> dict[str, Any]:
