@@ -147,10 +147,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         "findings": findings,
         "fit": fit,
         "power": [
-            {
-                "mechanism": entry.mechanism,
-                "smallest_visible_percent": rounded(entry.smallest_visible_percent, 2),
-            }
+            {"mechanism": entry.mechanism, "smallest_visible_percent": rounded(entry.smallest_visible_percent, 2)}
             for entry in diagnosis.power
         ],
         "d33": d33,

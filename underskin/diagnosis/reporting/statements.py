@@ -77,13 +77,7 @@ def first_and_rest(statement: str) -> tuple[str, str]:
 
 
 def _answer(
-    answers: Sequence[Answer],
-    verdict: str,
-    shape: Shape | None,
-    model: str,
-    idle: Sequence[str],
-    *,
-    all_used: bool,
+    answers: Sequence[Answer], verdict: str, shape: Shape | None, model: str, idle: Sequence[str], *, all_used: bool
 ) -> tuple[str, str]:
     """The verdict in one sentence, and what else there is to say of it."""
     leader = answers[0]
