@@ -12,7 +12,18 @@ import numpy as np
 
 from underskin.errors import InvalidInput, not_finite, not_unique, required
 from underskin.extensions import described
-from underskin.mechanisms.base import AXES, NEEDED_FIELDS, UNITS, Kind, Mechanism, Normal, Parameter, Stage, Uniform
+from underskin.mechanisms.base import (
+    AXES,
+    NEEDED_FIELDS,
+    TEXTS,
+    UNITS,
+    Kind,
+    Mechanism,
+    Normal,
+    Parameter,
+    Stage,
+    Uniform,
+)
 from underskin.mechanisms.models.compression import CompressionModel
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.models.indentation import IndentationModel
@@ -23,7 +34,6 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import load_table
 from underskin.units import Floats
 
-TEXTS = ("plain", "law", "assumptions", "source", "needs")
 HOOKS = {  # by the stage that calls them
     "on_declared": (Stage.DECLARED,),
     "on_material": (Stage.MATERIAL, Stage.CONTACT),

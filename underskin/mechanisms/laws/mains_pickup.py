@@ -31,21 +31,15 @@ class MainsPickup(Mechanism):
     """Charge from the mains on the sensors' leads."""
 
     name = "mains_pickup"
-    plain = (
-        "The mains put charge on the sensors' leads, so lines at the mains' frequency and its multiples are off, the "
-        "more the weaker the dynamic force."
-    )
-    law = (
-        "a charge q at the mains' frequency and a share of q/n at its n-th harmonic, each a line of some width, "
-        "whatever the dynamic force: an FRF error of q/Fd, complex, its phase independent in each recording and on "
-        "each line. It adds its square to the lines' variance."
-    )
-    assumptions = (
-        "q is the standard deviation of each component over recordings; 50 or 60 Hz, whichever stands out in the "
-        "campaign's lines; harmonics up to the fifth, all with the same share; lines are bells exp(−½ (f/width)²), f "
-        "from the multiple. How phases of neighbouring lines hang together, and the lines' shape in detail, depend on "
-        "the analyser's window and on how the mains drift: neither is relied on."
-    )
+    plain = """The mains put charge on the sensors' leads, so lines at the mains' frequency and its multiples are off,
+    the more the weaker the dynamic force."""
+    law = """a charge q at the mains' frequency and a share of q/n at its n-th harmonic, each a line of some width,
+    whatever the dynamic force: an FRF error of q/Fd, complex, its phase independent in each recording and on each line.
+    It adds its square to the lines' variance."""
+    assumptions = """q is the standard deviation of each component over recordings; 50 or 60 Hz, whichever stands out in
+    the campaign's lines; harmonics up to the fifth, all with the same share; lines are bells exp(−½ (f/width)²), f from
+    the multiple. How phases of neighbouring lines hang together, and the lines' shape in detail, depend on the
+    analyser's window and on how the mains drift: neither is relied on."""
     source = "Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling to leads)."
     stage = Stage.ADDED_CHARGE
     order = 10

@@ -17,19 +17,14 @@ class Misalignment(Mechanism):
     """A constant offset between commanded and true position."""
 
     name = "misalignment"
-    plain = (
-        "The sphere does not come down where the stage says but always a little to the same side, so each sensor "
-        "shows what a press at that other place gives."
-    )
+    plain = """The sphere does not come down where the stage says but always a little to the same side, so each sensor
+    shows what a press at that other place gives."""
     law = "true position = commanded + a constant offset, for all recordings."
-    assumptions = (
-        "stage and array are shifted against each other, not turned or stretched. Where every press is commanded at a "
-        "sensor's centre and no charge of its neighbours shows (crosstalk), the direction cannot be told, and the "
-        "offset's length alone is a parameter."
-    )
-    source = (
-        "Sneddon, Fourier Transforms (1951), chapter 10: in the layer's Hankel integral the offset enters as J0(k e/h)."
-    )
+    assumptions = """stage and array are shifted against each other, not turned or stretched. Where every press is
+    commanded at a sensor's centre and no charge of its neighbours shows (crosstalk), the direction cannot be told, and
+    the offset's length alone is a parameter."""
+    source = """Sneddon, Fourier Transforms (1951), chapter 10: in the layer's Hankel integral the offset enters as J0(k
+    e/h)."""
     stage = Stage.POSITION
     order = 10
     axes = ("position_mm", "sensor", "preload_n", "indenter_radius_mm")

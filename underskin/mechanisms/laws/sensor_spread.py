@@ -11,19 +11,14 @@ class SensorSpread(Mechanism):
     """Sensors with different d33."""
 
     name = "sensor_spread"
-    plain = (
-        "The sensors are not alike, so the same press gives each of them a charge that is off by a factor of its own, "
-        "in all of its recordings."
-    )
+    plain = """The sensors are not alike, so the same press gives each of them a charge that is off by a factor of its
+    own, in all of its recordings."""
     law = "d33 of sensor j = d33 · e^(g_j), g_j normal with the standard deviation `spread`."
-    assumptions = (
-        "the gains are the sensors' own, constant over the campaign; they are marginalised by whoever fits, as a "
-        "random effect along the model's response that a sensor's recordings share. Without this mechanism the spread "
-        "is 1 %."
-    )
-    source = (
-        "Seminara 2018, section 3.2 (d33 over the sensors of an array); a gain is positive, so its logarithm is normal."
-    )
+    assumptions = """the gains are the sensors' own, constant over the campaign; they are marginalised by whoever fits,
+    as a random effect along the model's response that a sensor's recordings share. Without this mechanism the spread is
+    1 %."""
+    source = """Seminara 2018, section 3.2 (d33 over the sensors of an array); a gain is positive, so its logarithm is
+    normal."""
     stage = Stage.SENSOR
     order = 20
     axes = ("sensor",)
