@@ -229,6 +229,10 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
     moments = [contact.positioned.scattered(p / contact.thickness) for p in mixed_model.POSITIONS]
     mean, variance = (np.array(part) for part in zip(*moments, strict=True))
     outliers = _outliers(rows, np.sqrt((mean[-1] - 1) ** 2 + np.maximum(variance[-1], 0)))
+    far_off = [
+        Finding(Reason.OUTLIER, rows.ids[row], "d33_pc_per_n", {"d33_pc_per_n": value})
+        for row, value in zip(outliers, to_lab("d33_pc_per_n", rows.d33[outliers]).tolist(), strict=True)
+    ]
     good = np.setdiff1d(np.flatnonzero(rows.inside), outliers)
     sensor, d33, noise = rows.sensor[good], rows.d33[good], rows.d33_uncertainty[good]
     unfit, pilot = population_flags(ids, sensor, d33, noise)
@@ -259,7 +263,7 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
         spread=model.spread if model and len(set(sensor[plain])) > 1 else None,
         gain=model.gain if model else None,
         position=model.position if model else None,
-        left_out=_left_out(rows, outliers, list(unfit.values())),
+        left_out=(*far_off, *unfit.values()),
         findings=(),
         declared_percent=100 * float(np.nanmedian(contact.declared[good])),
     )  # fmt: skip
@@ -284,11 +288,3 @@ def _cells(rows: RecordingD33, good: NDArray[np.intp]) -> tuple[NDArray[np.intp]
     keys = np.column_stack([rows.sensor, rows.indenter_radius, rows.preload])[good]
     _, where, cell, count = np.unique(keys, axis=0, return_index=True, return_inverse=True, return_counts=True)
     return cell.reshape(-1), good[where], count
-
-
-def _left_out(rows: RecordingD33, outliers: NDArray[np.intp], unfit: Sequence[Flag]) -> tuple[Finding | Flag, ...]:
-    d33 = to_lab("d33_pc_per_n", rows.d33)
-    findings = [
-        Finding(Reason.OUTLIER, rows.ids[row], "d33_pc_per_n", {"d33_pc_per_n": float(d33[row])}) for row in outliers
-    ]
-    return (*findings, *unfit)

@@ -42,8 +42,7 @@ class Estimate:
     def d33_rows(self) -> list[list[float]]:
         """Value, uncertainty, low and high of each d33 [pC/N]."""
         parts = [np.atleast_1d(part) for part in (self.value, self.uncertainty, self.low, self.high)]
-        rows: list[list[float]] = to_lab("d33_pc_per_n", np.column_stack(parts)).tolist()
-        return rows
+        return to_lab("d33_pc_per_n", np.column_stack(parts)).tolist()
 
 
 @dataclass(frozen=True)

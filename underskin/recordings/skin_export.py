@@ -18,10 +18,9 @@ import h5py
 import numpy as np
 import orjson
 
-from underskin.errors import FileError, damage_said
-from underskin.recordings.readers.hdf5_damage import damage
+from underskin.errors import FileError
+from underskin.recordings.readers import hdf5_input
 from underskin.recordings.readers.hdf5_file import MAGIC
-from underskin.recordings.readers.hdf5_links import refuse_outside
 from underskin.recordings.readers.sandbox import ParsingLimits, call_apart
 from underskin.units import Floats
 
@@ -111,7 +110,7 @@ def _is_export(stream: BinaryIO) -> dict[str, Any]:
         with h5py.File(stream, "r") as source:
             return {"is_export": str(source.attrs.get("schema")).startswith(_ANY_SCHEMA)}
     except OSError as error:
-        raise FileError("", "", damage(error)) from None
+        raise FileError("", "", hdf5_input.damage(error)) from None
 
 
 def _overview(stream: BinaryIO) -> dict[str, Any]:
@@ -128,8 +127,7 @@ def _campaigns(stream: BinaryIO, names: str) -> dict[str, Any]:
 
 @contextmanager
 def _opened(stream: BinaryIO) -> Iterator[Any]:
-    with damage_said("", "", lambda error: f"the export {damage(error)}"), h5py.File(stream, "r") as source:
-        refuse_outside(source, "")
+    with hdf5_input.opened(stream, "", "the export") as source:
         schema = str(source.attrs.get("schema"))
         if schema.startswith(_ANY_SCHEMA) and schema != SCHEMA:
             raise FileError("", "/", f"is an export of another underskin: {schema}; this one reads {SCHEMA}")

@@ -76,7 +76,7 @@ def of_report(report: Report) -> dict[str, go.Figure]:
 
 
 def _plot(figure: go.Figure, name: str) -> str:
-    text: str = plotly.io.to_html(
+    return plotly.io.to_html(
         figure,
         full_html=False,
         include_plotlyjs=False,
@@ -84,4 +84,3 @@ def _plot(figure: go.Figure, name: str) -> str:
         config={"displaylogo": False, "responsive": True},
         post_script=_LIST if figure.layout.updatemenus else None,
     )
-    return text
