@@ -1,8 +1,7 @@
 """The figures of one campaign, from its inversion, and a page that shows them without network or server."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import plotly.graph_objects as go
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from underskin.figures.array import array_map, frf_versus_preload, response_per_sensor
@@ -11,11 +10,8 @@ from underskin.physics.charge_response import gain
 from underskin.recordings.campaign import Campaign
 from underskin.units import Floats, to_lab
 
-if TYPE_CHECKING:
-    import plotly.graph_objects as go
 
-
-def figures(campaign: Campaign, inversion: Inversion) -> "tuple[go.Figure, go.Figure, go.Figure]":
+def figures(campaign: Campaign, inversion: Inversion) -> tuple[go.Figure, go.Figure, go.Figure]:
     """The map of the array, FRF against preload per indenter, and the response of each sensor.
 
     The model's line is the array's d33 times (3/2) ρ² σ, with σ at the commanded offset, averaged over the recordings

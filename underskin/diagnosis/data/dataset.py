@@ -100,16 +100,13 @@ class Lines:
         total = np.add.reduceat(weight, self.first)
         mean = np.add.reduceat(weight * self.value, self.first).astype(np.complex128) / total
         left = float(np.sum(weight * np.abs(self.value - mean[self.recording]) ** 2))
-        campaign = replace(
-            self.campaign,
-            recordings=tuple(
-                FrfRecording.of_lines(entry, np.array([COLLAPSED_HZ]), mean[[number]])
-                for number, entry in enumerate(frf_recordings(self.campaign))
-            ),
+        recordings = tuple(
+            FrfRecording.of_lines(entry, np.array([COLLAPSED_HZ]), mean[[number]])
+            for number, entry in enumerate(frf_recordings(self.campaign))
         )
         return replace(
             self,
-            campaign=campaign,
+            campaign=replace(self.campaign, recordings=recordings),
             value=mean,
             deviation=total**-0.5,
             frequency=np.full(len(mean), COLLAPSED_HZ),
@@ -122,14 +119,11 @@ class Lines:
         recordings = np.unique(self.recording[kept])
         entries = [self.campaign.recordings[number] for number in recordings]
         rows = [np.flatnonzero(kept & (self.recording == number)) for number in recordings]
-        campaign = replace(
-            self.campaign,
-            recordings=tuple(_with_rows(entry, self, own) for entry, own in zip(entries, rows, strict=True)),
-        )
+        kept_entries = tuple(_with_rows(entry, self, own) for entry, own in zip(entries, rows, strict=True))
         order = np.concatenate(rows)
         return replace(
             self,
-            campaign=campaign,
+            campaign=replace(self.campaign, recordings=kept_entries),
             value=self.value[order],
             deviation=self.deviation[order],
             frequency=self.frequency[order],
@@ -167,15 +161,10 @@ def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None, expect
         sensors.append(numbers[entry.sensor])
     recording = np.repeat(np.arange(len(values)), [len(value) for value in values]).astype(np.intp)
     value = np.concatenate([*values, np.zeros(0, dtype=complex)])
-    frequency = np.concatenate([*frequencies, np.zeros(0)])
-    noise = line_noise(
-        value,
-        frequency,
-        recording,
-        np.concatenate([*coherences, np.zeros(0)]),
-        np.concatenate([*unevens, np.zeros(0)]),
-        expected,
+    frequency, coherence, unevenness = (
+        np.concatenate([*columns, np.zeros(0)]) for columns in (frequencies, coherences, unevens)
     )
+    noise = line_noise(value, frequency, recording, coherence, unevenness, expected)
     return Lines(
         campaign=replace(campaign, recordings=tuple(entries)),
         value=value,

@@ -72,17 +72,12 @@ def shown_curves(
         for entry in recorded.recordings
         if isinstance(entry, CurveRecording) and entry.kind == problem.kind
     }
-    rows = zip(
-        problem.lines.campaign.recordings,
-        problem.lines.spans,
-        _predictions(problem, before),
-        _predictions(problem, after),
-        strict=True,
-    )
+    lines = problem.lines
+    predicted = zip(_predictions(problem, before), _predictions(problem, after), strict=True)
     curves = []
-    for entry, own, *predicted in rows:
+    for entry, own, both in zip(lines.campaign.recordings, lines.spans, predicted, strict=True):
         assert isinstance(entry, CurveRecording)
-        curves.append(_shown(raw[entry.id], entry.displacement_mm, problem.lines.value.real[own], *predicted))
+        curves.append(_shown(raw[entry.id], entry.displacement_mm, lines.value.real[own], *both))
     return sorted(curves, key=lambda curve: -curve.left_percent)
 
 

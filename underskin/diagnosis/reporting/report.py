@@ -198,13 +198,8 @@ def _alternatives(answers: Sequence[Answer]) -> list[dict[str, Any]]:
         enough = answer.probability < _LEAST_PROBABILITY and len(alternatives) > 1
         if enough or len(alternatives) >= _ALTERNATIVES:
             break
-        alternatives.append(
-            {
-                "mechanisms": list(answer.names),
-                "probability": round(answer.probability, 3),
-                "why_not": why_not(answer, leader),
-            }
-        )
+        said = {"mechanisms": list(answer.names), "probability": round(answer.probability, 3)}
+        alternatives.append({**said, "why_not": why_not(answer, leader)})
     return alternatives
 
 
