@@ -20,6 +20,8 @@ from underskin.findings.finding import Finding
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Array = NDArray[Any]  # float64 or complex128
+Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -172,7 +174,7 @@ def unusual(name: str, value: ArrayLike) -> list[Finding]:
     return [Finding(Reason.UNUSUAL_MAGNITUDE, "", name, arguments, index=first if values.ndim else None)]
 
 
-def _refuse(name: str, values: Floats, bad: NDArray[np.bool_], allowed: str, code: ErrorCode) -> None:
+def _refuse(name: str, values: Floats, bad: Mask, allowed: str, code: ErrorCode) -> None:
     if bad.any():
         first = int(np.argmax(bad))
         row = int(np.unravel_index(first, values.shape)[0]) if values.ndim else None

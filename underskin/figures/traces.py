@@ -8,7 +8,7 @@ from plotly.subplots import make_subplots
 
 from underskin.figures.style import COLOURS, label, styled
 from underskin.recordings.channels import Channel
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 _MOST_POINTS = 700  # of one channel
 _ROW = 130  # pixels
@@ -42,7 +42,7 @@ def raw_traces(traces: Sequence[Channel], sample_rate_hz: float | None) -> go.Fi
     return styled(figure, "As it came", _EDGES + _ROW * len(traces))
 
 
-def _extremes(values: Floats) -> "np.ndarray[tuple[int], np.dtype[np.intp]]":
+def _extremes(values: Floats) -> Indices:
     """Which samples to draw: all, or the lowest and the highest of each of as many bins as a figure resolves."""
     count = len(values)
     if count <= _MOST_POINTS:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
@@ -32,7 +31,7 @@ from underskin.recordings.frf.flat_zone import FlatZone, band_average, flat_zone
 from underskin.recordings.plausibility import implausible
 from underskin.surrogate.off_centre_sigma import positioned_sigma
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats, to_lab, to_si
+from underskin.units import Floats, Indices, Mask, to_lab, to_si
 
 _LEAST_CHARGE = 1e-24  # FRF [C/N] that can be a measured one
 _MOST_REASONS = 3  # quoted where no recording can be used
@@ -51,7 +50,7 @@ class RecordingD33:
     """One entry a recording, SI: measured level, σ, d33 and its uncertainty by line noise; NaN where not `inside`."""
 
     ids: tuple[str, ...]
-    sensor: NDArray[np.intp]  # number of the sensor in Inversion.sensor_ids
+    sensor: Indices  # number of the sensor in Inversion.sensor_ids
     indenter_radius: Floats
     preload: Floats
     frf: Floats
@@ -61,10 +60,10 @@ class RecordingD33:
     rel_error: Floats  # of σ, the table's bound
     d33: Floats
     d33_uncertainty: Floats
-    inside: NDArray[np.bool_]  # contact within the table's domain, and a line in the band with a charge that can be
+    inside: Mask  # contact within the table's domain, and a line in the band with a charge that can be
 
     @cached_property
-    def condition(self) -> NDArray[np.intp]:
+    def condition(self) -> Indices:
         """The number of each one's indenter and preload together."""
         both = np.column_stack([self.indenter_radius, self.preload])
         return np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
@@ -74,10 +73,10 @@ class RecordingD33:
 class Cells:
     """d33 per sensor × indenter × preload that was recorded; arrays over the cells, SI."""
 
-    sensor: NDArray[np.intp]
+    sensor: Indices
     indenter_radius: Floats
     preload: Floats
-    recordings: NDArray[np.intp]
+    recordings: Indices
     d33: Estimate
 
 
@@ -269,7 +268,7 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
     )  # fmt: skip
 
 
-def _outliers(rows: RecordingD33, position: Floats) -> NDArray[np.intp]:
+def _outliers(rows: RecordingD33, position: Floats) -> Indices:
     """The rows inside whose d33 is far off all others; `position` as for `outlying`."""
     good = np.flatnonzero(rows.inside)
     d33, noise = rows.d33[good], rows.d33_uncertainty[good]
@@ -283,7 +282,7 @@ def _expected_scatter(model: MixedModel, rows: LevelRows) -> Floats:
     return np.sqrt(float(model.gain.value) ** 2 + position + (rows.line / rows.pilot) ** 2)
 
 
-def _cells(rows: RecordingD33, good: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+def _cells(rows: RecordingD33, good: Indices) -> tuple[Indices, Indices, Indices]:
     """Of each good row its cell; of each cell a row that shows what it is, and its number of recordings."""
     keys = np.column_stack([rows.sensor, rows.indenter_radius, rows.preload])[good]
     _, where, cell, count = np.unique(keys, axis=0, return_index=True, return_inverse=True, return_counts=True)

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc, stdtr
 
 from underskin.findings import english
 from underskin.findings.codes import Reason
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 if TYPE_CHECKING:
     from underskin.inversion.invert import RecordingD33
@@ -55,9 +54,7 @@ def typical_size(d33: Floats) -> float:
     return float(np.median(size[size >= 1e-9 * size.max()]))
 
 
-def population_flags(
-    ids: Sequence[str], sensor: NDArray[np.intp], d33: Floats, noise: Floats
-) -> tuple[dict[int, Flag], Floats]:
+def population_flags(ids: Sequence[str], sensor: Indices, d33: Floats, noise: Floats) -> tuple[dict[int, Flag], Floats]:
     """Sensors that do not belong to the array's population, and each sensor's pilot d33.
 
     Parameters
@@ -109,9 +106,9 @@ def population_flags(
 
 def scatter_flags(
     ids: tuple[str, ...],
-    sensor: NDArray[np.intp],
+    sensor: Indices,
     rows: "RecordingD33",
-    good: NDArray[np.intp],
+    good: Indices,
     pilot: Floats,
     expected: Floats,
 ) -> list[Flag]:
@@ -140,7 +137,7 @@ def scatter_flags(
     return flags
 
 
-def _beyond_common(level: Floats, member: NDArray[np.intp], condition: NDArray[np.intp]) -> Floats:
+def _beyond_common(level: Floats, member: Indices, condition: Indices) -> Floats:
     """Each recording over its sensor's median, less what its condition does to all sensors (three or more)."""
     median = np.array([np.median(level[member == index]) for index in range(member.max() + 1)])
     own = level / median[member]

@@ -11,7 +11,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.noise.correlated_error import CurveError, Whitening
 from underskin.diagnosis.noise.line_noise import LineNoise, line_noise
@@ -19,7 +18,7 @@ from underskin.mechanisms.base import Kind
 from underskin.mechanisms.models.composition import kind_of
 from underskin.recordings.campaign import Campaign, FrfRecording, Recording, frf_recordings, samples_of
 from underskin.recordings.frf.estimation import lines_of
-from underskin.units import Complexes, Floats
+from underskin.units import Complexes, Floats, Indices, Mask
 
 COLLAPSED_HZ = 30.0  # stands for the frequency of a collapsed line; no model that is given one asks for it
 
@@ -38,8 +37,8 @@ class Lines:
     value: Complexes  # (rows,)
     deviation: Floats  # (rows,)
     frequency: Floats  # (rows,)
-    recording: NDArray[np.intp]  # (rows,)
-    sensor: NDArray[np.intp]  # (recordings,)
+    recording: Indices  # (rows,)
+    sensor: Indices  # (recordings,)
     noise: LineNoise
     scatter: tuple[float, int] = (0.0, 0)
     smooth: CurveError | None = None  # of curves
@@ -65,7 +64,7 @@ class Lines:
         return ("displacement_mm",) if self.curves else ("frequency_hz", "phase")
 
     @cached_property
-    def first(self) -> NDArray[np.intp]:
+    def first(self) -> Indices:
         """The first row of each recording."""
         return np.searchsorted(self.recording, np.arange(self.recordings))
 
@@ -114,7 +113,7 @@ class Lines:
             scatter=(self.scatter[0] + left, self.scatter[1] + 2 * (len(self.value) - len(mean))),
         )
 
-    def part(self, kept: NDArray[np.bool_]) -> "Lines":
+    def part(self, kept: Mask) -> "Lines":
         """Only some of the rows, each with the noise it had; recordings without a row are left out."""
         recordings = np.unique(self.recording[kept])
         entries = [self.campaign.recordings[number] for number in recordings]
@@ -176,7 +175,7 @@ def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None, expect
     )
 
 
-def _with_rows(entry: Recording, lines: Lines, own: NDArray[np.intp]) -> Recording:
+def _with_rows(entry: Recording, lines: Lines, own: Indices) -> Recording:
     """A recording with only some of its rows, given by their places among all rows."""
     if isinstance(entry, FrfRecording):
         return FrfRecording.of_lines(entry, lines.frequency[own], lines.value[own])

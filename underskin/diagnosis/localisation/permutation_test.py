@@ -12,13 +12,12 @@ from enum import StrEnum
 from math import factorial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.residuals import Residuals
 from underskin.diagnosis.selection.frequency_gp import frequency_bins
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 PERMUTATIONS = 999
 SEED = 20180205
@@ -120,7 +119,7 @@ def _bases(lines: Lines) -> dict[str, Floats]:
     return bases
 
 
-def _blocks(lines: Lines, bases: dict[str, Floats]) -> dict[str, NDArray[np.intp]]:
+def _blocks(lines: Lines, bases: dict[str, Floats]) -> dict[str, Indices]:
     """Within which each axis' recordings may be exchanged: sensors, where each has several values of it; else days."""
     none = np.zeros(lines.recordings, dtype=np.intp)
     days = none
@@ -138,7 +137,7 @@ def _blocks(lines: Lines, bases: dict[str, Floats]) -> dict[str, NDArray[np.intp
     return blocks
 
 
-def _undecidable(basis: Floats, others: list[Floats], blocks: NDArray[np.intp]) -> Undecidable | None:
+def _undecidable(basis: Floats, others: list[Floats], blocks: Indices) -> Undecidable | None:
     arrangements = 1.0
     for number in np.unique(blocks):
         arrangements *= float(factorial(min(int((blocks == number).sum()), 20)))
@@ -161,7 +160,7 @@ def _freedman_lane(
     weight: Floats,
     basis: Floats,
     others: list[Floats],
-    blocks: NDArray[np.intp],
+    blocks: Indices,
     random: np.random.Generator,
 ) -> Floats:
     """The weighted square explained beyond the other axes: as observed, then under each permutation."""
@@ -179,7 +178,7 @@ def _freedman_lane(
     return ((direction.T @ beyond(every)) ** 2).sum(axis=0)
 
 
-def _permutations(blocks: NDArray[np.intp], random: np.random.Generator) -> NDArray[np.intp]:
+def _permutations(blocks: Indices, random: np.random.Generator) -> Indices:
     """Orders of the recordings (permutations, recordings), each within its block."""
     drawn = random.random((PERMUTATIONS, len(blocks)))
     permutations = np.empty(drawn.shape, dtype=np.intp)

@@ -7,7 +7,6 @@ fit grants it the rest of a zero, a drift and a gain, of each curve its own.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.data.curve_samples import finite_samples, way_along
 from underskin.diagnosis.inference.curve_nuisances import cell_response
@@ -15,7 +14,7 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.reporting.numbers import place_of
 from underskin.recordings.campaign import Campaign, CurveRecording
 from underskin.recordings.curve_course import course
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 MOST_SAMPLES = 600  # of a curve
 _BESIDE_CORNER = 12  # samples on either side of a jump or of the deepest one, all of which are shown
@@ -121,7 +120,7 @@ def _shown(
     )
 
 
-def _thinned(way: Floats, corners: list[int]) -> NDArray[np.intp]:
+def _thinned(way: Floats, corners: list[int]) -> Indices:
     """Which samples are shown of those that lie so far along a curve, 0 to 1: as evenly as they lie, and all beside
     corners."""
     count = len(way)

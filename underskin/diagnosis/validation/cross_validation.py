@@ -12,7 +12,6 @@ from dataclasses import astuple, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.curve_nuisances import cell_response
@@ -21,7 +20,7 @@ from underskin.diagnosis.noise.noise_levels import NoiseLevels
 from underskin.diagnosis.selection.search import log_prior
 from underskin.mechanisms.models.composed import compose
 from underskin.recordings.conditions import curves_of, frf_of
-from underskin.units import Floats
+from underskin.units import Floats, Indices, Mask
 
 _FURTHEST = 0.6  # of a curve's highest force
 _LOADED, _RETURN = 0.02, 0.02  # of the highest force and of the travel: a way back under load
@@ -66,7 +65,7 @@ class HeldOut:
     after: PredictionScore
 
 
-def groups(lines: Lines) -> dict[str, NDArray[np.bool_]]:
+def groups(lines: Lines) -> dict[str, Mask]:
     """The rows of each group that can be left out, with enough recordings remaining."""
     if lines.curves:
         return _parts_of_curves(lines)
@@ -92,7 +91,7 @@ def groups(lines: Lines) -> dict[str, NDArray[np.bool_]]:
     }
 
 
-def _parts_of_curves(lines: Lines) -> dict[str, NDArray[np.bool_]]:
+def _parts_of_curves(lines: Lines) -> dict[str, Mask]:
     """A curve's contact point is its own, so parts of each are left out: the middle of the way back where there is one,
     else the later half of what is held, else the highest force."""
     force = np.abs(lines.value.real)  # tension is negative
@@ -137,9 +136,7 @@ def hold_out(
     return held_out
 
 
-def _predict(
-    smaller: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: NDArray[np.bool_]
-) -> PredictionScore:
+def _predict(smaller: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: Mask) -> PredictionScore:
     """Some of the rows from a fit to others; sensors that were seen keep the gain that was found for them."""
     left = problem.lines.part(rows)
     model = compose(explanation.names, problem.lines.campaign, problem.table, problem.kind)
@@ -167,7 +164,7 @@ def _predict(
 
 
 def _predict_curves(
-    lines: Lines, levels: NoiseLevels, force: Floats, rows: NDArray[np.bool_], smaller: FittingProblem
+    lines: Lines, levels: NoiseLevels, force: Floats, rows: Mask, smaller: FittingProblem
 ) -> PredictionScore:
     """Some of the rows, with the gain, the zero and the drift of the cell that the rows fitted to show."""
     fitted = ~rows if len(smaller.lines.value) < len(lines.value) else rows
@@ -181,7 +178,7 @@ def _predict_curves(
     return _scored(first, (lines.value.real - value)[rows] ** 2, noise[rows], measured**2)
 
 
-def _scored(first: NDArray[np.intp], square: Floats, noise: Floats, size: Floats) -> PredictionScore:
+def _scored(first: Indices, square: Floats, noise: Floats, size: Floats) -> PredictionScore:
     """From what was missed, what noise would give, and what was predicted (rows,), all squared."""
     each, expected, sizes = (np.add.reduceat(column, first) for column in (square, noise, size))
     sizes = np.maximum(sizes, 1e-300)

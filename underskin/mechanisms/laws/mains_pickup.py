@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage
 from underskin.mechanisms.models.frf_design import FrfDesign, frequencies
@@ -13,7 +12,7 @@ from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.conditions import Conditions, frf_of
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.recordings.frf.mains import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 _WIDTH_HZ = 1.5  # where it is asked which mains stand out
 _FURTHEST_HZ = 20.0  # beyond which no line reaches, and short of half way from one harmonic to the next
@@ -106,7 +105,7 @@ def _excess(recordings: Sequence[Frf], mains: float) -> float:
     return score / np.sqrt(weight) if weight else 0.0
 
 
-def _stray(lines: Frf, size: Floats, rows: NDArray[np.intp], beside: NDArray[np.intp]) -> Floats:
+def _stray(lines: Frf, size: Floats, rows: Indices, beside: Indices) -> Floats:
     """How far rows are from a straight line between others, relative to `size`."""
     between = np.interp(lines.frequency[rows], lines.frequency[beside], lines.values[beside])
     return np.asarray(np.abs(lines.values[rows] - between) / size[rows])

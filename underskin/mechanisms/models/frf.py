@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.autodiff import Differentiated, chain, constant, sum_rows
 from underskin.errors import ErrorCode, InvalidInput, required
@@ -20,7 +19,7 @@ from underskin.mechanisms.base import Mechanism, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
 from underskin.mechanisms.models.contact_stage import layer_curves, press, stiffness
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.frf_design import FrfDesign, Indices, frf_design, largest_offset
+from underskin.mechanisms.models.frf_design import FrfDesign, frf_design, largest_offset
 from underskin.mechanisms.models.nuisances import FRF_NUISANCES
 from underskin.mechanisms.models.off_centre_response import PROFILE_END, offset_sigma
 from underskin.mechanisms.models.pickup import Pickup, together
@@ -28,7 +27,7 @@ from underskin.mechanisms.models.response import Response, joined
 from underskin.mechanisms.models.sigma_curves import SigmaOfContacts, layer_of
 from underskin.recordings.conditions import Conditions
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Array, Floats, to_si
+from underskin.units import Array, Floats, Indices, Mask, to_si
 
 _NUISANCE_STRETCH = 1.06  # the thickness' bounds
 _QUANTITIES, _BLOCK = 6, 4**4  # of a linear layer's contact, and coefficients around a place in the table
@@ -76,7 +75,7 @@ class FrfModel:
         self._table = table
 
     @cached_property
-    def valid(self) -> NDArray[np.bool_]:
+    def valid(self) -> Mask:
         """Which rows lie inside the table as declared."""
         none = np.zeros((0, 1))
         modulus, thickness, poisson_ratio = (
@@ -88,7 +87,7 @@ class FrfModel:
         a, x = self._table.axes[0], self._table.axes[2]
         inside = (a_over_h <= a[-1]) & (contacts.cbrt_load.value <= x[-1])
         distance = np.hypot(design.point_x, design.point_y) + self._sensor_radius
-        near: NDArray[np.bool_] = inside[design.point_contact] & (distance <= PROFILE_END * self._thickness)
+        near: Mask = inside[design.point_contact] & (distance <= PROFILE_END * self._thickness)
         return near[design.point][self.recording]
 
     def predict(self, fit: Floats) -> Prediction:
@@ -172,7 +171,7 @@ class FrfModel:
 
     def _sigma_at_points(
         self, contacts: Contacts, own: dict[str, Values], position: Sequence[Differentiated]
-    ) -> tuple[list[Differentiated], NDArray[np.bool_]]:
+    ) -> tuple[list[Differentiated], Mask]:
         """σ of each point at each force node, and which points are inside the table at all of them.
 
         Inside means also that the sensor's disc lies within the stress profile, beyond whose end σ is 0.

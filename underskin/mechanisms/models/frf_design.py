@@ -8,14 +8,12 @@ from collections.abc import Collection
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from underskin.errors import required
 from underskin.recordings.conditions import Conditions, FrfConditions, frf_of
-from underskin.units import Floats, to_si
+from underskin.units import Floats, Indices, Mask, to_si
 
-Indices = NDArray[np.intp]
 NEIGHBOUR_PITCHES = 1.2
 
 
@@ -78,11 +76,11 @@ def frequencies(entry: FrfConditions) -> Floats:
     return entry.frequency_hz
 
 
-def _neighbours(places: Floats) -> NDArray[np.bool_]:
+def _neighbours(places: Floats) -> Mask:
     """Which sensors (sensors, sensors) are within 1.2 pitches of which."""
     distance = cdist(places, places)
     np.fill_diagonal(distance, np.inf)
-    near: NDArray[np.bool_] = distance <= NEIGHBOUR_PITCHES * distance.min()
+    near: Mask = distance <= NEIGHBOUR_PITCHES * distance.min()
     return near
 
 

@@ -13,7 +13,6 @@ power has the ratio κ; κ is taken to be the ratio of the signals' own powers, 
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.errors import not_finite, out_of_range, too_few, unequal_lengths, unusable
 from underskin.recordings.campaign import FrfRecording
@@ -21,7 +20,7 @@ from underskin.recordings.frf.periodic import period_of, without_drift
 from underskin.recordings.frf.signal_checks import damaged, defects_of_pair
 from underskin.recordings.frf.spectral_average import Blocks, Estimator, Frf, averaged, ratio, without_line
 from underskin.recordings.frf.stepped_sine import find_steps, settled, step_amplitudes
-from underskin.units import Complexes, Floats, to_si
+from underskin.units import Complexes, Floats, Mask, to_si
 
 __all__ = ["Frf", "broadband", "estimate", "lines_of", "periodic", "stepped_sine"]
 
@@ -229,7 +228,7 @@ def _check(force: Floats, charge: Floats, sample_rate: float) -> None:
     if not (np.isfinite(sample_rate) and sample_rate > 0):
         raise not_finite("sample_rate_hz", sample_rate, "must be finite and greater than 0")
     for name, signal in (("force_n", force), ("charge_pc", charge)):
-        bad: NDArray[np.bool_] = ~np.isfinite(signal)
+        bad: Mask = ~np.isfinite(signal)
         if bad.any():
             raise not_finite(name, "not finite", index=int(np.argmax(bad)))
 

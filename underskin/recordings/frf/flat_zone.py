@@ -11,14 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from underskin.errors import too_few
 from underskin.recordings.frf.estimation import Frf
 from underskin.recordings.frf.flat_zone_reason import levels_of, reason_of
 from underskin.recordings.frf.mains import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ
-from underskin.units import Complexes, Floats
+from underskin.units import Complexes, Floats, Indices, Mask
 
 FLATNESS = 0.02
 STEEPEST = 0.1  # fall of ln FRF with ln f that relaxation may have (a loss tangent of 0.16)
@@ -40,7 +39,7 @@ class FlatZone:
     left_out_hz: tuple[float, ...] = ()
     chosen_by_user: bool = False
 
-    def holds(self, frequency: Floats) -> NDArray[np.bool_]:
+    def holds(self, frequency: Floats) -> Mask:
         """Which lines are averaged."""
         inside = (frequency >= self.low_hz) & (frequency <= self.high_hz)
         return inside & ~np.isin(np.round(frequency, 6), self.left_out_hz)
@@ -50,7 +49,7 @@ class FlatZone:
 class Stack:
     """Recordings of one grid: `rows` are their numbers; frequency (lines,), values (rows, lines), γ² or NaN."""
 
-    rows: NDArray[np.intp]
+    rows: Indices
     frequency: Floats
     values: Complexes
     coherence: Floats
