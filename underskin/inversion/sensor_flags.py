@@ -105,12 +105,7 @@ def population_flags(ids: Sequence[str], sensor: Indices, d33: Floats, noise: Fl
 
 
 def scatter_flags(
-    ids: tuple[str, ...],
-    sensor: Indices,
-    rows: "RecordingD33",
-    good: Indices,
-    pilot: Floats,
-    expected: Floats,
+    ids: tuple[str, ...], sensor: Indices, rows: "RecordingD33", good: Indices, pilot: Floats, expected: Floats
 ) -> list[Flag]:
     """Sensors whose lines or recordings scatter, or whose d33 bends with preload, beyond their array's.
 

@@ -156,12 +156,7 @@ def _undecidable(basis: Floats, others: list[Floats], blocks: Indices) -> Undeci
 
 
 def _freedman_lane(
-    gain: Floats,
-    weight: Floats,
-    basis: Floats,
-    others: list[Floats],
-    blocks: Indices,
-    random: np.random.Generator,
+    gain: Floats, weight: Floats, basis: Floats, others: list[Floats], blocks: Indices, random: np.random.Generator
 ) -> Floats:
     """The weighted square explained beyond the other axes: as observed, then under each permutation."""
     reduced = np.column_stack([np.ones(len(gain)), *others]) * weight[:, None]
