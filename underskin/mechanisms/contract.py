@@ -12,18 +12,7 @@ import numpy as np
 
 from underskin.errors import InvalidInput, not_finite, not_unique, required
 from underskin.extensions import described
-from underskin.mechanisms.base import (
-    AXES,
-    NEEDED_FIELDS,
-    TEXTS,
-    UNITS,
-    Kind,
-    Mechanism,
-    Normal,
-    Parameter,
-    Stage,
-    Uniform,
-)
+from underskin.mechanisms.base import AXES, NEEDED_FIELDS, UNITS, Kind, Mechanism, Normal, Parameter, Stage, Uniform
 from underskin.mechanisms.models.compression import CompressionModel
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.models.indentation import IndentationModel
@@ -92,7 +81,7 @@ def check(mechanism: Mechanism, others: Sequence[Mechanism] = ()) -> None:
 def _check_traits(mechanism: Mechanism) -> None:
     name: Any = getattr(mechanism, "name", None)
     _require("name", name, isinstance(name, str) and _NAME.fullmatch(name), "must be lower case letters, digits and _")
-    for field in TEXTS:
+    for field in Mechanism.TEXTS:
         text: Any = getattr(mechanism, field, None)
         _require(field, text, isinstance(text, str) and text.strip(), "must be a text")
     stage: Any = getattr(mechanism, "stage", None)
