@@ -37,6 +37,7 @@ AXES = (  # fields of a campaign along which an effect can show
     *("preload_n", "indenter_radius_mm", "position_mm", "sensor", "dwell_s", "load_cycles", "dynamic_force_n"),
     *("frequency_hz", "phase", "displacement_mm", "force_n", "time_s", "sample_height_mm", "sample_diameter_mm"),
 )
+TEXTS = ("plain", "law", "assumptions", "source", "needs")
 NEEDED_FIELDS = ("dwell_s", "dynamic_force_n", "load_cycles", "sensor")  # of a recording, that a mechanism may require
 
 
@@ -215,7 +216,6 @@ class Mechanism:
     composition; `kinds` of recordings that it acts on; `axes` of the campaign on which the effect shows.
     """
 
-    TEXTS: ClassVar[tuple[str, ...]] = ("plain", "law", "assumptions", "source", "needs")
     name: ClassVar[str]
     plain: ClassVar[str]
     law: ClassVar[str]
@@ -244,7 +244,7 @@ class Mechanism:
 
     def __init_subclass__(cls) -> None:
         """Texts may be written over several lines."""
-        for name in cls.TEXTS:
+        for name in TEXTS:
             if isinstance(text := vars(cls).get(name), str):
                 setattr(cls, name, " ".join(text.split()))
 
