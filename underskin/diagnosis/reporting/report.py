@@ -16,19 +16,11 @@ from underskin.diagnosis.localisation.permutation_test import AxisResult
 from underskin.diagnosis.localisation.region import reaches_all_along
 from underskin.diagnosis.localisation.residual_shape import REACHES_NOISE, Shape
 from underskin.diagnosis.planning.optimal_design import NextRecordings
-from underskin.diagnosis.reporting import next_experiment
+from underskin.diagnosis.reporting import next_experiment, statements
 from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded, without_effect
-from underskin.diagnosis.reporting.statements import (
-    CONFOUNDED,
-    UNDECIDABLE,
-    answer_statement,
-    insufficient_statement,
-    location_statement,
-    why_not,
-)
 from underskin.diagnosis.selection.search import Answer, Search
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import Confounding
@@ -98,7 +90,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         return {
             **document,
             "probability": 1.0,
-            "statement": insufficient_statement(diagnosis.lacking),
+            "statement": statements.insufficient_statement(diagnosis.lacking),
             "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "Nothing was located."},
             "mechanisms": [],
             "alternatives": [],
@@ -119,7 +111,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     d33, implausible = _d33(problem, shown, fit) if stands else (None, [])
     findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *implausible)]
     modulus = fit["after"].get("youngs_modulus")
-    statement = answer_statement(
+    statement = statements.answer_statement(
         search.answers,
         stated,
         diagnosis.shape,
@@ -140,7 +132,9 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
             {
                 "mechanism": entry.mechanism,
                 "confounded_with": entry.confounded_with,
-                "reason": CONFOUNDED[entry.why].format(mechanism=entry.mechanism, other=entry.confounded_with),
+                "reason": statements.CONFOUNDED[entry.why].format(
+                    mechanism=entry.mechanism, other=entry.confounded_with
+                ),
             }
             for entry in diagnosis.confounded
         ],
@@ -199,7 +193,7 @@ def _alternatives(answers: Sequence[Answer]) -> list[dict[str, Any]]:
         if enough or len(alternatives) >= _ALTERNATIVES:
             break
         said = {"mechanisms": list(answer.names), "probability": round(answer.probability, 3)}
-        alternatives.append({**said, "why_not": why_not(answer, leader)})
+        alternatives.append({**said, "why_not": statements.why_not(answer, leader)})
     return alternatives
 
 
@@ -213,12 +207,12 @@ def _location(diagnosis: DiagnosisResult, problem: FittingProblem, agrees: bool)
                 "axis": entry.axis,
                 "p_value": None if entry.p_value is None else round(entry.p_value, 3),
                 "share_percent": round(100 * float(entry.share), 1),
-                **({"undecidable": UNDECIDABLE[entry.reason]} if entry.reason else {}),
+                **({"undecidable": statements.UNDECIDABLE[entry.reason]} if entry.reason else {}),
             }
             for entry in diagnosis.axes
         ],
         "region": {name: [rounded(x) if isinstance(x, float) else x for x in ends] for name, ends in region.items()},
         "effect_percent": rounded(effect.percent, 3),
         "effect_interval_percent": [rounded(effect.low, 3), rounded(effect.high, 3)],
-        "statement": location_statement(diagnosis.axes, region, whole, effect, agrees=agrees),
+        "statement": statements.location_statement(diagnosis.axes, region, whole, effect, agrees=agrees),
     }
