@@ -15,7 +15,7 @@ from tests.support import preloaded
 from tests.support.repository import ROOT
 from underskin.errors import FileError
 from underskin.recordings import read_file, rig_description
-from underskin.recordings.readers.repeated_keys import RepeatedKey, repeated_key
+from underskin.recordings.readers.repeated_keys import repeated_key
 
 EXAMPLES = ROOT / "examples" / "formats"
 CAMPAIGN = (EXAMPLES / "template.json").read_text()
@@ -77,7 +77,7 @@ def test_a_repeated_key_is_seen_wherever_it_is(document: Any, blank: str, ascii_
     ],
 )
 def test_its_line_and_column_are_told(text: str, key: str, line: int, column: int) -> None:
-    assert repeated_key(text.encode()) == RepeatedKey(key, line, column)
+    assert repeated_key(text.encode()) == (key, f"line {line}, column {column}")
 
 
 def test_the_search_costs_less_than_parsing_numbers_does() -> None:

@@ -60,7 +60,7 @@ __all__ = [
 # Imported on first use: SciPy takes longer to load than `underskin --help` to answer.
 _MODULES = {
     "Campaign": "recordings.campaign",
-    "Client": "client",
+    "Client": "client.service_client",
     "Conditions": "recordings.conditions",
     "Indenter": "physics.skin",
     "Inversion": "inversion.invert",

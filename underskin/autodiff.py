@@ -8,9 +8,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from underskin.units import Array
+from underskin.units import Array, Indices, Mask
 
 
 class Differentiated:
@@ -116,7 +115,7 @@ def chain(value: Array, *terms: tuple[Array, Differentiated]) -> Differentiated:
     return Differentiated(value, np.asarray(slopes))
 
 
-def where(condition: NDArray[np.bool_], yes: Differentiated, no: Differentiated | float) -> Differentiated:
+def where(condition: Mask, yes: Differentiated, no: Differentiated | float) -> Differentiated:
     """`yes` in the rows where `condition` (rows,) holds, `no` in the others."""
     if not isinstance(no, Differentiated):
         return Differentiated(np.where(condition, yes.value, no), np.where(condition, yes.slopes, 0.0))
@@ -148,7 +147,7 @@ def variables(values: Array, slopes: Array) -> list[Differentiated]:
     return [Differentiated(values[..., [place]], slopes[..., [place]]) for place in range(values.shape[-1])]
 
 
-def sum_rows(x: Differentiated, owner: NDArray[np.intp], rows: int) -> Differentiated:
+def sum_rows(x: Differentiated, owner: Indices, rows: int) -> Differentiated:
     """Sums over groups of rows.
 
     Parameters
@@ -169,7 +168,7 @@ def sum_rows(x: Differentiated, owner: NDArray[np.intp], rows: int) -> Different
     return Differentiated(_summed(x.value, owner, rows), _summed(x.slopes, owner, rows))
 
 
-def _summed(terms: Array, owner: NDArray[np.intp], rows: int) -> Array:
+def _summed(terms: Array, owner: Indices, rows: int) -> Array:
     sets = int(np.prod(terms.shape[:-1]))
     place = (rows * np.arange(sets)[:, None] + owner).ravel()
     return np.bincount(place, terms.ravel(), sets * rows).reshape(*terms.shape[:-1], rows)

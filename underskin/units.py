@@ -20,6 +20,8 @@ from underskin.findings.finding import Finding
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Array = NDArray[Any]  # float64 or complex128
+Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -129,9 +131,8 @@ def checked(name: str, value: ArrayLike, *, units_checked: bool = False) -> Floa
     values = np.asarray(value, dtype=float)
     size = np.abs(values) if field.signed else values
     positive = "finite and not zero" if field.signed else "finite and greater than 0"
-    _refuse(
-        name, values, ~(np.isfinite(values) & (size > 0)), f"must be {positive} ({field.unit})", ErrorCode.OUT_OF_RANGE
-    )
+    good = np.isfinite(values) & (size > 0)
+    _refuse(name, values, ~good, f"must be {positive} ({field.unit})", ErrorCode.OUT_OF_RANGE)
     if field.likely is not None and not units_checked:
         low, high = field.likely
         unlikely = (size < low) | (size > high)
@@ -143,21 +144,14 @@ def checked(name: str, value: ArrayLike, *, units_checked: bool = False) -> Floa
 
 def non_negative(name: str, values: Floats) -> Floats:
     """`values`; raises InvalidInput at the first row that is not finite or below 0."""
-    return _accepted(
-        name, values, np.isfinite(values) & (values >= 0), "must be finite and at least 0", ErrorCode.OUT_OF_RANGE
-    )
+    good = np.isfinite(values) & (values >= 0)
+    _refuse(name, values, ~good, "must be finite and at least 0", ErrorCode.OUT_OF_RANGE)
+    return values
 
 
 def finite(name: str, values: Floats) -> Floats:
     """`values`; raises InvalidInput at the first row that is not finite."""
-    return _accepted(name, values, np.isfinite(values), "must be finite", ErrorCode.NOT_FINITE)
-
-
-def _accepted(name: str, values: Floats, good: NDArray[np.bool_], allowed: str, code: ErrorCode) -> Floats:
-    if not good.all():
-        first = int(np.argmin(good.ravel()))
-        row = int(np.unravel_index(first, values.shape)[0]) if values.ndim else None
-        raise InvalidInput(name, float(values.flat[first]), allowed, index=row, code=code)
+    _refuse(name, values, ~np.isfinite(values), "must be finite", ErrorCode.NOT_FINITE)
     return values
 
 
@@ -175,19 +169,16 @@ def unusual(name: str, value: ArrayLike) -> list[Finding]:
         return []
     first = int(np.argmax(unlikely))
     number = float(values.flat[first])
-    arguments = {
-        "value": number,
-        "unit": field.unit,
-        "guess": _guess(field, abs(number)),
-        "more": int(unlikely.sum()) - 1,
-    }
+    more = int(unlikely.sum()) - 1
+    arguments = {"value": number, "unit": field.unit, "guess": _guess(field, abs(number)), "more": more}
     return [Finding(Reason.UNUSUAL_MAGNITUDE, "", name, arguments, index=first if values.ndim else None)]
 
 
-def _refuse(name: str, values: Floats, bad: NDArray[np.bool_], allowed: str, code: ErrorCode) -> None:
+def _refuse(name: str, values: Floats, bad: Mask, allowed: str, code: ErrorCode) -> None:
     if bad.any():
         first = int(np.argmax(bad))
-        raise InvalidInput(name, float(values.flat[first]), allowed, index=first if values.ndim else None, code=code)
+        row = int(np.unravel_index(first, values.shape)[0]) if values.ndim else None
+        raise InvalidInput(name, float(values.flat[first]), allowed, index=row, code=code)
 
 
 def _likely_range(field: LabField, size: float) -> Requirement:

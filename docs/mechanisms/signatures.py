@@ -136,7 +136,8 @@ def _over_sensors(name: str, table: SigmaTable) -> Panel:
     rows = [_recording(i, sensor=sensor.id) for i, sensor in enumerate(_SKIN.sensors)]
     campaign = Campaign("signature", _SKIN, tuple(rows))
     model = compose([name], campaign, table)
-    spread, _ = model.sensor_spread_of(_fit(model, compose([], campaign, table)))
+    fit = _fit(model, compose([], campaign, table))
+    spread = next(one.from_fit(at) for one, at in zip(model.parameters, fit, strict=True) if one.name == "spread")
     number = np.arange(1.0, len(rows) + 1)
     gains = np.random.default_rng(5).normal(0, spread, len(rows))
     band = 100 * np.expm1(np.full(len(rows), spread))

@@ -12,9 +12,8 @@ from underskin.recordings.readers.repeated_keys import repeated_key
 
 def require_unique_keys(body: bytes) -> None:
     """Raises Refusal (422) that names the key, its line and its column; `body` must be valid JSON."""
-    repeated = repeated_key(body)
-    if repeated is not None:
-        raise given_twice(repeated.key, repeated.place)
+    if repeated := repeated_key(body):
+        raise given_twice(*repeated)
 
 
 class _JsonRequest(Request):

@@ -19,7 +19,7 @@ from service.store.tables import metadata
 
 
 def place(database: Database, folder: Path, occasion: str) -> Path:
-    """Where in the data folder a backup is written that nobody asked for, now; a name of its own within a second, too."""
+    """Where in the data folder a backup is written that nobody asked for; a name apart within a second, too."""
     suffix = ".sqlite3" if database.is_sqlite else ".pgdump"
     return folder / "backups" / f"{occasion}-{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}{suffix}"
 

@@ -5,16 +5,11 @@ import plotly.graph_objects as go
 import pytest
 
 from underskin.errors import InvalidInput
-from underskin.figures import (
-    SensorPoints,
-    Trace,
-    array_map,
-    d33_history,
-    frf_recordings,
-    frf_versus_preload,
-    raw_traces,
-    response_per_sensor,
-)
+from underskin.figures.array import array_map, frf_versus_preload, response_per_sensor
+from underskin.figures.frf import frf_recordings
+from underskin.figures.history import SensorPoints, d33_history
+from underskin.figures.traces import raw_traces
+from underskin.recordings.channels import Channel
 from underskin.recordings.frf.summary import FrfLines
 
 SENSORS = ("s1", "s2", "s3")
@@ -64,7 +59,7 @@ def test_a_column_of_another_length_is_refused_by_name() -> None:
 def test_a_raw_trace_of_many_samples_keeps_its_extremes() -> None:
     values = np.sin(np.arange(100_000) / 50)
     values[[4_321, 77_777]] = 9.0, -8.0
-    figure = raw_traces([Trace("Load cell", "V", values), Trace("<b>", "", np.arange(5.0))], 1000.0)
+    figure = raw_traces([Channel("Load cell", "V", values), Channel("<b>", "", np.arange(5.0))], 1000.0)
     long, short = figure.data
     assert len(long.x) < 2_000
     assert dict(zip(long.x.tolist(), long.y.tolist(), strict=True))[4.321] == 9.0

@@ -121,9 +121,9 @@ def test_a_stiffening_contact_follows_the_law_s_secant_at_its_strain(
     invariant = stretch**2 + 2 / stretch - 3
     ratio = (stretch**-2 - stretch) / (3 * strain) * law(8.0 * invariant)
     values = {"stiffening_coefficient": 8.0, "stiffening_form": form, "stiffening_exponent": exponent}
-    found = force_at(["strain_stiffening"], depth, **values)
+    found = force_at(["strain_stiffening"], depth, None, **values)
     assert found == pytest.approx(ratio * hertz_force(depth, R_MM, E_MPA))
-    small = force_at(["strain_stiffening"], 1e-7 * depth + 1e-9, **values)
+    small = force_at(["strain_stiffening"], 1e-7 * depth + 1e-9, None, **values)
     assert small == pytest.approx(hertz_force(1e-7 * depth + 1e-9, R_MM, E_MPA), rel=1e-3)
 
 

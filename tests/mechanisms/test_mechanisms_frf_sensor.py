@@ -140,11 +140,3 @@ def test_a_pick_up_as_weak_as_the_noise_is_at_the_mains_whose_lines_stray_more_t
         model = compose(["mains_pickup"], campaign(recordings), table())
         pickup = model.predict(fit_of(model, pickup_charge=0.02)).pickup_variance
         assert frequency[pickup[: len(frequency)].argmax()] == 60.5
-
-
-def test_a_spread_of_the_sensors_is_what_its_parameter_says() -> None:
-    recordings = [frf_recording(), frf_recording(id="other", sensor="s2")]
-    model = compose(["sensor_spread"], campaign(recordings), table())
-    assert model.sensor_spread_of(fit_of(model, spread=0.13))[0] == pytest.approx(0.13)
-    plain = compose([], campaign(recordings), table())
-    assert plain.sensor_spread_of(fit_of(plain))[0] == 0.01

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from underskin.mechanisms import compose
+from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.conditions import Sensor, SkinDescription
 from underskin.surrogate.sigma_table import SigmaTable
@@ -93,7 +94,8 @@ def campaign(made: Made, table: SigmaTable) -> Campaign:
     if prediction.pickup is not None:
         phase = (random.normal(size=count) + 1j * random.normal(size=count))[model.recording]
         value = value + np.sqrt(prediction.pickup_variance) * phase
-    spread, _ = model.sensor_spread_of(fit)
+    freed = [one.from_fit(at) for one, at in zip(model.parameters, fit, strict=True) if one.acts_on == "gain_spread"]
+    spread = freed[0] if freed else SENSOR_SPREAD
     assert model.sensor is not None
     gain = random.normal(0, made.gain, count) + random.normal(0, spread, made.sensors)[model.sensor]
     value = value * np.exp(gain)[model.recording]

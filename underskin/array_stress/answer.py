@@ -4,7 +4,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.array_stress import load_integration as integration
 from underskin.array_stress.load_integration import Load, charge
@@ -15,7 +14,7 @@ from underskin.findings.finding import Finding
 from underskin.physics.contact_pressure import MOST_A_OVER_H, SpherePressure, sphere_pressures
 from underskin.physics.elastic_layer import Layer, slip
 from underskin.surrogate.influence_table import Influence, InfluenceTable
-from underskin.units import Floats, checked, to_lab, to_si
+from underskin.units import Floats, Mask, checked, to_lab, to_si
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class ArrayStress:
 
     columns: Mapping[str, Floats]
     sensors: tuple[str, ...]
-    inside: NDArray[np.bool_]
+    inside: Mask
     reach_mm: float
     contact_radius_mm: Floats
     findings: list[Finding]

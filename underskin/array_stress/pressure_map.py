@@ -7,16 +7,8 @@ Separated by commas, or by tabs or semicolons, as spreadsheets copy and save it,
 import math
 from typing import Any
 
-from underskin.errors import (
-    ErrorCode,
-    FileError,
-    InvalidInput,
-    not_finite,
-    out_of_range,
-    too_few,
-    unreadable,
-    wrong_type,
-)
+from underskin import errors
+from underskin.errors import ErrorCode, FileError, InvalidInput
 from underskin.recordings.readers import text
 
 _FIELD = "pressure_map"
@@ -29,7 +21,7 @@ def parse(content: bytes, name: str) -> dict[str, Any]:
     """The `pressure_map` of POST /v1/stress in a file called `name`; raises InvalidInput that names the place."""
     lines, decimal = _lines(content, name)
     if len(lines) < 3 or len(lines[0][1]) < 3:
-        raise too_few(_FIELD, name, f"{_FORM}; two of each at least")
+        raise errors.too_few(_FIELD, name, f"{_FORM}; two of each at least")
     (_, head), *rows = lines
     for line, cells in rows:
         if len(cells) != len(head):
@@ -47,7 +39,7 @@ def parse(content: bytes, name: str) -> dict[str, Any]:
         for column, value in enumerate(row[1:], 2):
             if value < 0:
                 allowed = f"must be at least 0: a pressure does not pull (line {line}, cell {column} of {name})"
-                raise out_of_range(_FIELD, value, allowed)
+                raise errors.out_of_range(_FIELD, value, allowed)
     return {"x_mm": x, "y_mm": [row[0] for row in numbers], "pressure_mpa": [row[1:] for row in numbers]}
 
 
@@ -56,7 +48,7 @@ def _lines(content: bytes, name: str) -> tuple[list[Line], str]:
     try:
         document = text.decode(content, name)
     except FileError as error:
-        raise unreadable(_FIELD, name, f"must be a readable CSV file ({error.place}: {error.reason})") from None
+        raise errors.unreadable(_FIELD, name, f"must be a readable CSV file ({error.place}: {error.reason})") from None
     separator = next((sign for sign in ("\t", ";") if sign in document), ",")
     numbered = [(number, _cells(line, separator, number, name)) for number, line in enumerate(text.lines(document), 1)]
     decimal = text.decimal_mark([cells for _, cells in numbered], separator)
@@ -67,14 +59,14 @@ def _cells(line: str, separator: str, number: int, name: str) -> list[str]:
     try:
         return text.cells(line, separator)
     except ValueError as error:
-        raise unreadable(_FIELD, line[:80], f"{error} (line {number} of {name})") from None
+        raise errors.unreadable(_FIELD, line[:80], f"{error} (line {number} of {name})") from None
 
 
 def _number(cell: str, decimal: str, place: str) -> float:
     value = text.number(cell, decimal)
     if value is None:
         reason = text.ungrouped(cell) if text.is_grouped(cell) else "must be a number"
-        raise wrong_type(_FIELD, cell[:80], f"{reason} ({place})")
+        raise errors.wrong_type(_FIELD, cell[:80], f"{reason} ({place})")
     if not math.isfinite(value):
-        raise not_finite(_FIELD, cell[:80], f"must be a finite number ({place})")
+        raise errors.not_finite(_FIELD, cell[:80], f"must be a finite number ({place})")
     return value

@@ -10,20 +10,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from underskin import errors
 from underskin.array_stress import pressure_map
-from underskin.errors import (
-    ErrorCode,
-    InvalidInput,
-    Mention,
-    Requirement,
-    conflicting,
-    not_unique,
-    out_of_range,
-    required,
-    too_few,
-    unreadable,
-    wrong_type,
-)
+from underskin.errors import ErrorCode, InvalidInput, Mention, Requirement
 from underskin.recordings import validation as field
 from underskin.recordings.conditions import Sensors
 from underskin.recordings.readers import json_file
@@ -58,7 +47,7 @@ class PressureMap:
 def _contacts(name: str, value: Any, units_checked: bool) -> tuple[LabContact, ...]:
     if not isinstance(value, list | tuple) or not 0 < len(value) <= MOST_CONTACTS:
         allowed = Requirement(f"must be a list of 1 to {MOST_CONTACTS} ", Mention("contacts"))
-        raise wrong_type(name, shown(value), allowed)
+        raise errors.wrong_type(name, shown(value), allowed)
     return tuple(field.build(LabContact, f"{name}[{i}]", entry, units_checked) for i, entry in enumerate(value))
 
 
@@ -86,7 +75,7 @@ def _refuse_pull(name: str, pressure: Floats) -> None:
         more = f" and {len(cells) - _MOST_NAMED} more" if len(cells) > _MOST_NAMED else ""
         also = f"; so are {', '.join(others)}{more}" if others else ""
         allowed = f"must be at least 0: a pressure does not pull{also}"
-        raise out_of_range(name + first, float(pressure[tuple(cells[0])]), allowed)
+        raise errors.out_of_range(name + first, float(pressure[tuple(cells[0])]), allowed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,11 +106,11 @@ def read_file(path: str, map_path: str | None = None) -> LoadCase:
     try:
         content = sys.stdin.buffer.read() if path == "-" else Path(path).read_bytes()
     except OSError as error:
-        raise unreadable("file", path, f"must be a readable JSON file ({error.strerror})") from error
+        raise errors.unreadable("file", path, f"must be a readable JSON file ({error.strerror})") from error
     document = json_file.document(content, path)
     if map_path is not None:
         if field.mapping("body", document).get("pressure_map") is not None:
-            raise not_unique("pressure_map", map_path, f"is in {path} already; give it once")
+            raise errors.not_unique("pressure_map", map_path, f"is in {path} already; give it once")
         document = {**document, "pressure_map": _map_in_file(map_path)}
     return read_request(document)
 
@@ -130,7 +119,7 @@ def _map_in_file(path: str) -> dict[str, Any]:
     try:
         content = Path(path).read_bytes()
     except OSError as error:
-        raise unreadable("pressure_map", path, f"must be a readable CSV file ({error.strerror})") from error
+        raise errors.unreadable("pressure_map", path, f"must be a readable CSV file ({error.strerror})") from error
     return pressure_map.parse(content, path)
 
 
@@ -143,13 +132,13 @@ def read_request(document: Any) -> LoadCase:
         raise refused[0]
     request = LoadCase(**values)
     if not request.sensors:
-        raise too_few("sensors", shown(request.sensors), "must hold at least one sensor")
+        raise errors.too_few("sensors", shown(request.sensors), "must hold at least one sensor")
     if bool(request.contacts) == (request.pressure_map is not None):
         allowed = Requirement("must be given, or ", Mention("pressure_map"), ", but not both")
         if not request.contacts:
-            raise required("contacts", allowed)
-        raise conflicting("contacts", shown(request.contacts), allowed)
+            raise errors.required("contacts", allowed)
+        raise errors.conflicting("contacts", shown(request.contacts), allowed)
     if request.contacts and request.youngs_modulus_mpa is None:
         allowed = Requirement("is required with ", Mention("contacts"), ", whose radii depend on it")
-        raise required("youngs_modulus_mpa", allowed)
+        raise errors.required("youngs_modulus_mpa", allowed)
     return request

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from underskin.array_stress.request import LabContact, LoadCase, PressureMap
 from underskin.errors import Mention, Requirement, conflicting, out_of_range
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.physics import hertz
+from underskin.recordings.plausibility import nearest_pair
 from underskin.units import Floats, to_lab, to_si, unusual
 
 MOST_PAIRS = 50_000_000  # of a sensor and a point force: about ten seconds
@@ -94,7 +94,10 @@ def findings(request: LoadCase) -> list[Finding]:
         ]
     modulus = request.youngs_modulus_mpa or np.nan
     strained = [(_load_parameter(contact, modulus), i) for i, contact in enumerate(request.contacts)]
-    slipping = [(_shear(contact) / contact.normal_force_n, i) for i, contact in enumerate(request.contacts)]
+    slipping = [
+        (float(np.hypot(*contact.tangential_force_n)) / contact.normal_force_n, i)
+        for i, contact in enumerate(request.contacts)
+    ]
     return [
         *_about_sensors(request),
         *_worst(Reason.LOAD_NOT_LINEAR, "load_parameter", ((load, i) for load, i in strained if load > _LINEAR)),
@@ -103,20 +106,10 @@ def findings(request: LoadCase) -> list[Finding]:
 
 
 def _about_sensors(request: LoadCase) -> Iterator[Finding]:
-    positions = np.array([[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
-    if len(positions) < 2:
-        return
-    # The first of the two is the sensor itself.
-    distances, nearest = (np.asarray(part) for part in cKDTree(positions).query(positions, k=2))
-    distance = distances[:, 1]
-    first = int(np.argmin(distance))
-    other = next(int(i) for i in nearest[first] if i != first)
-    if distance[first] < 2 * request.sensor_radius_mm * (1 - _ROUNDING):
-        arguments = {
-            "first": request.sensors[first].id,
-            "second": request.sensors[other].id,
-            "distance_mm": float(distance[first]),
-        }
+    distance, first, second = nearest_pair(request.sensors) or (np.inf, 0, 0)
+    if distance < 2 * request.sensor_radius_mm * (1 - _ROUNDING):
+        ids = {"first": request.sensors[first].id, "second": request.sensors[second].id}
+        arguments = {**ids, "distance_mm": distance}
         yield Finding(Reason.SENSORS_OVERLAP, "", f"sensors[{first}]", arguments)
 
 
@@ -151,7 +144,3 @@ def _about_map(given: PressureMap, modulus: float | None) -> Iterator[Finding]:
 def _load_parameter(contact: LabContact, modulus: float) -> float:
     force, radius = contact.normal_force_n, float(to_si("indenter_radius_mm", contact.indenter_radius_mm))
     return float(hertz.load_parameter(force, radius, to_si("youngs_modulus_mpa", modulus)))
-
-
-def _shear(contact: LabContact) -> float:
-    return float(np.hypot(*contact.tangential_force_n))

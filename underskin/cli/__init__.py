@@ -1,5 +1,1 @@
 """The command `underskin`."""
-
-from underskin.cli.app import main
-
-__all__ = ["main"]

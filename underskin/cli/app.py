@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from underskin.cli import diagnose, invert_files, store, stress
+from underskin.cli import diagnose, store, stress
 from underskin.errors import UnderskinError
 
 if TYPE_CHECKING:
@@ -64,6 +64,19 @@ Input = Annotated[
     typer.Option("--input", metavar="FILE", help="CSV file with columns named as the options (_ for -); - is stdin."),
 ]
 Csv = Annotated[bool, typer.Option("--csv", help="Write CSV (inputs, results, status) instead of a table.")]
+Files = Annotated[
+    list[Path] | None, typer.Argument(help="Campaigns, or files as instruments write them; each is inverted by itself.")
+]
+Together = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Join the FILEs, all of one skin, into one campaign called NAME.")
+]
+Rig = Annotated[Path | None, typer.Option(help="Rig description, for files that hold channels.")]
+Band = Annotated[
+    str | None, typer.Option(metavar="LOW,HIGH", help="Average FILE from LOW to HIGH [Hz], not over its flat zone.")
+]
+Figures = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Write the figures of each FILE into DIR, as FILE.html.")
+]
 UnitsChecked = Annotated[
     bool, typer.Option("--units-checked", help="Accept magnitudes that look like a slip of units.")
 ]
@@ -123,11 +136,11 @@ def d33(
     units_checked: UnitsChecked = False,
     input_file: Input = None,
     csv: Csv = False,
-    files: invert_files.FilesArgument = None,
-    rig: invert_files.Rig = None,
-    band: invert_files.BandOption = None,
-    figures: invert_files.Figures = None,
-    together: invert_files.Together = None,
+    files: Files = None,
+    rig: Rig = None,
+    band: Band = None,
+    figures: Figures = None,
+    together: Together = None,
 ) -> None:
     """The d33 of a sensor from its measured FRF, or of an array from files of its recordings.
 
@@ -138,17 +151,25 @@ def d33(
     if files:
         for_columns = [f"--{name.replace('_', '-')}" for name, values in options.items() if values]
         for_columns += [name for name, used in (("--input", input_file), ("--units-checked", units_checked)) if used]
-        invert_files.refuse(for_columns, "is for columns; files say it themselves")
-        invert_files.invert_files(files, rig, band, figures, together, csv)
+        _refuse(for_columns, "is for columns; files say it themselves")
+        from underskin.cli.invert_files import invert_files
+
+        invert_files(files, rig, band, figures, together, csv)
         return
     only_files = (("--rig", rig), ("--band", band), ("--figures", figures), ("--together", together))
     for_files = [name for name, used in only_files if used is not None]
-    invert_files.refuse(for_files, "goes with FILE, and none is given")
+    _refuse(for_files, "goes with FILE, and none is given")
 
     defaults: dict[str, float | None] = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": None}
     from underskin.prediction import answers
 
     _answer(options, defaults, input_file, csv, lambda table, columns: answers.d33(table, columns, units_checked))
+
+
+def _refuse(options: Sequence[str], why: str) -> None:
+    """Raise UnderskinError where any options are given."""
+    if options:
+        raise UnderskinError(f"{', '.join(options)} {why}")
 
 
 def _answer(

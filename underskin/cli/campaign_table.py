@@ -57,15 +57,12 @@ class InvertedFile:
         )
         notes += [f"look at: {finding.sentence}" for finding in findings]
         if not isinstance(self.inversion, Inversion) and not self.moduli:
-            refused = len(self.reading.problems)
-            all_refused = refused and not campaign.recordings
-            why = f"none of the {refused} recordings can be used" if all_refused else self.inversion
+            count = 0 if campaign.recordings else len(self.reading.problems)
+            why = f"none of the {count} recordings can be used" if count else self.inversion
             notes.append(f"no d33: {why}")
-        for problem in self.reading.problems:
-            notes.append(f"left out: recording {problem.recording}: {problem.as_error(problem.field)}")
-        for modulus in self.moduli:
-            if isinstance(modulus.result, InvalidInput):
-                notes.append(f"left out: recording {modulus.recording}: {modulus.result}")
+        refused = [(problem.recording, problem.as_error(problem.field)) for problem in self.reading.problems]
+        refused += [(one.recording, one.result) for one in self.moduli if isinstance(one.result, InvalidInput)]
+        notes += [f"left out: recording {recording}: {why}" for recording, why in refused]
         if isinstance(self.inversion, Inversion):
             notes += [f"left out: {left.sentence}" for left in self.inversion.left_out]
         return notes

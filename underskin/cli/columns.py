@@ -4,7 +4,6 @@ import sys
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
@@ -14,7 +13,7 @@ from underskin.errors import ErrorCode, InvalidInput, UnderskinError, not_unique
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import significant
 from underskin.prediction.columns import CsvError, from_csv, statuses, to_csv
-from underskin.units import LAB, Floats
+from underskin.units import LAB, Floats, Mask
 
 STANDARD_INPUT = "-"
 
@@ -96,7 +95,7 @@ def _from_csv(path: str, allowed: Sequence[str]) -> dict[str, Floats]:
 
 
 def write_csv(
-    columns: Mapping[str, Floats], inside: NDArray[np.bool_], count: int, names: Mapping[str, Sequence[str]] = _NO_NAMES
+    columns: Mapping[str, Floats], inside: Mask, count: int, names: Mapping[str, Sequence[str]] = _NO_NAMES
 ) -> None:
     """All columns and `status` as CSV on standard output, numbers in full, NaN where there is no value.
 
@@ -107,7 +106,7 @@ def write_csv(
 
 
 def write_table(
-    columns: Mapping[str, Floats], inside: NDArray[np.bool_], count: int, names: Mapping[str, Sequence[str]] = _NO_NAMES
+    columns: Mapping[str, Floats], inside: Mask, count: int, names: Mapping[str, Sequence[str]] = _NO_NAMES
 ) -> None:
     """Columns that are constant as a list, the others as a table, rounded; `names` go first."""
     console = Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH)
@@ -126,7 +125,7 @@ def write_table(
         console.print(_rows_table(varying, np.broadcast_to(inside, (count,)), names))
 
 
-def _rows_table(columns: Mapping[str, Floats], inside: NDArray[np.bool_], names: Mapping[str, Sequence[str]]) -> Table:
+def _rows_table(columns: Mapping[str, Floats], inside: Mask, names: Mapping[str, Sequence[str]]) -> Table:
     table = Table(box=SIMPLE_HEAD, padding=0)
     for name in names:
         table.add_column(name, overflow="fold")

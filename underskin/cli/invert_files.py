@@ -3,48 +3,26 @@
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.console import Console
+from rich.progress import Progress
 
+from underskin.cli.campaign_table import InvertedFile, write_csv, write_tables
 from underskin.cli.rigs import rig_description_in
 from underskin.errors import FileError, InvalidInput, UnderskinError, not_unique, wrong_type
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from underskin.cli.campaign_table import InvertedFile
-    from underskin.recordings.reading import Reading
-    from underskin.recordings.rig_description import RigDescription
-    from underskin.surrogate.sigma_table import SigmaTable
+from underskin.inversion.invert import Inversion, invert
+from underskin.recordings import Reading, elastomer, join, read_file, validation
+from underskin.recordings.rig_description import RigDescription
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 _BandHz = tuple[float, float]
-
-FilesArgument = Annotated[
-    list[Path] | None, typer.Argument(help="Campaigns, or files as instruments write them; each is inverted by itself.")
-]
-Together = Annotated[
-    str | None, typer.Option(metavar="NAME", help="Join the FILEs, all of one skin, into one campaign called NAME.")
-]
-Rig = Annotated[Path | None, typer.Option(help="Rig description, for files that hold channels.")]
-BandOption = Annotated[
-    str | None, typer.Option(metavar="LOW,HIGH", help="Average FILE from LOW to HIGH [Hz], not over its flat zone.")
-]
-Figures = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Write the figures of each FILE into DIR, as FILE.html.")
-]
-
-
-def refuse(options: Sequence[str], why: str) -> None:
-    """Raise UnderskinError where any options are given."""
-    if options:
-        raise UnderskinError(f"{', '.join(options)} {why}")
 
 
 class _FileErrors:
     """Prints errors of files beside the progress bar, and counts them."""
 
-    def __init__(self, console: "Console") -> None:
+    def __init__(self, console: Console) -> None:
         self.count = 0
         self._console = console
 
@@ -66,11 +44,6 @@ def invert_files(
 
     Raises UnderskinError where files that go together are not of one skin.
     """
-    from rich.console import Console
-    from rich.progress import Progress
-
-    from underskin.recordings import validation
-
     if together is not None:
         validation.name("together", together, False)
     band_hz = None if band is None else _band(band)
@@ -79,51 +52,37 @@ def invert_files(
         [(str(file), file.name) for file in files] if together is None else [(together, together.replace("/", "-"))]
     )
     pages = {} if figures is None else _pages(batches, figures)
-    from underskin.cli import campaign_table
-    from underskin.surrogate.sigma_table import load_table
-
     table = load_table()
     inverted: list[InvertedFile] = []
     # Results are written after the bar, which would take them from a pipe.
     console = Console(stderr=True)
     errors = _FileErrors(console)
     with Progress(console=console, redirect_stdout=False, disable=not console.is_terminal) as progress:
-        readings = _readings(progress.track(files, description="inverting"), description, errors)
-        for name, reading in readings if together is None else _joined(together, list(readings)):
+        readings: Iterable[tuple[str, Reading]] = _readings(
+            progress.track(files, description="inverting"), description, errors
+        )
+        if together is not None and (every := list(readings)):
+            readings = [(together, join(together, every))]
+        for name, reading in readings:
             with errors.about(name):
                 result = _inverted(name, reading, table, band_hz)
                 _write_page(result, pages.get(name))
                 inverted.append(result)
-    (campaign_table.write_csv if as_csv else campaign_table.write_tables)(inverted)
+    (write_csv if as_csv else write_tables)(inverted)
     if not all(result.is_of_use for result in inverted) or errors.count:
         raise typer.Exit(2)
 
 
-def _readings(
-    files: Iterable[Path], rig: "RigDescription | None", errors: _FileErrors
-) -> "Iterator[tuple[str, Reading]]":
+def _readings(files: Iterable[Path], rig: RigDescription | None, errors: _FileErrors) -> Iterator[tuple[str, Reading]]:
     """Each file that can be read, by its name."""
-    from underskin.recordings import read_file
-
     for file in files:
         with errors.about(str(file)):
             reading = read_file(file, str(file), rig)
             yield str(file), reading
 
 
-def _joined(name: str, readings: "Sequence[tuple[str, Reading]]") -> "list[tuple[str, Reading]]":
-    """All of them as one; none where there is none."""
-    from underskin.recordings import join
-
-    return [(name, join(name, readings))] if readings else []
-
-
-def _inverted(name: str, reading: "Reading", table: "SigmaTable", band_hz: _BandHz | None) -> "InvertedFile":
+def _inverted(name: str, reading: Reading, table: SigmaTable, band_hz: _BandHz | None) -> InvertedFile:
     """The inversion of a campaign, or the reason why there is none, and its moduli."""
-    from underskin.cli.campaign_table import InvertedFile
-    from underskin.inversion.invert import Inversion, invert
-    from underskin.recordings import elastomer
-
     inversion: Inversion | InvalidInput
     try:
         inversion = invert(reading.campaign, table, band_hz)
@@ -157,9 +116,7 @@ def _pages(batches: Iterable[tuple[str, str]], folder: Path) -> dict[str, Path]:
     return pages
 
 
-def _write_page(result: "InvertedFile", page: Path | None) -> None:
-    from underskin.inversion.invert import Inversion
-
+def _write_page(result: InvertedFile, page: Path | None) -> None:
     if page is None or not isinstance(result.inversion, Inversion):
         return
     from underskin.figures import campaign_figures

@@ -5,20 +5,21 @@ Answers are the documents of the HTTP interface (docs/store.md, /openapi.json), 
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
-from urllib.parse import quote
 from uuid import uuid4
 
 import orjson
 
-from underskin.client.http_session import Session
+from underskin.client.http_session import Session, path_of
 from underskin.errors import Unreachable, too_few
 from underskin.recordings.campaign import Campaign, parse, to_dict
 
 Document = dict[str, Any]
 ModelName = Literal["paper", "adopted"]
 _TRIES = 3
+_path, _skin = partial(path_of, "campaigns"), partial(path_of, "skins")
 
 
 class Campaigns:
@@ -92,13 +93,9 @@ class Campaigns:
         recorded_to: str | None = None,
     ) -> Iterator[Document]:
         """Campaigns, the latest arrival first, without their recordings."""
-        filters = {
-            "skin": skin,
-            "name_contains": name_contains,
-            "recorded_from": recorded_from,
-            "recorded_to": recorded_to,
-        }
-        yield from pages(self._session, "/v1/campaigns", "campaigns", state=state, **filters)
+        filters = {"skin": skin, "name_contains": name_contains, "state": state}
+        moments = {"recorded_from": recorded_from, "recorded_to": recorded_to}
+        yield from pages(self._session, "/v1/campaigns", "campaigns", **filters, **moments)
 
     def get(self, campaign_id: str) -> Document:
         """A campaign and its recordings, without their arrays."""
@@ -190,14 +187,6 @@ class Skins:
         headers = {"Content-Type": "application/octet-stream"}
         with Path(file).open("rb") as source:
             return self._session.json("POST", "/v1/skins/import", headers=headers, content=source)
-
-
-def _path(campaign_id: str, *more: str) -> str:
-    return "/".join(("/v1/campaigns", quote(campaign_id, safe=""), *more))
-
-
-def _skin(skin_id: str, *more: str) -> str:
-    return "/".join(("/v1/skins", quote(skin_id, safe=""), *more))
 
 
 def query_of(**given: Any) -> dict[str, dict[str, Any]]:

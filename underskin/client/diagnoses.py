@@ -8,10 +8,9 @@ Answers are the documents of the HTTP interface (docs/store.md, /openapi.json), 
 
 import time
 from collections.abc import Callable, Iterator
-from urllib.parse import quote
 
 from underskin.client.campaigns import Document, pages
-from underskin.client.http_session import Session
+from underskin.client.http_session import Session, path_of
 from underskin.errors import Unreachable
 
 _POLL_S = 0.5
@@ -26,11 +25,11 @@ class Diagnoses:
 
     def start(self, campaign_id: str) -> Document:
         """Start a diagnosis; its `id` and `state`. A campaign that was diagnosed as it is now is `done` at once."""
-        return self._session.json("POST", f"/v1/campaigns/{quote(campaign_id, safe='')}/diagnosis")
+        return self._session.json("POST", path_of("campaigns", campaign_id, "diagnosis"))
 
     def get(self, diagnosis_id: str) -> Document:
         """A diagnosis: its `state` and `progress` and, once it is done, its `report`."""
-        return self._session.json("GET", _path(diagnosis_id))
+        return self._session.json("GET", path_of("diagnoses", diagnosis_id))
 
     def all(
         self, *, campaign: str | None = None, skin: str | None = None, state: str | None = None
@@ -63,8 +62,4 @@ class Diagnoses:
 
     def cancel(self, diagnosis_id: str) -> Document:
         """Cancel a diagnosis; raises ServiceError (409) if it is done or has failed."""
-        return self._session.json("DELETE", _path(diagnosis_id))
-
-
-def _path(diagnosis_id: str) -> str:
-    return f"/v1/diagnoses/{quote(diagnosis_id, safe='')}"
+        return self._session.json("DELETE", path_of("diagnoses", diagnosis_id))

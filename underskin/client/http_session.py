@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
+from urllib.parse import quote
 
 import httpx
 import orjson
@@ -61,6 +62,11 @@ class Session:
         except httpx.TransportError as error:
             reason = "no answer in time" if isinstance(error, httpx.TimeoutException) else error
             raise Unreachable(f"the service at {self.http.base_url} cannot be reached: {reason}{_ELSEWHERE}") from error
+
+
+def path_of(noun: str, identity: str, *more: str) -> str:
+    """The path of one campaign, skin or diagnosis, or of what is below it."""
+    return "/".join(("/v1", noun, quote(identity, safe=""), *more))
 
 
 def _document(response: httpx.Response) -> dict[str, Any] | None:

@@ -62,20 +62,20 @@ def diagnose(
 
 
 def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits: RigLimits) -> DiagnosisResult:
-    provenance = _provenance(table)
     progress(0.05)
     possible = without_extremes(campaign)
+    begun = DiagnosisResult(campaign.name, possible.findings, _provenance(table))
     if possible.findings and possible.lacking:
-        return DiagnosisResult(campaign.name, possible.findings, provenance, lacking=possible.lacking)
-    campaign, findings = possible.campaign, list(possible.findings)
+        return replace(begun, lacking=possible.lacking)
+    campaign = possible.campaign
     for kind in () if any(isinstance(entry, FrfRecording) for entry in campaign.recordings) else _CURVES:
         if all(entry.kind != kind for entry in campaign.recordings):
             continue
         usable, unusable = without_unusable(campaign, kind)
         curves = without_inconsistent(usable, kind)
-        findings += [*unusable, *curves.findings]
+        begun = begun.with_findings(*unusable, *curves.findings)
         if curves.findings and curves.lacking:
-            return DiagnosisResult(campaign.name, findings, provenance, lacking=curves.lacking)
+            return replace(begun, lacking=curves.lacking)
         rows = curve_lines(curves.campaign, kind)
         if rows.recordings:
             problem = FittingProblem(rows, table)
@@ -83,26 +83,19 @@ def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits
             seated = without_seating(curves.campaign, result.answers[0].names, table) if kind == "compression" else None
             if seated is not None:
                 problem, seating = seated
-                findings, result = [*findings, seating], search(problem)
-            diagnosis = _work_out(campaign.name, problem, result, findings, provenance, progress, limits)
-            return replace(diagnosis, curves=curves.campaign)
+                begun, result = begun.with_findings(seating), search(problem)
+            return _work_out(replace(begun, curves=curves.campaign), problem, result, progress, limits)
     frf = tuple(entry for entry in campaign.recordings if isinstance(entry, FrfRecording))
     inspected = inspect(replace(campaign, recordings=frf), table)
-    findings += inspected.findings
+    begun = begun.with_findings(*inspected.findings)
     if inspected.lacking:
-        return DiagnosisResult(campaign.name, findings, provenance, lacking=inspected.lacking)
+        return replace(begun, lacking=inspected.lacking)
     problem, known = frf_problem(inspected.campaign, inspected.uneven, table)
-    return _work_out(campaign.name, problem, search(problem, known), findings, provenance, progress, limits)
+    return _work_out(begun, problem, search(problem, known), progress, limits)
 
 
 def _work_out(
-    name: str,
-    problem: FittingProblem,
-    result: Search,
-    findings: Sequence[Finding],
-    provenance: dict[str, Any],
-    progress: Progress,
-    limits: RigLimits,
+    begun: DiagnosisResult, problem: FittingProblem, result: Search, progress: Progress, limits: RigLimits
 ) -> DiagnosisResult:
     """All steps after the search."""
     progress(0.65)
@@ -135,15 +128,13 @@ def _work_out(
         shown = result.shown_or_nothing(leader)
     floor = largest_floor_percent(problem, nothing, groups)
     if leader.explanation is nothing and floor > _LARGEST_FLOOR:
-        return DiagnosisResult(name, findings, provenance, lacking=Lacking(Lack.NOISE, {"floor_percent": floor}))
+        return replace(begun, lacking=Lacking(Lack.NOISE, {"floor_percent": floor}))
     if leader.explanation is nothing and problem.kind == "frf" and problem.lines.recordings < _LEAST_TO_AGREE:
         few = {"recordings": problem.lines.recordings, "least": _LEAST_TO_AGREE}
-        return DiagnosisResult(name, findings, provenance, lacking=Lacking(Lack.FEW_TO_AGREE, few))
+        return replace(begun, lacking=Lacking(Lack.FEW_TO_AGREE, few))
     shape = describe(problem, shown) if leader.explanation is None else None
-    return DiagnosisResult(
-        name,
-        (*findings, *above_noise(problem, shown, groups)),
-        provenance,
+    return replace(
+        begun.with_findings(*above_noise(problem, shown, groups)),
         search=result,
         problem=problem,
         axes=axes,
@@ -157,26 +148,17 @@ def _work_out(
     )
 
 
-def diagnosis_report(
-    campaign: Campaign, table: SigmaTable, progress: Progress = lambda _: None, refused: Sequence[RecordingProblem] = ()
-) -> dict[str, Any]:
+def diagnosis_report(campaign: Campaign, table: SigmaTable, refused: Sequence[RecordingProblem] = ()) -> dict[str, Any]:
     """The report of a campaign's diagnosis (`report/1`); `refused` recordings are named among the findings."""
-    diagnosis = with_refused(diagnose(campaign, table, progress), refused)
-    progress(1.0)
-    return report(diagnosis)
+    return report(with_refused(diagnose(campaign, table), refused))
 
 
 def with_refused(diagnosis: DiagnosisResult, refused: Sequence[RecordingProblem]) -> DiagnosisResult:
     """The diagnosis with recordings that were refused when they were read named first among its findings."""
-    problems = [
-        Finding(
-            Reason.REFUSED,
-            entry.recording,
-            entry.field,
-            {"field": entry.field, "value": entry.value, "allowed": entry.allowed},
-        )
-        for entry in refused
-    ]
+    problems = []
+    for entry in refused:
+        arguments = {"field": entry.field, "value": entry.value, "allowed": entry.allowed}
+        problems.append(Finding(Reason.REFUSED, entry.recording, entry.field, arguments))
     lacking = diagnosis.lacking
     if lacking and problems:
         lacking = replace(

@@ -45,6 +45,7 @@ def array_map(
     """
     x, y, value, uncertainty = _columns(sensors, x_mm=x_mm, y_mm=y_mm, values=values, uncertainties=uncertainties)
     plain = np.array([not reason for reason in reasons])
+    size = 26 if len(sensors) <= 16 else 18 if len(sensors) <= 100 else 10
     figure = go.Figure()
     hover = f"%{{text}}<br>{quantity.name} %{{customdata[0]:.5g}} ± %{{customdata[1]:.3g}} {quantity.unit}"
     for name, chosen, symbol in (("sensor", plain, "circle"), ("stands out", ~plain, "x")):
@@ -60,7 +61,7 @@ def array_map(
             hovertemplate=f"{hover}<br>x %{{x:.4g}} mm, y %{{y:.4g}} mm<extra></extra>",
             marker={
                 "symbol": symbol,
-                "size": _marker_size(len(sensors)),
+                "size": size,
                 "color": value[chosen],
                 "colorbar": {"title": {"text": f"{quantity.name} [{quantity.unit}]", "side": "right"}},
                 "line": {"width": 1, "color": "#000000"},
@@ -80,10 +81,6 @@ def _scale(values: Floats, quantity: Quantity) -> dict[str, Any]:
         return {"colorscale": "PuOr_r", "cmin": -largest, "cmax": largest}
     ends = {"cmin": float(known.min()), "cmax": float(known.max())} if len(known) else {}
     return {"colorscale": "Cividis", **ends}
-
-
-def _marker_size(count: int) -> int:
-    return 26 if count <= 16 else 18 if count <= 100 else 10
 
 
 def frf_versus_preload(

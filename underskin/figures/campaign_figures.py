@@ -1,21 +1,17 @@
 """The figures of one campaign, from its inversion, and a page that shows them without network or server."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import plotly.graph_objects as go
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from underskin.figures import array_map, frf_versus_preload, response_per_sensor
+from underskin.figures.array import array_map, frf_versus_preload, response_per_sensor
 from underskin.inversion.invert import Inversion
 from underskin.physics.charge_response import gain
 from underskin.recordings.campaign import Campaign
 from underskin.units import Floats, to_lab
 
-if TYPE_CHECKING:
-    import plotly.graph_objects as go
 
-
-def figures(campaign: Campaign, inversion: Inversion) -> "tuple[go.Figure, go.Figure, go.Figure]":
+def figures(campaign: Campaign, inversion: Inversion) -> tuple[go.Figure, go.Figure, go.Figure]:
     """The map of the array, FRF against preload per indenter, and the response of each sensor.
 
     The model's line is the array's d33 times (3/2) ρ² σ, with σ at the commanded offset, averaged over the recordings
@@ -68,10 +64,9 @@ def model_frf(campaign: Campaign, inversion: Inversion) -> Floats:
     assert campaign.skin.sensor_radius_mm is not None
     assert campaign.skin.thickness_mm is not None
     rho = campaign.skin.sensor_radius_mm / campaign.skin.thickness_mm
-    alike = np.unique(np.column_stack([rows.indenter_radius, rows.preload]), axis=0, return_inverse=True)[1].reshape(-1)
     known = rows.inside
-    count = np.bincount(alike, known)
+    count = np.bincount(rows.condition, known)
     with np.errstate(invalid="ignore"):
-        sigma = np.bincount(alike, np.where(known, rows.sigma, 0.0)) / count
+        sigma = np.bincount(rows.condition, np.where(known, rows.sigma, 0.0)) / count
     d33 = np.nan if inversion.campaign_d33 is None else float(inversion.campaign_d33.value)
-    return d33 * gain(sigma[alike], rho)
+    return d33 * gain(sigma[rows.condition], rho)

@@ -34,7 +34,7 @@ def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | No
             "x": _short(np.concatenate([spread.frequency_hz, spread.frequency_hz[::-1]])),
             "y": _short(np.concatenate([high, low[::-1]])),
             "fill": "toself",
-            "fillcolor": _faint(colour),
+            "fillcolor": colour.replace("rgb(", "rgba(").replace(")", ", 0.12)"),
             "line": {"width": 0},
             "hoverinfo": "skip",
             "showlegend": False,
@@ -120,10 +120,6 @@ def _look(spread: FrfSpread, spreads: Sequence[FrfSpread]) -> tuple[str, str]:
     radii = sorted({entry.indenter_radius_mm for entry in spreads})
     place = _BRIGHTEST * preloads.index(spread.preload_n) / max(len(preloads) - 1, 1)
     return (sample_colorscale("Viridis", [place])[0], DASHES[radii.index(spread.indenter_radius_mm) % len(DASHES)])
-
-
-def _faint(colour: str) -> str:
-    return colour.replace("rgb(", "rgba(").replace(")", ", 0.12)")
 
 
 def _short(values: Floats) -> "np.ndarray[Any, np.dtype[np.float32]]":

@@ -1,14 +1,14 @@
 """Raw channels, one above the other."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from underskin.figures.style import COLOURS, label, styled
-from underskin.units import Floats
+from underskin.recordings.channels import Channel
+from underskin.units import Floats, Indices
 
 _MOST_POINTS = 700  # of one channel
 _ROW = 130  # pixels
@@ -16,26 +16,18 @@ _EDGES = 110
 _LONGEST = 18  # letters of a name beside its axis
 
 
-@dataclass(frozen=True)
-class Trace:
-    """One channel: its name, its unit as labelled (empty where the file says none), its values, (samples,)."""
-
-    name: str
-    unit: str
-    values: Floats
-
-
-def raw_traces(traces: Sequence[Trace], sample_rate_hz: float | None) -> go.Figure:
-    """Each channel over time, or over the sample number; of many samples the extremes are drawn."""
+def raw_traces(traces: Sequence[Channel], sample_rate_hz: float | None) -> go.Figure:
+    """Each channel of real numbers over time, or over the sample number; of many samples the extremes are drawn."""
     figure = make_subplots(len(traces), 1, shared_xaxes=True, vertical_spacing=0.12 / len(traces))
     place = "sample %{x}" if sample_rate_hz is None else "%{x:.6g} s"
     for row, trace in enumerate(traces, start=1):
-        chosen = _extremes(trace.values)
+        values = trace.values.real
+        chosen = _extremes(values)
         x = chosen if sample_rate_hz is None else chosen / sample_rate_hz
         name = label(trace.name)
         figure.add_scatter(
             x=x,
-            y=trace.values[chosen].astype(np.float32),
+            y=values[chosen].astype(np.float32),
             mode="lines",
             name=name,
             line={"color": COLOURS[(row - 1) % len(COLOURS)], "width": 1},
@@ -50,7 +42,7 @@ def raw_traces(traces: Sequence[Trace], sample_rate_hz: float | None) -> go.Figu
     return styled(figure, "As it came", _EDGES + _ROW * len(traces))
 
 
-def _extremes(values: Floats) -> "np.ndarray[tuple[int], np.dtype[np.intp]]":
+def _extremes(values: Floats) -> Indices:
     """Which samples to draw: all, or the lowest and the highest of each of as many bins as a figure resolves."""
     count = len(values)
     if count <= _MOST_POINTS:

@@ -8,9 +8,9 @@ declared and the base model as it stands: `declared_percent` says by how much d3
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
@@ -24,14 +24,14 @@ from underskin.physics.charge_response import gain
 from underskin.physics.skin import Indenter, Skin
 from underskin.prediction import domain_checks
 from underskin.prediction.domain_checks import usable
-from underskin.prediction.pressed_skin import Transmission, frf_gradient, transmission
+from underskin.prediction.pressed_skin import frf_gradient, transmission
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.recordings.frf.flat_zone import FlatZone, band_average, flat_zone, stacked
 from underskin.recordings.plausibility import implausible
-from underskin.surrogate.off_centre_sigma import PositionedSigma, positioned_sigma
+from underskin.surrogate.off_centre_sigma import positioned_sigma
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats, to_lab, to_si
+from underskin.units import Floats, Indices, Mask, to_lab, to_si
 
 _LEAST_CHARGE = 1e-24  # FRF [C/N] that can be a measured one
 _MOST_REASONS = 3  # quoted where no recording can be used
@@ -50,7 +50,7 @@ class RecordingD33:
     """One entry a recording, SI: measured level, σ, d33 and its uncertainty by line noise; NaN where not `inside`."""
 
     ids: tuple[str, ...]
-    sensor: NDArray[np.intp]  # number of the sensor in Inversion.sensor_ids
+    sensor: Indices  # number of the sensor in Inversion.sensor_ids
     indenter_radius: Floats
     preload: Floats
     frf: Floats
@@ -60,17 +60,23 @@ class RecordingD33:
     rel_error: Floats  # of σ, the table's bound
     d33: Floats
     d33_uncertainty: Floats
-    inside: NDArray[np.bool_]  # contact within the table's domain, and a line in the band with a charge that can be
+    inside: Mask  # contact within the table's domain, and a line in the band with a charge that can be
+
+    @cached_property
+    def condition(self) -> Indices:
+        """The number of each one's indenter and preload together."""
+        both = np.column_stack([self.indenter_radius, self.preload])
+        return np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
 
 
 @dataclass(frozen=True)
 class Cells:
     """d33 per sensor × indenter × preload that was recorded; arrays over the cells, SI."""
 
-    sensor: NDArray[np.intp]
+    sensor: Indices
     indenter_radius: Floats
     preload: Floats
-    recordings: NDArray[np.intp]
+    recordings: Indices
     d33: Estimate
 
 
@@ -94,9 +100,7 @@ class Inversion:
     declared_percent: float  # change of d33 for E 2 % and h 1 % off, in quadrature
 
 
-def invert(
-    campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] | None = None, zone: FlatZone | None = None
-) -> Inversion:
+def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] | None = None) -> Inversion:
     """The d33 of an array, Re FRF / ((3/2) ρ² σ) with ρ = rT/h, from the `frf` recordings of a campaign.
 
     Parameters
@@ -107,8 +111,6 @@ def invert(
         σ of a/h, rT/h and the load parameter L.
     band_hz : (low, high), optional
         The band that Re FRF is averaged over [Hz]; without it the flat zone.
-    zone : FlatZone, optional
-        The flat zone, where it is known.
 
     Returns
     -------
@@ -129,9 +131,9 @@ def invert(
     if not recorded:
         raise _none_usable(campaign, left_out)
     frfs = stacked(measured)
-    zone = zone or flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
+    zone = flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
-    contact = _Contact.of(campaign, recorded, table)
+    contact = _Contact(campaign, recorded, table)
     inside = usable(level, noise, contact.positioned.sigma, contact.transmitted)
     reasons = domain_checks.reasons(recorded, campaign.skin, contact.transmitted, level, table)
     left_out += [reason for reason, good in zip(reasons, inside, strict=True) if not good]
@@ -183,17 +185,10 @@ def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfReco
     return frfs, with_frf, left_out
 
 
-@dataclass(frozen=True)
 class _Contact:
-    """What the base model says of each recording's contact."""
+    """What the base model says of each recording's contact; `declared`: relative change of FRF for E and h off."""
 
-    transmitted: Transmission
-    positioned: PositionedSigma
-    thickness: float
-    declared: Floats  # relative change of FRF for E and h off
-
-    @classmethod
-    def of(cls, campaign: Campaign, recorded: Sequence[FrfRecording], table: SigmaTable) -> "_Contact":
+    def __init__(self, campaign: Campaign, recorded: Sequence[FrfRecording], table: SigmaTable) -> None:
         described = campaign.skin
         assert described.thickness_mm is not None
         assert described.youngs_modulus_mpa is not None
@@ -207,13 +202,13 @@ class _Contact:
         )
         indenter = Indenter(to_si("indenter_radius_mm", [item.indenter_radius_mm for item in recorded]))
         preload = to_si("preload_n", [item.preload_n for item in recorded])
-        transmitted = transmission(table, skin, indenter, preload)
+        self.transmitted = transmitted = transmission(table, skin, indenter, preload)
         centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in described.sensors}
         offset = [
             np.hypot(*np.subtract(item.position_mm or centres[item.sensor], centres[item.sensor])) for item in recorded
         ]
-        thickness = float(skin.thickness)
-        positioned = positioned_sigma(
+        self.thickness = thickness = float(skin.thickness)
+        self.positioned = positioned_sigma(
             table,
             transmitted.a_over_h,
             float(skin.rt_over_h),
@@ -223,17 +218,20 @@ class _Contact:
         )
         slopes = frf_gradient(table, skin, indenter, preload, 1.0)
         size = transmitted.frf(1.0)
-        declared = np.hypot(
+        self.declared = np.hypot(
             slopes["youngs_modulus"] * skin.youngs_modulus * _MODULUS_UNSURE / size,
             slopes["thickness"] * thickness * _THICKNESS_UNSURE / size,
         )
-        return cls(transmitted, positioned, thickness, declared)
 
 
 def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone: FlatZone) -> Inversion:
     moments = [contact.positioned.scattered(p / contact.thickness) for p in mixed_model.POSITIONS]
     mean, variance = (np.array(part) for part in zip(*moments, strict=True))
     outliers = _outliers(rows, np.sqrt((mean[-1] - 1) ** 2 + np.maximum(variance[-1], 0)))
+    far_off = [
+        Finding(Reason.OUTLIER, rows.ids[row], "d33_pc_per_n", {"d33_pc_per_n": value})
+        for row, value in zip(outliers, to_lab("d33_pc_per_n", rows.d33[outliers]).tolist(), strict=True)
+    ]
     good = np.setdiff1d(np.flatnonzero(rows.inside), outliers)
     sensor, d33, noise = rows.sensor[good], rows.d33[good], rows.d33_uncertainty[good]
     unfit, pilot = population_flags(ids, sensor, d33, noise)
@@ -264,18 +262,17 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
         spread=model.spread if model and len(set(sensor[plain])) > 1 else None,
         gain=model.gain if model else None,
         position=model.position if model else None,
-        left_out=_left_out(rows, outliers, list(unfit.values())),
+        left_out=(*far_off, *unfit.values()),
         findings=(),
         declared_percent=100 * float(np.nanmedian(contact.declared[good])),
     )  # fmt: skip
 
 
-def _outliers(rows: RecordingD33, position: Floats) -> NDArray[np.intp]:
+def _outliers(rows: RecordingD33, position: Floats) -> Indices:
     """The rows inside whose d33 is far off all others; `position` as for `outlying`."""
     good = np.flatnonzero(rows.inside)
-    condition = np.unique(np.column_stack([rows.indenter_radius, rows.preload])[good], axis=0, return_inverse=True)[1]
-    far = outlying(rows.sensor[good], condition.reshape(-1), rows.d33[good], rows.d33_uncertainty[good], position[good])
-    return good[far]
+    d33, noise = rows.d33[good], rows.d33_uncertainty[good]
+    return good[outlying(rows.sensor[good], rows.condition[good], d33, noise, position[good])]
 
 
 def _expected_scatter(model: MixedModel, rows: LevelRows) -> Floats:
@@ -285,16 +282,8 @@ def _expected_scatter(model: MixedModel, rows: LevelRows) -> Floats:
     return np.sqrt(float(model.gain.value) ** 2 + position + (rows.line / rows.pilot) ** 2)
 
 
-def _cells(rows: RecordingD33, good: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+def _cells(rows: RecordingD33, good: Indices) -> tuple[Indices, Indices, Indices]:
     """Of each good row its cell; of each cell a row that shows what it is, and its number of recordings."""
     keys = np.column_stack([rows.sensor, rows.indenter_radius, rows.preload])[good]
     _, where, cell, count = np.unique(keys, axis=0, return_index=True, return_inverse=True, return_counts=True)
     return cell.reshape(-1), good[where], count
-
-
-def _left_out(rows: RecordingD33, outliers: NDArray[np.intp], unfit: Sequence[Flag]) -> tuple[Finding | Flag, ...]:
-    d33 = to_lab("d33_pc_per_n", rows.d33)
-    findings = [
-        Finding(Reason.OUTLIER, rows.ids[row], "d33_pc_per_n", {"d33_pc_per_n": float(d33[row])}) for row in outliers
-    ]
-    return (*findings, *unfit)

@@ -16,11 +16,10 @@ Priors: g log-normal, 1–5 %; t zero, or half-Cauchy (Gelman 2006); p zero in m
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri, stdtrit
 
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER, POSITION_RANGE, USUAL_GAIN
-from underskin.units import Floats, to_lab
+from underskin.units import Floats, Indices, Mask, to_lab
 
 GAINS = np.geomspace(2e-3, 0.8, 36)
 SPREADS = np.concatenate([[0.0], np.geomspace(2e-3, 1.5, 36)])
@@ -42,8 +41,7 @@ class Estimate:
     def d33_rows(self) -> list[list[float]]:
         """Value, uncertainty, low and high of each d33 [pC/N]."""
         parts = [np.atleast_1d(part) for part in (self.value, self.uncertainty, self.low, self.high)]
-        rows: list[list[float]] = to_lab("d33_pc_per_n", np.column_stack(parts)).tolist()
-        return rows
+        return to_lab("d33_pc_per_n", np.column_stack(parts)).tolist()
 
 
 @dataclass(frozen=True)
@@ -57,15 +55,9 @@ class LevelRows:
     position_mean: Floats
     position_variance: Floats
 
-    def part(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> "LevelRows":
+    def part(self, chosen: Indices | Mask) -> "LevelRows":
         """Some of the rows."""
-        return LevelRows(
-            self.z[chosen],
-            self.line[chosen],
-            self.pilot[chosen],
-            self.position_mean[:, chosen],
-            self.position_variance[:, chosen],
-        )
+        return LevelRows(*(column[..., chosen] for column in vars(self).values()))
 
     def moments(self) -> tuple[Floats, Floats]:
         """E z over its sensor's d33, and 1/variance about it, each (positions, gains, rows)."""
@@ -81,7 +73,7 @@ class ScatterPosterior:
 
     weights: Floats
 
-    def d33(self, rows: LevelRows, group: NDArray[np.intp], count: int) -> Estimate:
+    def d33(self, rows: LevelRows, group: Indices, count: int) -> Estimate:
         """The d33 of each group of recordings, from the recordings of that group alone.
 
         Parameters
@@ -126,7 +118,7 @@ class MixedModel:
     scatter: ScatterPosterior
 
 
-def fit(rows: LevelRows, sensor: NDArray[np.intp]) -> MixedModel:
+def fit(rows: LevelRows, sensor: Indices) -> MixedModel:
     """The mixed model of recordings of an array.
 
     Parameters
@@ -215,12 +207,12 @@ def _scale_estimate(weights: Floats, nodes: Floats) -> Estimate:
     return Estimate(np.array(value), np.sqrt(weights @ (nodes - value) ** 2), np.asarray(low), np.asarray(high))
 
 
-def _sum_by_group(values: Floats, group: NDArray[np.intp], count: int) -> Floats:
+def _sum_by_group(values: Floats, group: Indices, count: int) -> Floats:
     """Sums over the last axis by group: (…, rows) → (…, count)."""
     return values @ np.eye(count)[group] if count <= 64 else _sorted_sums(values, group, count)
 
 
-def _sorted_sums(values: Floats, group: NDArray[np.intp], count: int) -> Floats:
+def _sorted_sums(values: Floats, group: Indices, count: int) -> Floats:
     order = np.argsort(group, kind="stable")
     present, first = np.unique(group[order], return_index=True)
     sums = np.zeros((*values.shape[:-1], count))

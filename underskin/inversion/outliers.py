@@ -6,19 +6,16 @@ and the effect of a misplaced sphere on a recording beside the centre.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.inversion.sensor_flags import typical_size
-from underskin.units import Floats
+from underskin.units import Floats, Indices, Mask
 
 _FAR = 8.0  # deviations
 _LEAST_DEVIATION = 0.1  # of the array's d33: only recordings that are off by 80 % or more are looked at
 _ENOUGH = 3  # recordings for a sensor, sensors for a condition, to have a median that one of them does not rule
 
 
-def outlying(
-    sensor: NDArray[np.intp], condition: NDArray[np.intp], d33: Floats, noise: Floats, position: Floats
-) -> NDArray[np.bool_]:
+def outlying(sensor: Indices, condition: Indices, d33: Floats, noise: Floats, position: Floats) -> Mask:
     """Which recordings lie more than 8 robust deviations from their sensor's d33, less the effect of their condition.
 
     Where all recordings of a sensor are, the sensor is off and none of its recordings is an outlier.
@@ -41,14 +38,14 @@ def outlying(
     rest = own - _common(sensor, condition, own)
     scatter = 1.4826 * float(np.median(np.abs(rest)))
     expected = np.hypot(np.hypot(_LEAST_DEVIATION, position), noise / array)
-    far: NDArray[np.bool_] = np.abs(rest) > _FAR * np.maximum(scatter, expected)
+    far: Mask = np.abs(rest) > _FAR * np.maximum(scatter, expected)
     for number in np.unique(sensor[far]):
         if far[sensor == number].all():
             far[sensor == number] = False
     return far
 
 
-def _over_usual(sensor: NDArray[np.intp], d33: Floats, array: float) -> Floats:
+def _over_usual(sensor: Indices, d33: Floats, array: float) -> Floats:
     """Each recording over what is usual with its sensor, or with the array where the sensor has few recordings.
 
     A dead sensor's recordings are 1 + their distance from its own, in units of the array's.
@@ -62,7 +59,7 @@ def _over_usual(sensor: NDArray[np.intp], d33: Floats, array: float) -> Floats:
     return over
 
 
-def _common(sensor: NDArray[np.intp], condition: NDArray[np.intp], own: Floats) -> Floats:
+def _common(sensor: Indices, condition: Indices, own: Floats) -> Floats:
     """What the condition of each recording makes of all sensors'; their overall median where few saw it."""
     common = np.full(len(own), float(np.median(own)))
     for number in np.unique(condition):

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc, stdtr
 
 from underskin.findings import english
 from underskin.findings.codes import Reason
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 if TYPE_CHECKING:
     from underskin.inversion.invert import RecordingD33
@@ -55,9 +54,7 @@ def typical_size(d33: Floats) -> float:
     return float(np.median(size[size >= 1e-9 * size.max()]))
 
 
-def population_flags(
-    ids: Sequence[str], sensor: NDArray[np.intp], d33: Floats, noise: Floats
-) -> tuple[dict[int, Flag], Floats]:
+def population_flags(ids: Sequence[str], sensor: Indices, d33: Floats, noise: Floats) -> tuple[dict[int, Flag], Floats]:
     """Sensors that do not belong to the array's population, and each sensor's pilot d33.
 
     Parameters
@@ -108,12 +105,7 @@ def population_flags(
 
 
 def scatter_flags(
-    ids: tuple[str, ...],
-    sensor: NDArray[np.intp],
-    rows: "RecordingD33",
-    good: NDArray[np.intp],
-    pilot: Floats,
-    expected: Floats,
+    ids: tuple[str, ...], sensor: Indices, rows: "RecordingD33", good: Indices, pilot: Floats, expected: Floats
 ) -> list[Flag]:
     """Sensors whose lines or recordings scatter, or whose d33 bends with preload, beyond their array's.
 
@@ -125,7 +117,7 @@ def scatter_flags(
     lines = rows.line_scatter[good] * np.abs(level)
     line_of = np.array([np.median(lines[member == index]) for index in range(len(numbers))])
     usual = float(np.median(line_of))
-    rest = _beyond_common(level, member, rows.indenter_radius[good], rows.preload[good])
+    rest = _beyond_common(level, member, rows.condition[good])
     alarm = _FALSE_ALARMS / len(numbers)
     flags = []
     for index, name in enumerate(ids[number] for number in numbers):
@@ -140,14 +132,13 @@ def scatter_flags(
     return flags
 
 
-def _beyond_common(level: Floats, member: NDArray[np.intp], radius: Floats, preload: Floats) -> Floats:
+def _beyond_common(level: Floats, member: Indices, condition: Indices) -> Floats:
     """Each recording over its sensor's median, less what its condition does to all sensors (three or more)."""
     median = np.array([np.median(level[member == index]) for index in range(member.max() + 1)])
     own = level / median[member]
     rest = own - 1
-    conditions = np.unique(np.column_stack([radius, preload]), axis=0, return_inverse=True)[1].reshape(-1)
-    for number in range(conditions.max() + 1):
-        alike = conditions == number
+    for number in np.unique(condition):
+        alike = condition == number
         if len(np.unique(member[alike])) > 2:
             rest[alike] = own[alike] - np.median(own[alike])
     return rest

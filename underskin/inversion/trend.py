@@ -58,5 +58,4 @@ def holm(p_values: Sequence[float]) -> list[float]:
     adjusted = np.empty(len(p_values))
     factors = np.arange(len(p_values), 0, -1)
     adjusted[order] = np.minimum(1.0, np.maximum.accumulate(np.asarray(p_values)[order] * factors))
-    result: list[float] = adjusted.tolist()
-    return result
+    return adjusted.tolist()

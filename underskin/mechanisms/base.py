@@ -37,6 +37,7 @@ AXES = (  # fields of a campaign along which an effect can show
     *("preload_n", "indenter_radius_mm", "position_mm", "sensor", "dwell_s", "load_cycles", "dynamic_force_n"),
     *("frequency_hz", "phase", "displacement_mm", "force_n", "time_s", "sample_height_mm", "sample_diameter_mm"),
 )
+TEXTS = ("plain", "law", "assumptions", "source", "needs")
 NEEDED_FIELDS = ("dwell_s", "dynamic_force_n", "load_cycles", "sensor")  # of a recording, that a mechanism may require
 
 
@@ -240,6 +241,12 @@ class Mechanism:
     imitated_by_seating: ClassVar[bool] = False  # a platen that seats bends the beginning of a compression alike
     # Axes of its figure, keys of PANELS in docs/mechanisms/signatures.py; empty: the first two of `axes` with a panel.
     figure: ClassVar[tuple[str, ...]] = ()
+
+    def __init_subclass__(cls) -> None:
+        """Texts may be written over several lines."""
+        for name in TEXTS:
+            if isinstance(text := vars(cls).get(name), str):
+                setattr(cls, name, " ".join(text.split()))
 
     @property
     def needs_lines(self) -> bool:

@@ -12,7 +12,8 @@ import numpy as np
 
 from underskin.errors import InvalidInput, not_finite, not_unique, required
 from underskin.extensions import described
-from underskin.mechanisms.base import AXES, NEEDED_FIELDS, UNITS, Kind, Mechanism, Normal, Parameter, Stage, Uniform
+from underskin.mechanisms import base
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Uniform
 from underskin.mechanisms.models.compression import CompressionModel
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.models.indentation import IndentationModel
@@ -23,7 +24,6 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import load_table
 from underskin.units import Floats
 
-TEXTS = ("plain", "law", "assumptions", "source", "needs")
 HOOKS = {  # by the stage that calls them
     "on_declared": (Stage.DECLARED,),
     "on_material": (Stage.MATERIAL, Stage.CONTACT),
@@ -82,7 +82,7 @@ def check(mechanism: Mechanism, others: Sequence[Mechanism] = ()) -> None:
 def _check_traits(mechanism: Mechanism) -> None:
     name: Any = getattr(mechanism, "name", None)
     _require("name", name, isinstance(name, str) and _NAME.fullmatch(name), "must be lower case letters, digits and _")
-    for field in TEXTS:
+    for field in base.TEXTS:
         text: Any = getattr(mechanism, field, None)
         _require(field, text, isinstance(text, str) and text.strip(), "must be a text")
     stage: Any = getattr(mechanism, "stage", None)
@@ -90,8 +90,8 @@ def _check_traits(mechanism: Mechanism) -> None:
     _require("order", mechanism.order, isinstance(mechanism.order, int), "must be a whole number")
     for field, allowed, needed in (
         ("kinds", get_args(Kind), True),
-        ("axes", AXES, True),
-        ("needs_fields", NEEDED_FIELDS, False),
+        ("axes", base.AXES, True),
+        ("needs_fields", base.NEEDED_FIELDS, False),
     ):
         values: Any = getattr(mechanism, field, None)
         good = isinstance(values, tuple) and set(values) <= set(allowed) and (values or not needed)
@@ -123,7 +123,7 @@ def _check_parameter(mechanism: Mechanism, entry: Any) -> None:
         _require(_field(entry, field), getattr(entry, field), good, allowed)
 
     require("name", isinstance(entry.name, str) and _NAME.fullmatch(entry.name), "must be lower case letters and _")
-    require("unit", entry.unit in UNITS, f"must be one of {', '.join(UNITS)}")
+    require("unit", entry.unit in base.UNITS, f"must be one of {', '.join(base.UNITS)}")
     require("scale", entry.scale in ("linear", "log"), "must be linear or log")
     for field in ("low", "high"):
         number = _is_finite(getattr(entry, field)) and (entry.scale == "linear" or getattr(entry, field) > 0)

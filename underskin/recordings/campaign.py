@@ -9,18 +9,10 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
-from underskin.errors import (
-    ErrorCode,
-    InvalidInput,
-    conflicting,
-    not_one_of,
-    not_unique,
-    required,
-    too_few,
-    unequal_lengths,
-    wrong_type,
-)
+from underskin import errors
+from underskin.errors import ErrorCode, InvalidInput
 from underskin.recordings import validation as field
 from underskin.recordings.conditions import (
     CompressionConditions,
@@ -55,9 +47,9 @@ class FrfRecording(FrfConditions):
         cls, conditions: FrfConditions, frequency: Floats, values: Complexes, coherence: Floats | None = None
     ) -> Self:
         """The recording of an FRF `values` [C/N] at lines `frequency` [Hz], in other conditions as these."""
-        known = {entry.name: getattr(conditions, entry.name) for entry in fields(FrfConditions)}
-        lines = {"frf_re_pc_per_n": 1e12 * values.real, "frf_im_pc_per_n": 1e12 * values.imag, "coherence": coherence}
-        return cls(**{**known, "frequency_hz": frequency, **lines})
+        known = vars(conditions.without_measurements(frequency_hz=frequency))
+        real, imaginary = 1e12 * values.real, 1e12 * values.imag
+        return cls(**known, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary, coherence=coherence)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +66,8 @@ class CompressionRecording(CompressionConditions):
     force_n: field.Series
 
 
-Recording = FrfRecording | IndentationRecording | CompressionRecording
+CurveRecording = IndentationRecording | CompressionRecording
+Recording = FrfRecording | CurveRecording
 KINDS: dict[str, type[Recording]] = {
     "frf": FrfRecording,
     "indentation": IndentationRecording,
@@ -115,11 +108,17 @@ class RecordingProblem:
         return InvalidInput(field, self.value, self.allowed, code=self.code)
 
 
+def samples_of(curve: CurveRecording, rows: NDArray[Any]) -> CurveRecording:
+    """A curve with only some of its samples."""
+    time = None if curve.time_s is None else curve.time_s[rows]
+    return replace(curve, displacement_mm=curve.displacement_mm[rows], force_n=curve.force_n[rows], time_s=time)
+
+
 def frf_recordings(campaign: Campaign) -> list[FrfRecording]:
     """The campaign's FRF recordings, in order; raises InvalidInput where there is none."""
     recordings = [entry for entry in campaign.recordings if isinstance(entry, FrfRecording)]
     if not recordings:
-        raise too_few("recordings", "none of kind frf", "must hold at least one")
+        raise errors.too_few("recordings", "none of kind frf", "must hold at least one")
     return recordings
 
 
@@ -135,13 +134,13 @@ def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
     skin = field.build(SkinDescription, "skin", document.get("skin"), units_checked)
     entries = document.get("recordings")
     if not isinstance(entries, list) or not entries:
-        raise wrong_type("recordings", shown(entries), "must be a list of at least one recording")
+        raise errors.wrong_type("recordings", shown(entries), "must be a list of at least one recording")
     good: dict[str, Recording] = {}
     problems: list[RecordingProblem] = []
     for index, entry in enumerate(entries):
         recording, refused = _recording(entry, skin, units_checked)
         if recording is not None and recording.id in good:
-            refused = [not_unique("id", recording.id, "must differ from every other recording's")]
+            refused = [errors.not_unique("id", recording.id, "must differ from every other recording's")]
         if recording is not None and not refused:
             good[recording.id] = recording
         label = recording.id if recording is not None else _label(entry, index)
@@ -196,7 +195,7 @@ def _recording(entry: Any, skin: SkinDescription, units_checked: bool) -> tuple[
         return None, [refusal]
     kind = document.get("kind") or "frf"
     if not isinstance(kind, str) or kind not in KINDS:
-        return None, [not_one_of("kind", shown(kind), KINDS)]
+        return None, [errors.not_one_of("kind", shown(kind), KINDS)]
     values, refused = field.check_fields(KINDS[kind], document, units_checked=units_checked)
     if refused:
         return None, refused
@@ -214,7 +213,7 @@ def _unmet_needs(recording: Recording, skin: SkinDescription) -> list[InvalidInp
         )
     if isinstance(recording, FrfRecording):
         refused += [
-            required(f"skin.{name}", "required by a recording of kind frf")
+            errors.required(f"skin.{name}", "required by a recording of kind frf")
             for name in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm")
             if getattr(skin, name) is None
         ]
@@ -231,9 +230,9 @@ def _not_one_of_two_forms(recording: FrfRecording) -> list[InvalidInput]:
     series = [name for name in _TIME_SERIES if getattr(recording, name) is not None]
     lines = [name for name in (*_LINES, "coherence") if getattr(recording, name) is not None]
     if series and lines:
-        return [conflicting(series[0], "given", "must be absent where the FRF itself is given")]
+        return [errors.conflicting(series[0], "given", "must be absent where the FRF itself is given")]
     needed = _TIME_SERIES if series else _LINES
-    return [required(name) for name in needed if getattr(recording, name) is None]
+    return [errors.required(name) for name in needed if getattr(recording, name) is None]
 
 
 def _unequal_lengths(recording: Recording) -> list[InvalidInput]:
@@ -245,7 +244,7 @@ def _unequal_lengths(recording: Recording) -> list[InvalidInput]:
     if len(set(columns.values())) < 2:
         return []
     first, length = next(iter(columns.items()))
-    return [unequal_lengths(name, size, length, first) for name, size in columns.items() if size != length]
+    return [errors.unequal_lengths(name, size, length, first) for name, size in columns.items() if size != length]
 
 
 def _label(entry: Any, index: int) -> str:

@@ -6,10 +6,9 @@ Displacement grows into the sample. All is found from the samples alone, without
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 _BEYOND_NOISE = 3.0  # standard deviations; a jump that was none only ends a mean early
 _BLOCKS = 60  # of a curve, over whose means jumps are sought
@@ -31,7 +30,7 @@ class Course:
     leave: int  # the last sample of the hold there
     snap_in: int | None
     pull_off: int | None
-    air: NDArray[np.intp]
+    air: Indices
     zero: float  # what the cell shows in the air, or at the first sample
 
     @property
@@ -80,7 +79,7 @@ def roughness(force: Floats) -> float:
     return float(np.hypot(noise, quantum / np.sqrt(12.0))) if coarse else noise
 
 
-def jumps(force: Floats, noise: float, block: int) -> NDArray[np.intp]:
+def jumps(force: Floats, noise: float, block: int) -> Indices:
     """The samples (jumps,) with which a new course begins, where means over `block` samples would hide it.
 
     A mean over samples on both sides is a force that never was. `noise`: the standard deviation of one sample. The
@@ -105,9 +104,7 @@ def _largest(change: Floats, first: int, last: int) -> int:
     return first + int(np.argmax(change[first : last + 1]))
 
 
-def _air(
-    force: Floats, turn: int, snap_in: int | None, pull_off: int | None, noise: float, span: float
-) -> NDArray[np.intp]:
+def _air(force: Floats, turn: int, snap_in: int | None, pull_off: int | None, noise: float, span: float) -> Indices:
     """The samples in the air: up to the snap-in, or while the force stays where it began; else those after the end."""
     if snap_in is not None:
         return np.arange(snap_in)

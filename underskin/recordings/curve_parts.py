@@ -2,7 +2,7 @@
 tells apart."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,22 +14,15 @@ _MOST_CURVES = 1000  # of a block
 _LEAST_SAMPLES = 2  # of a curve
 
 
-@dataclass(frozen=True)
-class CurvePart:
-    """The channels of one curve, and the name of the block that it was in."""
-
-    block: Block
-    of: str
-
-
-def curve_parts(blocks: Sequence[Block], curves: str | CurveChannel | None, file: str) -> list[CurvePart]:
-    """The curves of the blocks that hold a rig's channels, as `curves` of the rig description has it.
+def curve_parts(blocks: Sequence[Block], curves: str | CurveChannel | None, file: str) -> list[tuple[Block, str]]:
+    """The curves of the blocks that hold a rig's channels, as `curves` of the rig description has it, each with the
+    name of the block that it was in.
 
     Raises FileError where a channel changes too often to tell curves apart.
     """
     if curves == "file":
-        return [CurvePart(_joined(blocks), blocks[0].name)]
-    return [CurvePart(part, block.name) for block in blocks for part in _parts(block, curves, file)]
+        return [(_joined(blocks), blocks[0].name)]
+    return [(part, block.name) for block in blocks for part in _parts(block, curves, file)]
 
 
 def _parts(block: Block, curves: str | CurveChannel | None, file: str) -> list[Block]:

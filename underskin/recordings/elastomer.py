@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from underskin.errors import InvalidInput, too_few, unequal_lengths, unusable
-from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
 from underskin.units import Floats, to_lab, to_si
 
 _STRAIGHT = 0.02  # largest departure from a straight line, of the stress it spans
@@ -49,7 +49,7 @@ class CompressionModulus:
 
 @dataclass(frozen=True)
 class IndentationModulus:
-    """Hertz' modulus [Pa] with its standard uncertainty, the contact point d0 [m], F0 [N] and what the fit leaves [N].
+    """Hertz' modulus [Pa] with its standard uncertainty, the contact point d0 [m] and what the fit leaves [N].
 
     The uncertainty goes by the residuals and their correlation from point to point. `residual` far above the sensor's
     noise says that Hertz is not the whole story, and that E is a number for this curve only.
@@ -58,7 +58,6 @@ class IndentationModulus:
     modulus: float
     uncertainty: float
     contact_point: float
-    force_offset: float
     residual: float
 
     @property
@@ -79,22 +78,20 @@ class RecordingModulus:
 
 def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
     """What each recording of kind `compression` or `indentation` says of the elastomer."""
-    return [
-        RecordingModulus(recording.id, recording.kind, _result(recording, campaign.skin.poisson_ratio))
-        for recording in campaign.recordings
-        if not isinstance(recording, FrfRecording)
-    ]
-
-
-def _result(
-    recording: CompressionRecording | IndentationRecording, poisson_ratio: float
-) -> CompressionModulus | IndentationModulus | InvalidInput:
-    try:
-        if isinstance(recording, CompressionRecording):
-            return of_compression(recording)
-        return of_indentation(recording, poisson_ratio)
-    except InvalidInput as error:
-        return error
+    moduli = []
+    for recording in campaign.recordings:
+        result: CompressionModulus | IndentationModulus | InvalidInput
+        try:
+            if isinstance(recording, CompressionRecording):
+                result = of_compression(recording)
+            elif isinstance(recording, IndentationRecording):
+                result = of_indentation(recording, campaign.skin.poisson_ratio)
+            else:
+                continue
+        except InvalidInput as error:
+            result = error
+        moduli.append(RecordingModulus(recording.id, recording.kind, result))
+    return moduli
 
 
 def of_compression(recording: CompressionRecording) -> CompressionModulus:
@@ -156,20 +153,19 @@ def indentation_modulus(displacement: Floats, force: Floats, radius: float, pois
     if not with_offset:
         contact = _contact_point(depth, load, offset=False)
     design = _hertz_design(depth, contact, with_offset)
-    stiffness, *offset = np.linalg.lstsq(design, load, rcond=None)[0]
-    residual = load - design @ np.array([stiffness, *offset])
+    fitted = np.linalg.lstsq(design, load, rcond=None)[0]
+    residual = load - design @ fitted
     # d0 is a parameter as well: its column is the slope of the model.
-    slope = -1.5 * stiffness * np.sqrt(np.maximum(depth - contact, 0))
+    slope = -1.5 * fitted[0] * np.sqrt(np.maximum(depth - contact, 0))
     jacobian = np.column_stack([design, slope])
     freedom = max(1, len(load) - jacobian.shape[1])
     variance = float(residual @ residual) / freedom * _correlation_factor(residual)
     deviation = float(np.sqrt(variance)) * _amplification(jacobian)
     per_stiffness = 0.75 * (1 - poisson_ratio**2) / np.sqrt(radius)
     return IndentationModulus(
-        modulus=float(stiffness * per_stiffness),
+        modulus=float(fitted[0] * per_stiffness),
         uncertainty=float(deviation * per_stiffness),
         contact_point=contact,
-        force_offset=float(offset[0]) if offset else 0.0,
         residual=float(np.sqrt(np.mean(residual**2))),
     )
 

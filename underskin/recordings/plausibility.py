@@ -5,7 +5,7 @@ a recording lies in the future by more than time zones differ. No statement hold
 times have passed has the same findings on every later day.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -14,6 +14,7 @@ from scipy.spatial import KDTree
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Sensor
 from underskin.units import Floats
 
 _EARLIEST = datetime(1990, 1, 1, tzinfo=UTC)  # clocks that were never set begin in 1904, 1970 or 1980
@@ -55,29 +56,34 @@ def overlapping_sensors(campaign: Campaign) -> list[Finding]:
         ((x, y), ids), *others = shared
         arguments = {"sensors": ids, "x_mm": x, "y_mm": y, "more": len(others)}
         return [Finding(Reason.SENSORS_AT_ONE_PLACE, "", "skin.sensors", arguments)]
-    radius, nearest = campaign.skin.sensor_radius_mm, _nearest_mm(campaign)
+    radius, nearest = campaign.skin.sensor_radius_mm, nearest_pair(campaign.skin.sensors)
     if radius is None or nearest is None or nearest[0] >= 2 * radius:
         return []
-    pitch, pair = nearest
+    pitch, *pair = nearest
     in_metres = _IN_METRES * pitch >= 2 * radius and pitch < _LARGEST_IN_METRES_MM
-    arguments = {"sensors": pair, "radius_mm": radius, "pitch_mm": pitch, "in_metres": in_metres}
+    arguments = {
+        "sensors": [campaign.skin.sensors[number].id for number in pair],
+        "radius_mm": radius,
+        "pitch_mm": pitch,
+        "in_metres": in_metres,
+    }
     return [Finding(Reason.SENSORS_TOO_NEAR, "", "skin.sensor_radius_mm", arguments)]
 
 
 def pitch_mm(campaign: Campaign) -> float | None:
     """The distance of the two sensors that lie nearest to each other; None of fewer than two."""
-    nearest = _nearest_mm(campaign)
+    nearest = nearest_pair(campaign.skin.sensors)
     return None if nearest is None else nearest[0]
 
 
-def _nearest_mm(campaign: Campaign) -> tuple[float, list[str]] | None:
-    """The least distance between two sensors, and their ids."""
-    sensors = campaign.skin.sensors
+def nearest_pair(sensors: Sequence[Sensor]) -> tuple[float, int, int] | None:
+    """The least distance between two sensors [mm], and the numbers of these two; None of fewer than two."""
     if len(sensors) < 2:
         return None
     places: Floats = np.array([(sensor.x_mm, sensor.y_mm) for sensor in sensors])
-    distance, neighbour = (np.asarray(column)[:, 0] for column in KDTree(places).query(places, k=[2]))
-    one = int(np.argmin(distance))
-    if not np.isfinite(distance[one]):
+    distances, neighbours = (np.asarray(column) for column in KDTree(places).query(places, k=2))
+    one = int(np.argmin(distances[:, 1]))
+    if not np.isfinite(distances[one, 1]):
         return None
-    return float(distance[one]), [sensors[number].id for number in sorted((one, int(neighbour[one])))]
+    other = next(int(number) for number in neighbours[one] if number != one)  # of two at one place either comes first
+    return float(distances[one, 1]), min(one, other), max(one, other)

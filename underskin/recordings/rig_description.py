@@ -20,16 +20,7 @@ from typing import Any
 
 import yaml
 
-from underskin.errors import (
-    FileError,
-    InvalidInput,
-    Mention,
-    Requirement,
-    conflicting,
-    not_one_of,
-    required,
-    too_few,
-)
+from underskin.errors import FileError, InvalidInput, Mention, Requirement, conflicting, not_one_of, required, too_few
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import COLUMNS, KINDS
 from underskin.recordings.channel_mapping import ChannelMapping, Property, SignalMapping

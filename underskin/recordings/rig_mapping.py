@@ -38,10 +38,9 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
     recordings = []
     taken: dict[str, str] = {"": contents.layout} if contents.layout else {}
     parts = curve_parts(blocks, rig.curves, file)
-    for number, part in enumerate(parts, start=1):
-        block = part.block
+    for number, (block, of) in enumerate(parts, start=1):
         label = _label(stem, _printable(block.name) or str(number)) if len(parts) > 1 else stem
-        stated = _stated(contents, block, part.of)
+        stated = _stated(contents, block, of)
         common = {name: common_value(name, value, stated, file) for name, value in rig.recording.items()}
         began = {} if block.recorded_at is None else {"recorded_at": block.recorded_at}
         mapped = MappedBlock(rig, block, stated, file)

@@ -18,19 +18,17 @@ import h5py
 import numpy as np
 import orjson
 
-from underskin.errors import FileError, damage_said
-from underskin.recordings.readers.hdf5_damage import damage
+from underskin.errors import FileError
+from underskin.recordings.readers import hdf5_input
 from underskin.recordings.readers.hdf5_file import MAGIC
-from underskin.recordings.readers.hdf5_links import refuse_outside
 from underskin.recordings.readers.sandbox import ParsingLimits, call_apart
 from underskin.units import Floats
 
 SCHEMA = "skin-export/1"
 _ANY_SCHEMA = "skin-export/"
 _NOTHING = np.empty(0)
-_LIMITS = ParsingLimits(
-    unfolding=1000.0
-)  # a column of a simulated campaign may hold one value, and its gzip next to nothing
+# A column of a simulated campaign may hold one value, and its gzip next to nothing.
+_LIMITS = ParsingLimits(unfolding=1000.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +64,8 @@ def writing(file: Path, overview: Overview) -> Iterator[Any]:
     """A new file; the block adds the campaigns by `write_campaign`, one in memory at a time."""
     with h5py.File(file, "w", libver="latest") as target:
         target.attrs["schema"], target.attrs["skin"] = SCHEMA, overview.skin
-        _write_text(target, "skins", overview.skins)
-        _write_text(target, "rigs", overview.rigs)
-        _write_text(target, "diagnoses", overview.diagnoses)
-        _write_text(target, "models", overview.models)
+        for name in ("skins", "rigs", "diagnoses", "models"):
+            _write_text(target, name, getattr(overview, name))
         target.create_group("campaigns", track_order=True)
         yield target
 
@@ -114,7 +110,7 @@ def _is_export(stream: BinaryIO) -> dict[str, Any]:
         with h5py.File(stream, "r") as source:
             return {"is_export": str(source.attrs.get("schema")).startswith(_ANY_SCHEMA)}
     except OSError as error:
-        raise FileError("", "", damage(error)) from None
+        raise FileError("", "", hdf5_input.damage(error)) from None
 
 
 def _overview(stream: BinaryIO) -> dict[str, Any]:
@@ -131,8 +127,7 @@ def _campaigns(stream: BinaryIO, names: str) -> dict[str, Any]:
 
 @contextmanager
 def _opened(stream: BinaryIO) -> Iterator[Any]:
-    with damage_said("", "", lambda error: f"the export {damage(error)}"), h5py.File(stream, "r") as source:
-        refuse_outside(source, "")
+    with hdf5_input.opened(stream, "", "the export") as source:
         schema = str(source.attrs.get("schema"))
         if schema.startswith(_ANY_SCHEMA) and schema != SCHEMA:
             raise FileError("", "/", f"is an export of another underskin: {schema}; this one reads {SCHEMA}")

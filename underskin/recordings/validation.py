@@ -14,16 +14,8 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from underskin.errors import (
-    ErrorCode,
-    InvalidInput,
-    not_finite,
-    not_one_of,
-    out_of_range,
-    required,
-    too_few,
-    wrong_type,
-)
+from underskin import errors
+from underskin.errors import ErrorCode, InvalidInput
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings.shown_values import LONGEST_NAME, named, shown
 from underskin.units import Floats, checked
@@ -51,7 +43,7 @@ def check_fields(
         value = document.get(name)
         try:
             if value is None and default is MISSING:
-                raise required(name)
+                raise errors.required(name)
             values[name] = default if value is None else field_check(name, value, units_checked)
         except InvalidInput as refusal:
             refused.append(refusal)
@@ -70,7 +62,7 @@ def of_schema(noun: str, value: Any, schema: str, known: Collection[str]) -> Map
     if unknown := _unknown_fields(document, known, f"unknown field of a {noun}"):
         raise unknown[0]
     if document.get("schema") != schema:
-        raise not_one_of("schema", shown(document.get("schema")), (schema,))
+        raise errors.not_one_of("schema", shown(document.get("schema")), (schema,))
     return document
 
 
@@ -124,7 +116,7 @@ def number(field: str, value: Any, units_checked: bool = False) -> float:  # noq
     except OverflowError:
         result = math.inf
     if not math.isfinite(result):
-        raise not_finite(field, shown(result))
+        raise errors.not_finite(field, shown(result))
     return result
 
 
@@ -132,7 +124,7 @@ def positive(field: str, value: Any, units_checked: bool) -> float:  # noqa: ARG
     """A measured or chosen quantity greater than 0, of any magnitude."""
     result = number(field, value)
     if result <= 0:
-        raise out_of_range(field, result, "must be greater than 0")
+        raise errors.out_of_range(field, result, "must be greater than 0")
     return result
 
 
@@ -140,7 +132,7 @@ def not_negative(field: str, value: Any, units_checked: bool) -> float:  # noqa:
     """A number that is 0 or greater."""
     result = number(field, value)
     if result < 0:
-        raise out_of_range(field, result, "must be 0 or greater")
+        raise errors.out_of_range(field, result, "must be 0 or greater")
     return result
 
 
@@ -155,7 +147,7 @@ def poisson_ratio(field: str, value: Any, units_checked: bool) -> float:  # noqa
     """0 to 0.5."""
     result = number(field, value)
     if not 0 <= result <= INCOMPRESSIBLE:
-        raise out_of_range(field, result, f"must be 0 to {INCOMPRESSIBLE}")
+        raise errors.out_of_range(field, result, f"must be 0 to {INCOMPRESSIBLE}")
     return result
 
 
@@ -173,7 +165,7 @@ def time_of_day(field: str, value: Any, units_checked: bool) -> str:
     try:
         datetime.fromisoformat(text)
     except ValueError:
-        raise wrong_type(field, text, "must be a date and time like 2017-05-03T09:00:00Z") from None
+        raise errors.wrong_type(field, text, "must be a date and time like 2017-05-03T09:00:00Z") from None
     return text
 
 
@@ -193,7 +185,7 @@ def series(field: str, value: Any, units_checked: bool) -> Floats:  # noqa: ARG0
     """A column of at least one finite number."""
     column = _column(field, value)
     if column.size == 0:
-        raise too_few(field, shown(value), "must hold at least one number")
+        raise errors.too_few(field, shown(value), "must hold at least one number")
     _refuse_where(field, column, ~np.isfinite(column), "must be finite", ErrorCode.NOT_FINITE)
     return column
 
@@ -259,7 +251,7 @@ def _column(field: str, value: Any) -> Floats:
     try:
         return np.array(value, dtype=np.float64)
     except OverflowError:
-        raise out_of_range(field, shown(value), "holds a number too large to keep") from None
+        raise errors.out_of_range(field, shown(value), "holds a number too large to keep") from None
 
 
 def _refuse_where(field: str, column: Floats, bad: Any, allowed: str, code: ErrorCode) -> None:
@@ -269,7 +261,7 @@ def _refuse_where(field: str, column: Floats, bad: Any, allowed: str, code: Erro
 
 
 def _wrong_type(field: str, value: Any, allowed: str, index: int | None = None) -> InvalidInput:
-    return wrong_type(field, shown(value), allowed, index=index)
+    return errors.wrong_type(field, shown(value), allowed, index=index)
 
 
 Name = Annotated[str, name]

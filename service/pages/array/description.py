@@ -96,7 +96,7 @@ def charge_columns(answer: ArrayStress) -> dict[str, list[Any]]:
 
 def charge_figure(answer: ArrayStress, loads_mm: Sequence[tuple[float, float]], numbers: str) -> Drawn:
     """Each sensor coloured by its charge, with the loads where they have positions."""
-    from underskin.figures import loaded_array
+    from underskin.figures.loads import loaded_array
 
     x, y, charge, error = (answer.columns[name] for name in ("x_mm", "y_mm", "charge_pc", "charge_error_pc"))
     figure = loaded_array(answer.sensors, x, y, charge, error, loads_mm)

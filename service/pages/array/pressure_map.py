@@ -82,7 +82,7 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
 
 
 def _figures(document: Mapping[str, Any], answer: ArrayStress) -> list[Drawn]:
-    from underskin.figures import pressure_on_array
+    from underskin.figures.loads import pressure_on_array
 
     columns, held = answer.columns, document["pressure_map"]
     places = list(zip(columns["x_mm"].tolist(), columns["y_mm"].tolist(), strict=True))

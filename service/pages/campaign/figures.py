@@ -67,7 +67,7 @@ def _chosen(answer: Mapping[str, Any]) -> str:
 def _frf(
     row: AnyRow, loaded: Callable[[], Campaign], answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str
 ) -> list[Drawn]:
-    from underskin.figures import frf_overview, frf_recordings
+    from underskin.figures.frf import frf_overview, frf_recordings
     from underskin.recordings.frf import summary
 
     band = answer["band"]
@@ -98,7 +98,7 @@ def _title(recording: FrfRecording, show: str) -> str:
 
 
 def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any]) -> list[Drawn]:
-    from underskin.figures import array_map, frf_versus_preload, response_per_sensor
+    from underskin.figures.array import array_map, frf_versus_preload, response_per_sensor
 
     if answer["band"] is None:
         return []

@@ -175,7 +175,7 @@ def _computed(request: Request, table: SigmaTable) -> DesignAnswer:
 
 def _tried(table: SigmaTable, sliders: Sliders) -> tuple[list[DesignResult], list[Drawn], str | None]:
     """What the design tells, in numbers and figures, or what is wrong with it."""
-    from underskin.figures import Mark, array_response, design_overview
+    from underskin.figures.design import Mark, array_response, design_overview
 
     try:
         asked = parsed(DesignRequest, sliders.values)

@@ -44,7 +44,7 @@ def drawn(name: str, figure: "go.Figure", about: str, numbers: str | None = None
 def prepare() -> None:
     """Load what draws and what it needs, before somebody asks for the first figure: it takes half a second."""
     import underskin.figures.campaign_figures
-    from underskin.figures import frf_overview
+    from underskin.figures.frf import frf_overview
 
     assert underskin.figures.campaign_figures
     frf_overview([], None).to_json()
@@ -60,7 +60,7 @@ def drawn_before(name: str, text: str, about: str, numbers: str | None = None) -
 
 def drawn_curves(recordings: Iterable[Recording], most: int, noun: str = "", numbers: str | None = None) -> list[Drawn]:
     """The first recordings of curves in one figure; none where there are none. `noun`: what they are called."""
-    from underskin.figures import ForceCurve, force_curves
+    from underskin.figures.curves import ForceCurve, force_curves
 
     chosen = [one for one in recordings if not isinstance(one, FrfRecording)]
     if not chosen:

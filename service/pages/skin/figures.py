@@ -30,7 +30,7 @@ def map_rows(row: AnyRow, answer: Mapping[str, Any], history: History) -> list[d
 
 def drawn_map(root: str, row: AnyRow, rows: Sequence[Mapping[str, Any]], show: Shown, by: By) -> Drawn:
     """The sensors of `map_rows` where they lie."""
-    from underskin.figures import Quantity, array_map
+    from underskin.figures.array import Quantity, array_map
 
     value, uncertainty, name, unit, diverging = _QUANTITIES[show]
     names, x_mm, y_mm, reasons = columns_of(rows, "sensor", "x_mm", "y_mm", "reasons")
@@ -51,7 +51,7 @@ def _range(known: Sequence[Mapping[str, Any]]) -> str:
 
 def drawn_history(root: str, history: History, sensor: str | None, by: By) -> Drawn:
     """d33 over time: of one sensor, of all, or of very many the median and the range."""
-    from underskin.figures import SensorPoints, array_history, d33_history
+    from underskin.figures.history import SensorPoints, array_history, d33_history
 
     numbers = f"/skins/{quote(root, safe='')}/history.csv?model={by}"
     chosen = [entry for entry in history.sensors if sensor in (None, entry.sensor)]

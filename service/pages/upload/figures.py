@@ -26,7 +26,7 @@ def figures(look: InspectedFile, place: str, mapped: MappedFile | None) -> list[
 
 def _mapped_curves(mapped: MappedFile | None) -> list[Drawn]:
     """Force against displacement as soon as a mapping has both, be the sphere's radius known or not."""
-    from underskin.figures import ForceCurve, force_curves
+    from underskin.figures.curves import ForceCurve, force_curves
 
     recordings = [] if mapped is None else [one for one in mapped.document["recordings"] if one["kind"] != "frf"]
     curves = [
@@ -66,7 +66,7 @@ def _campaigns(look: InspectedFile) -> list[Campaign]:
 
 
 def _traces(look: InspectedFile, place: str) -> list[Drawn]:
-    from underskin.figures import Trace, raw_traces
+    from underskin.figures.traces import raw_traces
 
     if look.contents is None or not look.contents.blocks:
         return []
@@ -74,7 +74,6 @@ def _traces(look: InspectedFile, place: str) -> list[Drawn]:
     real = [one for one in block.channels if len(one.values) and not np.iscomplexobj(one.values)]
     if not real:
         return []
-    traces = [Trace(one.name, one.unit, one.values.astype(float)) for one in real[:_MOST_TRACES]]
     of = (
         f" of {block.name[:60]!r}, the first of {len(look.contents.blocks)} parts"
         if len(look.contents.blocks) > 1
@@ -82,11 +81,11 @@ def _traces(look: InspectedFile, place: str) -> list[Drawn]:
     )
     most = f" (the first {_MOST_TRACES} of {len(real)})" if len(real) > _MOST_TRACES else ""
     about = f"The channels{of}{most}, in the units of the file."
-    return [drawn("traces", raw_traces(traces, block.sample_rate_hz), about, f"{place}traces.csv")]
+    return [drawn("traces", raw_traces(real[:_MOST_TRACES], block.sample_rate_hz), about, f"{place}traces.csv")]
 
 
 def _frf(campaigns: list[Campaign], place: str) -> list[Drawn]:
-    from underskin.figures import frf_recordings
+    from underskin.figures.frf import frf_recordings
     from underskin.recordings.frf import summary
 
     measured_frfs = [entry for campaign in campaigns for entry in measured(campaign)]

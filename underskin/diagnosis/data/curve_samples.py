@@ -10,15 +10,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.noise.correlated_error import CurveError, instrument_columns
 from underskin.diagnosis.noise.line_noise import LineNoise
 from underskin.mechanisms.base import Kind
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.campaign import Campaign, CurveRecording
 from underskin.recordings.curve_course import Course, course, roughness
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 _SAMPLES, _MOST_SAMPLES = 50, 160  # of a curve, before and after blocks are split
 _STRAIGHT = 3.0  # standard deviations of χ² about a straight line beyond which a block is split
@@ -34,15 +33,13 @@ _STEP, _RESTS = 0.2, 1e-3  # of the usual step: the smaller way's, and that betw
 _IN_THE_AIR, _AT_CONTACT = 0.2, 0.7  # of the largest force, what the smooth error counts where there is less
 _FEW_FOR_ZERO = 0.01  # of the largest force: how well a cell's zero is known that no sample shows
 
-CurveRecording = IndentationRecording | CompressionRecording
-
 
 def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
     """The thinned curves of one kind; curves with fewer than five finite samples are left out."""
     entries: list[CurveRecording] = []
     forces, deviations, places, errors = [], [], [], []
     for entry in campaign.recordings:
-        if not isinstance(entry, IndentationRecording | CompressionRecording) or entry.kind != kind:
+        if not isinstance(entry, CurveRecording) or entry.kind != kind:
             continue
         columns = finite_samples(entry)
         if len(columns[0]) < _LEAST_SAMPLES:
@@ -135,13 +132,13 @@ def _thinned(columns: Sequence[Floats], seen: Course) -> tuple[list[Floats], Flo
     return thinned, deviation, place, counts.astype(float)
 
 
-def _corners(seen: Course) -> NDArray[np.intp]:
+def _corners(seen: Course) -> Indices:
     """The first samples of what is not smoothly joined to what was before."""
     places = (seen.snap_in, seen.pull_off, seen.turn, seen.leave)
     return np.unique(np.array([place for place in places if place is not None], dtype=np.intp))
 
 
-def _sag(column: Floats, starts: NDArray[np.intp], corners: NDArray[np.intp]) -> tuple[Floats, Floats]:
+def _sag(column: Floats, starts: Indices, corners: Indices) -> tuple[Floats, Floats]:
     """How far the mean over each block lies beside the column's value in the block's middle, and how surely.
 
     By the parabola through the means of the block and of those beside it, bent no more than those of its neighbours:
@@ -166,7 +163,7 @@ def _sag(column: Floats, starts: NDArray[np.intp], corners: NDArray[np.intp]) ->
     return sag, doubt
 
 
-def _split(starts: NDArray[np.intp], columns: Sequence[tuple[Floats, float]]) -> NDArray[np.intp]:
+def _split(starts: Indices, columns: Sequence[tuple[Floats, float]]) -> Indices:
     """Blocks halved until each column is straight within its noise: a mean over a bend lies beside the curve.
 
     The most bent ones first, as long as there are not too many.
@@ -196,7 +193,7 @@ def _bend(force: Floats, noise: float) -> float:
     return float((left @ left) / least**2 - freedom) / np.sqrt(2.0 * freedom)
 
 
-def _around(seen: Course, count: int) -> NDArray[np.intp]:
+def _around(seen: Course, count: int) -> Indices:
     """The samples with which blocks begin near the jumps, where a force falls steeply, and where the way turns: how
     far a contact has grown is told by single samples."""
     near = (_corners(seen)[:, None] + np.concatenate([-_NEAR_JUMP[:0:-1], _NEAR_JUMP])).ravel()

@@ -11,15 +11,14 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.noise.correlated_error import CurveError, Whitening
 from underskin.diagnosis.noise.line_noise import LineNoise, line_noise
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.models.composition import kind_of
-from underskin.recordings.campaign import Campaign, FrfRecording, Recording, frf_recordings
+from underskin.recordings.campaign import Campaign, FrfRecording, Recording, frf_recordings, samples_of
 from underskin.recordings.frf.estimation import lines_of
-from underskin.units import Complexes, Floats
+from underskin.units import Complexes, Floats, Indices, Mask
 
 COLLAPSED_HZ = 30.0  # stands for the frequency of a collapsed line; no model that is given one asks for it
 
@@ -38,8 +37,8 @@ class Lines:
     value: Complexes  # (rows,)
     deviation: Floats  # (rows,)
     frequency: Floats  # (rows,)
-    recording: NDArray[np.intp]  # (rows,)
-    sensor: NDArray[np.intp]  # (recordings,)
+    recording: Indices  # (rows,)
+    sensor: Indices  # (recordings,)
     noise: LineNoise
     scatter: tuple[float, int] = (0.0, 0)
     smooth: CurveError | None = None  # of curves
@@ -65,7 +64,7 @@ class Lines:
         return ("displacement_mm",) if self.curves else ("frequency_hz", "phase")
 
     @cached_property
-    def first(self) -> NDArray[np.intp]:
+    def first(self) -> Indices:
         """The first row of each recording."""
         return np.searchsorted(self.recording, np.arange(self.recordings))
 
@@ -100,16 +99,13 @@ class Lines:
         total = np.add.reduceat(weight, self.first)
         mean = np.add.reduceat(weight * self.value, self.first).astype(np.complex128) / total
         left = float(np.sum(weight * np.abs(self.value - mean[self.recording]) ** 2))
-        campaign = replace(
-            self.campaign,
-            recordings=tuple(
-                FrfRecording.of_lines(entry, np.array([COLLAPSED_HZ]), mean[[number]])
-                for number, entry in enumerate(frf_recordings(self.campaign))
-            ),
+        recordings = tuple(
+            FrfRecording.of_lines(entry, np.array([COLLAPSED_HZ]), mean[[number]])
+            for number, entry in enumerate(frf_recordings(self.campaign))
         )
         return replace(
             self,
-            campaign=campaign,
+            campaign=replace(self.campaign, recordings=recordings),
             value=mean,
             deviation=total**-0.5,
             frequency=np.full(len(mean), COLLAPSED_HZ),
@@ -117,19 +113,16 @@ class Lines:
             scatter=(self.scatter[0] + left, self.scatter[1] + 2 * (len(self.value) - len(mean))),
         )
 
-    def part(self, kept: NDArray[np.bool_]) -> "Lines":
+    def part(self, kept: Mask) -> "Lines":
         """Only some of the rows, each with the noise it had; recordings without a row are left out."""
         recordings = np.unique(self.recording[kept])
         entries = [self.campaign.recordings[number] for number in recordings]
         rows = [np.flatnonzero(kept & (self.recording == number)) for number in recordings]
-        campaign = replace(
-            self.campaign,
-            recordings=tuple(_with_rows(entry, self, own) for entry, own in zip(entries, rows, strict=True)),
-        )
+        kept_entries = tuple(_with_rows(entry, self, own) for entry, own in zip(entries, rows, strict=True))
         order = np.concatenate(rows)
         return replace(
             self,
-            campaign=campaign,
+            campaign=replace(self.campaign, recordings=kept_entries),
             value=self.value[order],
             deviation=self.deviation[order],
             frequency=self.frequency[order],
@@ -162,21 +155,15 @@ def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None, expect
         entries.append(FrfRecording.of_lines(entry, frequency, value))
         values.append(value)
         frequencies.append(frequency)
-        coherence = measured.coherence
-        coherences.append(np.full(len(order), np.nan) if coherence is None else coherence[order])
+        coherences.append(measured.coherence_or_nan[order])
         unevens.append((uneven or {}).get(entry.id, np.ones(len(measured.values)))[order])
         sensors.append(numbers[entry.sensor])
     recording = np.repeat(np.arange(len(values)), [len(value) for value in values]).astype(np.intp)
     value = np.concatenate([*values, np.zeros(0, dtype=complex)])
-    frequency = np.concatenate([*frequencies, np.zeros(0)])
-    noise = line_noise(
-        value,
-        frequency,
-        recording,
-        np.concatenate([*coherences, np.zeros(0)]),
-        np.concatenate([*unevens, np.zeros(0)]),
-        expected,
+    frequency, coherence, unevenness = (
+        np.concatenate([*columns, np.zeros(0)]) for columns in (frequencies, coherences, unevens)
     )
+    noise = line_noise(value, frequency, recording, coherence, unevenness, expected)
     return Lines(
         campaign=replace(campaign, recordings=tuple(entries)),
         value=value,
@@ -188,10 +175,8 @@ def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None, expect
     )
 
 
-def _with_rows(entry: Recording, lines: Lines, own: NDArray[np.intp]) -> Recording:
+def _with_rows(entry: Recording, lines: Lines, own: Indices) -> Recording:
     """A recording with only some of its rows, given by their places among all rows."""
     if isinstance(entry, FrfRecording):
         return FrfRecording.of_lines(entry, lines.frequency[own], lines.value[own])
-    rows = own - int(np.searchsorted(lines.recording, lines.recording[own[0]]))
-    time = None if entry.time_s is None else entry.time_s[rows]
-    return replace(entry, displacement_mm=entry.displacement_mm[rows], force_n=entry.force_n[rows], time_s=time)
+    return samples_of(entry, own - int(np.searchsorted(lines.recording, lines.recording[own[0]])))

@@ -3,8 +3,7 @@
 import numpy as np
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.mechanisms.models.frf_design import Indices
-from underskin.units import Array, Floats
+from underskin.units import Array, Floats, Indices
 
 _TOGETHER = 8  # factors of the determinant whose logarithm is taken together: below 1e38 each, they do not overflow
 

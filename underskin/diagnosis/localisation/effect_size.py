@@ -10,10 +10,9 @@ recordings.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.units import Array, Floats
+from underskin.units import Array, Floats, Mask
 
 _ONE_SIGN = 0.8
 _DRAWS, _SEED = 1000, 20180207
@@ -29,7 +28,7 @@ class EffectSize:
     signed: bool
 
 
-def effect(lines: Lines, predicted: Array, rows: NDArray[np.bool_], gain: float, level: float) -> EffectSize:
+def effect(lines: Lines, predicted: Array, rows: Mask, gain: float, level: float) -> EffectSize:
     """The size of the misfit on some rows.
 
     Parameters

@@ -12,13 +12,12 @@ from enum import StrEnum
 from math import factorial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.residuals import Residuals
 from underskin.diagnosis.selection.frequency_gp import frequency_bins
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 PERMUTATIONS = 999
 SEED = 20180205
@@ -79,24 +78,19 @@ def locate(lines: Lines, residuals: Residuals) -> list[AxisResult]:
     total = gain_misfit + line_misfit
     results: list[AxisResult] = []
     statistics: dict[str, Floats] = {}
-    shares: dict[str, float] = {}
     for name, basis in bases.items():
         others = [other for key, other in bases.items() if key != name]
         reason = _undecidable(basis, others, blocks[name])
         if reason:
             results.append(AxisResult(name, None, 0.0, reason))
-            continue
-        explained = _freedman_lane(residuals.gain, weight, basis, others, blocks[name], random)
-        statistics[name] = explained
-        shares[name] = explained[0] / total
-    for name, explained in _sign_flips(lines, residuals, random).items():
-        statistics[name] = explained
-        shares[name] = explained[0] / total
-    largest = [_standardised(values) for values in statistics.values()]
-    highest = np.max(largest, axis=0)[1:] if largest else np.zeros(0)
-    for name, values in zip(statistics, largest, strict=True):
+        else:
+            statistics[name] = _freedman_lane(residuals.gain, weight, basis, others, blocks[name], random)
+    statistics |= _sign_flips(lines, residuals, random)
+    standardised = [_standardised(values) for values in statistics.values()]
+    highest = np.max(standardised, axis=0)[1:] if standardised else np.zeros(0)
+    for (name, explained), values in zip(statistics.items(), standardised, strict=True):
         beyond = int((highest >= values[0] - 1e-12).sum())
-        results.append(AxisResult(name, (beyond + 1) / (PERMUTATIONS + 1), min(shares[name], 1.0)))
+        results.append(AxisResult(name, (beyond + 1) / (PERMUTATIONS + 1), min(explained[0] / total, 1.0)))
     if lines.recordings < 6:
         results += [AxisResult(name, None, 0.0, Undecidable.FEW_SIGNS) for name in lines.row_axes]
     return results
@@ -125,7 +119,7 @@ def _bases(lines: Lines) -> dict[str, Floats]:
     return bases
 
 
-def _blocks(lines: Lines, bases: dict[str, Floats]) -> dict[str, NDArray[np.intp]]:
+def _blocks(lines: Lines, bases: dict[str, Floats]) -> dict[str, Indices]:
     """Within which each axis' recordings may be exchanged: sensors, where each has several values of it; else days."""
     none = np.zeros(lines.recordings, dtype=np.intp)
     days = none
@@ -143,7 +137,7 @@ def _blocks(lines: Lines, bases: dict[str, Floats]) -> dict[str, NDArray[np.intp
     return blocks
 
 
-def _undecidable(basis: Floats, others: list[Floats], blocks: NDArray[np.intp]) -> Undecidable | None:
+def _undecidable(basis: Floats, others: list[Floats], blocks: Indices) -> Undecidable | None:
     arrangements = 1.0
     for number in np.unique(blocks):
         arrangements *= float(factorial(min(int((blocks == number).sum()), 20)))
@@ -162,12 +156,7 @@ def _undecidable(basis: Floats, others: list[Floats], blocks: NDArray[np.intp]) 
 
 
 def _freedman_lane(
-    gain: Floats,
-    weight: Floats,
-    basis: Floats,
-    others: list[Floats],
-    blocks: NDArray[np.intp],
-    random: np.random.Generator,
+    gain: Floats, weight: Floats, basis: Floats, others: list[Floats], blocks: Indices, random: np.random.Generator
 ) -> Floats:
     """The weighted square explained beyond the other axes: as observed, then under each permutation."""
     reduced = np.column_stack([np.ones(len(gain)), *others]) * weight[:, None]
@@ -184,7 +173,7 @@ def _freedman_lane(
     return ((direction.T @ beyond(every)) ** 2).sum(axis=0)
 
 
-def _permutations(blocks: NDArray[np.intp], random: np.random.Generator) -> NDArray[np.intp]:
+def _permutations(blocks: Indices, random: np.random.Generator) -> Indices:
     """Orders of the recordings (permutations, recordings), each within its block."""
     drawn = random.random((PERMUTATIONS, len(blocks)))
     permutations = np.empty(drawn.shape, dtype=np.intp)

@@ -3,13 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.residuals import Residuals
 from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT, AxisResult
-from underskin.units import Array, Floats
+from underskin.units import Array, Floats, Mask
 
 _MOST_OF_IT = 0.7
 
@@ -58,7 +57,7 @@ def region(lines: Lines, residuals: Residuals, results: list[AxisResult]) -> dic
     return ranges
 
 
-def in_region(lines: Lines, ranges: dict[str, list[float | str]]) -> NDArray[np.bool_]:
+def in_region(lines: Lines, ranges: dict[str, list[float | str]]) -> Mask:
     """Which rows lie in a region."""
     inside = np.ones(len(lines.value), dtype=bool)
     for name, limits in ranges.items():

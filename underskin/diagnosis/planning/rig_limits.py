@@ -14,10 +14,8 @@ from underskin.recordings.conditions import Conditions, FrfConditions, frf_of, o
 MOST_RECORDINGS = 8
 _FURTHER = 1.25  # beyond the highest preload used
 _PRELOADS = 8
-_LOUDER, _LONGER = (
-    (3.0, 10.0),
-    10.0,
-)  # than the campaign's largest dynamic force and longest dwell, where no more is known
+# Than the campaign's largest dynamic force and longest dwell, where no more is known
+_LOUDER, _LONGER = (3.0, 10.0), 10.0
 
 
 @dataclass(frozen=True)

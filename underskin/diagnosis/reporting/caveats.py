@@ -1,6 +1,6 @@
 """Findings that decide how far the statement of a report can be trusted, as sentences of that statement."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 
 from underskin.findings.codes import FindingCode
@@ -25,14 +25,11 @@ def _rank(entry: Mapping[str, str]) -> int:
     return _DECISIVE.index(FindingCode(entry["code"]))
 
 
-def _sentences(alike: Sequence[Mapping[str, str]]) -> list[str]:
+def _sentences(alike: Sequence[Mapping[str, str]]) -> Iterator[str]:
     if len(alike) > _MOST:
-        return [f"{len(alike)} findings of {alike[0]['code'].replace('_', ' ')}, see the findings."]
-    return [_sentence(entry) for entry in alike]
-
-
-def _sentence(entry: Mapping[str, str]) -> str:
-    text = entry["statement"].rstrip(".")
-    if entry["recording"]:
-        return f"Recording {entry['recording']!r}: {text}."
-    return f"{text[0].upper()}{text[1:]}."
+        yield f"{len(alike)} findings of {alike[0]['code'].replace('_', ' ')}, see the findings."
+        return
+    for entry in alike:
+        text = entry["statement"].rstrip(".")
+        about = f"Recording {entry['recording']!r}: {text}" if entry["recording"] else f"{text[0].upper()}{text[1:]}"
+        yield f"{about}."

@@ -7,15 +7,14 @@ fit grants it the rest of a zero, a drift and a gain, of each curve its own.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from underskin.diagnosis.data.curve_samples import CurveRecording, finite_samples, way_along
+from underskin.diagnosis.data.curve_samples import finite_samples, way_along
 from underskin.diagnosis.inference.curve_nuisances import cell_response
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.reporting.numbers import place_of
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.campaign import Campaign, CurveRecording
 from underskin.recordings.curve_course import course
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 MOST_SAMPLES = 600  # of a curve
 _BESIDE_CORNER = 12  # samples on either side of a jump or of the deepest one, all of which are shown
@@ -70,19 +69,14 @@ def shown_curves(
     raw = {
         entry.id: entry
         for entry in recorded.recordings
-        if isinstance(entry, IndentationRecording | CompressionRecording) and entry.kind == problem.kind
+        if isinstance(entry, CurveRecording) and entry.kind == problem.kind
     }
-    rows = zip(
-        problem.lines.campaign.recordings,
-        problem.lines.spans,
-        _predictions(problem, before),
-        _predictions(problem, after),
-        strict=True,
-    )
+    lines = problem.lines
+    predicted = zip(_predictions(problem, before), _predictions(problem, after), strict=True)
     curves = []
-    for entry, own, *predicted in rows:
-        assert isinstance(entry, IndentationRecording | CompressionRecording)
-        curves.append(_shown(raw[entry.id], entry.displacement_mm, problem.lines.value.real[own], *predicted))
+    for entry, own, both in zip(lines.campaign.recordings, lines.spans, predicted, strict=True):
+        assert isinstance(entry, CurveRecording)
+        curves.append(_shown(raw[entry.id], entry.displacement_mm, lines.value.real[own], *both))
     return sorted(curves, key=lambda curve: -curve.left_percent)
 
 
@@ -94,7 +88,7 @@ def _predictions(problem: FittingProblem, explanation: Explanation) -> list[Curv
     reading = cell.reading(lines, force)
     predicted = []
     for entry, own in zip(lines.campaign.recordings, lines.spans, strict=True):
-        assert isinstance(entry, IndentationRecording | CompressionRecording)
+        assert isinstance(entry, CurveRecording)
         contact = float(explanation.point.fit[place_of(explanation, f"contact_point {entry.id}")])
         nearest = int(np.abs(entry.displacement_mm - contact).argmin())
         predicted.append(CurvePrediction(reading[own], Mark(contact, float(cell.offset[own][nearest]))))
@@ -126,7 +120,7 @@ def _shown(
     )
 
 
-def _thinned(way: Floats, corners: list[int]) -> NDArray[np.intp]:
+def _thinned(way: Floats, corners: list[int]) -> Indices:
     """Which samples are shown of those that lie so far along a curve, 0 to 1: as evenly as they lie, and all beside
     corners."""
     count = len(way)

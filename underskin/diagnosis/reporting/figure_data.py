@@ -7,7 +7,6 @@ lines. Its values are means weighted with 1/variance.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
@@ -15,7 +14,7 @@ from underskin.diagnosis.inference.residuals import whole_prediction
 from underskin.diagnosis.localisation.region import axis_values
 from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.units import Array, Complexes, Floats
+from underskin.units import Array, Complexes, Floats, Indices
 
 _MOST_POINTS = 600
 _LEAST_BINS = 8  # of the lines, so that a shape over them can be seen in campaigns of any size
@@ -27,7 +26,7 @@ _SMALLEST = 0.05  # of the largest response: smaller ones are no scale for a res
 class Points:
     """Responses in pC/N, forces of curves in N; `deviation` without gain scatter, which is relative."""
 
-    recording: NDArray[np.intp]  # (points,)
+    recording: Indices  # (points,)
     measured: Complexes  # (points,)
     predicted: Complexes  # (points,)
     deviation: Floats  # (points,) of real and of imaginary part
@@ -45,7 +44,7 @@ class Points:
 class Levels:
     """An axis in steps: of each point the step, of each step its name and the values that it holds."""
 
-    step: NDArray[np.intp]  # (points,)
+    step: Indices  # (points,)
     names: list[str]
     low: Array  # (steps,)
     high: Array  # (steps,)

@@ -94,7 +94,8 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points) -
     part, name = _part(diagnosis, before.residual_percent)
     x_axis, y_axis = _map_axes(diagnosis, thinned)
     x, y = (None if axis is None else thinned.levels(axis) for axis in (x_axis, y_axis))
-    x, y = (_one_level(before) if entry is None else entry for entry in (x, y))
+    one_place = Levels(np.zeros(len(before.recording), dtype=np.intp), [""], np.zeros(1), np.zeros(1))
+    x, y = (one_place if entry is None else entry for entry in (x, y))
     cell = y.step * len(x.names) + x.step
     size = len(x.names) * len(y.names)
     count = np.bincount(cell, minlength=size)
@@ -243,11 +244,6 @@ def _map_axes(diagnosis: DiagnosisResult, thinned: Thinned) -> tuple[str | None,
     varying: list[str | None] = [name for name in wanted if thinned.levels(name) is not None]
     first, second = (*varying, None, None)[:2]
     return (second, first) if second in thinned.lines.row_axes else (first, second)
-
-
-def _one_level(points: Points) -> Levels:
-    """All points at one place."""
-    return Levels(np.zeros(len(points.recording), dtype=np.intp), [""], np.zeros(1), np.zeros(1))
 
 
 def _outline(diagnosis: DiagnosisResult, axis: str | None, levels: Levels) -> tuple[float, float]:

@@ -17,20 +17,14 @@ def fit_warnings(problem: FittingProblem, explanation: Explanation) -> list[Find
 
 def _at_bounds(explanation: Explanation) -> list[Finding]:
     findings = []
-    for name, place in own_places(explanation.names, explanation.best.hypothesis.lines).items():
-        for index in range(place.start, place.stop):
-            entry = explanation.model.parameters[index]
-            curves = explanation.best.hypothesis.lines.curves
-            if curves and entry.unit == "-" and entry.limit is None:  # a law's form, whose ends are laws of their own
+    lines = explanation.best.hypothesis.lines
+    for name, place in own_places(explanation.names, lines).items():
+        for entry, fit in zip(explanation.model.parameters[place], explanation.point.fit[place], strict=True):
+            if lines.curves and entry.unit == "-" and entry.limit is None:  # a law's form: its ends are laws themselves
                 continue
-            if min(abs(explanation.point.fit[index] - bound) for bound in entry.bounds) < 1e-9:
-                arguments = {
-                    "mechanism": name,
-                    "parameter": entry.name,
-                    "low": entry.low,
-                    "high": entry.high,
-                    "unit": entry.unit,
-                }
+            if min(abs(fit - bound) for bound in entry.bounds) < 1e-9:
+                bounds = {"low": entry.low, "high": entry.high, "unit": entry.unit}
+                arguments = {"mechanism": name, "parameter": entry.name, **bounds}
                 findings.append(Finding(Reason.PARAMETER_AT_BOUND, "", entry.name, arguments))
     return findings
 

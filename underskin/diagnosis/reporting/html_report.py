@@ -1,7 +1,7 @@
 """The report as one HTML file that needs nothing from outside: it opens on any computer, also without a network.
 
-`report_view` says what the page shows, the template makes HTML of it. Every text that comes from a campaign is escaped;
-the page's policy forbids whatever is not in it.
+The template says what the page shows; names and numbers of the report are worded by filters. Every text that comes from
+a campaign is escaped; the page's policy forbids whatever is not in it.
 """
 
 from collections.abc import Mapping
@@ -13,9 +13,12 @@ import plotly.io
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs
 
-from underskin.diagnosis.reporting import report_view
+from underskin.diagnosis.reporting import wording
+from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.figures import explanations
-from underskin.diagnosis.reporting.report_view import Report
+from underskin.diagnosis.reporting.statements import first_and_rest, lacking_part
+from underskin.findings.formatting import in_percent
+from underskin.mechanisms.registry import CATALOGUE
 
 _LIST = """
 const plot = document.getElementById("{plot_id}"), {buttons} = plot.layout.updatemenus[0];
@@ -27,6 +30,12 @@ Plotly.relayout(plot, {"updatemenus[0].visible": false});
 plot.before(label);
 """  # stands in for a figure's own menu, which only a pointer can open
 
+_FILTERS = (
+    *(wording.axis, wording.columns, wording.error, wording.group, wording.interval, wording.number, wording.plain),
+    *(wording.readable, wording.unit, wording.words, caveats, first_and_rest, in_percent, lacking_part),
+)
+
+Report = Mapping[str, Any]
 FigureHtml = Mapping[str, str]  # HTML of each figure, by its name
 
 
@@ -34,6 +43,8 @@ FigureHtml = Mapping[str, str]  # HTML of each figure, by its name
 def _macros() -> Any:
     loader = PackageLoader("underskin.diagnosis.reporting")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
+    environment.filters |= {function.__name__: function for function in _FILTERS}
+    environment.globals["catalogue"] = CATALOGUE
     return environment.get_template("report.html").module
 
 
@@ -41,25 +52,22 @@ def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
     """The whole page; `figures` as `underskin.diagnosis.reporting.figures` makes them: a report alone has but one."""
     given = figures if figures is not None else of_report(report)
     drawn = {name: _plot(figure, name) for name, figure in given.items()}
-    title = f"Diagnosis of {report['campaign']}"
-    entries = report_view.provenance_of(report)
-    script = get_plotlyjs() if drawn else ""
-    return str(_macros().page(title, report_view.view_of(report), drawn, entries, script))
+    return str(_macros().page(report, drawn, get_plotlyjs() if drawn else ""))
 
 
 def body_of(report: Report, drawn: FigureHtml) -> str:
     """What stands below the title, as HTML: one sentence, where, what, how much better, what to measure next."""
-    return str(_macros().body(report_view.view_of(report), drawn))
+    return str(_macros().body(report, drawn))
 
 
 def provenance(report: Report) -> str:
     """With what it was made, as HTML."""
-    return str(_macros().provenance(report_view.provenance_of(report)))
+    return str(_macros().provenance(report["provenance"]))
 
 
 def plan_of(planned: Mapping[str, Any]) -> str:
     """A report's `next_experiment` that is not empty, as HTML."""
-    return str(_macros().blocks(report_view.plan_of(planned), {}))
+    return str(_macros().plan(planned))
 
 
 def of_report(report: Report) -> dict[str, go.Figure]:
@@ -68,7 +76,7 @@ def of_report(report: Report) -> dict[str, go.Figure]:
 
 
 def _plot(figure: go.Figure, name: str) -> str:
-    text: str = plotly.io.to_html(
+    return plotly.io.to_html(
         figure,
         full_html=False,
         include_plotlyjs=False,
@@ -76,4 +84,3 @@ def _plot(figure: go.Figure, name: str) -> str:
         config={"displaylogo": False, "responsive": True},
         post_script=_LIST if figure.layout.updatemenus else None,
     )
-    return text

@@ -26,16 +26,11 @@ def next_experiment(plan: NextRecordings | None) -> dict[str, Any]:
 def _recordings(plan: NextRecordings) -> list[dict[str, Any]]:
     documents = []
     for entry in dict.fromkeys(plan.recordings):
-        described = {
-            "sensor": entry.sensor,
-            "indenter_radius_mm": entry.indenter_radius_mm,
-            "preload_n": entry.preload_n,
-            "dynamic_force_n": entry.dynamic_force_n,
-            "position_mm": list(entry.position_mm or ()),
-            "dwell_s": entry.dwell_s,
-            "repeats": plan.recordings.count(entry),
-        }
-        documents.append({name: value for name, value in described.items() if value is not None})
+        names = ("sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n")
+        described = {name: getattr(entry, name) for name in names}
+        described |= {"position_mm": list(entry.position_mm or ()), "dwell_s": entry.dwell_s}
+        known = {name: value for name, value in described.items() if value is not None}
+        documents.append({**known, "repeats": plan.recordings.count(entry)})
     return documents
 
 

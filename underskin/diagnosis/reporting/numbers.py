@@ -18,11 +18,6 @@ def rounded(value: float, digits: int = 4) -> float | None:
     return float(f"{value:.{digits}g}") if np.isfinite(value) else None
 
 
-def probability(value: float) -> float:
-    """To three decimals."""
-    return round(value, 3)
-
-
 def place_of(explanation: Explanation, name: str) -> int:
     """Where in its model's parameters one is."""
     return [entry.name for entry in explanation.model.parameters].index(name)

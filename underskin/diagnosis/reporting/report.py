@@ -5,7 +5,7 @@ gives the same report on one machine; on a processor that rounds differently a l
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING
@@ -16,19 +16,11 @@ from underskin.diagnosis.localisation.permutation_test import AxisResult
 from underskin.diagnosis.localisation.region import reaches_all_along
 from underskin.diagnosis.localisation.residual_shape import REACHES_NOISE, Shape
 from underskin.diagnosis.planning.optimal_design import NextRecordings
-from underskin.diagnosis.reporting import next_experiment
+from underskin.diagnosis.reporting import next_experiment, statements
 from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
-from underskin.diagnosis.reporting.numbers import parameter, place_of, probability, rounded, without_effect
-from underskin.diagnosis.reporting.statements import (
-    CONFOUNDED,
-    UNDECIDABLE,
-    answer_statement,
-    insufficient_statement,
-    location_statement,
-    why_not,
-)
+from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded, without_effect
 from underskin.diagnosis.selection.search import Answer, Search
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import Confounding
@@ -64,6 +56,10 @@ class DiagnosisResult:
     plan: NextRecordings | None = None
     curves: Campaign | None = None  # with every sample, where curves were diagnosed
 
+    def with_findings(self, *further: Finding) -> "DiagnosisResult":
+        """The same with further findings behind the others."""
+        return replace(self, findings=(*self.findings, *further))
+
     @property
     def next_experiment(self) -> dict[str, Any]:
         """The recordings to make next, as in the report; empty where all is decided."""
@@ -94,7 +90,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         return {
             **document,
             "probability": 1.0,
-            "statement": insufficient_statement(diagnosis.lacking),
+            "statement": statements.insufficient_statement(diagnosis.lacking),
             "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "Nothing was located."},
             "mechanisms": [],
             "alternatives": [],
@@ -115,7 +111,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     d33, implausible = _d33(problem, shown, fit) if stands else (None, [])
     findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *implausible)]
     modulus = fit["after"].get("youngs_modulus")
-    statement = answer_statement(
+    statement = statements.answer_statement(
         search.answers,
         stated,
         diagnosis.shape,
@@ -127,7 +123,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     )
     return {
         **document,
-        "probability": probability(leader.probability),
+        "probability": round(leader.probability, 3),
         "statement": statement,
         "location": _location(diagnosis, problem, stated == "no_mismatch"),
         "mechanisms": [] if named is None else _mechanisms(search, problem, named),
@@ -136,17 +132,16 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
             {
                 "mechanism": entry.mechanism,
                 "confounded_with": entry.confounded_with,
-                "reason": CONFOUNDED[entry.why].format(mechanism=entry.mechanism, other=entry.confounded_with),
+                "reason": statements.CONFOUNDED[entry.why].format(
+                    mechanism=entry.mechanism, other=entry.confounded_with
+                ),
             }
             for entry in diagnosis.confounded
         ],
         "findings": findings,
         "fit": fit,
         "power": [
-            {
-                "mechanism": entry.mechanism,
-                "smallest_visible_percent": rounded(entry.smallest_visible_percent, 2),
-            }
+            {"mechanism": entry.mechanism, "smallest_visible_percent": rounded(entry.smallest_visible_percent, 2)}
             for entry in diagnosis.power
         ],
         "d33": d33,
@@ -182,7 +177,7 @@ def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanatio
     return [
         {
             "name": name,
-            "probability": probability(sum(answer.probability for answer in sets if name in answer.names)),
+            "probability": round(sum(answer.probability for answer in sets if name in answer.names), 3),
             "parameters": [parameter(explanation, place) for place in range(places[name].start, places[name].stop)],
             "explains_percent": explains_percent(search, problem, explanation, name, whole),
         }
@@ -197,13 +192,8 @@ def _alternatives(answers: Sequence[Answer]) -> list[dict[str, Any]]:
         enough = answer.probability < _LEAST_PROBABILITY and len(alternatives) > 1
         if enough or len(alternatives) >= _ALTERNATIVES:
             break
-        alternatives.append(
-            {
-                "mechanisms": list(answer.names),
-                "probability": probability(answer.probability),
-                "why_not": why_not(answer, leader),
-            }
-        )
+        said = {"mechanisms": list(answer.names), "probability": round(answer.probability, 3)}
+        alternatives.append({**said, "why_not": statements.why_not(answer, leader)})
     return alternatives
 
 
@@ -217,12 +207,12 @@ def _location(diagnosis: DiagnosisResult, problem: FittingProblem, agrees: bool)
                 "axis": entry.axis,
                 "p_value": None if entry.p_value is None else round(entry.p_value, 3),
                 "share_percent": round(100 * float(entry.share), 1),
-                **({"undecidable": UNDECIDABLE[entry.reason]} if entry.reason else {}),
+                **({"undecidable": statements.UNDECIDABLE[entry.reason]} if entry.reason else {}),
             }
             for entry in diagnosis.axes
         ],
         "region": {name: [rounded(x) if isinstance(x, float) else x for x in ends] for name, ends in region.items()},
         "effect_percent": rounded(effect.percent, 3),
         "effect_interval_percent": [rounded(effect.low, 3), rounded(effect.high, 3)],
-        "statement": location_statement(diagnosis.axes, region, whole, effect, agrees=agrees),
+        "statement": statements.location_statement(diagnosis.axes, region, whole, effect, agrees=agrees),
     }

@@ -77,13 +77,7 @@ def first_and_rest(statement: str) -> tuple[str, str]:
 
 
 def _answer(
-    answers: Sequence[Answer],
-    verdict: str,
-    shape: Shape | None,
-    model: str,
-    idle: Sequence[str],
-    *,
-    all_used: bool,
+    answers: Sequence[Answer], verdict: str, shape: Shape | None, model: str, idle: Sequence[str], *, all_used: bool
 ) -> tuple[str, str]:
     """The verdict in one sentence, and what else there is to say of it."""
     leader = answers[0]
@@ -115,11 +109,7 @@ def power_statement(power: Sequence[Power], kind: Kind) -> str:
     if not shown:
         return f"None of the {all_of_them} known mechanisms would have shown with {_SMALL:g} % of the response."
     which = f"these {len(shown)} would each have shown with {_SMALL:g} % of the response"
-    return f"Of the {all_of_them} known mechanisms {which}: {_separated(shown)}."
-
-
-def _separated(names: Sequence[str]) -> str:
-    return ", ".join(in_words([name]) for name in names)
+    return f"Of the {all_of_them} known mechanisms {which}: {', '.join(in_words([name]) for name in shown)}."
 
 
 def _laws(names: Sequence[str]) -> str:

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -61,6 +61,11 @@ def interval(entry: Mapping[str, Any]) -> str:
 def unit(label: str) -> str:
     """Empty for a pure number."""
     return "" if label == "-" else label
+
+
+def columns(entries: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The fields that any of them has, in the order in which they first come."""
+    return list(dict.fromkeys(name for entry in entries for name in entry))
 
 
 def plain(value: Any) -> str:

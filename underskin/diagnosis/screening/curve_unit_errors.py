@@ -11,13 +11,12 @@ from functools import partial
 
 import numpy as np
 
-from underskin.diagnosis.data.curve_samples import CurveRecording
 from underskin.diagnosis.data.inspected import Inspected
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.base import Kind
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.campaign import Campaign, CompressionRecording, CurveRecording, IndentationRecording
 from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.curve_course import course
 from underskin.units import Floats

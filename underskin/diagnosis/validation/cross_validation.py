@@ -8,20 +8,19 @@ sensors' gains where the sensor was not seen.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.curve_nuisances import cell_response
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.noise.noise_levels import NoiseLevels
 from underskin.diagnosis.selection.search import log_prior
-from underskin.mechanisms.models.composed import Prediction, compose
+from underskin.mechanisms.models.composed import compose
 from underskin.recordings.conditions import curves_of, frf_of
-from underskin.units import Floats
+from underskin.units import Floats, Indices, Mask
 
 _FURTHEST = 0.6  # of a curve's highest force
 _LOADED, _RETURN = 0.02, 0.02  # of the highest force and of the travel: a way back under load
@@ -43,14 +42,7 @@ class PredictionScore:
     pickup: float = 0.0  # that part of `noise` which is mains pick-up
 
     def __add__(self, other: "PredictionScore") -> "PredictionScore":
-        return PredictionScore(
-            self.square + other.square,
-            self.size + other.size,
-            self.noise + other.noise,
-            self.log_score + other.log_score,
-            self.recordings + other.recordings,
-            self.pickup + other.pickup,
-        )
+        return PredictionScore(*(one + more for one, more in zip(astuple(self), astuple(other), strict=True)))
 
     @property
     def rmse_percent(self) -> float:
@@ -73,7 +65,7 @@ class HeldOut:
     after: PredictionScore
 
 
-def groups(lines: Lines) -> dict[str, NDArray[np.bool_]]:
+def groups(lines: Lines) -> dict[str, Mask]:
     """The rows of each group that can be left out, with enough recordings remaining."""
     if lines.curves:
         return _parts_of_curves(lines)
@@ -99,7 +91,7 @@ def groups(lines: Lines) -> dict[str, NDArray[np.bool_]]:
     }
 
 
-def _parts_of_curves(lines: Lines) -> dict[str, NDArray[np.bool_]]:
+def _parts_of_curves(lines: Lines) -> dict[str, Mask]:
     """A curve's contact point is its own, so parts of each are left out: the middle of the way back where there is one,
     else the later half of what is held, else the highest force."""
     force = np.abs(lines.value.real)  # tension is negative
@@ -144,9 +136,7 @@ def hold_out(
     return held_out
 
 
-def _predict(
-    smaller: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: NDArray[np.bool_]
-) -> PredictionScore:
+def _predict(smaller: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: Mask) -> PredictionScore:
     """Some of the rows from a fit to others; sensors that were seen keep the gain that was found for them."""
     left = problem.lines.part(rows)
     model = compose(explanation.names, problem.lines.campaign, problem.table, problem.kind)
@@ -154,28 +144,27 @@ def _predict(
     whole = model.predict(point.fit)
     if left.curves:
         return _predict_curves(problem.lines, levels, whole.value.real, rows, smaller)
-    prediction, pickup_variance = _some(whole, rows), whole.pickup_variance
     seen = np.isin(left.sensor, smaller.lines.sensor)
     gains = np.zeros(max(int(left.sensor.max()), int(smaller.lines.sensor.max())) + 1)
     fitted_gains = explanation.best.sensor_gains
     gains[: len(fitted_gains)] = fitted_gains
     # A contact on an extremum of σ feels positioning scatter in second order, as in the likelihood
     p2, curvature, recording = levels.position**2, problem.curvature, problem.lines.recording[rows]
-    value = prediction.value * np.exp(gains[left.sensor])[left.recording]
+    value = whole.value[rows] * np.exp(gains[left.sensor])[left.recording]
     value = value * np.exp(0.5 * p2 * curvature.laplacian)[recording]
     scatter = levels.gain**2 + np.where(seen, 0.0, levels.spread**2)
     noise = scatter[left.recording] * np.abs(value) ** 2 + 2 * (levels.level * left.deviation) ** 2
-    if prediction.position_slopes is not None:
-        noise = noise + p2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
+    if whole.position_slopes is not None:
+        noise = noise + p2 * (np.abs(whole.position_slopes[:, rows]) ** 2).sum(axis=0)
         noise = noise + 0.5 * p2**2 * curvature.square[recording] * np.abs(value) ** 2
-    pickup_noise = 2 * pickup_variance[rows]
+    pickup_noise = 2 * whole.pickup_variance[rows]
     noise = noise + pickup_noise
     square = np.abs(left.value - value) ** 2
     return replace(_scored(left.first, square, noise, np.abs(value) ** 2), pickup=float(pickup_noise.sum()))
 
 
 def _predict_curves(
-    lines: Lines, levels: NoiseLevels, force: Floats, rows: NDArray[np.bool_], smaller: FittingProblem
+    lines: Lines, levels: NoiseLevels, force: Floats, rows: Mask, smaller: FittingProblem
 ) -> PredictionScore:
     """Some of the rows, with the gain, the zero and the drift of the cell that the rows fitted to show."""
     fitted = ~rows if len(smaller.lines.value) < len(lines.value) else rows
@@ -189,7 +178,7 @@ def _predict_curves(
     return _scored(first, (lines.value.real - value)[rows] ** 2, noise[rows], measured**2)
 
 
-def _scored(first: NDArray[np.intp], square: Floats, noise: Floats, size: Floats) -> PredictionScore:
+def _scored(first: Indices, square: Floats, noise: Floats, size: Floats) -> PredictionScore:
     """From what was missed, what noise would give, and what was predicted (rows,), all squared."""
     each, expected, sizes = (np.add.reduceat(column, first) for column in (square, noise, size))
     sizes = np.maximum(sizes, 1e-300)
@@ -199,20 +188,10 @@ def _scored(first: NDArray[np.intp], square: Floats, noise: Floats, size: Floats
 
 def total(held_out: Sequence[HeldOut]) -> tuple[PredictionScore, PredictionScore]:
     """Before and after, over all groups."""
-    before, after = PredictionScore(), PredictionScore()
-    for entry in held_out:
-        before, after = before + entry.before, after + entry.after
-    return before, after
+    none = PredictionScore()
+    return sum((entry.before for entry in held_out), none), sum((entry.after for entry in held_out), none)
 
 
 def in_sample(problem: FittingProblem, explanation: Explanation) -> PredictionScore:
     """The recordings that the explanation was fitted to."""
     return _predict(problem, explanation, problem, np.ones(len(problem.lines.value), dtype=bool))
-
-
-def _some(whole: Prediction, rows: NDArray[np.bool_]) -> Prediction:
-    return replace(
-        whole,
-        value=whole.value[rows],
-        position_slopes=None if whole.position_slopes is None else whole.position_slopes[:, rows],
-    )

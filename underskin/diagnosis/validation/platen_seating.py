@@ -16,7 +16,7 @@ from underskin.diagnosis.selection.search import SHOWS
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.recordings.campaign import Campaign, CompressionRecording, Recording
+from underskin.recordings.campaign import Campaign, CompressionRecording, Recording, samples_of
 from underskin.surrogate.sigma_table import SigmaTable
 
 _BEGINNING = 0.1  # of each curve's displacement
@@ -60,9 +60,5 @@ def _without_beginning(campaign: Campaign) -> Campaign:
     for entry in campaign.recordings:
         assert isinstance(entry, CompressionRecording)
         moved = np.abs(entry.displacement_mm - entry.displacement_mm[0])
-        rest = moved > _BEGINNING * np.nanmax(moved)
-        time = None if entry.time_s is None else entry.time_s[rest]
-        kept.append(
-            replace(entry, displacement_mm=entry.displacement_mm[rest], force_n=entry.force_n[rest], time_s=time)
-        )
+        kept.append(samples_of(entry, moved > _BEGINNING * np.nanmax(moved)))
     return replace(campaign, recordings=tuple(kept))

@@ -37,23 +37,17 @@ class Adhesion(Mechanism):
     """Johnson-Kendall-Roberts adhesion between skin and sphere."""
 
     name = "adhesion"
-    plain = (
-        "The skin sticks to the sphere, so the contact is wider than the force alone would make it, most of all at "
-        "low force, under large spheres and on soft skins."
-    )
-    law = (
-        "Johnson, Kendall and Roberts: on the half space a³ = (3R/4E') [F + 3πwR + √(6πwRF + (3πwR)²)], pressure = "
-        "Hertz' less a flat punch's; on the layer φ(a) = −√(2awE'/π) in the integral equation of layered_contact. "
-        "Drawn back, the edge rests at the a that it reached while the energy release rate "
-        "G < w_s, the work of separation, and recedes at G = w_s."
-    )
-    assumptions = (
-        "short-ranged adhesion (soft, large contacts: Tabor's number far above 1), equilibrium on the loading branch "
-        "under a given force. FRF = Q(F)/F with the static pressure. An indentation sticks from the first touch on. "
-        "When it is drawn back the edge rests while its energy release rate rises from the work of adhesion to that of "
-        "separation, then recedes. It comes off where the travel δ + F/k has its least value: at JKR's depth under a "
-        "stiff stage, at the force −3πwR/2 under a soft one; from there on it must touch again."
-    )
+    plain = """The skin sticks to the sphere, so the contact is wider than the force alone would make it, most of all at
+    low force, under large spheres and on soft skins."""
+    law = """Johnson, Kendall and Roberts: on the half space a³ = (3R/4E') [F + 3πwR + √(6πwRF + (3πwR)²)], pressure =
+    Hertz' less a flat punch's; on the layer φ(a) = −√(2awE'/π) in the integral equation of layered_contact. Drawn back,
+    the edge rests at the a that it reached while the energy release rate G < w_s, the work of separation, and recedes
+    at G = w_s."""
+    assumptions = """short-ranged adhesion (soft, large contacts: Tabor's number far above 1), equilibrium on the
+    loading branch under a given force. FRF = Q(F)/F with the static pressure. An indentation sticks from the first
+    touch on. When it is drawn back the edge rests while its energy release rate rises from the work of adhesion to that
+    of separation, then recedes. It comes off where the travel δ + F/k has its least value: at JKR's depth under a stiff
+    stage, at the force −3πwR/2 under a soft one; from there on it must touch again."""
     source = "Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301."
     stage = Stage.CONTACT
     order = 20

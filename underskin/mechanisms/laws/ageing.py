@@ -18,21 +18,15 @@ class Ageing(Mechanism):
     """A d33 that falls with the number of load cycles."""
 
     name = "ageing"
-    plain = (
-        "The sensors lose strength as the skin is pressed again and again, so recordings after many load cycles are "
-        "lower than those after few."
-    )
-    law = (
-        "FRF · f(1 − loss · g), g = [1 − (1 + N/(n (1 + p)))^(−p)]/(1 − 10^(−p)), p = s/(1 − s), n the onset, s the "
-        "saturation. At s = 0 it is 1 − loss · log10(1 + N/n), a loss by the decade; for s → 1 it is 1 − loss · (1 − "
-        "e^(−N/n)), a loss that ends. f(x) = x down to 0.05, below it 0.05 e^(20x − 1): a response dies out, it does "
-        "not change its sign."
-    )
+    plain = """The sensors lose strength as the skin is pressed again and again, so recordings after many load cycles
+    are lower than those after few."""
+    law = """FRF · f(1 − loss · g), g = [1 − (1 + N/(n (1 + p)))^(−p)]/(1 − 10^(−p)), p = s/(1 − s), n the onset, s the
+    saturation. At s = 0 it is 1 − loss · log10(1 + N/n), a loss by the decade; for s → 1 it is 1 − loss · (1 −
+    e^(−N/n)), a loss that ends. f(x) = x down to 0.05, below it 0.05 e^(20x − 1): a response dies out, it does not
+    change its sign."""
     assumptions = "all sensors age alike, by the campaign's own count of cycles."
-    source = (
-        "Jaffe, Cook & Jaffe, Piezoelectric Ceramics (1971), for a loss by the decade; one family holds it and the "
-        "saturating law, so that a fit is well posed."
-    )
+    source = """Jaffe, Cook & Jaffe, Piezoelectric Ceramics (1971), for a loss by the decade; one family holds it and
+    the saturating law, so that a fit is well posed."""
     stage = Stage.RECORDING
     order = 10
     axes = ("load_cycles",)

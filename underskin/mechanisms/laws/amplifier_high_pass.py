@@ -12,16 +12,12 @@ class AmplifierHighPass(Mechanism):
     """The charge amplifier's lower cut-off frequency."""
 
     name = "amplifier_high_pass"
-    plain = (
-        "The charge amplifier cannot hold a charge for long, so at the lowest frequencies the response drops and runs "
-        "ahead of the force, alike in all recordings."
-    )
+    plain = """The charge amplifier cannot hold a charge for long, so at the lowest frequencies the response drops and
+    runs ahead of the force, alike in all recordings."""
     law = "FRF · iωτ/(1 + iωτ), τ = 1/(2π corner)."
     assumptions = "one pole, the same for all recordings and sensors."
-    source = (
-        "a charge amplifier's feedback capacitor with its resistor in parallel (Gautschi, Piezoelectric Sensorics, "
-        "2002, chapter 11)."
-    )
+    source = """a charge amplifier's feedback capacitor with its resistor in parallel (Gautschi, Piezoelectric
+    Sensorics, 2002, chapter 11)."""
     stage = Stage.LINES
     order = 30
     axes = ("frequency_hz", "phase")

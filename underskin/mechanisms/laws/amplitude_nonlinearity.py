@@ -15,24 +15,16 @@ class AmplitudeNonlinearity(Mechanism):
     """A contact that changes markedly within a cycle of the dynamic force."""
 
     name = "amplitude_nonlinearity"
-    plain = (
-        "The dynamic force is not small beside the preload, so the contact grows and shrinks markedly within a cycle "
-        "and charge over force depends on how hard the shaker drives."
-    )
-    law = (
-        "σ → (1 − m) σ + m · (first harmonic of (F + Fd sin ωt) σ(F + Fd sin ωt))/Fd, with the edge moving and every "
-        "other mechanism of contact and stress inside; tends to moving_contact_edge as Fd/F → 0. d33 is that at the "
-        "preload: where it changes with stress (preload_dependent_d33) it multiplies the harmonic and does not vary "
-        "within the cycle."
-    )
-    assumptions = (
-        "quasi-static over the cycle; the sphere never leaves the skin (Fd < F); m, the edge's mobility, is the same "
-        "for all recordings."
-    )
-    source = (
-        "Gelb & Vander Velde, Multiple-Input Describing Functions (1968), for the first harmonic of a nonlinear "
-        "answer. It is (2/π) ∫₋₁¹ Q(F + Fd s) s/√(1 − s²) ds, by Gauss–Chebyshev quadrature."
-    )
+    plain = """The dynamic force is not small beside the preload, so the contact grows and shrinks markedly within a
+    cycle and charge over force depends on how hard the shaker drives."""
+    law = """σ → (1 − m) σ + m · (first harmonic of (F + Fd sin ωt) σ(F + Fd sin ωt))/Fd, with the edge moving and every
+    other mechanism of contact and stress inside; tends to moving_contact_edge as Fd/F → 0. d33 is that at the preload:
+    where it changes with stress (preload_dependent_d33) it multiplies the harmonic and does not vary within the
+    cycle."""
+    assumptions = """quasi-static over the cycle; the sphere never leaves the skin (Fd < F); m, the edge's mobility, is
+    the same for all recordings."""
+    source = """Gelb & Vander Velde, Multiple-Input Describing Functions (1968), for the first harmonic of a nonlinear
+    answer. It is (2/π) ∫₋₁¹ Q(F + Fd s) s/√(1 − s²) ds, by Gauss–Chebyshev quadrature."""
     stage = Stage.LOAD_INCREMENT
     order = 20
     axes = ("dynamic_force_n", "preload_n", "indenter_radius_mm")

@@ -13,19 +13,13 @@ class CompressibleLayer(Mechanism):
     """A skin with a Poisson ratio below 0.5."""
 
     name = "compressible_layer"
-    plain = (
-        "The skin's material can be squeezed together a little in volume, so it passes the pressure on in another "
-        "shape, which shows beside the sensors and with centred presses looks like another d33."
-    )
+    plain = """The skin's material can be squeezed together a little in volume, so it passes the pressure on in another
+    shape, which shows beside the sensors and with centred presses looks like another d33."""
     law = "ν < 0.5 in Hertz' E' = E/(1 − ν²), in the layer's transmission M and in its compliance K."
-    assumptions = (
-        "isotropic linear elasticity; what finite strain adds is the incompressible table's, entered with L (0.75/(1 "
-        "− ν²))², which keeps q0/E. For a centred contact nearly a pure gain, not to be told from d33."
-    )
-    source = (
-        "Sneddon, Fourier Transforms (1951), chapter 10; the closed forms of M and K stand in "
-        "underskin/physics/elastic_layer.py."
-    )
+    assumptions = """isotropic linear elasticity; what finite strain adds is the incompressible table's, entered with L
+    (0.75/(1 − ν²))², which keeps q0/E. For a centred contact nearly a pure gain, not to be told from d33."""
+    source = """Sneddon, Fourier Transforms (1951), chapter 10; the closed forms of M and K stand in
+    underskin/physics/elastic_layer.py."""
     stage = Stage.MATERIAL
     order = 10
     kinds = ("frf", "indentation")

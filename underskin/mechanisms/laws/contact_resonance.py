@@ -15,24 +15,16 @@ class ContactResonance(Mechanism):
     """The tip's mass on the stiffness of the contact, a resonance."""
 
     name = "contact_resonance"
-    plain = (
-        "The tip between force cell and skin bounces on the contact as a mass on a spring, so the response swells "
-        "towards a resonance and falls beyond it, at a frequency that moves with preload and sphere."
-    )
-    law = (
-        "FRF/(1 − (ω/ω0)² + 2iζω/ω0), ω0² = k/m, k = dF/dδ = 2E'a S(a/h) of the layer at the contact radius in force: "
-        "the resonance moves with preload and indenter as the contact does; where the contact creeps it rises, for "
-        "the contact grows."
-    )
-    assumptions = (
-        "one mass, one damping ratio; damping acts on the tip and is not sensed (a dashpot inside the contact would "
-        "add a numerator 1 + 2iζω/ω0); the edge is held over a cycle, which is short beside the times of creep, so "
-        "that E' is the unrelaxed one; the layer itself has no inertia."
-    )
-    source = (
-        "Rabe, Janser & Arnold, Rev. Sci. Instrum. 67 (1996) 3281 (contact resonances); Lebedev & Ufliand, J. Appl. "
-        "Math. Mech. 22 (1958) 442, for the layer's S."
-    )
+    plain = """The tip between force cell and skin bounces on the contact as a mass on a spring, so the response swells
+    towards a resonance and falls beyond it, at a frequency that moves with preload and sphere."""
+    law = """FRF/(1 − (ω/ω0)² + 2iζω/ω0), ω0² = k/m, k = dF/dδ = 2E'a S(a/h) of the layer at the contact radius in
+    force: the resonance moves with preload and indenter as the contact does; where the contact creeps it rises, for the
+    contact grows."""
+    assumptions = """one mass, one damping ratio; damping acts on the tip and is not sensed (a dashpot inside the
+    contact would add a numerator 1 + 2iζω/ω0); the edge is held over a cycle, which is short beside the times of creep,
+    so that E' is the unrelaxed one; the layer itself has no inertia."""
+    source = """Rabe, Janser & Arnold, Rev. Sci. Instrum. 67 (1996) 3281 (contact resonances); Lebedev & Ufliand, J.
+    Appl. Math. Mech. 22 (1958) 442, for the layer's S."""
     stage = Stage.LINES
     order = 10
     axes = ("frequency_hz", "phase", "preload_n", "indenter_radius_mm")

@@ -16,18 +16,12 @@ class Crosstalk(Mechanism):
     """A fraction of the neighbouring sensors' charge in a sensor's channel."""
 
     name = "crosstalk"
-    plain = (
-        "Part of the charge of the neighbouring sensors gets into a sensor's own channel, so a press that they feel "
-        "as well reads too high."
-    )
-    law = (
-        "charge of a sensor = its own + fraction · Σ own charge of each sensor within 1.2 pitch, pitch being the "
-        "smallest distance between two sensors."
-    )
-    assumptions = (
-        "the same fraction for all pairs; a neighbour's own charge follows from the same contact at its own offset, "
-        "with the same d33 law (its own gain is taken as 1)."
-    )
+    plain = """Part of the charge of the neighbouring sensors gets into a sensor's own channel, so a press that they
+    feel as well reads too high."""
+    law = """charge of a sensor = its own + fraction · Σ own charge of each sensor within 1.2 pitch, pitch being the
+    smallest distance between two sensors."""
+    assumptions = """the same fraction for all pairs; a neighbour's own charge follows from the same contact at its own
+    offset, with the same d33 law (its own gain is taken as 1)."""
     source = "Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling between leads)."
     stage = Stage.NEIGHBOURS
     order = 10

@@ -12,10 +12,8 @@ class InstrumentCompliance(Mechanism):
     """A stage that gives way under the force."""
 
     name = "instrument_compliance"
-    plain = (
-        "The stage gives way under the force, so the displacement read off it is larger than the indentation and the "
-        "sample looks too soft, most of all at high force."
-    )
+    plain = """The stage gives way under the force, so the displacement read off it is larger than the indentation and
+    the sample looks too soft, most of all at high force."""
     law = "measured displacement = indentation + F/k, with the F that is measured: relaxed, and adhesive."
     assumptions = "a linear stage, the same in all recordings; without friction or backlash."
     source = "Oliver & Pharr, J. Mater. Res. 7 (1992) 1564 (frame compliance)."

@@ -1,10 +1,9 @@
 """The mechanism `mains_pickup`."""
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage
 from underskin.mechanisms.models.frf_design import FrfDesign, frequencies
@@ -13,7 +12,7 @@ from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.conditions import Conditions, frf_of
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.recordings.frf.mains import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 _WIDTH_HZ = 1.5  # where it is asked which mains stand out
 _FURTHEST_HZ = 20.0  # beyond which no line reaches, and short of half way from one harmonic to the next
@@ -21,27 +20,25 @@ _REACHED = 0.05  # of the shape
 _LEAST_LINES = 3
 _BESIDE = 9  # lines, the next in frequency, that say what is usual
 _LEAST_STRAY = 1e-6  # relative; of recordings without noise
+_CHARGE = "unshielded leads of some pF to mains at 230 V collect hundredths to tenths of a pC"
+_WIDTH = "the analyser's window and the mains' drift make lines a few Hz wide"
+_SHARE = "the n-th harmonic has about 1/n of the charge; a sine has none, rectifiers have more"
+_of_lines = partial(Parameter, scale="log", acts_on="line_variance")
 
 
 class MainsPickup(Mechanism):
     """Charge from the mains on the sensors' leads."""
 
     name = "mains_pickup"
-    plain = (
-        "The mains put charge on the sensors' leads, so lines at the mains' frequency and its multiples are off, the "
-        "more the weaker the dynamic force."
-    )
-    law = (
-        "a charge q at the mains' frequency and a share of q/n at its n-th harmonic, each a line of some width, "
-        "whatever the dynamic force: an FRF error of q/Fd, complex, its phase independent in each recording and on "
-        "each line. It adds its square to the lines' variance."
-    )
-    assumptions = (
-        "q is the standard deviation of each component over recordings; 50 or 60 Hz, whichever stands out in the "
-        "campaign's lines; harmonics up to the fifth, all with the same share; lines are bells exp(−½ (f/width)²), f "
-        "from the multiple. How phases of neighbouring lines hang together, and the lines' shape in detail, depend on "
-        "the analyser's window and on how the mains drift: neither is relied on."
-    )
+    plain = """The mains put charge on the sensors' leads, so lines at the mains' frequency and its multiples are off,
+    the more the weaker the dynamic force."""
+    law = """a charge q at the mains' frequency and a share of q/n at its n-th harmonic, each a line of some width,
+    whatever the dynamic force: an FRF error of q/Fd, complex, its phase independent in each recording and on each line.
+    It adds its square to the lines' variance."""
+    assumptions = """q is the standard deviation of each component over recordings; 50 or 60 Hz, whichever stands out in
+    the campaign's lines; harmonics up to the fifth, all with the same share; lines are bells exp(−½ (f/width)²), f from
+    the multiple. How phases of neighbouring lines hang together, and the lines' shape in detail, depend on the
+    analyser's window and on how the mains drift: neither is relied on."""
     source = "Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling to leads)."
     stage = Stage.ADDED_CHARGE
     order = 10
@@ -50,42 +47,9 @@ class MainsPickup(Mechanism):
     moves_predictions = False
     figure = ("mains",)
     parameters_stated = (
-        Parameter(
-            name="pickup_charge",
-            unit="pC",
-            low=1e-4,
-            high=1e3,
-            prior=Normal(-3.0, 1.5),
-            scale="log",
-            limit=0.0,
-            shown=0.05,
-            acts_on="line_variance",
-            reason="unshielded leads of some pF to mains at 230 V collect hundredths to tenths of a pC",
-        ),
-        Parameter(
-            name="pickup_width",
-            unit="Hz",
-            low=0.2,
-            high=6.0,
-            prior=Normal(0.4, 0.6),
-            scale="log",
-            limit=None,
-            shown=1.5,
-            acts_on="line_variance",
-            reason="the analyser's window and the mains' drift make lines a few Hz wide",
-        ),
-        Parameter(
-            name="pickup_harmonics",
-            unit="-",
-            low=1e-3,
-            high=10.0,
-            prior=Normal(0.0, 1.5),
-            scale="log",
-            limit=None,
-            shown=1.0,
-            acts_on="line_variance",
-            reason="the n-th harmonic has about 1/n of the charge; a sine has none, rectifiers have more",
-        ),
+        _of_lines("pickup_charge", "pC", 1e-4, 1e3, Normal(-3.0, 1.5), limit=0.0, shown=0.05, reason=_CHARGE),
+        _of_lines("pickup_width", "Hz", 0.2, 6.0, Normal(0.4, 0.6), limit=None, shown=1.5, reason=_WIDTH),
+        _of_lines("pickup_harmonics", "-", 1e-3, 10.0, Normal(0.0, 1.5), limit=None, shown=1.0, reason=_SHARE),
     )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
@@ -141,7 +105,7 @@ def _excess(recordings: Sequence[Frf], mains: float) -> float:
     return score / np.sqrt(weight) if weight else 0.0
 
 
-def _stray(lines: Frf, size: Floats, rows: NDArray[np.intp], beside: NDArray[np.intp]) -> Floats:
+def _stray(lines: Frf, size: Floats, rows: Indices, beside: Indices) -> Floats:
     """How far rows are from a straight line between others, relative to `size`."""
     between = np.interp(lines.frequency[rows], lines.frequency[beside], lines.values[beside])
     return np.asarray(np.abs(lines.values[rows] - between) / size[rows])

@@ -10,25 +10,21 @@ from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage,
 from underskin.recordings.conditions import Conditions, frf_of, offsets
 
 _LARGEST_MM = 2.0
+_REASON = "a tip centred by eye is off by some tenths of a millimetre to a millimetre"
 
 
 class Misalignment(Mechanism):
     """A constant offset between commanded and true position."""
 
     name = "misalignment"
-    plain = (
-        "The sphere does not come down where the stage says but always a little to the same side, so each sensor "
-        "shows what a press at that other place gives."
-    )
+    plain = """The sphere does not come down where the stage says but always a little to the same side, so each sensor
+    shows what a press at that other place gives."""
     law = "true position = commanded + a constant offset, for all recordings."
-    assumptions = (
-        "stage and array are shifted against each other, not turned or stretched. Where every press is commanded at a "
-        "sensor's centre and no charge of its neighbours shows (crosstalk), the direction cannot be told, and the "
-        "offset's length alone is a parameter."
-    )
-    source = (
-        "Sneddon, Fourier Transforms (1951), chapter 10: in the layer's Hankel integral the offset enters as J0(k e/h)."
-    )
+    assumptions = """stage and array are shifted against each other, not turned or stretched. Where every press is
+    commanded at a sensor's centre and no charge of its neighbours shows (crosstalk), the direction cannot be told, and
+    the offset's length alone is a parameter."""
+    source = """Sneddon, Fourier Transforms (1951), chapter 10: in the layer's Hankel integral the offset enters as J0(k
+    e/h)."""
     stage = Stage.POSITION
     order = 10
     axes = ("position_mm", "sensor", "preload_n", "indenter_radius_mm")
@@ -47,17 +43,7 @@ class Misalignment(Mechanism):
         directed = offsets(conditions).any() or any(other.needs_neighbours for other in others)
         shown, low = ({"offset_x": 0.6, "offset_y": 0.3}, -_LARGEST_MM) if directed else ({"offset": 0.7}, 0.0)
         return tuple(
-            Parameter(
-                name=name,
-                unit="mm",
-                low=low,
-                high=_LARGEST_MM,
-                prior=Normal(0.0, 0.7),
-                scale="linear",
-                limit=0.0,
-                shown=value,
-                reason="a tip centred by eye is off by some tenths of a millimetre to a millimetre",
-            )
+            Parameter(name, "mm", low, _LARGEST_MM, Normal(0.0, 0.7), "linear", limit=0.0, shown=value, reason=_REASON)
             for name, value in shown.items()
         )
 

@@ -12,18 +12,13 @@ class ModulusError(Mechanism):
     """A declared Young's modulus that is wrong by a factor."""
 
     name = "modulus_error"
-    plain = (
-        "The Young's modulus that was declared is not the skin's, a wrong number rather than missing physics, so "
-        "every contact is wider or narrower than computed, which shows the more the wider it is."
-    )
-    law = (
-        "E = declared E · factor; it acts through a³ ∝ 1/E and L ∝ 1/E, and on an indentation's or compression's force."
-    )
+    plain = """The Young's modulus that was declared is not the skin's, a wrong number rather than missing physics, so
+    every contact is wider or narrower than computed, which shows the more the wider it is."""
+    law = """E = declared E · factor; it acts through a³ ∝ 1/E and L ∝ 1/E, and on an indentation's or compression's
+    force."""
     assumptions = "one factor for the whole skin, in all recordings."
-    source = (
-        "Seminara 2018, equations 7 to 10 and 16: E enters through a and L; under force control a linear layer "
-        "transmits a given pressure alike whatever its modulus."
-    )
+    source = """Seminara 2018, equations 7 to 10 and 16: E enters through a and L; under force control a linear layer
+    transmits a given pressure alike whatever its modulus."""
     stage = Stage.DECLARED
     order = 10
     kinds = ("frf", "indentation", "compression")

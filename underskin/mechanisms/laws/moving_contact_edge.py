@@ -14,20 +14,14 @@ class MovingContactEdge(Mechanism):
     """A contact edge that moves with a small dynamic force."""
 
     name = "moving_contact_edge"
-    plain = (
-        "The edge of the contact moves with the dynamic force, so the oscillating part of the pressure sits towards "
-        "the rim, and a wide contact gives less charge than the steady pressure's shape says."
-    )
-    law = (
-        "σ → (1 − m) σ + m d(Fσ)/dF at fixed R, with every other mechanism of contact and stress inside the "
-        "derivative (d33 multiplies it: preload_dependent_d33's is the tangent coefficient already); for the linear "
-        "Hertz case d(Fσ)/dF = σ + (a/3) ∂σ/∂a, the flat punch's σ. FRF = charge over oscillating force."
-    )
+    plain = """The edge of the contact moves with the dynamic force, so the oscillating part of the pressure sits
+    towards the rim, and a wide contact gives less charge than the steady pressure's shape says."""
+    law = """σ → (1 − m) σ + m d(Fσ)/dF at fixed R, with every other mechanism of contact and stress inside the
+    derivative (d33 multiplies it: preload_dependent_d33's is the tangent coefficient already); for the linear Hertz
+    case d(Fσ)/dF = σ + (a/3) ∂σ/∂a, the flat punch's σ. FRF = charge over oscillating force."""
     assumptions = "m, the mobile fraction, is the same for all recordings; oscillations small against the preload."
-    source = (
-        "Johnson, Contact Mechanics (1985), section 3.4 (an increment of Hertz' pressure is the flat punch's); "
-        "Seminara 2018, equations 12 to 16, holds the edge still."
-    )
+    source = """Johnson, Contact Mechanics (1985), section 3.4 (an increment of Hertz' pressure is the flat punch's);
+    Seminara 2018, equations 12 to 16, holds the edge still."""
     stage = Stage.LOAD_INCREMENT
     order = 10
     axes = ("preload_n", "indenter_radius_mm", "position_mm")

@@ -10,15 +10,11 @@ class PlatenFriction(Mechanism):
     """Platens that hold the ends of a compressed cylinder."""
 
     name = "platen_friction"
-    plain = (
-        "The plates hold the ends of the compressed cylinder, so that it cannot widen freely and looks too stiff, the "
-        "more so the flatter it is."
-    )
+    plain = """The plates hold the ends of the compressed cylinder, so that it cannot widen freely and looks too stiff,
+    the more so the flatter it is."""
     law = "nominal stress · (1 + 2 f S²), S = D/4H of the unloaded sample, f from 0 (slips) to 1 (sticks fully)."
-    assumptions = (
-        "incompressible; Gent and Lindley's factor for bonded cylinders, which they use with the unloaded shape at "
-        "large compressions as well; f constant. Samples of one shape cannot tell it from the modulus."
-    )
+    assumptions = """incompressible; Gent and Lindley's factor for bonded cylinders, which they use with the unloaded
+    shape at large compressions as well; f constant. Samples of one shape cannot tell it from the modulus."""
     source = "Gent & Lindley, Proc. Inst. Mech. Eng. 173 (1959) 111."
     stage = Stage.CURVE
     order = 20

@@ -13,18 +13,12 @@ class PreloadDependentD33(Mechanism):
     """A d33 that depends on the static stress on the sensor."""
 
     name = "preload_dependent_d33"
-    plain = (
-        "The preload squeezes the sensor itself and changes how strongly it answers, so d33 comes out different at "
-        "each preload and under each sphere."
-    )
-    law = (
-        "d33 = d0 (1 + β T0/(1 + |T0|/Ts)), T0 = 3Fσ/(2πh²) > 0 in compression; linear as Ts → ∞, saturating at 1 + β "
-        "Ts."
-    )
-    assumptions = (
-        "d33(T0) is the tangent coefficient, felt by the small oscillation; T0 is the mean over the sensor, of the "
-        "static σ at its own offset. The same law for all sensors."
-    )
+    plain = """The preload squeezes the sensor itself and changes how strongly it answers, so d33 comes out different at
+    each preload and under each sphere."""
+    law = """d33 = d0 (1 + β T0/(1 + |T0|/Ts)), T0 = 3Fσ/(2πh²) > 0 in compression; linear as Ts → ∞, saturating at 1 +
+    β Ts."""
+    assumptions = """d33(T0) is the tangent coefficient, felt by the small oscillation; T0 is the mean over the sensor,
+    of the static σ at its own offset. The same law for all sensors."""
     source = "Seminara 2018, section 3.2 (22 pC/N at 3 N against 14 pC/N at 1 N on the array)."
     stage = Stage.SENSOR
     order = 10

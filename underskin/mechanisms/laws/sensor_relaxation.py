@@ -17,14 +17,11 @@ class SensorRelaxation(Mechanism):
     """Dielectric relaxation of the sensor's material."""
 
     name = "sensor_relaxation"
-    plain = (
-        "The sensor's material follows a change only with delay, so the response falls with rising frequency and the "
-        "charge lags behind the force."
-    )
+    plain = """The sensor's material follows a change only with delay, so the response falls with rising frequency and
+    the charge lags behind the force."""
     law = "(iω/ω_ref)^(−n) · (1 + s/(1 + iω/ω_s)), n ≥ 0, s ≥ 0, ω_ref = 2π · 30 Hz: a power law, a step, or both."
-    assumptions = (
-        "linear, the same for all sensors and preloads; causal, so that real and imaginary part belong together."
-    )
+    assumptions = """linear, the same for all sensors and preloads; causal, so that real and imaginary part belong
+    together."""
     source = "Jonscher, Dielectric Relaxation in Solids (1983), chapters 3 and 5 (Debye's step, universal power law)."
     stage = Stage.LINES
     order = 20

@@ -88,25 +88,17 @@ class StrainStiffening(Mechanism):
     """A modulus that grows with strain."""
 
     name = "strain_stiffening"
-    plain = (
-        "The elastomer gets stiffer the more it is deformed, so at high preloads and under small spheres the contact "
-        "grows less, and the force rises more, than a constant modulus would have it."
-    )
-    law = (
-        "FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved "
-        "together. Curves: nominal stress (E/3)(λ⁻² − λ) f(I), I = λ² + 2/λ − 3, λ = 1 − strain; compression f = 1 + "
-        "2 c2 I + 3 c3 I² (Yeoh); under a sphere f = (1 + q c J)^(1/q), J = 3 (I/3)^(m/2), the secant ratio "
-        "at ε multiplying the modulus."
-    )
-    assumptions = (
-        "incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative strain; for "
-        "FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0, or c = 0, a "
-        "curve is neo-Hookean, not a straight line: the base model is recovered at small strain."
-    )
-    source = (
-        "Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of Metals (1951), for 0.2 a/R; Lin, "
-        "Dimitriadis & Horkay, J. Biomech. Eng. 129 (2007) 904."
-    )
+    plain = """The elastomer gets stiffer the more it is deformed, so at high preloads and under small spheres the
+    contact grows less, and the force rises more, than a constant modulus would have it."""
+    law = """FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved
+    together. Curves: nominal stress (E/3)(λ⁻² − λ) f(I), I = λ² + 2/λ − 3, λ = 1 − strain; compression f = 1 + 2 c2 I +
+    3 c3 I² (Yeoh); under a sphere f = (1 + q c J)^(1/q), J = 3 (I/3)^(m/2), the secant ratio at ε multiplying
+    the modulus."""
+    assumptions = """incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative
+    strain; for FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0, or c = 0,
+    a curve is neo-Hookean, not a straight line: the base model is recovered at small strain."""
+    source = """Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of Metals (1951), for 0.2 a/R; Lin,
+    Dimitriadis & Horkay, J. Biomech. Eng. 129 (2007) 904."""
     stage = Stage.MATERIAL
     order = 40
     kinds = ("frf", "indentation", "compression")

@@ -10,10 +10,8 @@ class ThicknessError(Mechanism):
     """A declared thickness that is wrong by a factor."""
 
     name = "thickness_error"
-    plain = (
-        "The thickness that was declared is not the skin's, a wrong number rather than missing physics, so the "
-        "pressure spreads out more or less on its way to the sensors than computed, in every recording."
-    )
+    plain = """The thickness that was declared is not the skin's, a wrong number rather than missing physics, so the
+    pressure spreads out more or less on its way to the sensors than computed, in every recording."""
     law = "h = declared h · factor; it acts through a/h, rT/h and e/h: everything."
     assumptions = "one factor for the whole skin, in all recordings."
     source = "Seminara 2018, equations 15 and 16: h is the unit of every length."

@@ -14,15 +14,12 @@ class TimingDelay(Mechanism):
     """A constant delay between the channels of charge and force."""
 
     name = "timing_delay"
-    plain = (
-        "Charge and force are not sampled at the same instant, so the phase goes off in proportion to frequency while "
-        "the size of the response stays."
-    )
+    plain = """Charge and force are not sampled at the same instant, so the phase goes off in proportion to frequency
+    while the size of the response stays."""
     law = "FRF · exp(−iωt0), t0 the delay."
     assumptions = "one constant delay for all recordings; positive where the charge comes later than the force."
-    source = (
-        "a shift in time is a phase linear in frequency (Bendat & Piersol, Random Data, 4th ed., 2010, section 5.1)."
-    )
+    source = """a shift in time is a phase linear in frequency (Bendat & Piersol, Random Data, 4th ed., 2010, section
+    5.1)."""
     stage = Stage.LINES
     order = 40
     axes = ("phase", "frequency_hz")

@@ -1,53 +1,24 @@
 """A model of recordings: the base model, and a set of mechanisms composed with it in a fixed order."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import Protocol
-
-import numpy as np
-from numpy.typing import NDArray
 
 from underskin.errors import ErrorCode, InvalidInput
-from underskin.mechanisms.base import Kind, Mechanism, Parameter
+from underskin.mechanisms.base import Kind, Mechanism
 from underskin.mechanisms.models.composition import Prediction, check_supported, chosen, kind_of
 from underskin.mechanisms.models.compression import CompressionModel
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.models.indentation import IndentationModel
-from underskin.mechanisms.models.pickup import Pickup
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.conditions import Conditions
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats
 
 __all__ = ["Model", "Prediction", "compose"]
 
 
-class Model(Protocol):
-    """A composed model. `parameters`: the mechanisms' own, in order of composition, then the nuisances.
-
-    `valid` (rows,) is decided by the declared values, before any fit: False where the contact or its offset lies
-    beyond the tables from the start; such rows are predicted by continuation and should not be fitted.
-    """
-
-    names: tuple[str, ...]
-    parameters: tuple[Parameter, ...]
-    recording: NDArray[np.intp]
-    sensor: NDArray[np.intp] | None
-    pickup: Pickup | None
-
-    @property
-    def valid(self) -> NDArray[np.bool_]:
-        """(rows,) False where the contact lies beyond the tables as declared."""
-        ...
-
-    def predict(self, fit: Floats) -> Prediction:
-        """All rows at one point of the fit coordinates (parameters,)."""
-        ...
-
-    def sensor_spread_of(self, fit: Floats) -> tuple[float, Floats]:
-        """The sd of the sensors' log gains, and its derivative (parameters,)."""
-        ...
+# The `parameters` of each are the mechanisms' own, in order of composition, then the nuisances. `valid` (rows,) is
+# decided by the declared values, before any fit: False where the contact or its offset lies beyond the tables from the
+# start; such rows are predicted by continuation and should not be fitted.
+Model = FrfModel | IndentationModel | CompressionModel
 
 
 def compose(names: Sequence[str], conditions: Conditions, table: SigmaTable, kind: Kind | None = None) -> Model:

@@ -6,13 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.autodiff import Differentiated, variables
 from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Unsupported, Values
 from underskin.recordings.conditions import Conditions
-from underskin.units import Array, Floats
+from underskin.units import Array, Floats, Indices, Mask
 
 SENSOR_SPREAD = 0.01  # sd of the logarithms of the sensors' gains, without `sensor_spread`
 
@@ -25,10 +24,10 @@ class Prediction:
     slopes: Array  # (parameters, rows)
     position_slopes: Array | None  # (2, rows) ∂value/∂x, ∂value/∂y of the contact's place [1/m] (frf)
     pickup: Floats | None  # sd of mains pick-up [C/N], of real and of imaginary part, on the rows that it reaches
-    pickup_rows: NDArray[np.intp] | None  # those rows
+    pickup_rows: Indices | None  # those rows
     # (rows,) False where the contact lies beyond the tables, which are continued there, or the sensor's disc beyond the
     # stress profile, behind whose end the value is 0
-    inside: NDArray[np.bool_]
+    inside: Mask
 
     @property
     def pickup_variance(self) -> Floats:
@@ -55,7 +54,6 @@ class Composition:
             for (name, group), start in zip(own.items(), starts[:-1], strict=True)
         }
         self._nuisances = {parameter.name: int(starts[-1]) + index for index, parameter in enumerate(nuisances)}
-        self._gain_spreads = {entry.name for entry in self.parameters if entry.acts_on == "gain_spread"}
         self._log = np.array([parameter.scale == "log" for parameter in self.parameters])
 
     def values(
@@ -88,20 +86,8 @@ class Composition:
                 other = self.parameters[place].relative_to
                 if other is not None:
                     own[name][key] = own[name][key] * own[name][other]
-        return (
-            dict(own),
-            {name: seeds[place] for name, place in self._nuisances.items()},
-            seeds[count:],
-        )
-
-    def sensor_spread(self, fit: Floats) -> tuple[float, Floats]:
-        """The spread that a mechanism frees, or the usual one."""
-        own, _, _ = self.values(fit)
-        for values in own.values():
-            for name, value in values.items():
-                if name in self._gain_spreads:
-                    return float(value.value[0]), value.slopes[:, 0]
-        return SENSOR_SPREAD, np.zeros(len(self.parameters))
+        nuisances = {name: seeds[place] for name, place in self._nuisances.items()}
+        return dict(own), nuisances, seeds[count:]
 
 
 def parameters_together(

@@ -3,10 +3,9 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 _DEGREE = 3
 
@@ -32,7 +31,7 @@ class CubicBasis:
         """The spline's coefficients, along one axis of the values."""
         return np.moveaxis(np.tensordot(self.to_coefficients, values, (1, axis)), 0, axis)
 
-    def weights(self, at: Floats) -> tuple[NDArray[np.intp], Floats, Floats]:
+    def weights(self, at: Floats) -> tuple[Indices, Floats, Floats]:
         """For each point (…): the first of its four functions, their values (…, 4) and their slopes (…, 4).
 
         Beyond the nodes every function is continued along its tangent.

@@ -86,10 +86,6 @@ class CurveModel(ABC):
         value, slopes, inside = self._differentiated(np.asarray(fit, dtype=float))
         return Prediction(value, slopes, None, None, None, inside)
 
-    def sensor_spread_of(self, fit: Floats) -> tuple[float, Floats]:
-        """No sensor takes part: the usual spread."""
-        return self._composition.sensor_spread(np.asarray(fit, dtype=float))
-
     def _forces(
         self, fit: Floats, held: NDArray[np.bool_] | None = None
     ) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.autodiff import Differentiated, chain, constant, sum_rows
 from underskin.errors import ErrorCode, InvalidInput, required
@@ -20,7 +19,7 @@ from underskin.mechanisms.base import Mechanism, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
 from underskin.mechanisms.models.contact_stage import layer_curves, press, stiffness
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.frf_design import FrfDesign, Indices, frf_design, largest_offset
+from underskin.mechanisms.models.frf_design import FrfDesign, frf_design, largest_offset
 from underskin.mechanisms.models.nuisances import FRF_NUISANCES
 from underskin.mechanisms.models.off_centre_response import PROFILE_END, offset_sigma
 from underskin.mechanisms.models.pickup import Pickup, together
@@ -28,7 +27,7 @@ from underskin.mechanisms.models.response import Response, joined
 from underskin.mechanisms.models.sigma_curves import SigmaOfContacts, layer_of
 from underskin.recordings.conditions import Conditions
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Array, Floats, to_si
+from underskin.units import Array, Floats, Indices, Mask, to_si
 
 _NUISANCE_STRETCH = 1.06  # the thickness' bounds
 _QUANTITIES, _BLOCK = 6, 4**4  # of a linear layer's contact, and coefficients around a place in the table
@@ -76,9 +75,20 @@ class FrfModel:
         self._table = table
 
     @cached_property
-    def valid(self) -> NDArray[np.bool_]:
+    def valid(self) -> Mask:
         """Which rows lie inside the table as declared."""
-        return self._declared_inside(self._table)[self.design.point][self.recording]
+        none = np.zeros((0, 1))
+        modulus, thickness, poisson_ratio = (
+            Differentiated(np.array([v]), none) for v in (self._modulus, self._thickness, self._poisson_ratio)
+        )
+        design = self.design
+        contacts = Contacts(design.force, design.indenter_radius, design.dwell, modulus, thickness, poisson_ratio)
+        a_over_h = contacts.hertz_radius.value / self._thickness
+        a, x = self._table.axes[0], self._table.axes[2]
+        inside = (a_over_h <= a[-1]) & (contacts.cbrt_load.value <= x[-1])
+        distance = np.hypot(design.point_x, design.point_y) + self._sensor_radius
+        near: Mask = inside[design.point_contact] & (distance <= PROFILE_END * self._thickness)
+        return near[design.point][self.recording]
 
     def predict(self, fit: Floats) -> Prediction:
         """The FRF on every row with its derivatives.
@@ -104,15 +114,12 @@ class FrfModel:
         response = self.respond(fit, place=True)
         value, slopes = response.on_rows(self.design)
         count = len(self.parameters)
-        own, _, _ = self._composition.values(fit)
-        return Prediction(
-            value=value,
-            slopes=slopes[:count],
-            position_slopes=slopes[count:],
-            pickup=None if self.pickup is None else self.pickup.deviation(_by_name(own)),
-            pickup_rows=None if self.pickup is None else self.pickup.rows,
-            inside=response.inside[self.recording],
-        )
+        pickup = rows = None
+        if self.pickup is not None:
+            own, _, _ = self._composition.values(fit)
+            by_name = {name: one.value for values in own.values() for name, one in values.items()}
+            pickup, rows = self.pickup.deviation(by_name), self.pickup.rows
+        return Prediction(value, slopes[:count], slopes[count:], pickup, rows, response.inside[self.recording])
 
     @property
     def numbers(self) -> int:
@@ -145,10 +152,6 @@ class FrfModel:
             inside[..., self.design.point],
         )
 
-    def sensor_spread_of(self, fit: Floats) -> tuple[float, Floats]:
-        """The sd of the sensors' log gains, and its derivative (parameters,)."""
-        return self._composition.sensor_spread(np.asarray(fit, dtype=float))
-
     def _contacts(self, own: dict[str, Values], nuisances: Values, points: tuple[int, ...], variables: int) -> Contacts:
         """The contacts at all force nodes, one node after another, as declared and as the mechanisms change them."""
         nodes = len(self._force)
@@ -168,7 +171,7 @@ class FrfModel:
 
     def _sigma_at_points(
         self, contacts: Contacts, own: dict[str, Values], position: Sequence[Differentiated]
-    ) -> tuple[list[Differentiated], NDArray[np.bool_]]:
+    ) -> tuple[list[Differentiated], Mask]:
         """σ of each point at each force node, and which points are inside the table at all of them.
 
         Inside means also that the sensor's disc lies within the stress profile, beyond whose end σ is 0.
@@ -243,21 +246,6 @@ class FrfModel:
                 product = factor if product is None else product * factor
         return product
 
-    def _declared_inside(self, table: SigmaTable) -> NDArray[np.bool_]:
-        """Which points lie inside the table as declared."""
-        none = np.zeros((0, 1))
-        modulus, thickness, poisson_ratio = (
-            Differentiated(np.array([v]), none) for v in (self._modulus, self._thickness, self._poisson_ratio)
-        )
-        design = self.design
-        contacts = Contacts(design.force, design.indenter_radius, design.dwell, modulus, thickness, poisson_ratio)
-        a_over_h = contacts.hertz_radius.value / self._thickness
-        a, x = table.axes[0], table.axes[2]
-        inside = (a_over_h <= a[-1]) & (contacts.cbrt_load.value <= x[-1])
-        distance = np.hypot(design.point_x, design.point_y) + self._sensor_radius
-        near: NDArray[np.bool_] = inside[design.point_contact] & (distance <= PROFILE_END * self._thickness)
-        return near
-
 
 def _force_nodes(
     mechanisms: Sequence[Mechanism], design: FrfDesign
@@ -277,11 +265,6 @@ def _on_one_layer(contacts: Contacts) -> bool:
     """Whether the contacts at several points of the fit coordinates all are on the same linear layer."""
     layers = [x.value for x in (contacts.poisson_ratio, contacts.slip) if x is not None]
     return all(bool((value == value.flat[0]).all()) for value in layers)
-
-
-def _by_name(own: dict[str, Values]) -> dict[str, Floats]:
-    """The mechanisms' parameters (1,), whosever they are."""
-    return {name: value.value for values in own.values() for name, value in values.items()}
 
 
 def _required(name: str, value: float | None) -> float:

@@ -5,107 +5,68 @@ are points, and a contact at one frequency is a line. Only these distinct ones a
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from underskin.errors import required
 from underskin.recordings.conditions import Conditions, FrfConditions, frf_of
-from underskin.units import Floats, to_si
+from underskin.units import Floats, Indices, Mask, to_si
 
-Indices = NDArray[np.intp]
 NEIGHBOUR_PITCHES = 1.2
 
 
-@dataclass(frozen=True, eq=False)
 class FrfDesign:
     """Arrays over recordings, contacts, points, neighbours, lines and rows; SI."""
 
-    sensor_ids: tuple[str, ...]
-    sensor: Indices  # of each recording
-    contact: Indices  # of each recording
-    point: Indices  # of each recording: its contact beside its own sensor
-    load_cycles: Floats  # of each recording, NaN where unknown
-    force: Floats  # of each contact
-    indenter_radius: Floats
-    dynamic_force: Floats  # of each contact, where a mechanism asks; else 0
-    dwell: Floats
-    point_contact: Indices  # of each point
-    point_x: Floats  # the contact's place, seen from the sensor's centre
-    point_y: Floats
-    neighbour_recording: Indices  # of each pair of a recording and a neighbour of its sensor
-    neighbour_point: Indices
-    line_contact: Indices  # of each distinct line
-    line_frequency: Floats
-    recording: Indices  # of each row
-    line: Indices  # of each row
-    row_dynamic_force: Floats
-    row_frequency: Floats
-
-    @classmethod
-    def of(cls, conditions: Conditions, fields: Collection[str], *, neighbours: bool) -> "FrfDesign":
-        """The design; `fields` may name what else tells contacts apart: "dwell_s", "dynamic_force_n"."""
+    def __init__(self, conditions: Conditions, fields: Collection[str], neighbours: bool) -> None:
+        """`fields` may name what else tells contacts apart: "dwell_s", "dynamic_force_n"."""
         recordings = frf_of(conditions)
-        sensor_ids = tuple(sensor.id for sensor in conditions.skin.sensors)
-        number = {name: index for index, name in enumerate(sensor_ids)}
+        count = len(recordings)
+        number = {sensor.id: index for index, sensor in enumerate(conditions.skin.sensors)}
         places = to_si("thickness_mm", [(sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors])
-        sensor = np.array([number[entry.sensor] for entry in recordings])
+        # Of each recording
+        self.sensor: Indices = np.array([number[entry.sensor] for entry in recordings])
+        cycles = [np.nan if entry.load_cycles is None else entry.load_cycles for entry in recordings]
+        self.load_cycles: Floats = np.array(cycles)
         position = np.array(
             [
                 places[own] if entry.position_mm is None else to_si("thickness_mm", entry.position_mm)
-                for own, entry in zip(sensor, recordings, strict=True)
+                for own, entry in zip(self.sensor, recordings, strict=True)
             ]
         )
-        keys = np.array([_contact_key(entry, fields) for entry in recordings])
-        contacts, contact = np.unique(keys, axis=0, return_inverse=True)
-        force, radius, dynamic_force, dwell = contacts.T
+        # Of each contact; the dynamic force and the dwell are 0 where no mechanism asks
+        contacts, contact = np.unique(
+            np.array([_contact_key(entry, fields) for entry in recordings]), axis=0, return_inverse=True
+        )
+        self.force, self.indenter_radius, self.dynamic_force, self.dwell = contacts.T
+        # Of each point: its contact, and that contact's place seen from the sensor's centre; of each recording its
+        # point beside its own sensor; of each pair of a recording and a neighbour of its sensor both
         pairs = _neighbours(places) if neighbours else np.zeros((len(places), len(places)), dtype=bool)
-        pair_recording, other = np.nonzero(pairs[sensor])
-        all_recordings = np.concatenate([np.arange(len(recordings)), pair_recording])
-        beside = position[all_recordings] - places[np.concatenate([sensor, other])]
-        points, point = np.unique(
-            np.column_stack([contact[all_recordings], np.round(beside, 12)]), axis=0, return_inverse=True
-        )
+        self.neighbour_recording, other = np.nonzero(pairs[self.sensor])
+        every = np.concatenate([np.arange(count), self.neighbour_recording])
+        beside = position[every] - places[np.concatenate([self.sensor, other])]
+        points, point = np.unique(np.column_stack([contact[every], np.round(beside, 12)]), axis=0, return_inverse=True)
+        self.point_contact: Indices = points[:, 0].astype(np.intp)
+        self.point_x, self.point_y = points[:, 1], points[:, 2]
+        self.point, self.neighbour_point = point[:count], point[count:]
+        # Of each row, and of each distinct line
         lines_hz = [frequencies(entry) for entry in recordings]
-        recording = np.repeat(np.arange(len(recordings)), [len(column) for column in lines_hz])
-        row_frequency = np.concatenate(lines_hz)
-        distinct, frequency = np.unique(row_frequency, return_inverse=True)
-        lines, line = np.unique(contact[recording] * len(distinct) + frequency, return_inverse=True)
-        return cls(
-            sensor_ids=sensor_ids,
-            sensor=sensor,
-            contact=contact,
-            point=point[: len(recordings)],
-            load_cycles=np.array([np.nan if entry.load_cycles is None else entry.load_cycles for entry in recordings]),
-            force=force,
-            indenter_radius=radius,
-            dynamic_force=dynamic_force,
-            dwell=dwell,
-            point_contact=points[:, 0].astype(np.intp),
-            point_x=points[:, 1],
-            point_y=points[:, 2],
-            neighbour_recording=pair_recording,
-            neighbour_point=point[len(recordings) :],
-            line_contact=lines // len(distinct),
-            line_frequency=distinct[lines % len(distinct)],
-            recording=recording,
-            line=line,
-            row_dynamic_force=np.array([entry.dynamic_force_n for entry in recordings])[recording],
-            row_frequency=row_frequency,
-        )
+        self.recording: Indices = np.repeat(np.arange(count), [len(column) for column in lines_hz])
+        self.row_frequency = np.concatenate(lines_hz)
+        self.row_dynamic_force: Floats = np.array([entry.dynamic_force_n for entry in recordings])[self.recording]
+        distinct, frequency = np.unique(self.row_frequency, return_inverse=True)
+        lines, self.line = np.unique(contact[self.recording] * len(distinct) + frequency, return_inverse=True)
+        self.line_contact, self.line_frequency = lines // len(distinct), distinct[lines % len(distinct)]
+
+
+_kept = lru_cache(maxsize=8)(FrfDesign)  # by the conditions' identity: a diagnosis composes dozens of models of one
 
 
 def frf_design(conditions: Conditions, fields: Collection[str], *, neighbours: bool) -> FrfDesign:
-    """`FrfDesign.of`, kept for the next model of the same conditions."""
+    """The design, kept for the next model of the same conditions."""
     return _kept(conditions, frozenset(fields) & {"dwell_s", "dynamic_force_n"}, neighbours)
-
-
-@lru_cache(maxsize=8)  # by the conditions' identity: a diagnosis composes dozens of models of one campaign
-def _kept(conditions: Conditions, fields: frozenset[str], neighbours: bool) -> FrfDesign:
-    return FrfDesign.of(conditions, fields, neighbours=neighbours)
 
 
 def frequencies(entry: FrfConditions) -> Floats:
@@ -115,11 +76,11 @@ def frequencies(entry: FrfConditions) -> Floats:
     return entry.frequency_hz
 
 
-def _neighbours(places: Floats) -> NDArray[np.bool_]:
+def _neighbours(places: Floats) -> Mask:
     """Which sensors (sensors, sensors) are within 1.2 pitches of which."""
     distance = cdist(places, places)
     np.fill_diagonal(distance, np.inf)
-    near: NDArray[np.bool_] = distance <= NEIGHBOUR_PITCHES * distance.min()
+    near: Mask = distance <= NEIGHBOUR_PITCHES * distance.min()
     return near
 
 

@@ -11,37 +11,19 @@ from underskin.mechanisms.base import Normal, Parameter
 from underskin.recordings.conditions import SkinDescription
 from underskin.units import to_lab
 
+_D33 = "what is measured; PVDF and its copolymers have 5 to 40 pC/N, ceramics up to some hundred"
+_DECLARED_MODULUS = "a declared modulus is good to 2 %; a larger error is the mechanism modulus_error"
+_DECLARED_THICKNESS = "a declared thickness is good to 1 %; a larger error is the mechanism thickness_error"
+_FREE_MODULUS = "what is measured; wide around the base model's own fit"
+_CONTACT_POINT = "where the curve leaves zero, found by the base model"
+
 D33 = Parameter(
-    name="d33",
-    unit="pC/N",
-    low=1e-3,
-    high=1e5,
-    prior=Normal(float(np.log(15.0)), 1.5),
-    scale="log",
-    limit=None,
-    proportional=True,
-    reason="what is measured; PVDF and its copolymers have 5 to 40 pC/N, ceramics up to some hundred",
+    "d33", "pC/N", 1e-3, 1e5, Normal(float(np.log(15.0)), 1.5), "log", limit=None, proportional=True, reason=_D33
 )
 YOUNGS_MODULUS = Parameter(
-    name="youngs_modulus",
-    unit="-",
-    low=0.9,
-    high=1.1,
-    prior=Normal(0.0, 0.02),
-    scale="log",
-    limit=1.0,
-    reason="a declared modulus is good to 2 %; a larger error is the mechanism modulus_error",
+    "youngs_modulus", "-", 0.9, 1.1, Normal(0.0, 0.02), "log", limit=1.0, reason=_DECLARED_MODULUS
 )
-THICKNESS = Parameter(
-    name="thickness",
-    unit="-",
-    low=0.95,
-    high=1.05,
-    prior=Normal(0.0, 0.01),
-    scale="log",
-    limit=1.0,
-    reason="a declared thickness is good to 1 %; a larger error is the mechanism thickness_error",
-)
+THICKNESS = Parameter("thickness", "-", 0.95, 1.05, Normal(0.0, 0.01), "log", limit=1.0, reason=_DECLARED_THICKNESS)
 FRF_NUISANCES = (D33, YOUNGS_MODULUS, THICKNESS)
 _WIDE_SD = 1.5  # of the logarithm of a modulus that nobody declared
 
@@ -51,16 +33,9 @@ def modulus_parameter(skin: SkinDescription, estimates: Sequence[float]) -> Para
     if skin.youngs_modulus_mpa is not None:
         return YOUNGS_MODULUS
     middle = float(to_lab("youngs_modulus_mpa", np.median(estimates)))
+    low, high, prior = middle * 1e-3, middle * 1e3, Normal(float(np.log(middle)), _WIDE_SD)
     return Parameter(
-        name="youngs_modulus",
-        unit="MPa",
-        low=middle * 1e-3,
-        high=middle * 1e3,
-        prior=Normal(float(np.log(middle)), _WIDE_SD),
-        scale="log",
-        limit=None,
-        proportional=True,
-        reason="what is measured; wide around the base model's own fit",
+        "youngs_modulus", "MPa", low, high, prior, "log", limit=None, proportional=True, reason=_FREE_MODULUS
     )
 
 
@@ -74,13 +49,6 @@ def required_modulus(skin: SkinDescription) -> float:
 def contact_point(recording: str, middle: float, sd: float, bound: float) -> Parameter:
     """The displacement at which the contact of one recording begins, around `middle` [m]."""
     middle_mm, sd_mm, bound_mm = (float(to_lab("displacement_mm", value)) for value in (middle, sd, bound))
-    return Parameter(
-        name=f"contact_point {recording}",
-        unit="mm",
-        low=middle_mm - bound_mm,
-        high=middle_mm + bound_mm,
-        prior=Normal(middle_mm, sd_mm),
-        scale="linear",
-        limit=None,
-        reason="where the curve leaves zero, found by the base model",
-    )
+    low, high, prior = middle_mm - bound_mm, middle_mm + bound_mm, Normal(middle_mm, sd_mm)
+    name = f"contact_point {recording}"
+    return Parameter(name, "mm", low, high, prior, "linear", limit=None, reason=_CONTACT_POINT)

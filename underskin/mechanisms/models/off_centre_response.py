@@ -14,13 +14,12 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import j0
 
 from underskin.mechanisms.models.cubic_basis import CubicBasis
 from underskin.physics.contact_curves import CurveGrid
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats
+from underskin.units import Floats, Indices, Mask
 
 PROFILE_END = 8.0
 _SPACING = 0.0625  # of the profile and of the offsets; the profile turns over lengths of 0.3 h and more
@@ -37,7 +36,7 @@ class Place:
     Beyond the profile's end all four are 0.
     """
 
-    first: NDArray[np.intp]  # of the four (…, points)
+    first: Indices  # of the four (…, points)
     values: Floats
     slopes: Floats
 
@@ -91,7 +90,7 @@ class OffsetSigma:
         """The grid of contacts with a layer whose pressures' transforms are at this object's wavenumbers."""
         return CurveGrid(self.wavenumber)
 
-    def contains(self, a_over_h: Floats, cbrt_load: Floats) -> NDArray[np.bool_]:
+    def contains(self, a_over_h: Floats, cbrt_load: Floats) -> Mask:
         """Which contacts the table holds; the others are continued."""
         return np.asarray((a_over_h <= self.bases[0].nodes[-1]) & (cbrt_load <= self.bases[1].nodes[-1]))
 
@@ -131,9 +130,7 @@ class OffsetSigma:
             ]
         return answers
 
-    def linear_at(
-        self, transforms: Floats, contact: NDArray[np.intp], place: Place, *, slopes: bool
-    ) -> tuple[Floats, Floats]:
+    def linear_at(self, transforms: Floats, contact: Indices, place: Place, *, slopes: bool) -> tuple[Floats, Floats]:
         """The Hankel integrals of transforms p̂ · M · 2 J1(kρ)/(kρ) (quantities, …, contacts, k) of these contacts at
         their places (quantities, …, points), the first alone without `slopes`; and the first's derivative by e/h."""
         kernel, by_place = (
@@ -149,9 +146,7 @@ def offset_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_of
     return _kept(table, rt_over_h, stretch, min(PROFILE_END, float(np.ceil(2 * largest_offset) / 2)))
 
 
-@lru_cache(maxsize=8)
-def _kept(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> OffsetSigma:
-    return OffsetSigma(table, rt_over_h, stretch, largest_offset)
+_kept = lru_cache(maxsize=8)(OffsetSigma)
 
 
 def _windows(values: Floats) -> Floats:

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from underskin.mechanisms.models.frf_design import Indices
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.autodiff import Differentiated
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.units import Array, Floats
+from underskin.units import Array, Floats, Mask
 
 
 @dataclass(frozen=True)
@@ -21,7 +20,7 @@ class Response:
     level: Differentiated  # (…, recordings) [C/N], real: before the dynamics
     place_slopes: Floats | None  # (2, …, recordings) [C/N/m]
     lines: Differentiated | None  # (…, distinct lines) complex: the dynamics' factor; None where there are none
-    inside: NDArray[np.bool_]  # (…, recordings)
+    inside: Mask  # (…, recordings)
 
     def on_rows(self, design: FrfDesign) -> tuple[Array, Array]:
         """Level times line factor on every row of a single point (rows,), and its derivatives (variables, rows).

@@ -12,7 +12,6 @@ x = k a/h; on the layer both come from its own contact (contact_curves).
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import j0
 
 from underskin.autodiff import Differentiated, chain
@@ -23,7 +22,7 @@ from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactCurves
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average, hertz_transform, punch_transform
 from underskin.physics.skin import INCOMPRESSIBLE
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 
 class SigmaOfContacts:
@@ -47,7 +46,7 @@ class SigmaOfContacts:
             self._variables += further
             self.inside = self.inside & (pressed.a_over_h.value < LARGEST_A_OVER_H)
 
-    def at(self, contact: NDArray[np.intp], place: Place, offset: Differentiated) -> Differentiated:
+    def at(self, contact: Indices, place: Place, offset: Differentiated) -> Differentiated:
         """σ (…, points) at the places of these contacts (points,), `offset` e/h being what the place was found for."""
         a, x, rho = (variable[contact] for variable in self._variables[:3])
         moving = any(variable.slopes.any() for variable in self._variables)

@@ -10,48 +10,21 @@ H1 is unbiased by noise in the charge, H2 by noise in the force, and Hv (total l
 power has the ratio κ; κ is taken to be the ratio of the signals' own powers, so that Hv does not depend on units.
 """
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.errors import not_finite, out_of_range, too_few, unequal_lengths, unusable
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.periodic import period_of, without_drift
-from underskin.recordings.frf.signal_checks import Defect, damaged, defects_of_pair
-from underskin.recordings.frf.spectral_average import Average, Blocks, Estimator, averaged, ratio, without_line
+from underskin.recordings.frf.signal_checks import damaged, defects_of_pair
+from underskin.recordings.frf.spectral_average import Blocks, Estimator, Frf, averaged, ratio, without_line
 from underskin.recordings.frf.stepped_sine import find_steps, settled, step_amplitudes
-from underskin.units import Complexes, Floats, to_si
+from underskin.units import Complexes, Floats, Mask, to_si
+
+__all__ = ["Frf", "broadband", "estimate", "lines_of", "periodic", "stepped_sine"]
 
 _BLOCKS = 15  # of a broadband record, half overlapping, where no resolution is asked for: 8 / its length
-
-
-@dataclass(frozen=True)
-class Frf:
-    """Lines of a measured FRF: `frequency` [Hz], `values` [C/N], and γ² and the number of averages where known.
-
-    `averages` counts independent blocks (overlapping ones count for less than one each); NaN coherence where a line
-    was averaged over one block. `defects` are those of the time series. `force_power` [N²] and
-    `charge_power` [C²] are mean squared amplitudes, and `passes` is in how many blocks the force has its power at a
-    line, (Σ p)²/Σ p²; None of tones. `independent`: whether neighbouring lines' noise is.
-    """
-
-    frequency: Floats
-    values: Complexes
-    coherence: Floats | None = None
-    averages: Floats | None = None
-    defects: tuple[Defect, ...] = ()
-    force_power: Floats | None = None
-    charge_power: Floats | None = None
-    independent: bool = True
-    passes: Floats | None = None
-
-    @property
-    def relative_uncertainty(self) -> Floats | None:
-        """Standard uncertainty of log|FRF|, and of the phase in radians; None where n is not known."""
-        if self.coherence is None or self.averages is None:
-            return None
-        return np.sqrt((1 - self.coherence) / (2 * self.averages * np.maximum(self.coherence, 1e-12)))
 
 
 def lines_of(recording: FrfRecording) -> Frf:
@@ -152,8 +125,8 @@ def broadband(
         raise out_of_range("overlap", overlap, "must be 0 or greater and less than 1")
     step = max(1, round(size * (1 - overlap)))
     taper = _taper(window, size)
-    average = averaged(force, charge, Blocks(taper, step, slice(1, (size + 1) // 2), without_line), estimator)
-    return _frf(average, sample_rate, independent=False)
+    blocks = Blocks(taper, step, slice(1, (size + 1) // 2), without_line)
+    return replace(averaged(force, charge, sample_rate, blocks, estimator), independent=False)
 
 
 def periodic(force: Floats, charge: Floats, sample_rate: float, *, estimator: Estimator = "H1") -> Frf:
@@ -189,8 +162,8 @@ def periodic(force: Floats, charge: Floats, sample_rate: float, *, estimator: Es
     if not period:
         raise unusable("force_n", f"{len(force)} samples", "must repeat itself at least four times")
     taper = _taper("hann", 2 * period)
-    average = averaged(force, charge, Blocks(taper, period, slice(2, period, 2), without_drift), estimator)
-    return _frf(average, sample_rate, independent=True)
+    blocks = Blocks(taper, period, slice(2, period, 2), without_drift)
+    return averaged(force, charge, sample_rate, blocks, estimator)
 
 
 def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator: Estimator = "H1") -> Frf:
@@ -242,10 +215,6 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
     return Frf(frequency, values, coherence, averages, tuple(defects))
 
 
-def _frf(average: Average, sample_rate: float, *, independent: bool) -> Frf:
-    return Frf(**{**vars(average), "frequency": average.frequency * sample_rate}, independent=independent)
-
-
 def _same_line(frequency: float, lines: dict[float, list[tuple[Complexes, Complexes]]]) -> float:
     """The line already seen that this frequency repeats, or itself."""
     return next((line for line in lines if abs(line - frequency) < 1e-3 * frequency), frequency)
@@ -259,7 +228,7 @@ def _check(force: Floats, charge: Floats, sample_rate: float) -> None:
     if not (np.isfinite(sample_rate) and sample_rate > 0):
         raise not_finite("sample_rate_hz", sample_rate, "must be finite and greater than 0")
     for name, signal in (("force_n", force), ("charge_pc", charge)):
-        bad: NDArray[np.bool_] = ~np.isfinite(signal)
+        bad: Mask = ~np.isfinite(signal)
         if bad.any():
             raise not_finite(name, "not finite", index=int(np.argmax(bad)))
 

@@ -11,14 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from underskin.errors import too_few
 from underskin.recordings.frf.estimation import Frf
 from underskin.recordings.frf.flat_zone_reason import levels_of, reason_of
 from underskin.recordings.frf.mains import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ
-from underskin.units import Complexes, Floats
+from underskin.units import Complexes, Floats, Indices, Mask
 
 FLATNESS = 0.02
 STEEPEST = 0.1  # fall of ln FRF with ln f that relaxation may have (a loss tangent of 0.16)
@@ -40,7 +39,7 @@ class FlatZone:
     left_out_hz: tuple[float, ...] = ()
     chosen_by_user: bool = False
 
-    def holds(self, frequency: Floats) -> NDArray[np.bool_]:
+    def holds(self, frequency: Floats) -> Mask:
         """Which lines are averaged."""
         inside = (frequency >= self.low_hz) & (frequency <= self.high_hz)
         return inside & ~np.isin(np.round(frequency, 6), self.left_out_hz)
@@ -50,7 +49,7 @@ class FlatZone:
 class Stack:
     """Recordings of one grid: `rows` are their numbers; frequency (lines,), values (rows, lines), γ² or NaN."""
 
-    rows: NDArray[np.intp]
+    rows: Indices
     frequency: Floats
     values: Complexes
     coherence: Floats
@@ -63,18 +62,8 @@ def stacked(frfs: Sequence[Frf]) -> list[Stack]:
         members.setdefault(frf.frequency.tobytes(), []).append(row)
     stacks = []
     for rows in members.values():
-        coherence = [
-            np.full(len(frfs[row].values), np.nan) if frfs[row].coherence is None else frfs[row].coherence
-            for row in rows
-        ]
-        stacks.append(
-            Stack(
-                np.array(rows),
-                frfs[rows[0]].frequency,
-                np.array([frfs[row].values for row in rows]),
-                np.array(coherence),
-            )
-        )
+        values, coherence = ([frfs[row].values for row in rows], [frfs[row].coherence_or_nan for row in rows])
+        stacks.append(Stack(np.array(rows), frfs[rows[0]].frequency, np.array(values), np.array(coherence)))
     return stacks
 
 
@@ -111,20 +100,17 @@ def flat_zone(
     if band_hz is not None:
         inside = (frequencies >= band_hz[0]) & (frequencies <= band_hz[1])
         if not inside.any():
-            raise too_few(
-                "band_hz",
-                list(band_hz),
-                f"must hold at least one line; they lie at {frequencies[0]:g} to {frequencies[-1]:g} Hz",
-            )
+            allowed = f"must hold at least one line; they lie at {frequencies[0]:g} to {frequencies[-1]:g} Hz"
+            raise too_few("band_hz", list(band_hz), allowed)
         return FlatZone(*band_hz, "the band given by the user", mains, chosen_by_user=True)
-    edges = _edges(frequencies)
+    decades = float(np.log10(frequencies[-1] / frequencies[0]))
+    edges = np.geomspace(frequencies[0], frequencies[-1], max(1, round(_BINS_PER_DECADE * decades)) + 1)
     ratio = _binned(stacks, edges, mains)
     names, curves, noise = _by_condition(ratio, conditions)
     filled = np.flatnonzero(np.isfinite(curves).any(axis=0))
     if len(filled) < 2:
-        return FlatZone(
-            frequencies[0], frequencies[-1], "the whole recorded range: too few lines to look for less", mains
-        )
+        reason = "the whole recorded range: too few lines to look for less"
+        return FlatZone(frequencies[0], frequencies[-1], reason, mains)
     middle = np.sqrt(edges[1:] * edges[:-1])[filled]
     curves, noise = curves[:, filled], noise[:, filled]
     first, last, slope = _widest(np.log(middle), curves, noise)
@@ -199,21 +185,15 @@ def _mains_lines(stacks: Sequence[Stack]) -> tuple[float, ...]:
         near = np.abs(stack.frequency[:, None] - harmonics).min(axis=1) <= HARMONIC_WIDTH_HZ
         if not near.any() or len(near) < _NEIGHBOURS:
             continue
-        smooth = median_filter(stack.values.real, (1, _NEIGHBOURS), mode="nearest") + 1j * median_filter(
-            stack.values.imag, (1, _NEIGHBOURS), mode="nearest"
+        real, imaginary = (
+            median_filter(part, (1, _NEIGHBOURS), mode="nearest") for part in (stack.values.real, stack.values.imag)
         )
-        scatter = np.median(np.abs(stack.values - smooth), axis=0)
+        scatter = np.median(np.abs(stack.values - (real + 1j * imaginary)), axis=0)
         beside = median_filter(np.where(near, np.median(scatter[~near]), scatter), _NEIGHBOURS, mode="nearest")
         few = 1 + 1.5 / np.sqrt(len(stack.rows))  # scatter over few recordings is itself unsure
         lines = stack.frequency[near & (scatter > _OUTSTANDING * few * beside)]
         lines_hz.update(np.round(lines, 6).tolist())
     return tuple(sorted(lines_hz))
-
-
-def _edges(frequencies: Floats) -> Floats:
-    decades = np.log10(frequencies[-1] / frequencies[0])
-    bins = max(1, round(_BINS_PER_DECADE * float(decades)))
-    return np.geomspace(frequencies[0], frequencies[-1], bins + 1)
 
 
 def _binned(stacks: Sequence[Stack], edges: Floats, mains: tuple[float, ...]) -> Floats:
@@ -227,9 +207,8 @@ def _binned(stacks: Sequence[Stack], edges: Floats, mains: tuple[float, ...]) ->
         kept = ~np.isin(np.round(stack.frequency, 6), mains)
         bins = np.clip(np.searchsorted(edges, stack.frequency, side="right") - 1, 0, len(edges) - 2)
         for number in np.unique(bins[kept]):
-            ratio[stack.rows[plain], number] = np.median(
-                real[np.ix_(plain, kept & (bins == number))] / level[plain, None], axis=1
-            )
+            lines = real[np.ix_(plain, kept & (bins == number))]
+            ratio[stack.rows[plain], number] = np.median(lines / level[plain, None], axis=1)
     return ratio
 
 
@@ -274,10 +253,9 @@ def _widest(log_frequency: Floats, curves: Floats, noise: Floats) -> tuple[int, 
         for last in range(bins - 1, first - 1, -1):
             if log_frequency[last] - log_frequency[first] <= width:
                 break
-            slope = _slope(log_frequency[first : last + 1], curves[-1, first : last + 1])
-            if _is_flat(
-                log_frequency[first : last + 1], curves[:, first : last + 1], noise[:, first : last + 1], slope
-            ):
+            part = slice(first, last + 1)
+            slope = _slope(log_frequency[part], curves[-1, part])
+            if _is_flat(log_frequency[part], curves[:, part], noise[:, part], slope):
                 best, width = (first, last, slope), float(log_frequency[last] - log_frequency[first])
                 break
     return best

@@ -6,12 +6,11 @@ The blocks that a defect touches are left out of the FRF, and the rest is used.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from underskin.findings.arguments import DefectKind
 from underskin.recordings.frf.periodic import period_of
-from underskin.units import Floats
+from underskin.units import Floats, Mask
 
 _CLIPPED_RUN = 3  # samples in a row at the extreme value
 _CLIPPED_RATIO = 5.0  # a quantised sine's top level holds at most 1/(√2 − 1) = 2.4 times the samples of the next
@@ -64,7 +63,7 @@ def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
     ]
 
 
-def _recurs(signal: Floats, period: int) -> NDArray[np.bool_]:
+def _recurs(signal: Floats, period: int) -> Mask:
     """Where a signal bends as sharply a period before or after; nowhere without a period."""
     bend = np.pad(np.abs(np.diff(signal, n=2)), 1)
     if not period:
@@ -93,7 +92,7 @@ def defects(channel: str, signal: Floats) -> list[Defect]:
     return [Defect(kind, channel, count, first) for kind, mask in kinds for first, count in _runs(mask)]
 
 
-def damaged(every: list[Defect], samples: int) -> NDArray[np.bool_]:
+def damaged(every: list[Defect], samples: int) -> Mask:
     """Which of the samples any of the defects touches."""
     mask = np.zeros(samples, dtype=bool)
     for defect in every:
@@ -101,18 +100,20 @@ def damaged(every: list[Defect], samples: int) -> NDArray[np.bool_]:
     return mask
 
 
-def _overload(signal: Floats) -> NDArray[np.bool_]:
+def _overload(signal: Floats) -> Mask:
     mask = np.zeros(len(signal), dtype=bool)
     levels, counts = np.unique(signal, return_counts=True)
     if len(levels) < 3:
         return mask
     for end, neighbour in ((0, 1), (-1, -2)):
         if counts[end] > _CLIPPED_RATIO * counts[neighbour]:
-            mask |= _in_long_runs(signal == levels[end], _CLIPPED_RUN)
+            for first, count in _runs(signal == levels[end]):
+                if count >= _CLIPPED_RUN:
+                    mask[first : first + count] = True
     return mask
 
 
-def _held(signal: Floats) -> NDArray[np.bool_]:
+def _held(signal: Floats) -> Mask:
     """Runs of one value that end in more than one level's step (a slow signal turns on one level); where levels are so
     coarse that neighbours are alike by chance, those that end in a leap."""
     step = np.abs(np.diff(signal))
@@ -130,7 +131,7 @@ def _held(signal: Floats) -> NDArray[np.bool_]:
     return mask
 
 
-def _jumps(signal: Floats) -> NDArray[np.bool_]:
+def _jumps(signal: Floats) -> Mask:
     mask = np.zeros(len(signal), dtype=bool)
     bend = np.abs(np.diff(signal, n=2))
     blocks = max(1, len(bend) // _LOCAL)
@@ -142,15 +143,7 @@ def _jumps(signal: Floats) -> NDArray[np.bool_]:
     return mask
 
 
-def _in_long_runs(mask: NDArray[np.bool_], shortest: int) -> NDArray[np.bool_]:
-    long = np.zeros_like(mask)
-    for first, count in _runs(mask):
-        if count >= shortest:
-            long[first : first + count] = True
-    return long
-
-
-def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _runs(mask: Mask) -> list[tuple[int, int]]:
     """First index and length of each run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return [(int(first), int(last - first)) for first, last in zip(edges[::2], edges[1::2], strict=True)]

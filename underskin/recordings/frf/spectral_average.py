@@ -36,21 +36,40 @@ class Blocks:
 
 
 @dataclass(frozen=True)
-class Average:
-    """Spectra averaged over the undamaged blocks, (lines,) each: as the fields of the same names of `Frf`."""
+class Frf:
+    """Lines of a measured FRF: `frequency` [Hz], `values` [C/N], and γ² and the number of averages where known.
 
-    frequency: Floats  # in cycles per sample
+    `averages` counts independent blocks (overlapping ones count for less than one each); NaN coherence where a line
+    was averaged over one block. `defects` are those of the time series. `force_power` [N²] and
+    `charge_power` [C²] are mean squared amplitudes, and `passes` is in how many blocks the force has its power at a
+    line, (Σ p)²/Σ p²; None of tones. `independent`: whether neighbouring lines' noise is.
+    """
+
+    frequency: Floats
     values: Complexes
-    coherence: Floats
-    averages: Floats
-    defects: tuple[Defect, ...]
-    force_power: Floats
-    charge_power: Floats
-    passes: Floats
+    coherence: Floats | None = None
+    averages: Floats | None = None
+    defects: tuple[Defect, ...] = ()
+    force_power: Floats | None = None
+    charge_power: Floats | None = None
+    independent: bool = True
+    passes: Floats | None = None
+
+    @property
+    def coherence_or_nan(self) -> Floats:
+        """γ² of each line, NaN where it is not known."""
+        return np.full(len(self.values), np.nan) if self.coherence is None else self.coherence
+
+    @property
+    def relative_uncertainty(self) -> Floats | None:
+        """Standard uncertainty of log|FRF|, and of the phase in radians; None where n is not known."""
+        if self.coherence is None or self.averages is None:
+            return None
+        return np.sqrt((1 - self.coherence) / (2 * self.averages * np.maximum(self.coherence, 1e-12)))
 
 
-def averaged(force: Floats, charge: Floats, blocks: Blocks, estimator: Estimator) -> Average:
-    """The average over the undamaged blocks, its frequencies in cycles per sample."""
+def averaged(force: Floats, charge: Floats, sample_rate: float, blocks: Blocks, estimator: Estimator) -> Frf:
+    """The average over the undamaged blocks of force [N] and charge [C], sampled at `sample_rate` [Hz]."""
     defects = defects_of_pair(force, charge)
     whole = ~blocks.of(damaged(defects, len(force))).any(axis=1)
     count = int(whole.sum())
@@ -59,12 +78,12 @@ def averaged(force: Floats, charge: Floats, blocks: Blocks, estimator: Estimator
         words = sentences.defect(first.kind, first.channel, first.samples, first.first_sample)
         raise unusable(first.channel, f"{len(defects)} defects", f"no undamaged block: {words}")
     force_spectra, charge_spectra = (blocks.spectra(signal)[whole] for signal in (force, charge))
-    frequency: Floats = np.fft.rfftfreq(len(blocks.taper))[blocks.lines].astype(np.float64)
+    frequency: Floats = sample_rate * np.fft.rfftfreq(len(blocks.taper))[blocks.lines].astype(np.float64)
     averages = _independent_blocks(count, blocks.taper, blocks.step)
     values, coherence = ratio(force_spectra, charge_spectra, estimator)
     scale = 2 / blocks.taper.sum()
     force_power, charge_power = (np.abs(scale * spectra) ** 2 for spectra in (force_spectra, charge_spectra))
-    return Average(
+    return Frf(
         frequency,
         values,
         coherence if count > 1 else np.full_like(coherence, np.nan),
@@ -72,7 +91,7 @@ def averaged(force: Floats, charge: Floats, blocks: Blocks, estimator: Estimator
         tuple(defects),
         force_power.mean(axis=0),
         charge_power.mean(axis=0),
-        force_power.sum(axis=0) ** 2 / np.maximum((force_power**2).sum(axis=0), _TINY),
+        passes=force_power.sum(axis=0) ** 2 / np.maximum((force_power**2).sum(axis=0), _TINY),
     )
 
 

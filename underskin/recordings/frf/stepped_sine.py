@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.units import Complexes, Floats
+from underskin.units import Complexes, Floats, Mask
 
 _SAME_PERIOD = 0.05
 _DRIFT = 0.025  # of the period, from a run's first half to its second: a sweep's runs drift by about 0.05
@@ -65,7 +65,7 @@ def settled(step: Step, sample_rate: float) -> int:
 
 
 def step_amplitudes(
-    force: Floats, charge: Floats, sample_rate: float, step: Step, bad: NDArray[np.bool_]
+    force: Floats, charge: Floats, sample_rate: float, step: Step, bad: Mask
 ) -> tuple[Complexes, Complexes]:
     """Complex amplitudes of force and charge in each settled, undamaged block of whole cycles.
 
@@ -105,7 +105,7 @@ def step_amplitudes(
     return pair[0], pair[1]
 
 
-def _level_and_drift(signal: Floats, time: Floats, frequency: float, good: NDArray[np.bool_]) -> Floats:
+def _level_and_drift(signal: Floats, time: Floats, frequency: float, good: Mask) -> Floats:
     """DC and drift of a tone: the straight line of a least-squares fit of line, cosine and sine."""
     angle = 2 * np.pi * frequency * time
     line = np.column_stack([np.ones_like(time), time - time.mean()])
@@ -135,8 +135,8 @@ def _rising_crossings(signal: Floats) -> Floats:
     threshold = 0.3 * np.quantile(np.abs(middle), 0.9)
     state = np.where(middle > threshold, 1, np.where(middle < -threshold, -1, 0))
     marks = np.flatnonzero(state)
-    rises = marks[1:][(state[marks[1:]] == 1) & (state[marks[:-1]] == -1)]
-    before = marks[:-1][(state[marks[1:]] == 1) & (state[marks[:-1]] == -1)]
+    rising = (state[marks[1:]] == 1) & (state[marks[:-1]] == -1)
+    before, rises = marks[:-1][rising], marks[1:][rising]
     low, high = middle[before], middle[rises]
     return before + (rises - before) * low / (low - high)
 

@@ -8,16 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.recordings.frf.estimation import Frf
-from underskin.recordings.frf.flat_zone import Stack, stacked
-from underskin.units import Complexes, Floats, to_lab
+from underskin.recordings.frf.flat_zone import Condition, Stack, stacked
+from underskin.units import Complexes, Floats, Indices, Mask, to_lab
 
 MOST_LINES = 240  # of one recording
 MOST_BINS = 80  # of a spread
-
-Condition = tuple[float, float]  # indenter radius [mm], preload [N]
 
 
 @dataclass(frozen=True)
@@ -46,10 +43,9 @@ class FrfSpread:
 
 def lines_of(name: str, frf: Frf) -> FrfLines:
     """A recording's lines, thinned to MOST_LINES: of each bin those of the smallest and the largest magnitude."""
-    coherence = np.full(len(frf.values), np.nan) if frf.coherence is None else frf.coherence
     magnitude, phase = _polar(frf.values)
     chosen = _extremes(frf.frequency, magnitude)
-    return FrfLines(name, frf.frequency[chosen], magnitude[chosen], phase[chosen], coherence[chosen])
+    return FrfLines(name, frf.frequency[chosen], magnitude[chosen], phase[chosen], frf.coherence_or_nan[chosen])
 
 
 def spreads(frfs: Sequence[Frf], conditions: Sequence[Condition]) -> list[FrfSpread]:
@@ -63,7 +59,7 @@ def spreads(frfs: Sequence[Frf], conditions: Sequence[Condition]) -> list[FrfSpr
     return sorted(every, key=lambda spread: (spread.indenter_radius_mm, spread.preload_n))
 
 
-def _spread(stack: Stack, alike: NDArray[np.bool_], condition: Floats) -> FrfSpread:
+def _spread(stack: Stack, alike: Mask, condition: Floats) -> FrfSpread:
     positive = stack.frequency > 0
     frequency, start = _bins(stack.frequency[positive], MOST_BINS)
     magnitude, phase = _polar(stack.values[alike][:, positive])
@@ -71,7 +67,7 @@ def _spread(stack: Stack, alike: NDArray[np.bool_], condition: Floats) -> FrfSpr
     return FrfSpread(float(condition[0]), float(condition[1]), int(alike.sum()), frequency, *columns)
 
 
-def _levels(values: Floats, start: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
+def _levels(values: Floats, start: Indices) -> tuple[Floats, Floats, Floats]:
     """Lowest, median over recordings (mean of a bin's lines), and highest of each bin; `values` (recordings, lines)."""
     low = np.minimum.reduceat(values, start, axis=1).min(axis=0)
     high = np.maximum.reduceat(values, start, axis=1).max(axis=0)
@@ -79,7 +75,7 @@ def _levels(values: Floats, start: NDArray[np.intp]) -> tuple[Floats, Floats, Fl
     return low, np.median(np.add.reduceat(values, start, axis=1) / count, axis=0), high
 
 
-def _bins(frequency: Floats, most: int) -> tuple[Floats, NDArray[np.intp]]:
+def _bins(frequency: Floats, most: int) -> tuple[Floats, Indices]:
     """The middle of each bin that holds lines, and its first line."""
     if len(frequency) <= most:
         return frequency, np.arange(len(frequency))
@@ -90,7 +86,7 @@ def _bins(frequency: Floats, most: int) -> tuple[Floats, NDArray[np.intp]]:
     return np.exp(np.add.reduceat(np.log(frequency), start) / count), start
 
 
-def _extremes(frequency: Floats, magnitude: Floats) -> NDArray[np.intp]:
+def _extremes(frequency: Floats, magnitude: Floats) -> Indices:
     positive = np.flatnonzero(frequency > 0)
     if len(positive) <= MOST_LINES:
         return positive

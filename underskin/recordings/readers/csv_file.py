@@ -8,7 +8,7 @@ own table.
 """
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import BinaryIO
 
 import numpy as np
@@ -126,14 +126,10 @@ def _properties(lines: Iterable[str], separator: str) -> tuple[dict[str, str | f
             case [name, value]:
                 values.setdefault(name, []).append(value)
     twice = {name: different for name, said in values.items() if len(different := list(dict.fromkeys(said))) > 1}
-    return {name: said[0] for name, said in values.items() if name not in twice}, _doubts(twice)
-
-
-def _doubts(twice: Mapping[str, Sequence[str]]) -> list[str]:
-    return [
-        f"{name!r} is given as {different[0]!r} and as {different[1]!r}: neither is used"
-        for name, different in twice.items()
+    doubts = [
+        f"{name!r} is given as {one!r} and as {other!r}: neither is used" for name, (one, other, *_) in twice.items()
     ]
+    return {name: said[0] for name, said in values.items() if name not in twice}, doubts
 
 
 def _stated(line: str, separator: str) -> list[str]:

@@ -13,10 +13,9 @@ from typing import Any, BinaryIO
 import h5py
 import numpy as np
 
-from underskin.errors import ErrorCode, FileError, damage_said
+from underskin.errors import ErrorCode, FileError
 from underskin.recordings.campaign import COLUMNS, SCHEMA, Campaign, to_dict
-from underskin.recordings.readers import hdf5_links
-from underskin.recordings.readers.hdf5_damage import damage
+from underskin.recordings.readers import hdf5_input
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 
@@ -52,9 +51,7 @@ def _write_attributes(group: Any, values: dict[str, Any]) -> None:
 
 def read(stream: BinaryIO, file: str) -> dict[str, Any]:
     """The campaign document of an HDF5 file; raises FileError that names the object."""
-    stream.seek(0)
-    with damage_said(file, "", lambda error: f"the HDF5 file {damage(error)}"), h5py.File(stream, "r") as source:
-        hdf5_links.refuse_outside(source, file)
+    with hdf5_input.opened(stream, file, "the HDF5 file") as source:
         return _document(source, file)
 
 

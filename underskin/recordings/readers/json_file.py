@@ -27,9 +27,9 @@ def document(data: bytes, file: str) -> Any:
         read = orjson.loads(data)
     except orjson.JSONDecodeError as error:
         raise FileError(file, f"line {error.lineno}, column {error.colno}", f"not JSON: {error.msg}") from None
-    repeated = repeated_key(data)
-    if repeated is not None:
-        raise FileError(file, repeated.place, f"the key {repeated.key!r} must be given once in its object")
+    if repeated := repeated_key(data):
+        key, place = repeated
+        raise FileError(file, place, f"the key {key!r} must be given once in its object")
     return read
 
 

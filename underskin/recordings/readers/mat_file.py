@@ -13,7 +13,7 @@ import scipy.io
 
 from underskin.errors import damage_said
 from underskin.recordings.channels import Block, Channel, Contents, as_values
-from underskin.recordings.readers import hdf5_links
+from underskin.recordings.readers import hdf5_input
 
 MAGIC_73 = b"MATLAB 7.3 MAT-file"
 _MOST_COLUMNS = 1000
@@ -25,7 +25,8 @@ def read(stream: BinaryIO, file: str) -> Contents:
     is_73 = stream.read(len(MAGIC_73)) == MAGIC_73
     stream.seek(0)
     with damage_said(file, "", lambda error: f"no MATLAB file: {type(error).__name__}: {error}"):
-        variables = _variables_73(stream, file) if is_73 else _variables_5(stream)
+        # SciPy's stubs know paths alone
+        variables = _variables_73(stream, file) if is_73 else scipy.io.loadmat(stream, simplify_cells=True)  # type: ignore[arg-type]
     return _contents({name: value for name, value in variables.items() if not name.startswith("__")})
 
 
@@ -57,13 +58,9 @@ def _channels(name: str, value: Any) -> Iterator[Channel]:
             yield Channel(f"{name}(:,{column + 1})", "", values[:, column])
 
 
-def _variables_5(stream: Any) -> dict[str, Any]:
-    return scipy.io.loadmat(stream, simplify_cells=True)
-
-
 def _variables_73(stream: BinaryIO, file: str) -> dict[str, Any]:
     with h5py.File(stream, "r") as source:
-        hdf5_links.refuse_outside(source, file)
+        hdf5_input.refuse_outside(source, file)
         return {
             name: {inner: _value(value[inner]) for inner in value} if isinstance(value, h5py.Group) else _value(value)
             for name, value in source.items()

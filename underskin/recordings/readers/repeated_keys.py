@@ -5,7 +5,6 @@ The search hops from one quotation mark to the next, so that the numbers between
 
 import json
 import re
-from dataclasses import dataclass
 
 _ESCAPE = re.compile(rb'\\(["\\])')
 _AS_UNICODE = {b'"': rb"\u0022", b"\\": rb"\u005c"}
@@ -13,22 +12,9 @@ _STRING = re.compile(rb'"((?:[^"\\]|\\.)*)"')
 _COLON = re.compile(rb"\s*:")
 
 
-@dataclass(frozen=True)
-class RepeatedKey:
-    """A key that its object has already, and where it comes again: line and column, both from 1."""
-
-    key: str
-    line: int
-    column: int
-
-    @property
-    def place(self) -> str:
-        """Line and column in words."""
-        return f"line {self.line}, column {self.column}"
-
-
-def repeated_key(document: bytes) -> RepeatedKey | None:
-    """The first key that comes again in its object, however it is escaped; None where there is none.
+def repeated_key(document: bytes) -> tuple[str, str] | None:
+    """The first key that comes again in its object, however it is escaped, and the line and column of its second
+    place, from 1, in words; None where there is none.
 
     `document` must be valid JSON, in UTF-8, or in UTF-16 or UTF-32, which Python's own parser reads too.
     """
@@ -38,7 +24,8 @@ def repeated_key(document: bytes) -> RepeatedKey | None:
         return None
     string = next(match for place, match in enumerate(_STRING.finditer(document)) if place == number)
     before = document[: string.start()].decode("utf-8", "replace")
-    return RepeatedKey(_unescaped(string[1]), before.count("\n") + 1, len(before) - before.rfind("\n"))
+    line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+    return _unescaped(string[1]), f"line {line}, column {column}"
 
 
 def _in_utf8(document: bytes) -> bytes:

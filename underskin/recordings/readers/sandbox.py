@@ -50,16 +50,10 @@ def parse_apart(name: str, stream: BinaryIO, file: str, limits: ParsingLimits = 
     contents = call_apart(f"{__name__}:_parsed", stream, file, name, what=name, limits=limits)
     if "document" in contents:
         return dict(contents["document"])
-    blocks = [
-        Block(
-            **{
-                **block,
-                "channels": tuple(Channel(**channel) for channel in block["channels"]),
-                "group_starts": tuple(block["group_starts"]),
-            }
-        )
-        for block in contents["blocks"]
-    ]
+    blocks = []
+    for block in contents["blocks"]:
+        channels = tuple(Channel(**channel) for channel in block["channels"])
+        blocks.append(Block(**{**block, "channels": channels, "group_starts": tuple(block["group_starts"])}))
     return Contents(tuple(blocks), contents["properties"], tuple(contents["warnings"]), contents["layout"])
 
 
@@ -83,9 +77,8 @@ def call_apart(
         try:
             status = child.wait(limits.seconds)
         except subprocess.TimeoutExpired:
-            raise FileError(
-                file, "", f"reading it as {what} took more than {limits.seconds:g} s and was stopped"
-            ) from None
+            reason = f"reading it as {what} took more than {limits.seconds:g} s and was stopped"
+            raise FileError(file, "", reason) from None
         finally:
             child.kill()
             child.wait()

@@ -89,8 +89,7 @@ def _channel(channel: TdmsChannel, file: str) -> Channel:
 
 
 def _properties(prefix: str, properties: Mapping[str, Any]) -> dict[str, str | float]:
-    numbers = {f"{prefix}{name}": value for name, value in properties.items()}
     return {
-        name: float(value) if isinstance(value, int | float | np.number) else str(value)
-        for name, value in numbers.items()
+        f"{prefix}{name}": float(value) if isinstance(value, int | float | np.number) else str(value)
+        for name, value in properties.items()
     }

@@ -125,11 +125,10 @@ def _some(names: list[str]) -> str:
 def _blocks(functions: list[dict[str, Any]]) -> tuple[Block, ...]:
     together: list[list[dict[str, Any]]] = []
     for function in functions:
-        same = next((group for group in together if _same_abscissa(group[0], function)), None)
-        if same is None:
-            together.append([function])
-        else:
-            same.append(function)
+        same = next((group for group in together if _same_abscissa(group[0], function)), [])
+        if not same:
+            together.append(same)
+        same.append(function)
     return tuple(_block(group) for group in together)
 
 

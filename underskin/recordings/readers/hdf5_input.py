@@ -1,19 +1,42 @@
-"""What an HDF5 file from outside may not hold: anything that leads out of it, or back to where the walk has been, and
+"""HDF5 files from outside. They may hold nothing that leads out of them, or back to where the walk has been, and no
 data that were never written.
 """
 
+import re
 from collections.abc import Iterator
-from typing import Any
+from contextlib import contextmanager
+from typing import Any, BinaryIO
 
 import h5py
 
-from underskin.errors import FileError
+from underskin.errors import FileError, damage_said
 
+_CUT = re.compile(r"truncated file: eof = (\d+),.*stored_eof = (\d+)")
 _DEEPEST = 8
 _MOST_OBJECTS = 200_000
 _TOO_MUCH = "is nested too deep, or holds too many objects"
 _SMALL = 100_000  # bytes, which a dataset may declare without any stored
 _LARGEST_COMPRESSION = 1100  # deflate's is 1032
+
+
+@contextmanager
+def opened(stream: BinaryIO, file: str, what: str) -> Iterator[Any]:
+    """The root of a file, which a message calls `what`.
+
+    Raises FileError where it is damaged, or holds what it may not.
+    """
+    stream.seek(0)
+    with damage_said(file, "", lambda error: f"{what} {damage(error)}"), h5py.File(stream, "r") as source:
+        refuse_outside(source, file)
+        yield source
+
+
+def damage(error: Exception) -> str:
+    """What is wrong with the file; h5py lets any exception of a damaged one through."""
+    cut = _CUT.search(str(error))
+    if cut is not None:
+        return f"was cut off: {cut[1]} of its {cut[2]} bytes are there; copy it once more"
+    return f"is damaged: {type(error).__name__}: {error}"
 
 
 def refuse_outside(source: Any, file: str) -> None:
