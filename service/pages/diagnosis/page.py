@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from urllib.parse import quote
 
 from fastapi import APIRouter, Request, Response
+from jinja2 import UndefinedError
 from markupsafe import Markup
 from sqlalchemy import Connection
 
@@ -34,7 +35,7 @@ _ABOUT = {
     "explanations": "What the recordings say of each explanation, the stated one on top.",
     "parameters": "What is known of each parameter: grey before the recordings, blue after them.",
 }
-_ODD = (LookupError, TypeError, ValueError, AttributeError)  # of a report that came with an import
+_ODD = (LookupError, TypeError, ValueError, AttributeError, UndefinedError)  # of a report that came with an import
 
 
 @router.post("/campaigns/{campaign_id}/diagnosis", dependencies=[*WRITE, OWN_FORM])
