@@ -18,6 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
+from underskin.autodiff import contiguous
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.products import Products
 from underskin.diagnosis.inference.sums import SlopeSums
@@ -35,11 +36,33 @@ class Curvature:
     square: Floats
 
 
+def log_likelihoods(
+    lines: Lines, curvature: Curvature, products: Products, levels: SeveralLevels, bend: Floats
+) -> Floats:
+    """Of predictions at several points, each at some sets of noise levels (points, sets, 1): (points, sets).
+
+    `bend` (points, sensors).
+    """
+    from underskin.diagnosis.inference.cost_kernel import log_likelihoods as add
+
+    sums = products.summed(levels)
+    about_means, numbers = lines.about_means
+    further = sums.log_determinant + 2 * numbers * np.log(levels.level) + about_means / levels.level**2
+    each = np.ascontiguousarray(-0.5 * np.asarray(further)[..., 0])
+    slopes = products.place_slopes
+    place = np.zeros((len(bend), 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
+    noise = np.concatenate([levels.gain, levels.level, levels.position, levels.spread], axis=-1)
+    yy = sums.yy if sums.yy.ndim == 3 else sums.yy[None, None]
+    arrays = map(contiguous, (products.level, sums.uu, sums.uy, yy, place))
+    add(*arrays, lines.sensor, contiguous(bend), curvature.laplacian, curvature.square, noise, each)
+    return each
+
+
 class Likelihoods:
     """Of predictions at several points, each at some sets of noise levels.
 
-    Attributes: `each` (points, sets), the log likelihoods. Of recordings (points, sets, recordings): `a` and `uu`, `ur`
-    and `rr`, Re u*u, Re u*r and |r|² of the residual r, over κ².
+    Attributes, of recordings (points, sets, recordings): `a`; `uu` and `ur`, Re u*u and Re u*r of the residual r, over
+    κ².
     """
 
     def __init__(
@@ -60,7 +83,6 @@ class Likelihoods:
         self._known = known = a * (1 - own) if bent else a
         self.uu = uu = sums.uu / k2
         self.ur = ur = (sums.uy - known * sums.uu) / k2
-        self.rr = rr = (sums.yy - known * (2 * sums.uy - known * sums.uu)) / k2
         a2 = a**2
         self._as_model = levels.gain**2  # of V, in units of a²
         if placed:
@@ -79,11 +101,6 @@ class Likelihoods:
         self._sensor_mm = self._mm @ self._sensors
         self._sensor_mr = self._mr @ self._sensors
         self._sensor_shrink = tau2 / (1 + tau2 * self._sensor_mm)
-        about_means, numbers = lines.about_means
-        chi2 = (rr - self._shrink * ur**2).sum(axis=-1) - (self._sensor_shrink * self._sensor_mr**2).sum(axis=-1)
-        log_determinant = np.log1p(tau2 * self._sensor_mm).sum(axis=-1) - np.log(reduced).sum(axis=-1)
-        further = sums.log_determinant + numbers * np.log(k2) + about_means / k2
-        self.each: Floats = -0.5 * (chi2 + log_determinant + np.asarray(further)[..., 0])
 
     @property
     def sensor_gains(self) -> Floats:

@@ -4,7 +4,7 @@ Every step of the mean parameters is followed by steps of the noise levels, whic
 own damping, and rests once it has converged, while the others go on.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -37,27 +37,32 @@ Target = Callable[[Evaluated], Floats]  # costs (points,) that points must get b
 class Fitter(Evaluator):
     """Begins and improves points of hypotheses."""
 
-    def _start(self, own: Floats, parent: FitPoint | None) -> Points:
-        """Points of the one hypothesis with these coordinates of its mechanisms (points, own), and the nuisances of a
+    def _start(self, own: Sequence[Floats], parents: Sequence[FitPoint | None]) -> Points:
+        """Points of each hypothesis with these coordinates of its mechanisms (points, own), and the nuisances of a
         parent or at their centre; noise as it is usual."""
-        (entry,) = self.hypotheses
-        count, mechanisms = len(entry.model.parameters), entry.own_parameters
-        fit = np.zeros((len(own), count))
-        fit[:, mechanisms:] = [parameter.start for parameter in entry.model.parameters[mechanisms:]]
-        if parent is not None:
-            fit[:, mechanisms:] = parent.fit[len(parent.fit) - (count - mechanisms) :]
-        fit[:, :mechanisms] = own
+        owner = np.repeat(np.arange(len(own)), [len(entry) for entry in own])
+        fit = np.zeros((len(owner), max(self.counts)))
+        for number, (entry, values, parent) in enumerate(zip(self.hypotheses, own, parents, strict=True)):
+            count, mechanisms = self.counts[number], entry.own_parameters
+            nuisances = [parameter.start for parameter in entry.model.parameters[mechanisms:]]
+            if parent is not None:
+                nuisances = parent.fit[len(parent.fit) - (count - mechanisms) :].tolist()
+            rows = owner == number
+            fit[rows, :mechanisms], fit[rows, mechanisms:count] = values, nuisances
         common = [GAIN_PRIOR.middle, 0.0]
         if self.placed:
             common.append(POSITION_PRIOR.middle)
         if self.lines.curves:
-            common.append(entry.smooth.middle)
-        covariance = np.concatenate([np.tile(common, (len(own), 1)), fit[:, self.own[0]]], axis=1)
-        return Points(np.zeros(len(own), dtype=np.intp), fit, covariance, np.tile(self.no_bend, (len(own), 1)))
+            common.append(self.hypotheses[0].smooth.middle)
+        of_mechanisms = np.take_along_axis(fit, self.own[owner], axis=1)
+        covariance = np.concatenate([np.tile(common, (len(owner), 1)), of_mechanisms], axis=1)
+        return Points(owner, fit, covariance, np.tile(self.no_bend, (len(owner), 1)))
 
-    def begin(self, own: Floats, parent: FitPoint | None = None, *, slopes: bool = False) -> Evaluated:
-        """The starts of these coordinates of the one hypothesis, d33 as the data would have it, evaluated."""
-        points = self._start(own, parent)
+    def begin(
+        self, own: Sequence[Floats], parents: Sequence[FitPoint | None] | None = None, *, slopes: bool = False
+    ) -> Evaluated:
+        """The starts of each hypothesis with these coordinates, d33 as the data would have it, evaluated."""
+        points = self._start(own, parents or [None] * len(own))
         products = self.products(points, slopes=slopes, place=self.placed)
         if not any(entry.proportional for entry in self.hypotheses[0].model.parameters):
             return self.weighed(points, products)

@@ -40,7 +40,10 @@ class Prediction:
 
 
 class Composition:
-    """The mechanisms of a model, in order, and how one vector of fit coordinates is theirs and the nuisances'."""
+    """The mechanisms of a model, in order, and how one vector of fit coordinates is theirs and the nuisances'.
+
+    Attributes: `places` of each mechanism's parameters in that vector, by its name and theirs; `nuisances`, theirs.
+    """
 
     def __init__(
         self, mechanisms: Sequence[Mechanism], conditions: Conditions, kind: Kind, nuisances: Sequence[Parameter]
@@ -50,11 +53,11 @@ class Composition:
         own = parameters_together(mechanisms, conditions, kind)
         self.parameters = (*(parameter for group in own.values() for parameter in group), *nuisances)
         starts = np.cumsum([0, *(len(group) for group in own.values())])
-        self._places = {
+        self.places = {
             name: {parameter.name: start + index for index, parameter in enumerate(group)}
             for (name, group), start in zip(own.items(), starts[:-1], strict=True)
         }
-        self._nuisances = {parameter.name: int(starts[-1]) + index for index, parameter in enumerate(nuisances)}
+        self.nuisances = {parameter.name: int(starts[-1]) + index for index, parameter in enumerate(nuisances)}
         self._gain_spreads = {entry.name for entry in self.parameters if entry.acts_on == "gain_spread"}
         self._log = np.array([parameter.scale == "log" for parameter in self.parameters])
 
@@ -82,15 +85,15 @@ class Composition:
             np.concatenate([np.where(self._log, value[..., :count], 1.0), np.ones((*points, further))], axis=-1), -1, 0
         )
         seeds = variables(value, by_own if slopes else by_own[count:])
-        own = {name: {key: seeds[place] for key, place in places.items()} for name, places in self._places.items()}
-        for name, places in self._places.items():
+        own = {name: {key: seeds[place] for key, place in places.items()} for name, places in self.places.items()}
+        for name, places in self.places.items():
             for key, place in places.items():
                 other = self.parameters[place].relative_to
                 if other is not None:
                     own[name][key] = own[name][key] * own[name][other]
         return (
             dict(own),
-            {name: seeds[place] for name, place in self._nuisances.items()},
+            {name: seeds[place] for name, place in self.nuisances.items()},
             seeds[count:],
         )
 

@@ -40,7 +40,7 @@ class Response:
                 row += level * of_lines[design.line]
         return level * factor, slopes
 
-    def part(self, index: int | slice) -> "Response":
+    def part(self, index: int | slice | NDArray[np.intp]) -> "Response":
         """At some of several points."""
 
         def of(x: Differentiated) -> Differentiated:

@@ -1,0 +1,61 @@
+"""Functions as machine code: numba compiles them at set-up, and later processes load them from its cache.
+
+`python -m underskin.compiled` fills the cache. Modules of compiled functions (named in `KERNELS`) are imported where
+they are called, since the import of numba takes a tenth of a second and 50 MB that small answers can do without.
+"""
+
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import config
+from numba.core.caching import CacheImpl, InTreeCacheLocator
+
+KERNELS = (
+    "underskin.diagnosis.inference.cost_kernel",
+    "underskin.diagnosis.selection.process_kernel",
+    "underskin.mechanisms.models.sigma_kernel",
+)
+
+# Every processor of a kind runs the same code, so that a cache made on one serves another, and gives the same bytes.
+vars(config).update(CPU_NAME="generic", CPU_FEATURES="")
+
+Function = Callable[..., Any]
+
+
+class _BesideSource(InTreeCacheLocator):
+    """The cache in `__pycache__`, also where it was made at set-up and is read-only now."""
+
+    def ensure_cache_path(self) -> None:
+        """Ask for a folder that can be written only where it holds no cache yet."""
+        if not any(Path(self._cache_path).glob(f"{Path(self._py_file).stem}.*.nbi")):
+            super().ensure_cache_path()  # type: ignore[no-untyped-call]
+
+
+CacheImpl._locator_classes.insert(0, _BesideSource)
+
+
+def compiled(signature: str | None = None) -> Callable[[Function], Function]:
+    """A decorator: compiled for this signature when its module is imported, or within its callers where there is none.
+
+    Errors are those of NumPy: a division by zero is infinite.
+    """
+
+    def decorate(function: Function) -> Function:
+        if signature is None:
+            return numba.njit(function, error_model="numpy", inline="never")
+        return numba.njit(signature, cache=True, error_model="numpy")(function)
+
+    return decorate
+
+
+def compile_all() -> None:
+    """Fill the cache."""
+    for name in KERNELS:
+        importlib.import_module(name)
+
+
+if __name__ == "__main__":
+    compile_all()
