@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import NdBSpline, make_interp_spline
+from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
 
 from underskin.physics.charge_response import Sigma
 from underskin.surrogate.hdf5_format import SIGMA_SCHEMA
@@ -126,6 +126,14 @@ class SigmaTable(Table):
         """
         points, inside, shape = _points(self._profile_axes, a_over_h, r_over_h, load_parameter)
         return np.where(inside, self._profile(points), np.nan).reshape(shape)
+
+    def profile_over(self, r_over_h: Floats, a_over_h: Floats, cbrt_load: Floats) -> Floats:
+        """The same over a grid of these axes inside the domain, (r, a, L^(1/3))."""
+        values = self._profile.c
+        for axis, (knots, nodes) in enumerate(zip(self._profile.t, (a_over_h, r_over_h, cbrt_load), strict=True)):
+            at_nodes = BSpline.design_matrix(nodes, knots, 3).toarray()
+            values = np.moveaxis(np.tensordot(at_nodes, values, (1, axis)), 0, axis)
+        return values.transpose(1, 0, 2)
 
 
 def tables_folder() -> Path:

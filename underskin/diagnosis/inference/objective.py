@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from underskin.autodiff import contiguous
 from underskin.diagnosis.inference.frf_products import FrfProducts
 from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis, curvature_of_prior
-from underskin.diagnosis.inference.likelihood import Likelihoods, log_likelihoods
+from underskin.diagnosis.inference.likelihood import Likelihoods, log_likelihoods, normal_equations
 from underskin.diagnosis.inference.products import Products, joined
 from underskin.diagnosis.noise.noise_levels import SeveralLevels
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
@@ -155,14 +155,27 @@ class Evaluator:
                 if high > low
             ]
             return joined(parts, max(self.counts))
-        largest = max(hypothesis.frf_model.numbers for hypothesis in self.hypotheses)
-        at_once = max(_PREDICTED_AT_ONCE // (largest * (max(self.counts) if slopes else 1)), 1)
-        several = [slice(first, first + at_once) for first in range(0, len(points), at_once)]
+        several = self._at_once(points, max(self.counts) if slopes else 1)
         return joined([self._frf_products(points[some], slopes, place) for some in several], max(self.counts))
+
+    def _at_once(self, points: Points, variables: int) -> list[slice]:
+        """Which points are worked out at once, so that arrays with derivatives by so many variables stay small."""
+        largest = max(hypothesis.frf_model.numbers for hypothesis in self.hypotheses)
+        count = max(_PREDICTED_AT_ONCE // (largest * variables), 1)
+        return [slice(first, first + count) for first in range(0, len(points), count)]
 
     @cached_property
     def _models(self) -> FrfModels:
         return FrfModels([hypothesis.frf_model for hypothesis in self.hypotheses])
+
+    def place_slopes(self, points: Points) -> Floats:
+        """∂m/∂x and ∂m/∂y of recordings, before the dynamics (2, points, recordings)."""
+        slopes = np.empty((2, len(points), self.lines.recordings))
+        for some in self._at_once(points, 1):
+            part = points[some]
+            for rows, response in self._models.respond(part.owner, part.fit, slopes=False, place=True, lines=False):
+                slopes[:, some][:, rows] = response.place_slopes
+        return slopes
 
     def _frf_products(self, points: Points, slopes: bool, place: bool) -> FrfProducts:
         """The inner products at points that are worked out at once."""
@@ -236,7 +249,8 @@ class Evaluator:
 
         What is held or no parameter has gradient 0 and information 1 of its own.
         """
-        information, gradient = self.marginal(at).normal_equations(at.growth)
+        levels, bend = self.levels(at.points.covariance[:, None]), at.points.bend
+        information, gradient = normal_equations(self.lines, self.curvature, at.products, levels, bend, at.growth)
         owner = at.points.owner
         free = self.free[owner]
         precision = self._precision[owner]

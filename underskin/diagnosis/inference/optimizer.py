@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from underskin.diagnosis.inference.curve_starts import by_least_squares
 from underskin.diagnosis.inference.frf_products import FrfProducts
-from underskin.diagnosis.inference.hypothesis import FitPoint
+from underskin.diagnosis.inference.hypothesis import FitPoint, own_places
 from underskin.diagnosis.inference.objective import Evaluated, Evaluator, Places, Points
 from underskin.diagnosis.inference.products import Products, joined
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR, START_GAIN
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Floats
 
 __all__ = ["Evaluated", "Fitter"]
@@ -133,6 +134,17 @@ class Fitter(Evaluator):
         proportional = [[entry.proportional for entry in one.model.parameters] for one in self.hypotheses]
         return np.array([own.index(True) for own in proportional])
 
+    @cached_property
+    def _moves_place(self) -> NDArray[np.bool_]:
+        """Which parameters of each hypothesis may change how σ depends on the contact's place (hypotheses, parameters),
+        relative to σ: not d33, nor those of the dynamics."""
+        moves = np.zeros(self.low.shape, dtype=bool)
+        for number, hypothesis in enumerate(self.hypotheses):
+            moves[number, : self.counts[number]] = [not entry.proportional for entry in hypothesis.model.parameters]
+            for name, own in own_places(hypothesis.model.names, self.lines).items():
+                moves[number, own] &= not CATALOGUE[name].needs_lines
+        return moves
+
     def improve(self, start: Points, target: Target | None = None) -> Evaluated:
         """The most probable points near the starts; only roughly where their targets will not be reached."""
         if not self.lines.curves:
@@ -240,13 +252,13 @@ class Fitter(Evaluator):
         owner = at.points.owner
         step = _SLOPE_STEP * (self.high - self.low)[owner]
         step = np.where(at.points.fit + step <= self.high[owner], step, -step)
-        number, place = np.nonzero(self.free[owner])
+        number, place = np.nonzero(self.free[owner] & self._moves_place[owner])
         moved = at.points[number]
         fit = moved.fit.copy()
         fit[np.arange(len(fit)), place] += step[number, place]
-        slopes = [self.products(points, slopes=False, place=True) for points in (at.points, replace(moved, fit=fit))]
-        here, there = (_log_slopes(products) for products in slopes)
+        here, there = (_log_size(self.place_slopes(points)) for points in (at.points, replace(moved, fit=fit)))
         growth = np.zeros((len(at), here.shape[1], count))
+        growth[np.arange(len(at)), :, self._d33[owner]] = 2.0  # the response is proportional to d33
         growth[number, :, place] = (there - here[number]) / step[number, place][:, None]
         return replace(at, growth=growth)
 
@@ -270,7 +282,6 @@ class Fitter(Evaluator):
         return step, (gradient * step).sum(axis=1)
 
 
-def _log_slopes(products: Products) -> Floats:
-    """log |t|² (points, recordings) of the position's slopes; least where there are none."""
-    assert products.place_slopes is not None
-    return np.log((products.place_slopes**2).sum(axis=0) + 1e-300)
+def _log_size(slopes: Floats) -> Floats:
+    """log |t|² (points, recordings) of the position's slopes (2, points, recordings); least where there are none."""
+    return np.log((slopes**2).sum(axis=0) + 1e-300)

@@ -60,11 +60,11 @@ class FrfModels:
             self._alike.setdefault(model.structure, []).append(number)
         self._mechanisms = sorted(mechanisms.values(), key=_place_in_order)
 
-    def respond(self, owner: Indices, fit: Floats, *, slopes: bool, place: bool) -> list[Part]:
+    def respond(self, owner: Indices, fit: Floats, *, slopes: bool, place: bool, lines: bool = True) -> list[Part]:
         """The responses at points (points, parameters) of these models, in rising order of `owner`; each part holds
         some of them. Fit coordinates beyond those of a point's own model do not count.
 
-        Derivatives by the parameters and by the contact's place on request.
+        Derivatives by the parameters and by the contact's place on request; without `lines`, no line factors.
         """
         seeds = Seeds(fit, self._log[owner], owner, slopes=slopes, further=_POSITION if place else 0)
         edges = np.searchsorted(owner, np.arange(len(self._models) + 1))
@@ -74,7 +74,9 @@ class FrfModels:
             if present:
                 rows = {number: np.arange(edges[number], edges[number + 1]) for number in present}
                 for points, contacts in self._pressed(rows, seeds):
-                    parts.append((points, self._response(self._models[present[0]], points, contacts, seeds, place)))
+                    level, inside = self._level_and_inside(self._models[present[0]], points, contacts, seeds)
+                    of_lines = self._line_factor(self._models[present[0]], points, contacts, seeds) if lines else None
+                    parts.append((points, _response(level, inside, of_lines, seeds)))
         return parts
 
     def _pressed(self, rows: dict[int, Indices], seeds: Seeds) -> list[tuple[Indices, Contacts]]:
@@ -130,21 +132,14 @@ class FrfModels:
                     some = np.flatnonzero(has)
                     yield entry.mechanism, some, entry.values(points[some], seeds)
 
-    def _response(self, model: FrfModel, points: Indices, contacts: Contacts, seeds: Seeds, place: bool) -> Response:
-        """The response at points whose contacts have one structure; `model` is one of theirs."""
-        design = model.design
+    def _level_and_inside(
+        self, model: FrfModel, points: Indices, contacts: Contacts, seeds: Seeds
+    ) -> tuple[Differentiated, NDArray[np.bool_]]:
+        """The FRF before the dynamics [C/N] and which recordings are inside the table, at points whose contacts have
+        one structure; `model` is one of theirs."""
         sigma, inside = self._sigma_at_points(model, points, contacts, seeds)
-        level = self._level(model, points, contacts, sigma, seeds).spread(len(design.point))
-        lines = self._line_factor(model, points, contacts, seeds)
-        count = seeds.variables - len(seeds.position)
-        if lines is not None:
-            lines = Differentiated(lines.value, lines.slopes[:count])
-        return Response(
-            Differentiated(level.value, level.slopes[:count]),
-            level.slopes[count:] if place else None,
-            lines,
-            np.broadcast_to(inside, (len(points), inside.shape[-1]))[:, design.point],
-        )
+        level = self._level(model, points, contacts, sigma, seeds).spread(len(model.design.point))
+        return level, np.broadcast_to(inside, (len(points), inside.shape[-1]))[:, model.design.point]
 
     def _sigma_at_points(
         self, model: FrfModel, points: Indices, contacts: Contacts, seeds: Seeds
@@ -233,6 +228,16 @@ class FrfModels:
                 )
                 product = one.times(factor, some, count)
         return product
+
+
+def _response(level: Differentiated, inside: NDArray[np.bool_], lines: Differentiated | None, seeds: Seeds) -> Response:
+    """With the derivatives by the contact's place apart from the others."""
+    count, place = seeds.variables - len(seeds.position), None
+    if seeds.position:
+        place = level.slopes[count:]
+    if lines is not None:
+        lines = Differentiated(lines.value, lines.slopes[:count])
+    return Response(Differentiated(level.value, level.slopes[:count]), place, lines, inside)
 
 
 def _place_in_order(entry: Acting) -> tuple[int, int, str]:
