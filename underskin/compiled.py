@@ -16,6 +16,7 @@ from numba.core.caching import CacheImpl, InTreeCacheLocator
 KERNELS = (
     "underskin.diagnosis.inference.cost_kernel",
     "underskin.diagnosis.inference.normal_kernel",
+    "underskin.diagnosis.inference.pickup_kernel",
     "underskin.diagnosis.selection.process_kernel",
     "underskin.mechanisms.models.sigma_kernel",
 )
