@@ -4,8 +4,10 @@
 they are called, since the import of numba takes a tenth of a second and 50 MB that small answers can do without.
 """
 
+import hashlib
 import importlib
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ KERNELS = (
     "underskin.diagnosis.inference.pickup_kernel",
     "underskin.diagnosis.selection.process_kernel",
     "underskin.mechanisms.models.sigma_kernel",
+    "underskin.surrogate.table_kernel",
 )
 
 # Every processor of a kind runs the same code, so that a cache made on one serves another, and gives the same bytes.
@@ -34,6 +37,16 @@ class _BesideSource(InTreeCacheLocator):
         """Ask for a folder that can be written only where it holds no cache yet."""
         if not any(Path(self._cache_path).glob(f"{Path(self._py_file).stem}.*.nbi")):
             super().ensure_cache_path()  # type: ignore[no-untyped-call]
+
+    def get_source_stamp(self) -> bytes:
+        """A digest of all kernels, since one may hold functions of another."""
+        return _digest()
+
+
+@cache
+def _digest() -> bytes:
+    files = [Path(__file__).parents[1].joinpath(*name.split(".")).with_suffix(".py") for name in KERNELS]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).digest()
 
 
 CacheImpl._locator_classes.insert(0, _BesideSource)
@@ -53,11 +66,11 @@ def compiled(signature: str | None = None) -> Callable[[Function], Function]:
     return decorate
 
 
-def compile_all() -> None:
-    """Fill the cache."""
+def load_all() -> None:
+    """Load all compiled functions, and compile what the cache does not hold."""
     for name in KERNELS:
         importlib.import_module(name)
 
 
 if __name__ == "__main__":
-    compile_all()
+    load_all()
