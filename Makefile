@@ -10,6 +10,9 @@ TEST_PACKAGES = nginx openssl octave curl postgresql chromium
 # Two processes; the tests of one file stay in one of them, since they share servers.
 PYTEST = $(PYTHON) -m pytest --numprocesses 2 --dist loadfile
 
+# Modules stay compiled: servers, workers and commands start some hundred times in the tests.
+unexport PYTHONDONTWRITEBYTECODE
+
 PIP_INSTALL = $(PYTHON) -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help

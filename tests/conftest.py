@@ -78,8 +78,8 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
 
 
 def _refuse_servers_in_unit_tests(event: str, arguments: tuple[object, ...]) -> None:
-    if event == "subprocess.Popen" and _unit_test_under_way:
-        program, given = arguments[:2]
+    if event in ("subprocess.Popen", "tests.underskin") and _unit_test_under_way:
+        program, given = ("underskin", ["underskin", *arguments]) if event == "tests.underskin" else arguments[:2]
         words = [Path(str(word)).name for word in (given if isinstance(given, Sequence) else [program])]
         if (words[1:2] == ["serve"] and "--help" not in words) or words[0] in ("chromium", "initdb"):
             raise RuntimeError(f"{_unit_test_under_way} starts {words[0]}: it needs a marker (CONTRIBUTING.md)")

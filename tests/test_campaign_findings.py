@@ -11,7 +11,8 @@ import httpx
 import pytest
 
 from tests.service.pages.forms import BROWSING, token_of
-from tests.support.server import UNDERSKIN, Server, running
+from tests.support import preloaded
+from tests.support.server import Server, running
 from tests.support.store_server import campaign
 from underskin.recordings.campaign import parse
 from underskin.recordings.plausibility import implausible
@@ -82,7 +83,7 @@ def test_what_is_told_of_times_and_places(document: dict[str, Any], told: Sequen
 
 
 def underskin(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run([UNDERSKIN, *arguments], cwd=folder, capture_output=True, text=True)
+    return preloaded.run(*arguments, folder=folder)
 
 
 @pytest.mark.slow

@@ -1,7 +1,6 @@
 """A key that comes twice in one object of a JSON or YAML document is refused, wherever such a document comes in."""
 
 import json
-import subprocess
 import time
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.support import preloaded
 from tests.support.repository import ROOT
-from tests.support.store_server import UNDERSKIN
 from underskin.errors import FileError
 from underskin.recordings import read_file, rig_description
 from underskin.recordings.readers.repeated_keys import RepeatedKey, repeated_key
@@ -141,7 +140,7 @@ def test_a_problem_says_what_comes_twice(http: httpx.Client) -> None:
 @pytest.mark.slow
 def test_the_command_line_names_file_line_and_column(tmp_path: Path) -> None:
     (tmp_path / "monday.json").write_text(TWICE)
-    found = subprocess.run([UNDERSKIN, "d33", "monday.json"], cwd=tmp_path, capture_output=True, text=True)
+    found = preloaded.run("d33", "monday.json", folder=tmp_path)
     assert found.returncode == 2
     line = TWICE[: TWICE.rindex('"thickness_mm"')].count("\n") + 1
     expected = f"monday.json: line {line}, column 2: the key 'thickness_mm' must be given once in its object"

@@ -3,7 +3,6 @@
 import csv
 import io
 import json
-import subprocess
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +11,8 @@ import httpx
 import numpy as np
 import pytest
 
-from tests.array_stress.stress_documents import COMMAND, PRESS, SKIN, Document, document, posted
+from tests.array_stress.stress_documents import PRESS, SKIN, Document, document, posted
+from tests.support import preloaded
 from tests.support.sphere_contact import SphereOnLayer
 from underskin import Client
 from underskin.array_stress.answer import answer
@@ -162,12 +162,10 @@ def test_client_and_command_give_the_services_numbers(http: httpx.Client, server
     assert found.status.tolist() == plain["status"]
     file = tmp_path / "load.json"
     file.write_text(json.dumps(request), encoding="utf-8-sig")  # as some editors write it
-    written = subprocess.run([COMMAND, "stress", file, "--csv"], capture_output=True, text=True, check=True).stdout
+    written = preloaded.run("stress", file, "--csv").stdout
     rows = list(csv.DictReader(io.StringIO(written)))
     assert [float(row["charge_pc"]) for row in rows] == plain["charge_pc"]
-    shown = subprocess.run(
-        [COMMAND, "stress", "-"], input=json.dumps(request), capture_output=True, text=True, check=True
-    ).stdout
+    shown = preloaded.run("stress", "-", given=json.dumps(request)).stdout
     first_words = [line.split()[0] for line in shown.splitlines() if line.strip()]
     assert [word for word in first_words if word in found.sensor] == ["s0", "s1", "s2", "s3", "s4"]
     assert found.contact_radius_mm == pytest.approx(plain["contact_radius_mm"])
@@ -217,18 +215,16 @@ def test_the_command_takes_a_map_from_csv(tmp_path: Path) -> None:
     pressed.write_text("y_mm \\ x_mm,7,8,9\n-1,0,0.1,0\n0,0.1,0.3,0.1\n1,0,0.1,0\n")
     drawn = {"x_mm": [7, 8, 9], "y_mm": [-1, 0, 1], "pressure_mpa": [[0, 0.1, 0], [0.1, 0.3, 0.1], [0, 0.1, 0]]}
     expected = answer(TABLE, read_request({**SKIN, "pressure_map": drawn})).columns["charge_pc"].tolist()
-    command: list[str | Path] = [COMMAND, "stress", skin, "--pressure-map", pressed, "--csv"]
-    rows = csv.DictReader(io.StringIO(subprocess.run(command, capture_output=True, text=True, check=True).stdout))
+    command = ("stress", skin, "--pressure-map", pressed, "--csv")
+    rows = csv.DictReader(io.StringIO(preloaded.run(*command).stdout))
     assert [(row["sensor"], float(row["charge_pc"])) for row in rows] == list(
         zip(["s0", "s1", "s2", "s3", "s4"], expected, strict=True)
     )
     pressed.write_bytes("mm;7;8;9;\r\n-1;0;0,1;0;\r\n0;0,1;0,3;0,1;\r\n1;0;0,1;0;\r\n;;;;\r\n".encode("utf-16"))
-    spreadsheet = csv.DictReader(
-        io.StringIO(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
-    )
+    spreadsheet = csv.DictReader(io.StringIO(preloaded.run(*command).stdout))
     assert [float(row["charge_pc"]) for row in spreadsheet] == expected
     skin.write_text(json.dumps({**SKIN, "pressure_map": drawn}))
-    refused = subprocess.run(command, capture_output=True, text=True)
+    refused = preloaded.run(*command)
     assert (refused.returncode, "give it once" in refused.stderr) == (2, True), refused.stderr
     skin.write_text(json.dumps(SKIN))
     for content, says in (
@@ -241,5 +237,5 @@ def test_the_command_takes_a_map_from_csv(tmp_path: Path) -> None:
         (",1,2\n0,1,1\n1,nan,1\n", "pressure_map = 'nan': must be a finite number (line 3, cell 2 of"),
     ):
         pressed.write_text(content)
-        refused = subprocess.run(command, capture_output=True, text=True)
+        refused = preloaded.run(*command)
         assert (refused.returncode, says in refused.stderr) == (2, True), refused.stderr

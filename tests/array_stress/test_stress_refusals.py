@@ -1,7 +1,6 @@
 """Loads on an array that cannot be are refused by name; answers that are doubtful say why."""
 
 import json
-import subprocess
 from collections.abc import Callable
 from copy import deepcopy
 from pathlib import Path
@@ -12,7 +11,8 @@ import numpy as np
 import pytest
 
 from service.routes.stress import EXAMPLE
-from tests.array_stress.stress_documents import COMMAND, PRESS, SKIN, Document, document, posted
+from tests.array_stress.stress_documents import PRESS, SKIN, Document, document, posted
+from tests.support import preloaded
 
 
 def map_of(**changes: Any) -> Callable[[Document], None]:
@@ -123,7 +123,7 @@ def test_nan_is_refused_and_a_batch_too_large_says_so(http: httpx.Client) -> Non
 @pytest.mark.slow
 def test_the_command_names_what_is_wrong(tmp_path: Path) -> None:
     file = tmp_path / "load.json"
-    missing = subprocess.run([COMMAND, "stress", tmp_path / "none.json"], capture_output=True, text=True)
+    missing = preloaded.run("stress", tmp_path / "none.json")
     assert (missing.returncode, "No such file" in missing.stderr) == (2, True)
     for content, says in (
         ("{", "line 1, column 2: not JSON"),
@@ -131,7 +131,7 @@ def test_the_command_names_what_is_wrong(tmp_path: Path) -> None:
         ("[]", "named fields"),
     ):
         file.write_text(content)
-        refused = subprocess.run([COMMAND, "stress", file], capture_output=True, text=True)
+        refused = preloaded.run("stress", file)
         assert refused.returncode == 2
         assert says in refused.stderr
         assert len(refused.stderr.splitlines()) == 1
@@ -180,7 +180,7 @@ def test_doubtful_answers_say_why(http: httpx.Client, tmp_path: Path) -> None:
     assert "spans 0.01 mm, on sensors 3 mm across: is it in mm?" in found["statement"]
     file = tmp_path / "load.json"
     file.write_text(json.dumps(document(hard)))
-    written = subprocess.run([COMMAND, "stress", file], capture_output=True, text=True, check=True)
+    written = preloaded.run("stress", file)
     assert written.stderr.startswith("underskin: look at contacts[0]: L = F/(R²E) is 0.12")
 
 

@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from tests.support import preloaded
+
 COMMAND = Path(sys.executable).with_name("underskin")
 PRESSED: dict[str, Any] = {
     "thickness_mm": 2.5,
@@ -17,13 +19,15 @@ SKIN = [part for name, value in PRESSED.items() for part in ("--" + name.replace
 FRF = ["frf", *SKIN, "--d33-pc-per-n", "14"]
 
 
-def run(*arguments: str, given: str | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
+def run(*arguments: str, given: str = "", **environment: str) -> subprocess.CompletedProcess[str]:
     """The command's result; `given` is its standard input."""
     plain = {**os.environ, "COLUMNS": "120", **environment}
-    return subprocess.run([COMMAND, *arguments], input=given, env=plain, capture_output=True, text=True)
+    if any(name.startswith("PYTHON") for name in environment):  # read at the start of the interpreter
+        return subprocess.run([COMMAND, *arguments], input=given, env=plain, capture_output=True, text=True)
+    return preloaded.run(*arguments, given=given, environment=plain)
 
 
-def refused(*arguments: str, given: str | None = None, **environment: str) -> str:
+def refused(*arguments: str, given: str = "", **environment: str) -> str:
     """The one line on stderr of a command that ends with status 2."""
     answer = run(*arguments, given=given, **environment)
     assert (answer.returncode, answer.stdout) == (2, "")

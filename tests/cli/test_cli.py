@@ -14,7 +14,7 @@ from tests.cli.commands import COMMAND, FRF, PRESSED, SKIN, refused, run
 from underskin import Client
 
 
-def columns(*arguments: str, given: str | None = None) -> dict[str, list[str]]:
+def columns(*arguments: str, given: str = "") -> dict[str, list[str]]:
     """The columns that a command writes with --csv."""
     answer = run(*arguments, "--csv", given=given)
     assert (answer.returncode, answer.stderr) == (0, "")

@@ -2,7 +2,6 @@
 
 import http.server
 import os
-import subprocess
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +11,8 @@ import numpy as np
 import pytest
 
 import underskin
-from tests.support.server import UNDERSKIN, running
+from tests.support import preloaded
+from tests.support.server import running
 from underskin import Client, Indenter, ServiceError, Skin, Unreachable
 from underskin.physics import half_space
 from underskin.surrogate.influence_table import load_influence
@@ -142,10 +142,7 @@ def test_slip_of_units_can_be_meant(client: Client) -> None:
 
 
 def test_key_is_sent_and_a_wrong_one_is_refused(tmp_path: Path) -> None:
-    create = [str(UNDERSKIN), "key", "create", "lab"]
-    made = subprocess.run(
-        create, env={**os.environ, "UNDERSKIN_DATA": str(tmp_path / "data")}, capture_output=True, text=True, check=True
-    )
+    made = preloaded.run("key", "create", "lab", environment=os.environ | {"UNDERSKIN_DATA": str(tmp_path / "data")})
     with running(tmp_path, {}, "--host", "0.0.0.0") as keyed:
         with Client(keyed.url, api_key=made.stdout.strip()) as client:
             assert client.sigma(0.3, 0.6).status == "ok"

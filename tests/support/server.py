@@ -2,8 +2,6 @@
 
 import os
 import socket
-import subprocess
-import sys
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -12,7 +10,8 @@ from pathlib import Path
 
 import httpx
 
-UNDERSKIN = Path(sys.executable).with_name("underskin")
+from tests.support import preloaded
+
 _START_LIMIT = 30.0  # s
 
 
@@ -21,7 +20,7 @@ class Server:
     """A running `underskin serve`."""
 
     url: str
-    process: subprocess.Popen[bytes]
+    process: preloaded.Process
     log: Path
 
 
@@ -44,9 +43,8 @@ def running(folder: Path, settings: Mapping[str, str] | None = None, *options: s
         **dict(settings or {}),
     }
     with log.open("wb") as errors:
-        process = subprocess.Popen(
-            [UNDERSKIN, "serve", "--port", str(port), *options], env=environment, stdout=errors, stderr=errors
-        )
+        files = (0, errors.fileno(), errors.fileno())
+        process = preloaded.start(["serve", "--port", str(port), *options], environment, files)
     try:
         url = f"http://127.0.0.1:{port}"
         _await_ready(url, process, log)
@@ -56,7 +54,7 @@ def running(folder: Path, settings: Mapping[str, str] | None = None, *options: s
         process.wait(20)
 
 
-def _await_ready(url: str, process: subprocess.Popen[bytes], log: Path) -> None:
+def _await_ready(url: str, process: preloaded.Process, log: Path) -> None:
     end = time.monotonic() + _START_LIMIT
     while time.monotonic() < end and process.poll() is None:
         try:

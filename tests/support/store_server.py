@@ -4,7 +4,6 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,7 +15,7 @@ from zlib import crc32
 import httpx
 import numpy as np
 
-UNDERSKIN = str(Path(sys.executable).with_name("underskin"))
+from tests.support import preloaded
 
 
 @dataclass
@@ -33,14 +32,14 @@ class Place:
 
     def command(self, *arguments: str) -> "subprocess.CompletedProcess[str]":
         """Run `underskin` to its end."""
-        return subprocess.run([UNDERSKIN, *arguments], env=self.environment(), capture_output=True, text=True)
+        return preloaded.run(*arguments, environment=self.environment())
 
 
 @dataclass
 class Server:
     """A running server and a client of it."""
 
-    process: "subprocess.Popen[bytes]"
+    process: preloaded.Process
     http: httpx.Client
     place: Place
 
@@ -59,7 +58,7 @@ def running(place: Place, *, key: str | None = None, **settings: str) -> Iterato
     log = place.folder.parent / f"{place.folder.name}.log"
     headers = {} if key is None else {"Authorization": f"Bearer {key}"}
     with log.open("ab") as stderr:
-        process = subprocess.Popen([UNDERSKIN, "serve", "--port", str(port)], env=environment, stderr=stderr)
+        process = preloaded.start(["serve", "--port", str(port)], environment, (0, 1, stderr.fileno()))
     try:
         with httpx.Client(base_url=f"http://127.0.0.1:{port}", headers=headers, timeout=60) as client:
             _wait_until_ready(client, process, log)
@@ -69,7 +68,7 @@ def running(place: Place, *, key: str | None = None, **settings: str) -> Iterato
         process.wait()
 
 
-def _wait_until_ready(client: httpx.Client, process: "subprocess.Popen[bytes]", log: Path) -> None:
+def _wait_until_ready(client: httpx.Client, process: preloaded.Process, log: Path) -> None:
     deadline = time.monotonic() + 120  # a machine may be busy
     while time.monotonic() < deadline:
         assert process.poll() is None, log.read_text()[-2000:]

@@ -17,7 +17,8 @@ from service.auth.keys import KeyStore
 from service.auth.session import COOKIE, logged_in
 from tests.service.connections import BODIES
 from tests.service.requests import SIGMA, all_routes, problem_of
-from tests.support.server import UNDERSKIN, Server, running
+from tests.support import preloaded
+from tests.support.server import Server, running
 from underskin import InvalidInput
 
 OPEN = {"/health", "/ready"}
@@ -28,7 +29,7 @@ FOREIGN = ["http://evil.example", "https://evil.example:8000", "null", "http://1
 def command(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """`underskin` on the data of the server in `folder`."""
     settings = {**os.environ, "UNDERSKIN_DATA": str(folder / "data"), **environment}
-    return subprocess.run([UNDERSKIN, *arguments], env=settings, capture_output=True, text=True, timeout=60)
+    return preloaded.run(*arguments, environment=settings)
 
 
 def keys_in(folder: Path) -> KeyStore:

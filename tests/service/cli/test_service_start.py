@@ -5,7 +5,6 @@ import os
 import shutil
 import signal
 import socket
-import subprocess
 from pathlib import Path
 
 import h5py
@@ -15,16 +14,15 @@ import pytest
 from service.settings import Settings
 from tests.service.connections import HEAD, connect, read_answer
 from tests.service.requests import SIGMA, problem_of
-from tests.support.server import UNDERSKIN, running
+from tests.support import preloaded
+from tests.support.server import running
 from underskin.surrogate.sigma_table import SIGMA_TABLE, tables_folder
 
 
 def refusal(folder: Path, *options: str, **environment: str) -> str:
     """The one line on stderr with which `underskin serve` ends."""
     settings = {**os.environ, "UNDERSKIN_DATA": str(folder / "data"), **environment}
-    ended = subprocess.run(
-        [UNDERSKIN, "serve", "--port", "0", *options], env=settings, capture_output=True, text=True, timeout=60
-    )
+    ended = preloaded.run("serve", "--port", "0", *options, environment=settings)
     assert (ended.returncode, ended.stdout) == (1, "")
     (line,) = ended.stderr.splitlines()
     assert line.startswith("underskin: ")
@@ -52,9 +50,8 @@ def test_a_data_folder_is_made_for_its_owner_alone_and_one_that_is_there_stays_a
     own, shared = tmp_path / "own", tmp_path / "shared"
     shared.mkdir(mode=0o755)
     for folder, mode in ((own, 0o700), (shared, 0o755)):
-        subprocess.run(
-            [UNDERSKIN, "key", "create", "lab"], env=os.environ | {"UNDERSKIN_DATA": str(folder)}, check=True
-        )
+        made = preloaded.run("key", "create", "lab", environment=os.environ | {"UNDERSKIN_DATA": str(folder)})
+        assert made.returncode == 0
         assert folder.stat().st_mode & 0o777 == mode
 
 

@@ -1,8 +1,8 @@
 """Request ids, the log and the metrics of a real server."""
 
 import json
+import os
 import re
-import subprocess
 import time
 from collections.abc import Iterator
 from datetime import datetime
@@ -12,7 +12,8 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.support.server import UNDERSKIN, Server, running
+from tests.support import preloaded
+from tests.support.server import Server, running
 
 SIGMA = "/v1/sigma?a_over_h=0.3&rt_over_h=0.6"
 
@@ -106,8 +107,7 @@ def test_what_waits_is_written_when_the_server_stops(tmp_path: Path) -> None:
 
 def test_the_key_is_named_and_never_written(tmp_path: Path) -> None:
     environment = {"UNDERSKIN_DATA": str(tmp_path / "data")}
-    command = [str(UNDERSKIN), "key", "create", "bench-7"]
-    made = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    made = preloaded.run("key", "create", "bench-7", environment=os.environ | environment)
     token = made.stdout.split()[-1]
     with running(tmp_path) as started:
         asked = httpx.get(started.url + SIGMA, headers={"Authorization": f"Bearer {token}"})
