@@ -181,12 +181,7 @@ class PickupProducts:
         assert levels.pickup is not None
         if self.v is None:
             return sums
-        lost = self.rows.lost(levels.pickup[:, 0], levels.level[:, 0])[:, None]
-        v, summed = self.v, self.rows.summed
-        uv = sums.uv - np.moveaxis(summed(lost, (self.u[:, None].conj() * v).real), 1, -1)
-        vy = sums.vy - np.moveaxis(summed(lost, (v.conj() * self.rows.value).real), 1, -1)
-        vv = summed(lost[:, None], (v[:, :, None].conj() * v[:, None]).real)
-        return SlopeSums(uv, vy, sums.vv - np.moveaxis(vv, -1, 1))
+        return self.rows.slopes_less(sums, self.u, self.v, levels.pickup[:, 0], levels.level[:, 0, 0])
 
 
 def _over_rows(matrix: csr_array, values: Floats) -> Floats:

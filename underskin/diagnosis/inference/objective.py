@@ -28,7 +28,7 @@ _LARGEST_STEP = 0.7  # of a Newton step in a noise level's logarithm: a factor o
 _STEP = 0.05  # of the finite differences in the covariance's logarithms
 _FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
 _NUMBERS_AT_ONCE = 500_000
-_PREDICTED_AT_ONCE = 4_000_000
+_PREDICTED_AT_ONCE = 2_000_000
 _BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
 
 Places = NDArray[np.intp]
@@ -155,13 +155,13 @@ class Evaluator:
                 if high > low
             ]
             return joined(parts, max(self.counts))
-        several = self._at_once(points, max(self.counts) if slopes else 1)
+        several = self._at_once(points, max(self.counts) if slopes else 0)
         return joined([self._frf_products(points[some], slopes, place) for some in several], max(self.counts))
 
     def _at_once(self, points: Points, variables: int) -> list[slice]:
         """Which points are worked out at once, so that arrays with derivatives by so many variables stay small."""
-        largest = max(hypothesis.frf_model.numbers for hypothesis in self.hypotheses)
-        count = max(_PREDICTED_AT_ONCE // (largest * variables), 1)
+        largest = max(hypothesis.frf_model.numbers(variables) for hypothesis in self.hypotheses)
+        count = max(_PREDICTED_AT_ONCE // largest, 1)
         return [slice(first, first + count) for first in range(0, len(points), count)]
 
     @cached_property
@@ -171,7 +171,7 @@ class Evaluator:
     def place_slopes(self, points: Points) -> Floats:
         """∂m/∂x and ∂m/∂y of recordings, before the dynamics (2, points, recordings)."""
         slopes = np.empty((2, len(points), self.lines.recordings))
-        for some in self._at_once(points, 1):
+        for some in self._at_once(points, 0):
             part = points[some]
             for rows, response in self._models.respond(part.owner, part.fit, slopes=False, place=True, lines=False):
                 slopes[:, some][:, rows] = response.place_slopes

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.compiled import compiled
-from underskin.units import Floats
+from underskin.units import Array, Floats
 
 _TOGETHER = 8  # factors of the determinant whose logarithm is taken together: below 1e38 each, they do not overflow
 _SUMS = "float64[:, :, ::1]"
@@ -57,3 +57,45 @@ def lost(
                     total += np.log(determinant)
                     determinant = 1.0
             log_determinant[point, number] += 2 * (total + np.log(determinant))
+
+
+@compiled(
+    f"void(float64[:, ::1], float64[::1], float64[::1], int64[::1], complex128[::1], complex128[:, ::1], "
+    f"complex128[:, :, ::1], {_SUMS}, {_SUMS}, float64[:, :, :, ::1])"
+)
+def slopes_lost(
+    pickup: Floats,
+    level: Floats,
+    variance: Floats,
+    recording: NDArray[np.int64],
+    y: Array,
+    u: Array,
+    v: Array,
+    uv: Floats,
+    vy: Floats,
+    vv: Floats,
+) -> None:
+    """Take from `uv`, `vy` (points, recordings, P) and `vv` (points, recordings, P, P) what rows lose.
+
+    Parameters
+    ----------
+    pickup, level
+        q (points, rows) and κ (points,).
+    variance, recording, y
+        d², the recording and the measured value of each row.
+    u, v
+        The direction (points, rows), and its derivatives (points, P, rows).
+    """
+    points, count, rows = v.shape
+    for point in range(points):
+        inverse = 1 / level[point] ** 2
+        for row in range(rows):
+            ratio = pickup[point, row] ** 2 * inverse / variance[row]
+            less, of = ratio / ((1 + ratio) * variance[row]), recording[row]
+            for p in range(count):
+                of_p = v[point, p, row]
+                uv[point, of, p] -= less * (u[point, row].real * of_p.real + u[point, row].imag * of_p.imag)
+                vy[point, of, p] -= less * (y[row].real * of_p.real + y[row].imag * of_p.imag)
+                for q in range(count):
+                    of_q = v[point, q, row]
+                    vv[point, of, p, q] -= less * (of_p.real * of_q.real + of_p.imag * of_q.imag)

@@ -4,7 +4,7 @@ import numpy as np
 
 from underskin.autodiff import contiguous
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.sums import Sums
+from underskin.diagnosis.inference.sums import SlopeSums, Sums
 from underskin.mechanisms.models.frf_design import Indices
 from underskin.units import Array, Floats
 
@@ -22,8 +22,6 @@ class PickupRows:
         self._square = self.value.real**2 + self.value.imag**2
         self._recordings = lines.recordings
         self._recording = lines.recording[rows]
-        self._first = np.flatnonzero(np.diff(self._recording, prepend=-1))
-        self._owner = self._recording[self._first]
         self.line = line[rows]
 
     def less(self, sums: Sums, u: Array, pickup: Floats, level: Floats) -> Sums:
@@ -40,14 +38,14 @@ class PickupRows:
         lost(*arrays, *map(contiguous, of_rows), uu, uy, yy, log_determinant)
         return Sums(uu, uy, yy, log_determinant[..., None])
 
-    def lost(self, pickup: Floats, level: Floats) -> Floats:
-        """The weight that rows lose to pick-up of these deviations (…, pick-up rows), of 1/d² each."""
-        ratio = pickup**2 / (level**2 * self._variance)
-        return ratio / (1 + ratio) / self._variance
+    def slopes_less(self, sums: SlopeSums, u: Array, v: Array, pickup: Floats, level: Floats) -> SlopeSums:
+        """The sums with derivatives v (points, parameters, pick-up rows) less what rows lose, likewise; deviations are
+        (points, pick-up rows), levels (points,)."""
+        from underskin.diagnosis.inference.pickup_kernel import slopes_lost
 
-    def summed(self, lost: Floats, products: Array) -> Floats:
-        """What sums of products lose in each recording, rows (…, pick-up rows) to (…, recordings)."""
-        losses = lost * products
-        sums = np.zeros((*losses.shape[:-1], self._recordings))
-        sums[..., self._owner] = np.add.reduceat(losses, self._first, axis=-1)
-        return sums
+        pickup = contiguous(np.broadcast_to(pickup, u.shape))
+        level = contiguous(np.broadcast_to(level, u.shape[:1]))
+        of_rows = self._variance, self._recording, self.value, contiguous(u.astype(complex, copy=False))
+        uv, vy, vv = (np.array(x) for x in (sums.uv, sums.vy, sums.vv))
+        slopes_lost(pickup, level, *of_rows, contiguous(v.astype(complex, copy=False)), uv, vy, vv)
+        return SlopeSums(uv, vy, vv)

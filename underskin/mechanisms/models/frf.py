@@ -111,12 +111,11 @@ class FrfModel:
             inside=response.inside[self.recording],
         )
 
-    @property
-    def numbers(self) -> int:
-        """How many numbers a response without derivatives takes, roughly: bounds the points that are worked out at
-        once."""
+    def numbers(self, variables: int) -> int:
+        """How many numbers the largest arrays of a response with derivatives by so many variables take, roughly: bounds
+        the points that are worked out at once."""
         contacts, lines = len(self.force.ravel()), len(self.design.line_frequency)
-        return _QUANTITIES * contacts * self.sigma.wavenumbers + lines
+        return _QUANTITIES * contacts * self.sigma.wavenumbers + 2 * (1 + variables) * lines
 
     @property
     def structure(self) -> Hashable:
@@ -133,16 +132,12 @@ class FrfModel:
         """Where in the fit coordinates a mechanism's parameters are, by their names."""
         return self._composition.places[mechanism.name]
 
-    @cached_property
-    def _alone(self) -> FrfModels:
-        return FrfModels([self])
-
     def respond(self, fit: Floats, *, slopes: bool = True, place: bool = False) -> Response:
         """The response at points (…, parameters); its derivatives by the parameters and by the contact's place on
         request."""
         several = np.atleast_2d(fit)
         owner = np.zeros(len(several), dtype=np.intp)
-        parts = self._alone.respond(owner, several, slopes=slopes, place=place)
+        parts = FrfModels([self]).respond(owner, several, slopes=slopes, place=place)
         response = joined([part for _, part in parts]).part(np.argsort(np.concatenate([points for points, _ in parts])))
         return response if fit.ndim > 1 else response.part(0)
 
