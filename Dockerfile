@@ -11,8 +11,9 @@ COPY tablegen /app/tablegen
 COPY rig /app/rig
 COPY tables /app/tables
 RUN /opt/venv/bin/pip install --quiet --no-index --no-build-isolation -e '/app[server,fem]'
-# The root is read-only later, so byte code is written now; the packages' own test suites and pip are not needed any more.
-RUN python3 -m compileall -q /app && \
+# The root is read-only later, so byte code and machine code are written now; the packages' own test suites and pip are
+# not needed any more.
+RUN python3 -m compileall -q /app && /opt/venv/bin/python -m underskin.compiled && \
     find /opt/venv -type d -name tests -prune -exec rm -rf {} + && \
     /opt/venv/bin/pip uninstall --quiet --yes hatchling editables pip
 

@@ -83,6 +83,7 @@ $(VENV)/.runtime: $(VENV)/.created requirements.lock pyproject.toml
 	@echo "Installing the locked packages into $(VENV) ..."
 	@$(PIP_INSTALL) --require-hashes -r requirements.lock
 	@$(PIP_INSTALL) --no-index --no-build-isolation -e '.[server,fem]'
+	@$(PYTHON) -m underskin.compiled
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.runtime requirements-dev.lock

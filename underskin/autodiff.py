@@ -5,11 +5,13 @@ Only what physics and mechanisms need: arithmetic, a few functions, selecting ro
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from underskin.units import Array, Indices, Mask
+from underskin.units import Array
 
 
 class Differentiated:
@@ -78,6 +80,30 @@ class Differentiated:
             np.broadcast_to(self.slopes, (*self.slopes.shape[:-1], rows)),
         )
 
+    def at_points(self, some: NDArray[np.intp] | None) -> Differentiated:
+        """At some of several points (points, rows), at all for None."""
+        if some is None or len(self.value) == 1:
+            return self
+        return Differentiated(self.value[some], self.slopes[:, some])
+
+    def times(self, factor: Differentiated | None, some: NDArray[np.intp] | None, points: int) -> Differentiated:
+        """With those at some of so many points multiplied; None stands for 1, and for all."""
+        if factor is None:
+            return self
+        return self * factor if some is None else self._with(some, self.at_points(some) * factor, points)
+
+    def plus(self, term: Differentiated, some: NDArray[np.intp] | None, points: int) -> Differentiated:
+        """With something added to those at some of so many points; None stands for all."""
+        return self + term if some is None else self._with(some, self.at_points(some) + term, points)
+
+    def _with(self, some: NDArray[np.intp], changed: Differentiated, points: int) -> Differentiated:
+        shape = points, max(self.value.shape[-1], changed.value.shape[-1])
+        dtype = np.result_type(self.value, changed.value)
+        value = np.broadcast_to(self.value, shape).astype(dtype)
+        slopes = np.broadcast_to(self.slopes, (len(self.slopes), *shape)).astype(dtype)
+        value[some], slopes[:, some] = changed.value, changed.slopes
+        return Differentiated(value, slopes)
+
 
 def exp(x: Differentiated) -> Differentiated:
     """e^x, with the derivative e^x x′."""
@@ -115,7 +141,7 @@ def chain(value: Array, *terms: tuple[Array, Differentiated]) -> Differentiated:
     return Differentiated(value, np.asarray(slopes))
 
 
-def where(condition: Mask, yes: Differentiated, no: Differentiated | float) -> Differentiated:
+def where(condition: NDArray[np.bool_], yes: Differentiated, no: Differentiated | float) -> Differentiated:
     """`yes` in the rows where `condition` (rows,) holds, `no` in the others."""
     if not isinstance(no, Differentiated):
         return Differentiated(np.where(condition, yes.value, no), np.where(condition, yes.slopes, 0.0))
@@ -147,7 +173,42 @@ def variables(values: Array, slopes: Array) -> list[Differentiated]:
     return [Differentiated(values[..., [place]], slopes[..., [place]]) for place in range(values.shape[-1])]
 
 
-def sum_rows(x: Differentiated, owner: Indices, rows: int) -> Differentiated:
+def stacked(parts: Sequence[Differentiated], points: Sequence[int]) -> Differentiated:
+    """Several with (points, rows) one after another, each with so many points."""
+    if len(parts) == 1:
+        return parts[0]
+    rows = max(part.value.shape[-1] for part in parts)
+    shapes = [(count, rows) for count in points]
+    value = [np.broadcast_to(part.value, shape) for part, shape in zip(parts, shapes, strict=True)]
+    slopes = [
+        np.broadcast_to(part.slopes, (len(part.slopes), *shape)) for part, shape in zip(parts, shapes, strict=True)
+    ]
+    return Differentiated(np.concatenate(value), np.concatenate(slopes, axis=1))
+
+
+def as_columns(x: Differentiated) -> tuple[Array, Array]:
+    """Value (points, rows) and derivatives (variables, points, rows) as contiguous arrays, for compiled functions."""
+    value, slopes = x.value, x.slopes
+    if slopes.shape[1:] != value.shape:
+        slopes = np.broadcast_to(slopes, (len(slopes), *value.shape))
+    if value.ndim != 2:
+        rows = value.shape[-1]
+        points = value.size // rows
+        value, slopes = value.reshape(points, rows), slopes.reshape(len(slopes), points, rows)
+    return contiguous(value), contiguous(slopes)
+
+
+def contiguous(x: Array) -> Array:
+    """The array as compiled functions take it: itself, or a copy where it is a view or read-only."""
+    return x if x.flags.c_contiguous and x.flags.writeable else x.copy()
+
+
+def unfilled(parameters: int, shape: tuple[int, ...]) -> Differentiated:
+    """What a compiled function is to fill, with derivatives by so many parameters."""
+    return Differentiated(np.empty(shape), np.empty((parameters, *shape)))
+
+
+def sum_rows(x: Differentiated, owner: NDArray[np.intp], rows: int) -> Differentiated:
     """Sums over groups of rows.
 
     Parameters
@@ -168,7 +229,7 @@ def sum_rows(x: Differentiated, owner: Indices, rows: int) -> Differentiated:
     return Differentiated(_summed(x.value, owner, rows), _summed(x.slopes, owner, rows))
 
 
-def _summed(terms: Array, owner: Indices, rows: int) -> Array:
+def _summed(terms: Array, owner: NDArray[np.intp], rows: int) -> Array:
     sets = int(np.prod(terms.shape[:-1]))
     place = (rows * np.arange(sets)[:, None] + owner).ravel()
     return np.bincount(place, terms.ravel(), sets * rows).reshape(*terms.shape[:-1], rows)

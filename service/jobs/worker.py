@@ -58,9 +58,11 @@ def main() -> None:
     _be_called("underskin-ready")
     for module in _LOADED:
         import_module(module)
+    from underskin.compiled import load_all
     from underskin.errors import UnderskinError
     from underskin.surrogate.sigma_table import load_table
 
+    load_all()
     try:
         table = load_table(Path(sys.argv[1]))
         problem = ""

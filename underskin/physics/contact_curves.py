@@ -16,6 +16,7 @@ row costs one product of `basis` with them. Both transforms are 1 at k = 0: that
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -75,8 +76,7 @@ class CurveGrid:
     """
 
     def __init__(self, wave_numbers: Floats) -> None:
-        self.interval = ChebyshevInterval(LARGEST_A_OVER_H, _NODES)
-        self.equation = ContactEquation(self.interval.nodes)
+        self.interval, self.equation = _at_nodes()
         s = np.multiply.outer(self.interval.nodes, wave_numbers)
         self.transforms = mode_transforms(s, self.equation.modes).transpose(0, 2, 1)
         self.table_basis = self.interval.basis(_TABLE)
@@ -84,6 +84,13 @@ class CurveGrid:
     def curves(self, layer: Layer) -> "ContactCurves":
         """The contact curves of one layer."""
         return ContactCurves(self, layer)
+
+
+@cache
+def _at_nodes() -> tuple[ChebyshevInterval, ContactEquation]:
+    """What does not depend on the wave numbers either."""
+    interval = ChebyshevInterval(LARGEST_A_OVER_H, _NODES)
+    return interval, ContactEquation(interval.nodes)
 
 
 class ContactCurves:

@@ -71,6 +71,11 @@ def _basis_functions(knots: Floats) -> Floats:
     return np.stack([np.asarray(basis(nodes, nu=order)) / math.factorial(order) for order in (3, 2, 1, 0)], axis=-1)
 
 
+def four_functions(knots: Floats) -> Floats:
+    """The four basis functions that differ from 0 in each cell, as cubics (cells, functions, powers)."""
+    return np.array(_of_cells(_basis_functions(np.asarray(knots))))
+
+
 def _of_cells(functions: Floats) -> list[Basis]:
     """The four basis functions that differ from 0 in each cell."""
     return [basis[cell : cell + 4].tolist() for cell, basis in enumerate(functions)]

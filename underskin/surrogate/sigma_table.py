@@ -7,19 +7,22 @@ proportional to the strain (a/R, Seminara 2018, equation 16). Rows outside the d
 import math
 import os
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import NdBSpline, make_interp_spline
+from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
 
+from underskin.autodiff import contiguous
 from underskin.physics.charge_response import Sigma
 from underskin.surrogate.hdf5_format import SIGMA_SCHEMA
-from underskin.surrogate.point_spline import PointSpline, cell_of
+from underskin.surrogate.point_spline import PointSpline, cell_of, four_functions
 from underskin.surrogate.table_file import Table
 from underskin.units import Floats
 
 SIGMA_TABLE = "sigma.h5"
+_MANY = 10_000  # rows
 
 
 class SigmaTable(Table):
@@ -67,6 +70,8 @@ class SigmaTable(Table):
         Sigma
             σ, the bound on its relative error, and which rows are inside; NaN where not.
         """
+        if max(map(np.size, (a_over_h, rt_over_h, load_parameter))) >= _MANY:
+            return self._sigma_of_many(a_over_h, rt_over_h, load_parameter)
         points, inside, shape = _points(self.axes, a_over_h, rt_over_h, load_parameter)
         sigma = self._sigma(points)
         rel_error = self._cell_error[_cells(self.axes, points)]
@@ -75,6 +80,29 @@ class SigmaTable(Table):
             sigma[outside] = np.nan
             rel_error[outside] = np.nan
         return Sigma(sigma.reshape(shape), rel_error.reshape(shape), inside.reshape(shape))
+
+    def _sigma_of_many(self, a_over_h: ArrayLike, rt_over_h: ArrayLike, load_parameter: ArrayLike) -> Sigma:
+        """The same by a compiled function, whose import takes longer than a few rows."""
+        from underskin.surrogate.table_kernel import sigma_rows
+
+        columns = np.asarray(a_over_h, dtype=float), np.asarray(rt_over_h, dtype=float), np.cbrt(load_parameter)
+        shape = np.broadcast_shapes(*(column.shape for column in columns))
+        rows = [np.broadcast_to(column, shape).ravel() for column in columns]
+        sigma, rel_error = np.empty(rows[0].size), np.empty(rows[0].size)
+        sigma_rows(self._coefficients, self._cell_error, *self._cells_of_axes, *map(contiguous, rows), sigma, rel_error)
+        return Sigma(sigma.reshape(shape), rel_error.reshape(shape), np.isfinite(sigma).reshape(shape))
+
+    @cached_property
+    def _cells_of_axes(self) -> list[Floats]:
+        """Of each axis the table's nodes, and the knots and functions of the spline's cells."""
+        parts: list[Floats] = []
+        for nodes, knots in zip(self.axes, self._sigma.t, strict=True):
+            parts += [contiguous(np.asarray(nodes)), contiguous(knots[3:-3]), four_functions(knots)]
+        return parts
+
+    @cached_property
+    def _coefficients(self) -> Floats:
+        return np.ascontiguousarray(self._sigma.c)
 
     def at(self, a_over_h: float, rt_over_h: float, load_parameter: float = 0.0) -> tuple[float, float] | None:
         """σ and the bound on its relative error at one point, without the cost of arrays; None outside the domain."""
@@ -126,6 +154,14 @@ class SigmaTable(Table):
         """
         points, inside, shape = _points(self._profile_axes, a_over_h, r_over_h, load_parameter)
         return np.where(inside, self._profile(points), np.nan).reshape(shape)
+
+    def profile_over(self, r_over_h: Floats, a_over_h: Floats, cbrt_load: Floats) -> Floats:
+        """The same over a grid of these axes inside the domain, (r, a, L^(1/3))."""
+        values = self._profile.c
+        for axis, (knots, nodes) in enumerate(zip(self._profile.t, (a_over_h, r_over_h, cbrt_load), strict=True)):
+            at_nodes = BSpline.design_matrix(nodes, knots, 3).toarray()
+            values = np.moveaxis(np.tensordot(at_nodes, values, (1, axis)), 0, axis)
+        return values.transpose(1, 0, 2)
 
 
 def tables_folder() -> Path:

@@ -4,7 +4,7 @@ Every set is fitted without positioning scatter and, where that could show, with
 two under their prior.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -18,7 +18,7 @@ from underskin.diagnosis.inference.likelihood import Curvature
 from underskin.diagnosis.inference.objective import Points
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.inference.position_curvature import curvature
-from underskin.diagnosis.inference.starts import best_starts
+from underskin.diagnosis.inference.starts import Beginning, best_starts
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import Model, compose
@@ -101,11 +101,15 @@ class FittingProblem:
         self.collapsed = lines.collapsed() if kind == "frf" else lines
         none = np.zeros(lines.recordings)
         self.curvature = curvature(self.collapsed, table) if kind == "frf" else Curvature(none, none)
+        self._models: dict[tuple[frozenset[str], bool], Model] = {}
 
     def hypothesis(self, names: Sequence[str], placed: bool, *, whole: bool = False) -> Hypothesis:
         """The set's model on the lines that it needs; raises Unsupported."""
-        lines = self.lines if whole or any(CATALOGUE[name].needs_lines for name in names) else self.collapsed
-        return Hypothesis(compose(names, lines.campaign, self.table, self.kind), lines, self.curvature, placed)
+        whole = whole or any(CATALOGUE[name].needs_lines for name in names)
+        lines, key = self.lines if whole else self.collapsed, (frozenset(names), whole)
+        if key not in self._models:
+            self._models[key] = compose(names, lines.campaign, self.table, self.kind)
+        return Hypothesis(self._models[key], lines, self.curvature, placed)
 
     def explain(self, requests: Sequence[Request], best: float = np.inf) -> list[Explanation | None]:
         """The sets' explanations.
@@ -116,13 +120,15 @@ class FittingProblem:
         """
         plain = [self.hypothesis(request.names, False) for request in requests]
         placed = [replace(hypothesis, placed=True) for hypothesis in plain]
-        starts: dict[bool, dict[int, Points]] = {False: {}, True: {}}  # without and with positioning scatter
-        for number, request in enumerate(requests):
-            scattered = not request.without_scatter
-            starts[scattered][number] = _starts((placed if scattered else plain)[number], request)
+        scattered = {number for number, request in enumerate(requests) if not request.without_scatter}
+        starts = _starts(
+            {number: plain[number] for number in range(len(requests)) if number not in scattered}, requests
+        )
+        placed_starts = _starts({number: placed[number] for number in sorted(scattered)}, requests)
         fits: list[list[tuple[float, Evidence]]] = [[] for _ in requests]
         log_priors = np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER])
-        for number, improved, evidence in _fitted(plain, starts[False], requests, best):
+        also_placed: dict[int, Points] = {}
+        for number, improved, evidence in _fitted(plain, starts, requests, best):
             parent = requests[number].parent
             if evidence is None and parent is not None and parent.placed <= 0.5:
                 continue
@@ -130,9 +136,10 @@ class FittingProblem:
             if evidence is not None:
                 fits[number].append((float(log_priors[0]) if also or parent else 0.0, evidence))
             if also:
-                starts[True][number] = Fitter([placed[number]]).with_scatter(improved)
+                also_placed[number] = improved
+        placed_starts |= _with_scatter(placed, also_placed)
         best = min([best, *(evidence.cost for own in fits for _, evidence in own)])
-        for number, _, evidence in _fitted(placed, starts[True], requests, best):
+        for number, _, evidence in _fitted(placed, placed_starts, requests, best):
             if evidence is not None:
                 fits[number].append((float(log_priors[1]), evidence))
             elif np.isfinite(requests[number].target(True)):
@@ -167,7 +174,9 @@ class FittingProblem:
 
     def _position_matters(self, hypothesis: Hypothesis, points: Points) -> bool:
         """Whether positioning scatter as large as it usually gets would show in some recording."""
-        products = hypothesis.products(points.fit, slopes=False, place=True)
+        if self.lines.curves:
+            return False
+        products = Fitter([hypothesis]).products(points, slopes=False, place=True)
         if products.place_slopes is None:
             return False
         p = POSITION_RANGE[1]
@@ -196,11 +205,8 @@ def _fitted(
 ) -> list[tuple[int, Points, Evidence | None]]:
     """Of each hypothesis that has starts: its number, the starts improved, and the evidence of the best; None where
     that does not gain on its parent, or is hopeless beside the others and the `best` cost so far."""
-    groups: dict[object, list[int]] = {}
-    for number in starts:
-        groups.setdefault(hypotheses[number].group(number), []).append(number)
     fits: list[tuple[int, Points, Evidence | None]] = []
-    for members in groups.values():
+    for members in _groups(starts, hypotheses):
         fitter = Fitter([hypotheses[number] for number in members])
         points = _stacked([starts[number] for number in members])
         gains = np.array([requests[number].target(fitter.placed) for number in members])[points.owner]
@@ -237,9 +243,36 @@ def _stacked(points: Sequence[Points]) -> Points:
     return Points(owner, fit, covariance, bend)
 
 
-def _starts(hypothesis: Hypothesis, request: Request) -> Points:
-    """Where the fit of a request begins."""
-    parent = request.parent
-    known = None if parent is None else {name: parent.own(name) for name in parent.names}
-    begin = parent.point if parent and request.begin is None else request.begin
-    return best_starts(Fitter([hypothesis]), known, begin)
+def _starts(hypotheses: Mapping[int, Hypothesis], requests: Sequence[Request]) -> dict[int, Points]:
+    """Where the fits of requests begin."""
+    starts: dict[int, Points] = {}
+    for members in _groups(hypotheses, hypotheses):
+        beginnings = []
+        for number in members:
+            parent, begin = requests[number].parent, requests[number].begin
+            known = None if parent is None else {name: parent.own(name) for name in parent.names}
+            beginnings.append(Beginning(known, parent.point if parent and begin is None else begin))
+        starts |= dict(
+            zip(members, best_starts(Fitter([hypotheses[number] for number in members]), beginnings), strict=True)
+        )
+    return starts
+
+
+def _with_scatter(hypotheses: Sequence[Hypothesis], points: Mapping[int, Points]) -> dict[int, Points]:
+    """For hypotheses with positioning scatter, from the points of those without it."""
+    starts: dict[int, Points] = {}
+    for members in _groups(points, hypotheses):
+        fitter = Fitter([hypotheses[number] for number in members])
+        begun = fitter.with_scatter(_stacked([points[number] for number in members]))
+        starts |= {number: _alone(begun, owner, fitter.counts[owner]) for owner, number in enumerate(members)}
+    return starts
+
+
+def _groups(
+    numbers: Iterable[int], hypotheses: Sequence[Hypothesis] | Mapping[int, Hypothesis]
+) -> Collection[list[int]]:
+    """Which of these hypotheses can be evaluated together."""
+    groups: dict[object, list[int]] = {}
+    for number in numbers:
+        groups.setdefault(hypotheses[number].group(number), []).append(number)
+    return groups.values()

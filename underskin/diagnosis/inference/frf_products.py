@@ -174,22 +174,14 @@ class PickupProducts:
     def less(self, sums: Sums, levels: SeveralLevels) -> Sums:
         """The sums less what rows lose to pick-up."""
         assert levels.pickup is not None
-        lost, log_determinant = self.rows.lost(levels.pickup, levels.level)
-        y, u, summed = self.rows.value, self.u[:, None], self.rows.summed
-        uu, uy = sums.uu - summed(lost, np.abs(u) ** 2), sums.uy - summed(lost, (u.conj() * y).real)
-        return Sums(uu, uy, sums.yy - summed(lost, np.abs(y) ** 2), log_determinant)
+        return self.rows.less(sums, self.u, levels.pickup, levels.level)
 
     def slopes_less(self, sums: SlopeSums, levels: SeveralLevels) -> SlopeSums:
         """The sums with derivatives less what rows lose, at the first of the sets of noise levels."""
         assert levels.pickup is not None
         if self.v is None:
             return sums
-        lost, _ = self.rows.lost(levels.pickup[:, 0], levels.level[:, 0])
-        lost, v, summed = lost[:, None], self.v, self.rows.summed
-        uv = sums.uv - np.moveaxis(summed(lost, (self.u[:, None].conj() * v).real), 1, -1)
-        vy = sums.vy - np.moveaxis(summed(lost, (v.conj() * self.rows.value).real), 1, -1)
-        vv = summed(lost[:, None], (v[:, :, None].conj() * v[:, None]).real)
-        return SlopeSums(uv, vy, sums.vv - np.moveaxis(vv, -1, 1))
+        return self.rows.slopes_less(sums, self.u, self.v, levels.pickup[:, 0], levels.level[:, 0, 0])
 
 
 def _over_rows(matrix: csr_array, values: Floats) -> Floats:

@@ -8,10 +8,9 @@ import numpy as np
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.curve_products import CurveLines, CurveProducts
-from underskin.diagnosis.inference.frf_products import FrfProducts, frf_lines
+from underskin.diagnosis.inference.frf_products import FrfLines, frf_lines
 from underskin.diagnosis.inference.likelihood import Curvature
 from underskin.diagnosis.inference.pickup_rows import PickupRows
-from underskin.diagnosis.inference.products import Products
 from underskin.diagnosis.noise.correlated_error import USUAL
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR, Plateau, level_prior
 from underskin.mechanisms.base import Normal, Parameter
@@ -24,7 +23,6 @@ from underskin.units import Floats
 
 _LEVELS = (0.1, 100.0)  # bounds of the lines' level
 _CURVE_LEVELS = (0.3, 5.0)  # no cell is more accurate, however smooth; rougher than its neighbours differ is no noise
-_NUMBERS_AT_ONCE = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -90,24 +88,28 @@ class Hypothesis:
     def _curve_lines(self) -> CurveLines:
         return CurveLines(self.lines)
 
-    def products(self, fit: Floats, *, slopes: bool, place: bool) -> Products:
-        """The inner products of the model at points (points, parameters); with derivatives by the parameters, and by
-        the contact's place, on request."""
-        model = self.model
-        if isinstance(model, CurveModel):
-            force, by_force = model.forces_and_slopes(fit) if slopes else (model.forces(fit), None)
-            return CurveProducts.of(self._curve_lines, force, by_force)
-        assert isinstance(model, FrfModel)
-        lines = frf_lines(self.lines, model.design)
-        pickup = None if model.pickup is None else PickupRows(self.lines, model.pickup.rows, model.design.line)
-        of_lines = len(model.design.line_frequency) * (len(model.parameters) if slopes else 1)
-        at_once = max(_NUMBERS_AT_ONCE // (model.numbers + of_lines), 1)
-        if len(fit) <= at_once:
-            return FrfProducts.of(lines, pickup, model.respond(fit, slopes=slopes, place=place))
-        parts = [fit[first : first + at_once] for first in range(0, len(fit), at_once)]
-        responses = (model.respond(part, slopes=slopes, place=place) for part in parts)
-        products = [FrfProducts.of(lines, pickup, response) for response in responses]
-        return FrfProducts.joined(products, len(model.parameters))
+    def curve_products(self, fit: Floats, *, slopes: bool) -> CurveProducts:
+        """Of curves the inner products of the model at points (points, parameters), with derivatives on request."""
+        assert isinstance(self.model, CurveModel)
+        force, by_force = self.model.forces_and_slopes(fit) if slopes else (self.model.forces(fit), None)
+        return CurveProducts.of(self._curve_lines, force, by_force)
+
+    @property
+    def frf_model(self) -> FrfModel:
+        """The model, which is one of FRFs."""
+        assert isinstance(self.model, FrfModel)
+        return self.model
+
+    @cached_property
+    def frf_lines(self) -> FrfLines:
+        """The lines as sums over the model's distinct lines."""
+        return frf_lines(self.lines, self.frf_model.design)
+
+    @cached_property
+    def pickup_rows(self) -> PickupRows | None:
+        """The rows that pick-up reaches, where the model has any."""
+        pickup, design = self.model.pickup, self.frf_model.design
+        return None if pickup is None else PickupRows(self.lines, pickup.rows, design.line)
 
 
 @dataclass(frozen=True)

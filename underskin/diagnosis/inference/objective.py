@@ -6,16 +6,19 @@ Newton steps on the likelihood of the predictions at hand, which costs no model 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.autodiff import contiguous
+from underskin.diagnosis.inference.frf_products import FrfProducts
 from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis, curvature_of_prior
-from underskin.diagnosis.inference.likelihood import Likelihoods
+from underskin.diagnosis.inference.likelihood import Likelihoods, log_likelihoods, normal_equations
 from underskin.diagnosis.inference.products import Products, joined
 from underskin.diagnosis.noise.noise_levels import SeveralLevels
-from underskin.diagnosis.noise.noise_priors import Plateaus
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
+from underskin.mechanisms.models.frf_models import FrfModels
 from underskin.units import Floats
 
 GAIN, LEVEL, POSITION = 0, 1, 2  # places among the covariance's parameters, the last where there is such scatter
@@ -25,6 +28,7 @@ _LARGEST_STEP = 0.7  # of a Newton step in a noise level's logarithm: a factor o
 _STEP = 0.05  # of the finite differences in the covariance's logarithms
 _FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
 _NUMBERS_AT_ONCE = 500_000
+_PREDICTED_AT_ONCE = 2_000_000
 _BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
 
 Places = NDArray[np.intp]
@@ -93,7 +97,7 @@ class Evaluator:
         first = hypotheses[0]
         self.lines, self.curvature, self.placed = first.lines, first.curvature, first.placed
         self.covariance = first.covariance
-        self._covariance_prior = Plateaus([entry.prior for entry in self.covariance])
+        self._covariance_prior = np.array([entry.prior.row for entry in self.covariance])
         self._lowest = np.array([entry.low for entry in self.covariance])
         self._highest = np.array([entry.high for entry in self.covariance])
         self.counts = [len(entry.model.parameters) for entry in hypotheses]
@@ -141,13 +145,49 @@ class Evaluator:
 
     def products(self, points: Points, *, slopes: bool, place: bool) -> Products:
         """The inner products at points."""
-        edges = np.searchsorted(points.owner, np.arange(len(self.hypotheses) + 1))
-        parts = [
-            hypothesis.products(points.fit[low:high, :count], slopes=slopes, place=place)
-            for hypothesis, count, low, high in zip(self.hypotheses, self.counts, edges[:-1], edges[1:], strict=True)
-            if high > low
-        ]
-        return joined(parts, max(self.counts))
+        if self.lines.curves:
+            edges = np.searchsorted(points.owner, np.arange(len(self.hypotheses) + 1))
+            parts = [
+                hypothesis.curve_products(points.fit[low:high, :count], slopes=slopes)
+                for hypothesis, count, low, high in zip(
+                    self.hypotheses, self.counts, edges[:-1], edges[1:], strict=True
+                )
+                if high > low
+            ]
+            return joined(parts, max(self.counts))
+        several = self._at_once(points, max(self.counts) if slopes else 0)
+        return joined([self._frf_products(points[some], slopes, place) for some in several], max(self.counts))
+
+    def _at_once(self, points: Points, variables: int) -> list[slice]:
+        """Which points are worked out at once, so that arrays with derivatives by so many variables stay small."""
+        largest = max(hypothesis.frf_model.numbers(variables) for hypothesis in self.hypotheses)
+        count = max(_PREDICTED_AT_ONCE // largest, 1)
+        return [slice(first, first + count) for first in range(0, len(points), count)]
+
+    @cached_property
+    def _models(self) -> FrfModels:
+        return FrfModels([hypothesis.frf_model for hypothesis in self.hypotheses])
+
+    def place_slopes(self, points: Points) -> Floats:
+        """∂m/∂x and ∂m/∂y of recordings, before the dynamics (2, points, recordings)."""
+        slopes = np.empty((2, len(points), self.lines.recordings))
+        for some in self._at_once(points, 0):
+            part = points[some]
+            for rows, response in self._models.respond(part.owner, part.fit, slopes=False, place=True, lines=False):
+                slopes[:, some][:, rows] = response.place_slopes
+        return slopes
+
+    def _frf_products(self, points: Points, slopes: bool, place: bool) -> FrfProducts:
+        """The inner products at points that are worked out at once."""
+        parts = self._models.respond(points.owner, points.fit, slopes=slopes, place=place)
+        each = []
+        for rows, response in parts:
+            own = self.hypotheses[points.owner[rows[0]]]
+            each.append(FrfProducts.of(own.frf_lines, own.pickup_rows, response))
+        if len(parts) == 1:
+            return each[0]
+        order = np.argsort(np.concatenate([rows for rows, _ in parts]))
+        return FrfProducts.joined(each, max(self.counts))[order]
 
     def weighed(self, points: Points, products: Products) -> Evaluated:
         """Points whose predictions are known, with the sensors' gains that belong to them where these are free."""
@@ -185,33 +225,32 @@ class Evaluator:
 
     def _costs(self, points: Points, products: Products, covariances: Floats) -> Floats:
         """The costs (points, sets) with covariance parameters (points, sets, parameters), where points predict."""
+        from underskin.diagnosis.inference.cost_kernel import log_priors
+
         pickup = self.hypotheses[0].model.pickup
-        rows = self.lines.recordings + (0 if pickup is None else len(pickup.rows))
-        size = covariances.shape[1] * rows
-        at_once = max(_NUMBERS_AT_ONCE // size, 1)
-        if len(points) > at_once:
-            parts = [slice(first, first + at_once) for first in range(0, len(points), at_once)]
-            return np.concatenate([self._costs(points[part], products[part], covariances[part]) for part in parts])
-        likelihoods = Likelihoods(self.lines, self.curvature, products, self.levels(covariances), points.bend).each
-        return -likelihoods - self._covariance_prior.log_density(covariances) - self._log_mean_prior(points)[:, None]
+        if pickup is not None or self.lines.curves:
+            rows = len(self.lines.value) if pickup is None else self.lines.recordings + len(pickup.rows)
+            at_once = max(_NUMBERS_AT_ONCE // (covariances.shape[1] * rows), 1)
+            if len(points) > at_once:
+                parts = [slice(first, first + at_once) for first in range(0, len(points), at_once)]
+                return np.concatenate([self._costs(points[part], products[part], covariances[part]) for part in parts])
+        covariances = contiguous(covariances)
+        each = log_likelihoods(self.lines, self.curvature, products, self.levels(covariances), points.bend)
+        bounds = self.free, self.low, self.high, self._precision, self._centre, self._log_prior_height
+        log_priors(points.owner, contiguous(points.fit), *bounds, covariances, self._covariance_prior, each)
+        return -each
 
     def costs(self, at: Evaluated, covariances: Floats) -> Floats:
         """The costs (points, sets) at the same predictions with other covariance parameters (points, sets, …)."""
         return self._costs(at.points, at.products, covariances)
-
-    def _log_mean_prior(self, points: Points) -> Floats:
-        """Of the parameters that move the mean."""
-        owner, fit = points.owner, points.fit
-        outside = self.free[owner] & ((fit < self.low[owner]) | (fit > self.high[owner]))
-        square = (self._precision[owner] * (fit - self._centre[owner]) ** 2).sum(axis=1)
-        return np.where(outside.any(axis=1), -np.inf, self._log_prior_height[owner] - 0.5 * square)
 
     def posterior_equations(self, at: Evaluated) -> tuple[Floats, Floats]:
         """Information and gradient of the log posterior in the mean parameters (points, parameters, parameters).
 
         What is held or no parameter has gradient 0 and information 1 of its own.
         """
-        information, gradient = self.marginal(at).normal_equations(at.growth)
+        levels, bend = self.levels(at.points.covariance[:, None]), at.points.bend
+        information, gradient = normal_equations(self.lines, self.curvature, at.products, levels, bend, at.growth)
         owner = at.points.owner
         free = self.free[owner]
         precision = self._precision[owner]

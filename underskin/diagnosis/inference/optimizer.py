@@ -4,7 +4,7 @@ Every step of the mean parameters is followed by steps of the noise levels, whic
 own damping, and rests once it has converged, while the others go on.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from underskin.diagnosis.inference.curve_starts import by_least_squares
 from underskin.diagnosis.inference.frf_products import FrfProducts
-from underskin.diagnosis.inference.hypothesis import FitPoint
+from underskin.diagnosis.inference.hypothesis import FitPoint, own_places
 from underskin.diagnosis.inference.objective import Evaluated, Evaluator, Places, Points
 from underskin.diagnosis.inference.products import Products, joined
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR, START_GAIN
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Floats
 
 __all__ = ["Evaluated", "Fitter"]
@@ -37,27 +38,32 @@ Target = Callable[[Evaluated], Floats]  # costs (points,) that points must get b
 class Fitter(Evaluator):
     """Begins and improves points of hypotheses."""
 
-    def _start(self, own: Floats, parent: FitPoint | None) -> Points:
-        """Points of the one hypothesis with these coordinates of its mechanisms (points, own), and the nuisances of a
+    def _start(self, own: Sequence[Floats], parents: Sequence[FitPoint | None]) -> Points:
+        """Points of each hypothesis with these coordinates of its mechanisms (points, own), and the nuisances of a
         parent or at their centre; noise as it is usual."""
-        (entry,) = self.hypotheses
-        count, mechanisms = len(entry.model.parameters), entry.own_parameters
-        fit = np.zeros((len(own), count))
-        fit[:, mechanisms:] = [parameter.start for parameter in entry.model.parameters[mechanisms:]]
-        if parent is not None:
-            fit[:, mechanisms:] = parent.fit[len(parent.fit) - (count - mechanisms) :]
-        fit[:, :mechanisms] = own
+        owner = np.repeat(np.arange(len(own)), [len(entry) for entry in own])
+        fit = np.zeros((len(owner), max(self.counts)))
+        for number, (entry, values, parent) in enumerate(zip(self.hypotheses, own, parents, strict=True)):
+            count, mechanisms = self.counts[number], entry.own_parameters
+            nuisances = [parameter.start for parameter in entry.model.parameters[mechanisms:]]
+            if parent is not None:
+                nuisances = parent.fit[len(parent.fit) - (count - mechanisms) :].tolist()
+            rows = owner == number
+            fit[rows, :mechanisms], fit[rows, mechanisms:count] = values, nuisances
         common = [GAIN_PRIOR.middle, 0.0]
         if self.placed:
             common.append(POSITION_PRIOR.middle)
         if self.lines.curves:
-            common.append(entry.smooth.middle)
-        covariance = np.concatenate([np.tile(common, (len(own), 1)), fit[:, self.own[0]]], axis=1)
-        return Points(np.zeros(len(own), dtype=np.intp), fit, covariance, np.tile(self.no_bend, (len(own), 1)))
+            common.append(self.hypotheses[0].smooth.middle)
+        of_mechanisms = np.take_along_axis(fit, self.own[owner], axis=1)
+        covariance = np.concatenate([np.tile(common, (len(owner), 1)), of_mechanisms], axis=1)
+        return Points(owner, fit, covariance, np.tile(self.no_bend, (len(owner), 1)))
 
-    def begin(self, own: Floats, parent: FitPoint | None = None, *, slopes: bool = False) -> Evaluated:
-        """The starts of these coordinates of the one hypothesis, d33 as the data would have it, evaluated."""
-        points = self._start(own, parent)
+    def begin(
+        self, own: Sequence[Floats], parents: Sequence[FitPoint | None] | None = None, *, slopes: bool = False
+    ) -> Evaluated:
+        """The starts of each hypothesis with these coordinates, d33 as the data would have it, evaluated."""
+        points = self._start(own, parents or [None] * len(own))
         products = self.products(points, slopes=slopes, place=self.placed)
         if not any(entry.proportional for entry in self.hypotheses[0].model.parameters):
             return self.weighed(points, products)
@@ -127,6 +133,17 @@ class Fitter(Evaluator):
         """Where each hypothesis has the parameter that the prediction is proportional to."""
         proportional = [[entry.proportional for entry in one.model.parameters] for one in self.hypotheses]
         return np.array([own.index(True) for own in proportional])
+
+    @cached_property
+    def _moves_place(self) -> NDArray[np.bool_]:
+        """Which parameters of each hypothesis may change how σ depends on the contact's place (hypotheses, parameters),
+        relative to σ: not d33, nor those of the dynamics."""
+        moves = np.zeros(self.low.shape, dtype=bool)
+        for number, hypothesis in enumerate(self.hypotheses):
+            moves[number, : self.counts[number]] = [not entry.proportional for entry in hypothesis.model.parameters]
+            for name, own in own_places(hypothesis.model.names, self.lines).items():
+                moves[number, own] &= not CATALOGUE[name].needs_lines
+        return moves
 
     def improve(self, start: Points, target: Target | None = None) -> Evaluated:
         """The most probable points near the starts; only roughly where their targets will not be reached."""
@@ -235,13 +252,13 @@ class Fitter(Evaluator):
         owner = at.points.owner
         step = _SLOPE_STEP * (self.high - self.low)[owner]
         step = np.where(at.points.fit + step <= self.high[owner], step, -step)
-        number, place = np.nonzero(self.free[owner])
+        number, place = np.nonzero(self.free[owner] & self._moves_place[owner])
         moved = at.points[number]
         fit = moved.fit.copy()
         fit[np.arange(len(fit)), place] += step[number, place]
-        slopes = [self.products(points, slopes=False, place=True) for points in (at.points, replace(moved, fit=fit))]
-        here, there = (_log_slopes(products) for products in slopes)
+        here, there = (_log_size(self.place_slopes(points)) for points in (at.points, replace(moved, fit=fit)))
         growth = np.zeros((len(at), here.shape[1], count))
+        growth[np.arange(len(at)), :, self._d33[owner]] = 2.0  # the response is proportional to d33
         growth[number, :, place] = (there - here[number]) / step[number, place][:, None]
         return replace(at, growth=growth)
 
@@ -265,7 +282,6 @@ class Fitter(Evaluator):
         return step, (gradient * step).sum(axis=1)
 
 
-def _log_slopes(products: Products) -> Floats:
-    """log |t|² (points, recordings) of the position's slopes; least where there are none."""
-    assert products.place_slopes is not None
-    return np.log((products.place_slopes**2).sum(axis=0) + 1e-300)
+def _log_size(slopes: Floats) -> Floats:
+    """log |t|² (points, recordings) of the position's slopes (2, points, recordings); least where there are none."""
+    return np.log((slopes**2).sum(axis=0) + 1e-300)

@@ -18,6 +18,8 @@ Products = FrfProducts | CurveProducts
 
 def joined(parts: Sequence[Products], parameters: int) -> Products:
     """Products of models of the same recordings one after another, their parameters filled up to so many."""
+    if len(parts) == 1:
+        return parts[0]
     curves = [part for part in parts if isinstance(part, CurveProducts)]
     if curves:
         slopes = [part.force_slopes for part in curves if part.force_slopes is not None]

@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,64 +22,79 @@ _KEPT_OF_PARENT = 1  # of curves, from an explanation with one mechanism less
 _PLACED_STARTS = 4  # of curves, whose contact points are looked for
 
 
-def best_starts(fitter: Fitter, parent: Mapping[str, Sequence[float]] | None, begin: FitPoint | None) -> Points:
-    """The best of the local minima of a grid over the new mechanisms' prior quantiles, and of what recordings suggest.
+@dataclass(frozen=True)
+class Beginning:
+    """Where the fit of a hypothesis may begin.
 
-    Parameters
-    ----------
-    fitter
-        Of the one hypothesis.
-    parent
-        Fit coordinates of its mechanisms that were fitted without the others; None where none were.
-    begin
-        Where the nuisances begin; None for their priors' centres.
+    `parent`: fit coordinates of its mechanisms that were fitted without the others; None where none were. `begin`:
+    where the nuisances begin; None for their priors' centres.
     """
-    (hypothesis,) = fitter.hypotheses
-    places = own_places(hypothesis.model.names, hypothesis.lines)
-    known = parent or {}
-    # New too is what has other parameters beside the mechanism that was added.
-    new = [name for name, place in places.items() if len(known.get(name, ())) != place.stop - place.start]
-    parameters = {name: hypothesis.model.parameters[places[name]] for name in new}
-    quantiles = _QUANTILES.get(sum(map(len, parameters.values())), (0.5,))
-    axes = [[entry.quantile(q) for q in quantiles] for name in new for entry in parameters[name]]
-    free = [place for name in new for place in range(places[name].start, places[name].stop)]
-    grid = list(itertools.product(*axes))
-    own = np.zeros((len(grid), hypothesis.own_parameters))
-    for name, values in known.items():
-        if name not in new:
-            own[:, places[name]] = values
-    own[:, free] = grid
-    guessed = _guesses(new, hypothesis)
-    if guessed:
-        more = np.repeat(own[:1], len(guessed), axis=0)
-        more[:, free] = guessed
-        own = np.concatenate([own, more])
-    tried = fitter.settle(fitter.begin(own, begin), 1)
-    cost = tried.cost[: len(grid)].reshape([len(axis) for axis in axes] or [1])
-    lowest = tried[np.append(np.flatnonzero(_are_lowest(cost)), np.arange(len(grid), len(own)))]
-    if hypothesis.lines.curves:
-        return _of_curves(fitter, lowest, len(guessed), new, known=begin is not None, grown=parent is not None)
-    return lowest.points[np.sort(_cheapest(lowest)[:_KEPT_STARTS])]
+
+    parent: Mapping[str, Sequence[float]] | None
+    begin: FitPoint | None
 
 
-def _of_curves(
-    fitter: Fitter, lowest: Evaluated, guessed: int, new: Sequence[str], *, known: bool, grown: bool
-) -> Points:
-    """The best starts of curves, contact points looked for where they are not `known`; the last so many are guesses."""
+def best_starts(fitter: Fitter, beginnings: Sequence[Beginning]) -> list[Points]:
+    """Of each hypothesis the best of the local minima of a grid over the new mechanisms' prior quantiles, and of what
+    recordings suggest."""
+    grids = [_Grid(*pair) for pair in zip(fitter.hypotheses, beginnings, strict=True)]
+    tried = fitter.settle(fitter.begin([grid.own for grid in grids], [entry.begin for entry in beginnings]), 1)
+    edges = np.cumsum([0, *(len(grid.own) for grid in grids)])
+    starts = []
+    for number, (grid, beginning) in enumerate(zip(grids, beginnings, strict=True)):
+        own = tried[edges[number] : edges[number + 1]]
+        cost = own.cost[: grid.size].reshape(grid.shape)
+        lowest = own[np.append(np.flatnonzero(_are_lowest(cost)), np.arange(grid.size, len(own)))]
+        if fitter.lines.curves:
+            guessed = len(own) - grid.size
+            starts.append(_of_curves(fitter, lowest, guessed, grid.new, beginning))
+        else:
+            starts.append(lowest.points[np.sort(_cheapest(lowest)[:_KEPT_STARTS])])
+    return starts
+
+
+class _Grid:
+    """Coordinates of a hypothesis' mechanisms (points, own): a grid, then guesses.
+
+    Attributes: `own`; `shape`, along each new parameter, and `size` of the grid; `new`, the mechanisms that are.
+    """
+
+    def __init__(self, hypothesis: Hypothesis, beginning: Beginning) -> None:
+        places = own_places(hypothesis.model.names, hypothesis.lines)
+        known = beginning.parent or {}
+        # New too is what has other parameters beside the mechanism that was added.
+        self.new = [name for name, place in places.items() if len(known.get(name, ())) != place.stop - place.start]
+        parameters = {name: hypothesis.model.parameters[places[name]] for name in self.new}
+        quantiles = _QUANTILES.get(sum(map(len, parameters.values())), (0.5,))
+        axes = [[entry.quantile(q) for q in quantiles] for name in self.new for entry in parameters[name]]
+        free = [place for name in self.new for place in range(places[name].start, places[name].stop)]
+        points = [*itertools.product(*axes)]
+        self.shape = [len(axis) for axis in axes] or [1]
+        self.size = len(points)
+        points += map(tuple, _guesses(self.new, hypothesis))
+        self.own = np.zeros((len(points), hypothesis.own_parameters))
+        for name, values in known.items():
+            if name not in self.new:
+                self.own[:, places[name]] = values
+        self.own[:, free] = points
+
+
+def _of_curves(fitter: Fitter, lowest: Evaluated, guessed: int, new: Sequence[str], beginning: Beginning) -> Points:
+    """The best starts of curves, contact points looked for where none are known; the last so many are guesses."""
     count = len(lowest) - guessed
     ranked = _cheapest(lowest[:count])[:_PLACED_STARTS]
     several = lowest[np.append(np.sort(ranked), np.arange(count, len(lowest)))]
     alone = len(fitter.hypotheses[0].model.names) == 1
     sticks = alone and any(CATALOGUE[name].moves_contact_points for name in new)
-    if fitter.lines.kind == "indentation" and (sticks or not known):
+    if fitter.lines.kind == "indentation" and (sticks or beginning.begin is None):
         several = with_contact_points(fitter, softer(fitter, several) if sticks else several)
-    kept = _KEPT_OF_PARENT if grown else _KEPT_STARTS
+    kept = _KEPT_OF_PARENT if beginning.parent is not None else _KEPT_STARTS
     chosen = several.points[np.sort(_cheapest(several)[:kept])]
     if not (sticks and guessed):
         return chosen
     # What the null hypothesis made of modulus and contact points may lead away from where the jumps are.
     own = fitter.hypotheses[0].own_parameters
-    begun = fitter.begin(lowest.points.fit[count:, :own])
+    begun = fitter.begin([lowest.points.fit[count:, :own]], [None])
     return together(chosen, begun.points[_cheapest(begun)[:1]])
 
 

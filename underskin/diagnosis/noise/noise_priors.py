@@ -6,7 +6,6 @@
 - line noise: its level as estimated from the lines' roughness, times a factor near 1.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,28 +46,15 @@ class Plateau:
         """The middle of the constant part."""
         return (self.low + self.high) / 2
 
+    @property
+    def row(self) -> tuple[float, float, float, float, float]:
+        """Its numbers, with the logarithm of the area, as compiled functions take them."""
+        return self.low, self.high, self.fall_low, self.fall_high, float(np.log(self.area))
+
     def log_density(self, x: Floats | float) -> Floats:
         """The logarithm of the density."""
         outside = np.maximum((self.low - x) / self.fall_low, 0.0) + np.maximum((x - self.high) / self.fall_high, 0.0)
         return np.asarray(-0.5 * outside**2 - np.log(self.area))
-
-
-class Plateaus:
-    """Several such densities of independent coordinates."""
-
-    def __init__(self, each: Sequence[Plateau]) -> None:
-        """In the order of the coordinates."""
-        names = "low", "high", "fall_low", "fall_high"
-        self._low, self._high, self._fall_low, self._fall_high = (
-            np.array([getattr(entry, name) for entry in each]) for name in names
-        )
-        self._log_areas = float(np.log([entry.area for entry in each]).sum())
-
-    def log_density(self, x: Floats) -> Floats:
-        """The logarithm of their product at (…, coordinates)."""
-        below = np.maximum((self._low - x) / self._fall_low, 0.0)
-        above = np.maximum((x - self._high) / self._fall_high, 0.0)
-        return np.asarray(-0.5 * ((below + above) ** 2).sum(axis=-1) - self._log_areas)
 
 
 START_GAIN = 0.03  # scatter of gains while nothing was fitted yet

@@ -146,6 +146,8 @@ class GainResidual:
 
     def _with(self, sets: Floats, amplitudes: Floats, scatter: ScatterNodes) -> Floats:
         """log p(residual, features) at one scatter of place and each of gain (gains, sets)."""
+        from underskin.diagnosis.selection.process_kernel import gained
+
         count, rows, size = sets.shape
         root = 1 / np.sqrt(scatter.variances)[:, :, None]
         fixed = self.fixed * root
@@ -159,12 +161,11 @@ class GainResidual:
         moment = shapes.transpose(0, 2, 1) @ z - taken[..., 1:].transpose(0, 2, 1) @ taken[..., :1]
         moment = moment.reshape(-1, count, size).swapaxes(0, 1)
         gram = _grams(shapes, count) - _grams(taken[..., 1:], count)
-        values, vectors = np.linalg.eigh(gram)
-        values = np.maximum(values, 0.0)[..., None, :] * amplitudes[:, None] ** 2
-        along = (vectors.swapaxes(-1, -2) @ moment[..., None])[..., 0]
-        gained = (amplitudes[:, None] ** 2 * along[..., None, :] ** 2 / (1 + values)).sum(axis=-1)
-        gained = np.logaddexp.reduce(0.5 * (gained - np.log1p(values).sum(axis=-1)), axis=-1) - np.log(len(amplitudes))
-        return np.asarray((scatter.log_weights - 0.5 * (chi2 + log_determinant))[:, None] + gained.T)
+        each = np.empty((count * len(scatter.variances), len(amplitudes)))
+        gained(gram.reshape(-1, size, size), np.ascontiguousarray(moment.reshape(-1, size)), amplitudes, each)
+        each = each.reshape(count, -1, len(amplitudes))
+        more = np.logaddexp.reduce(each, axis=-1) - np.log(len(amplitudes))
+        return np.asarray((scatter.log_weights - 0.5 * (chi2 + log_determinant))[:, None] + more.T)
 
 
 def _grams(columns: Floats, count: int) -> Floats:

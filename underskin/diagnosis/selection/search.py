@@ -26,7 +26,7 @@ _PARENTS = 3
 _BEST = 3  # nothing and two more: processes are tried on top of the best two
 SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
 _UNTHOUGHT = 0.015  # probability that none of what was compared is right
-_WITHIN = 20.0  # nats behind the best within which evidence is worth integrating over loose parameters
+_WITHIN = 8.0  # nats behind the best within which evidence is worth integrating: that moves it by less than 2
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
 
 

@@ -35,7 +35,7 @@ class Signatures:
         """Predict them around the base model as declared."""
         self._problem = problem
         self._fitter = Fitter([problem.hypothesis((), placed=False)])
-        point = self._fitter.begin(np.zeros((1, 0))).points.fit[0]
+        point = self._fitter.begin([np.zeros((1, 0))]).points.fit[0]
         self._base = self._fitter.hypotheses[0].model.predict(point)
         self.owners: list[str] = []
         self._values: list[tuple[Array, Lines]] = []
@@ -77,7 +77,7 @@ class Signatures:
         """On the nuisances and then on every signature."""
         hypothesis = self._problem.hypothesis((), placed=levels.position > 0)
         fitter = Fitter([hypothesis])
-        base = fitter.begin(np.zeros((1, 0)))
+        base = fitter.begin([np.zeros((1, 0))])
         rows = _Rows(self._problem, self._base.value, levels.smooth)
         parts = [rows.split(slope, fitter.lines) for slope in self._base.slopes]
         for value, lines in self._values:

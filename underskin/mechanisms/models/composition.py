@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from underskin.autodiff import Differentiated, variables
 from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Unsupported, Values
 from underskin.recordings.conditions import Conditions
-from underskin.units import Array, Floats, Indices, Mask
+from underskin.units import Array, Floats
 
 SENSOR_SPREAD = 0.01  # sd of the logarithms of the sensors' gains, without `sensor_spread`
 
@@ -24,10 +25,10 @@ class Prediction:
     slopes: Array  # (parameters, rows)
     position_slopes: Array | None  # (2, rows) ∂value/∂x, ∂value/∂y of the contact's place [1/m] (frf)
     pickup: Floats | None  # sd of mains pick-up [C/N], of real and of imaginary part, on the rows that it reaches
-    pickup_rows: Indices | None  # those rows
+    pickup_rows: NDArray[np.intp] | None  # those rows
     # (rows,) False where the contact lies beyond the tables, which are continued there, or the sensor's disc beyond the
     # stress profile, behind whose end the value is 0
-    inside: Mask
+    inside: NDArray[np.bool_]
 
     @property
     def pickup_variance(self) -> Floats:
@@ -39,7 +40,10 @@ class Prediction:
 
 
 class Composition:
-    """The mechanisms of a model, in order, and how one vector of fit coordinates is theirs and the nuisances'."""
+    """The mechanisms of a model, in order, and how one vector of fit coordinates is theirs and the nuisances'.
+
+    Attributes: `places` of each mechanism's parameters in that vector, by its name and theirs; `nuisances`, theirs.
+    """
 
     def __init__(
         self, mechanisms: Sequence[Mechanism], conditions: Conditions, kind: Kind, nuisances: Sequence[Parameter]
@@ -49,11 +53,11 @@ class Composition:
         own = parameters_together(mechanisms, conditions, kind)
         self.parameters = (*(parameter for group in own.values() for parameter in group), *nuisances)
         starts = np.cumsum([0, *(len(group) for group in own.values())])
-        self._places = {
+        self.places = {
             name: {parameter.name: start + index for index, parameter in enumerate(group)}
             for (name, group), start in zip(own.items(), starts[:-1], strict=True)
         }
-        self._nuisances = {parameter.name: int(starts[-1]) + index for index, parameter in enumerate(nuisances)}
+        self.nuisances = {parameter.name: int(starts[-1]) + index for index, parameter in enumerate(nuisances)}
         self._log = np.array([parameter.scale == "log" for parameter in self.parameters])
 
     def values(
@@ -80,14 +84,17 @@ class Composition:
             np.concatenate([np.where(self._log, value[..., :count], 1.0), np.ones((*points, further))], axis=-1), -1, 0
         )
         seeds = variables(value, by_own if slopes else by_own[count:])
-        own = {name: {key: seeds[place] for key, place in places.items()} for name, places in self._places.items()}
-        for name, places in self._places.items():
+        own = {name: {key: seeds[place] for key, place in places.items()} for name, places in self.places.items()}
+        for name, places in self.places.items():
             for key, place in places.items():
                 other = self.parameters[place].relative_to
                 if other is not None:
                     own[name][key] = own[name][key] * own[name][other]
-        nuisances = {name: seeds[place] for name, place in self._nuisances.items()}
-        return dict(own), nuisances, seeds[count:]
+        return (
+            dict(own),
+            {name: seeds[place] for name, place in self.nuisances.items()},
+            seeds[count:],
+        )
 
 
 def parameters_together(

@@ -1,10 +1,15 @@
 """The contacts of a campaign on their way through a model: what is pressed, by what, and how. SI throughout."""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from underskin.autodiff import Differentiated, chain
+from underskin.autodiff import Differentiated, chain, stacked
 from underskin.units import Floats
 
 
@@ -23,6 +28,25 @@ class Contacts:
     relaxed: Differentiated | None = None  # that E over the one that a fast oscillation meets; None where they are one
     layered: bool = False  # contact by the layer of finite thickness, not by the half space
     stiffness: Differentiated | None = None  # dF/dδ [N/m] at the radius in force, where a mechanism asks
+
+    def at_points(self, some: NDArray[np.intp] | None) -> Contacts:
+        """At some of several points (points, contacts), at all for None."""
+        if some is None:
+            return self
+        return self._with({name: x.at_points(some) for name, x in self._differentiated().items()})
+
+    @classmethod
+    def stacked(cls, parts: Sequence[Contacts], points: Sequence[int]) -> Contacts:
+        """Contacts of the same structure at several sets of points, of so many each."""
+        each = [part._differentiated() for part in parts]
+        return parts[0]._with({name: stacked([own[name] for own in each], points) for name in each[0]})
+
+    def _with(self, changed: dict[str, Any]) -> Contacts:
+        return replace(self, **changed)
+
+    def _differentiated(self) -> dict[str, Differentiated]:
+        own = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: value for name, value in own.items() if isinstance(value, Differentiated)}
 
     @property
     def reduced_modulus(self) -> Differentiated:

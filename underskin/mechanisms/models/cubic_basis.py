@@ -11,7 +11,11 @@ _DEGREE = 3
 
 
 class CubicBasis:
-    """The cubic splines through values at `nodes` (not-a-knot ends); `to_coefficients` (functions, nodes)."""
+    """The cubic splines through values at `nodes` (not-a-knot ends).
+
+    Attributes: `to_coefficients` (functions, nodes); `knots`, the ends of the cells; `cubics` (cells, powers,
+    functions), the four functions of each cell in the distance from its lower knot, lowest power first.
+    """
 
     def __init__(self, nodes: Floats) -> None:
         """Write each basis function of each cell as a cubic in the distance from the cell's lower knot."""
@@ -20,12 +24,11 @@ class CubicBasis:
         self.to_coefficients = np.asarray(interpolating.c)
         knots = np.asarray(interpolating.t)
         count = len(knots) - _DEGREE - 1
-        self._knots = knots[_DEGREE:-_DEGREE]
+        self.knots = knots[_DEGREE:-_DEGREE]
         basis = BSpline(knots, np.eye(count), _DEGREE)
-        powers = [np.asarray(basis(self._knots[:-1], nu=order)) / math.factorial(order) for order in range(4)]
-        cells = np.arange(len(self._knots) - 1)[:, None]
-        # (cell, power, function): the four functions of each cell, lowest power first
-        self._cubics = np.stack([power[cells, cells + np.arange(4)] for power in powers], axis=1)
+        powers = [np.asarray(basis(self.knots[:-1], nu=order)) / math.factorial(order) for order in range(4)]
+        cells = np.arange(len(self.knots) - 1)[:, None]
+        self.cubics = np.ascontiguousarray(np.stack([power[cells, cells + np.arange(4)] for power in powers], axis=1))
 
     def coefficients(self, values: Floats, axis: int) -> Floats:
         """The spline's coefficients, along one axis of the values."""
@@ -37,13 +40,13 @@ class CubicBasis:
         Beyond the nodes every function is continued along its tangent.
         """
         inside = np.minimum(np.maximum(at, self.nodes[0]), self.nodes[-1])
-        cell = np.searchsorted(self._knots[1:-1], inside, side="right")
-        u = inside - self._knots[cell]
+        cell = np.searchsorted(self.knots[1:-1], inside, side="right")
+        u = inside - self.knots[cell]
         square = u * u
         powers = np.empty((*u.shape, 2, 4))
         powers[..., 0, 0], powers[..., 0, 1], powers[..., 0, 2], powers[..., 0, 3] = 1.0, u, square, square * u
         powers[..., 1, 0], powers[..., 1, 1], powers[..., 1, 2], powers[..., 1, 3] = 0.0, 1.0, 2 * u, 3 * square
-        weights = powers @ self._cubics[cell]
+        weights = powers @ self.cubics[cell]
         value, slope = weights[..., 0, :], weights[..., 1, :]
         beyond = at - inside
         return cell, value + slope * beyond[..., None] if beyond.any() else value, slope

@@ -10,35 +10,25 @@ A contact beyond the table's a/h or L is continued along the tangent and reporte
 r/h = 8, the stress is 0 (below 1e-6 of its peak).
 """
 
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import j0
 
+from underskin.autodiff import Differentiated, as_columns, contiguous, unfilled
 from underskin.mechanisms.models.cubic_basis import CubicBasis
 from underskin.physics.contact_curves import CurveGrid
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats, Indices, Mask
+from underskin.units import Floats
 
 PROFILE_END = 8.0
 _SPACING = 0.0625  # of the profile and of the offsets; the profile turns over lengths of 0.3 h and more
 _MIRRORED = 4  # offsets below 0, so that the curve is even
 _RADIAL, _ANGULAR = 10, 20  # quadrature over the disc
 _RHO_RATIO = 1.1  # of neighbouring rT/h in the table
-_WAVENUMBER_END, _NODES_PER_TURN, _PANEL = 24.0, 4, 16  # M decays as e^(−k)
-
-
-@dataclass(frozen=True)
-class Place:
-    """The four functions of each offset that differ from 0, their values and their slopes (…, points, 4).
-
-    Beyond the profile's end all four are 0.
-    """
-
-    first: Indices  # of the four (…, points)
-    values: Floats
-    slopes: Floats
+_WAVENUMBER_END, _NODES_PER_TURN = 24.0, 4  # M decays as e^(−k)
+PANEL = 16  # wave numbers in each of several equal panels
 
 
 class OffsetSigma:
@@ -52,16 +42,19 @@ class OffsetSigma:
         radii = np.arange(0.0, min(PROFILE_END, offsets[-1] + rho[-1]) + _SPACING / 2, _SPACING)
         radii = np.append(radii, radii[-1] + _SPACING * np.arange(1, 4)) if len(radii) < 4 else radii
         a, x = table.axes[0], table.axes[2]
-        profile = table.profile(radii[:, None, None], a[:, None], x**3)
+        profile = table.profile_over(radii, a, x)
         along = CubicBasis(radii)
         average = np.stack([_disc_averages(along, np.abs(offsets), ratio) for ratio in rho])
         values: Floats = np.einsum("mer,rax->axme", average, profile, optimize=True)
         self.bases = [CubicBasis(np.asarray(nodes)) for nodes in (a, x, np.log(rho), offsets)]
         for axis, basis in enumerate(self.bases):
             values = basis.coefficients(values, axis)
-        self._table = _windows(values)
+        self._table = np.ascontiguousarray(values)
         # The first coefficient over L^(1/3) is the value at L = 0, and splines sum to 1.
-        self._strained = _windows(values - values[:, :1])
+        self._strained = np.ascontiguousarray(values - values[:, :1])
+        self._ends = np.array([[basis.nodes[0], basis.nodes[-1]] for basis in self.bases])
+        self._ends[3, 1] = self.end
+        self._axes = [part for basis in self.bases for part in (basis.knots, basis.cubics)]
         self._turns = float(offsets[-1] + rho[-1] + a[-1])
 
     @cached_property
@@ -71,7 +64,7 @@ class OffsetSigma:
     @property
     def wavenumbers(self) -> int:
         """How many there are."""
-        return _PANEL * _panels(self._turns)
+        return PANEL * _panels(self._turns)
 
     @property
     def wavenumber(self) -> Floats:
@@ -90,15 +83,9 @@ class OffsetSigma:
         """The grid of contacts with a layer whose pressures' transforms are at this object's wavenumbers."""
         return CurveGrid(self.wavenumber)
 
-    def contains(self, a_over_h: Floats, cbrt_load: Floats) -> Mask:
+    def contains(self, a_over_h: Floats, cbrt_load: Floats) -> NDArray[np.bool_]:
         """Which contacts the table holds; the others are continued."""
         return np.asarray((a_over_h <= self.bases[0].nodes[-1]) & (cbrt_load <= self.bases[1].nodes[-1]))
-
-    def place(self, offset: Floats) -> Place:
-        """Where offsets e/h (…, points) lie among the functions of the offset."""
-        first, value, slope = self.bases[3].weights(np.minimum(offset, self.end))
-        within = (offset <= self.end)[..., None]
-        return Place(first, value * within, slope * within)
 
     @property
     def end(self) -> float:
@@ -106,39 +93,46 @@ class OffsetSigma:
         return min(float(self.bases[3].nodes[-1]), PROFILE_END)
 
     def at(
-        self, a_over_h: Floats, cbrt_load: Floats, rt_over_h: Floats, place: Place, *, strained: bool, slopes: bool
-    ) -> list[Floats]:
-        """σ of the table at contacts and places (…, points), and its derivative by e/h; with `slopes` also those by
-        a/h, L^(1/3) and rT/h. `strained`: less its own value at L = 0, which is what finite strain adds."""
-        first_a, value_a, slope_a = self.bases[0].weights(a_over_h)
-        first_x, value_x, slope_x = self.bases[1].weights(cbrt_load)
-        first_r, value_r, slope_r = self.bases[2].weights(np.log(rt_over_h))
-        near = (self._strained if strained else self._table)[first_a, first_x, first_r, place.first]  # (…, a, x, r, e)
-        near = near.reshape(*near.shape[:-4], 64, 4) @ np.stack([place.values, place.slopes], axis=-1)
-        of_r = np.stack([value_r, slope_r / rt_over_h[..., None]], axis=-1)[..., None, :, :]
-        value, by_place = (near[..., number].reshape(*near.shape[:-2], 4, 4, 4) for number in range(2))
-        value = value @ of_r  # (…, a, x, 2)
-        answers = [
-            np.einsum("...a,...ax,...x->...", value_a, value[..., 0], value_x),
-            np.einsum("...a,...axr,...x,...r->...", value_a, by_place, value_x, value_r),
-        ]
-        if slopes:
-            answers += [
-                np.einsum("...a,...ax,...x->...", slope_a, value[..., 0], value_x),
-                np.einsum("...a,...ax,...x->...", value_a, value[..., 0], slope_x),
-                np.einsum("...a,...ax,...x->...", value_a, value[..., 1], value_x),
-            ]
-        return answers
+        self,
+        contact: NDArray[np.intp],
+        a_over_h: Differentiated,
+        cbrt_load: Differentiated,
+        rt_over_h: Differentiated,
+        offset: Differentiated,
+        *,
+        strained: bool,
+    ) -> Differentiated:
+        """σ of the table at rows (…, rows) of these contacts (rows,) and offsets e/h (…, rows).
 
-    def linear_at(self, transforms: Floats, contact: Indices, place: Place, *, slopes: bool) -> tuple[Floats, Floats]:
-        """The Hankel integrals of transforms p̂ · M · 2 J1(kρ)/(kρ) (quantities, …, contacts, k) of these contacts at
-        their places (quantities, …, points), the first alone without `slopes`; and the first's derivative by e/h."""
-        kernel, by_place = (
-            sum(self._bessel[place.first + number] * weights[..., number, None] for number in range(4))
-            for weights in (place.values, place.slopes)
+        `strained`: less its own value at L = 0, which is what finite strain adds.
+        """
+        from underskin.mechanisms.models.sigma_kernel import table_sigma
+
+        variables = a_over_h, cbrt_load, rt_over_h, offset
+        points = np.broadcast_shapes(*(variable.value.shape[:-1] for variable in variables))
+        result = unfilled(len(offset.slopes), (*points, len(contact)))
+        columns = [array for variable in (*variables, result) for array in as_columns(variable)]
+        table_sigma(self._strained if strained else self._table, self._ends, *self._axes, contact, *columns)
+        return result
+
+    def linear_at(
+        self, transforms: Floats, contact: NDArray[np.intp], offset: Floats, points: tuple[int, ...]
+    ) -> Floats:
+        """Hankel integrals of transforms p̂ · M · 2 J1(kρ)/(kρ) (quantities, …, contacts, k) of these contacts (rows,)
+        at offsets e/h (…, rows), and the first one's derivative by e/h: (quantities + 1, *points, rows)."""
+        from underskin.mechanisms.models.sigma_kernel import linear_sigma
+
+        whole = np.empty((len(transforms) + 1, *points, len(contact)))
+        linear_sigma(
+            self._bessel,
+            self._ends[3],
+            *self._axes[6:],
+            contact,
+            contiguous(transforms.reshape(len(transforms), -1, *transforms.shape[-2:])),
+            contiguous(offset.reshape(-1, offset.shape[-1])),
+            whole.reshape(len(whole), -1, len(contact)),
         )
-        of_points = (transforms if slopes else transforms[:1])[..., contact, :]
-        return np.einsum("...k,...k->...", of_points, kernel), np.einsum("...k,...k->...", of_points[0], by_place)
+        return whole
 
 
 def offset_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> OffsetSigma:
@@ -146,12 +140,9 @@ def offset_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_of
     return _kept(table, rt_over_h, stretch, min(PROFILE_END, float(np.ceil(2 * largest_offset) / 2)))
 
 
-_kept = lru_cache(maxsize=8)(OffsetSigma)
-
-
-def _windows(values: Floats) -> Floats:
-    """All blocks of 4 × 4 × 4 × 4 neighbouring coefficients, by the first of each (a view)."""
-    return np.lib.stride_tricks.sliding_window_view(np.ascontiguousarray(values), (4, 4, 4, 4))
+@lru_cache(maxsize=8)
+def _kept(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> OffsetSigma:
+    return OffsetSigma(table, rt_over_h, stretch, largest_offset)
 
 
 def _disc_averages(along: CubicBasis, offsets: Floats, rt_over_h: float) -> Floats:
@@ -178,13 +169,13 @@ def _disc_averages(along: CubicBasis, offsets: Floats, rt_over_h: float) -> Floa
 def _panels(highest: float) -> int:
     """Panels of [0, end] that are short enough for an oscillation over this distance."""
     turns = _WAVENUMBER_END * highest / (2 * np.pi)
-    return int(np.ceil((turns * _NODES_PER_TURN + 48) / _PANEL))
+    return int(np.ceil((turns * _NODES_PER_TURN + 48) / PANEL))
 
 
 def _wavenumbers(highest: float) -> tuple[Floats, Floats]:
     """Gauss–Legendre nodes and weights on panels of [0, end], short enough for the fastest oscillation."""
     panels = _panels(highest)
-    x, w = np.polynomial.legendre.leggauss(_PANEL)
+    x, w = np.polynomial.legendre.leggauss(PANEL)
     half = _WAVENUMBER_END / panels / 2
     k = 2 * half * np.arange(panels)[:, None] + half * (1 + x)
     return k.ravel(), np.tile(half * w, panels)

@@ -7,7 +7,7 @@ import numpy as np
 
 from underskin.autodiff import Differentiated
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.units import Array, Floats, Mask
+from underskin.units import Array, Floats, Indices, Mask
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Response:
                 row += level * of_lines[design.line]
         return level * factor, slopes
 
-    def part(self, index: int | slice) -> "Response":
+    def part(self, index: int | slice | Indices) -> "Response":
         """At some of several points."""
 
         def of(x: Differentiated) -> Differentiated:

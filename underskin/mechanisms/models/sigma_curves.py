@@ -12,17 +12,18 @@ x = k a/h; on the layer both come from its own contact (contact_curves).
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import j0
 
-from underskin.autodiff import Differentiated, chain
+from underskin.autodiff import Differentiated, chain, contiguous
 from underskin.mechanisms.models.contact_stage import PressedContacts
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.off_centre_response import OffsetSigma, Place
+from underskin.mechanisms.models.off_centre_response import PANEL, OffsetSigma
 from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactCurves
 from underskin.physics.elastic_layer import Layer
-from underskin.physics.hankel_transform import disc_average, hertz_transform, punch_transform
+from underskin.physics.hankel_transform import disc_average
 from underskin.physics.skin import INCOMPRESSIBLE
-from underskin.units import Floats, Indices
+from underskin.units import Floats
 
 
 class SigmaOfContacts:
@@ -41,27 +42,21 @@ class SigmaOfContacts:
         self._variables = [pressed.a_over_h, pressed.cbrt_load, rho]
         self.inside = sigma.contains(pressed.a_over_h.value, pressed.cbrt_load.value)
         self._linear: Floats | None = None
-        if layer is not None or not _as_in_the_table(contacts, pressed):
+        if layer is not None or not as_in_the_table(contacts):
             self._linear, further = _transforms(sigma.wavenumber, contacts, pressed, rho.value, layer)
             self._variables += further
             self.inside = self.inside & (pressed.a_over_h.value < LARGEST_A_OVER_H)
 
-    def at(self, contact: Indices, place: Place, offset: Differentiated) -> Differentiated:
-        """σ (…, points) at the places of these contacts (points,), `offset` e/h being what the place was found for."""
-        a, x, rho = (variable[contact] for variable in self._variables[:3])
-        moving = any(variable.slopes.any() for variable in self._variables)
-        strained = self._linear is not None
-        value, by_offset, *partial = self._sigma.at(
-            a.value, x.value, rho.value, place, strained=strained, slopes=moving
-        )
-        if self._linear is not None:
-            of_contact, by_place = self._sigma.linear_at(self._linear, contact, place, slopes=moving)
-            value, by_offset = value + of_contact[0], by_offset + by_place
-            if moving:
-                by_a, by_x, by_rho = partial
-                partial = [by_a + of_contact[1], by_x, by_rho + of_contact[2], *of_contact[3:]]
-        terms = zip(partial, (variable[contact] for variable in self._variables), strict=True) if moving else ()
-        return chain(value, (by_offset, offset), *terms)
+    def at(self, contact: NDArray[np.intp], offset: Differentiated) -> Differentiated:
+        """σ (…, points) at these offsets e/h from these contacts (points,)."""
+        a, x, rho, *further = self._variables
+        sigma = self._sigma.at(contact, a, x, rho, offset, strained=self._linear is not None)
+        if self._linear is None:
+            return sigma
+        points = sigma.value.shape[:-1]
+        linear, *partial, by_offset = self._sigma.linear_at(self._linear, contact, offset.value, points)
+        variables = (variable[contact] for variable in (a, rho, *further))
+        return sigma + chain(linear, (by_offset, offset), *zip(partial, variables, strict=bool(partial)))
 
 
 def layer_of(contacts: Contacts) -> Layer:
@@ -70,34 +65,43 @@ def layer_of(contacts: Contacts) -> Layer:
     return Layer(float(contacts.poisson_ratio.value.flat[0]), slip)
 
 
-def _as_in_the_table(contacts: Contacts, pressed: PressedContacts) -> bool:
+def as_in_the_table(contacts: Contacts) -> bool:
+    """Whether the table is of such contacts: of spheres without adhesion, on a bonded incompressible layer."""
     nu = contacts.poisson_ratio
     incompressible = (nu.value == INCOMPRESSIBLE).all() and not nu.slopes.any()
-    return pressed.sphere_share is None and contacts.slip is None and bool(incompressible)
+    return contacts.work_of_adhesion is None and contacts.slip is None and bool(incompressible)
 
 
 def _transforms(
     k: Floats, contacts: Contacts, pressed: PressedContacts, rho: Floats, layer: ContactCurves | None
 ) -> tuple[Floats, list[Differentiated]]:
     """p̂ · M · disc (quantities, …, contacts, k): its value, its derivatives by a/h, rT/h and what follows; and that."""
-    shape = _half_space_shape(k, pressed) if layer is None else _layer_shape(pressed, layer)
     slip = np.zeros(1) if contacts.slip is None else contacts.slip.value
+    of_layer = [x for x in (contacts.poisson_ratio, contacts.slip) if x is not None and x.slopes.any()]
+    shape = _half_space_shape(k, pressed) if layer is None else _layer_shape(pressed, layer, moving=bool(of_layer))
     transmission = Layer(contacts.poisson_ratio.value[..., None], slip[..., None]).transmission(k)
     by_poisson_ratio, by_slip = transmission.slopes
     disc, by_rho = _disc(k, rho[..., None])
     passed = transmission.value * disc
-    entries = [shape.value * passed, shape.by_alpha * passed, shape.value * (transmission.value * by_rho)]
+    terms: list[tuple[tuple[Floats | float, Floats], ...]] = [((shape.value, passed),)]
     further = []
-    if pressed.sphere_share is not None:
-        entries.append(shape.by_share * passed)
-        further.append(pressed.sphere_share)
-    if contacts.poisson_ratio.slopes.any():
-        entries.append(shape.value * (by_poisson_ratio * disc) + shape.by_poisson_ratio * passed)
-        further.append(contacts.poisson_ratio)
-    if contacts.slip is not None:
-        entries.append(shape.value * (by_slip * disc) + shape.by_slip * passed)
-        further.append(contacts.slip)
-    return np.stack(np.broadcast_arrays(*entries)), further
+    if any(x.slopes.any() for x in (pressed.a_over_h, contacts.thickness, *of_layer)):
+        terms += [((shape.by_alpha, passed),), ((shape.value, transmission.value * by_rho),)]
+        if pressed.sphere_share is not None:
+            terms.append(((shape.by_share, passed),))
+            further.append(pressed.sphere_share)
+        if contacts.poisson_ratio in of_layer:
+            terms.append(((shape.value, by_poisson_ratio * disc), (shape.by_poisson_ratio, passed)))
+            further.append(contacts.poisson_ratio)
+        if contacts.slip in of_layer:
+            terms.append(((shape.value, by_slip * disc), (shape.by_slip, passed)))
+            further.append(contacts.slip)
+    whole = np.empty((len(terms), *np.broadcast_shapes(shape.value.shape, passed.shape)))
+    for quantity, (first, *others) in zip(whole, terms, strict=True):
+        np.multiply(*first, out=quantity)
+        for one, other in others:
+            quantity += one * other
+    return whole, further
 
 
 @dataclass(frozen=True)
@@ -112,18 +116,19 @@ class _Shape:
 
 
 def _half_space_shape(k: Floats, pressed: PressedContacts) -> _Shape:
-    alpha = pressed.a_over_h.value[..., None]
-    argument = alpha * k
-    sphere, punch = hertz_transform(argument), punch_transform(argument)
-    sphere_slope = 3 * (punch - sphere) / alpha
-    punch_slope = (np.cos(argument) - punch) / alpha
+    from underskin.mechanisms.models.sigma_kernel import sphere_and_punch
+
+    alpha = pressed.a_over_h.value
+    shapes = np.empty((4, alpha.size, len(k)))
+    sphere_and_punch(k, PANEL, contiguous(alpha), shapes)
+    sphere, punch, sphere_slope, punch_slope = shapes.reshape(4, *alpha.shape, len(k))
     if pressed.sphere_share is None:
         return _Shape(sphere, sphere_slope, sphere - punch)
     share = pressed.sphere_share.value[..., None]
     return _Shape(punch + share * (sphere - punch), punch_slope + share * (sphere_slope - punch_slope), sphere - punch)
 
 
-def _layer_shape(pressed: PressedContacts, layer: ContactCurves) -> _Shape:
+def _layer_shape(pressed: PressedContacts, layer: ContactCurves, *, moving: bool) -> _Shape:
     alpha = pressed.a_over_h.value
     basis = layer.interval.basis(alpha.ravel()).reshape(*alpha.shape, -1)
     to_coefficients = layer.interval.coefficients(np.eye(len(layer.interval.nodes)))
@@ -137,7 +142,7 @@ def _layer_shape(pressed: PressedContacts, layer: ContactCurves) -> _Shape:
         return of_punch + pressed.sphere_share.value[..., None] * (of_sphere - of_punch)
 
     sphere, punch = layer.sphere_transform, layer.punch_transform
-    by_layer = [mixed(at, *slopes) for slopes in zip(sphere.slopes, punch.slopes, strict=True)]
+    by_layer = [mixed(at, *slopes) for slopes in zip(sphere.slopes, punch.slopes, strict=True)] if moving else []
     value, by_alpha = (mixed(weights, sphere.value, punch.value) for weights in (at, slope))
     return _Shape(value, by_alpha, at @ (sphere.value - punch.value), *by_layer)
 

@@ -1,0 +1,28 @@
+"""Compiled functions come from the cache that set-up made, also where nothing can be written."""
+
+import subprocess
+import sys
+
+_LOADED = """
+import tempfile
+def refuse(*args, **kwargs):
+    raise PermissionError("read-only")
+tempfile.TemporaryFile = refuse
+from underskin.compiled import load_all
+load_all()
+from underskin.diagnosis.inference.cost_kernel import log_likelihoods
+from underskin.surrogate.table_kernel import sigma_rows
+for function in (log_likelihoods, sigma_rows):
+    assert sum(function.stats.cache_hits.values()) == 1, function.stats
+    assert not function.stats.cache_misses, function.stats
+"""
+
+
+def test_what_set_up_compiled_is_loaded_and_not_compiled_again() -> None:
+    subprocess.run([sys.executable, "-m", "underskin.compiled"], check=True)
+    subprocess.run([sys.executable, "-c", _LOADED], check=True)
+
+
+def test_the_command_line_and_small_tables_do_without() -> None:
+    small = "import sys, underskin.cli.app; from underskin import load_table; load_table().sigma([0.5, 1.0], 0.5, 0.01)"
+    subprocess.run([sys.executable, "-c", f"{small}; assert 'numba' not in sys.modules"], check=True)

@@ -1,0 +1,135 @@
+"""Compiled: how probable recordings are under predictions (see `likelihood`), and priors, at many sets of noise levels.
+
+Arrays are (points, sets, recordings) where an axis may be 1 and then stands for all.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.compiled import compiled
+from underskin.units import Floats
+
+_TOGETHER = 8  # factors of a determinant whose logarithm is taken together: below 1e38 each, they do not overflow
+
+
+@compiled(
+    "void(float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1], float64[:, :, ::1], float64[:, ::1], int64[::1], "
+    "float64[:, ::1], float64[::1], float64[::1], float64[:, :, ::1], float64[:, ::1])"
+)
+def log_likelihoods(
+    level: Floats,
+    uu: Floats,
+    uy: Floats,
+    yy: Floats,
+    place: Floats,
+    sensor: NDArray[np.int64],
+    bend: Floats,
+    laplacian: Floats,
+    square: Floats,
+    noise: Floats,
+    each: Floats,
+) -> None:
+    """−½ of what noise levels make of χ² and log|C|: added to `each` (points, sets).
+
+    Parameters
+    ----------
+    level
+        (points, recordings).
+    uu, uy, yy
+        The sums Re u*u, Re u*y and |y|².
+    place
+        (points, recordings) |t|² of the position's slopes, (points, 0) where there are none.
+    sensor
+        (recordings,).
+    bend
+        (points, sensors).
+    laplacian, square
+        (recordings,) of σ over the place, relative to it.
+    noise
+        (points, sets, 4): gain, level, position and spread.
+    """
+    points, sets = each.shape
+    recordings, sensors = level.shape[1], bend.shape[1]
+    mm, mr = np.empty(sensors), np.empty(sensors)
+    for point in range(points):
+        for number in range(sets):
+            gain2, k2, p2, tau2 = noise[min(point, len(noise) - 1), number] ** 2
+            uu_at, uy_at, yy_at = (
+                uu[min(point, uu.shape[0] - 1), min(number, uu.shape[1] - 1)],
+                uy[min(point, uy.shape[0] - 1), min(number, uy.shape[1] - 1)],
+                yy[min(point, yy.shape[0] - 1), min(number, yy.shape[1] - 1)],
+            )
+            mm[:], mr[:] = 0.0, 0.0
+            chi2 = log_determinant = 0.0
+            determinant, inverse = 1.0, 1 / k2
+            for recording in range(recordings):
+                of = sensor[recording]
+                own = bend[point, of]
+                exponent = own + 0.5 * p2 * laplacian[recording]
+                factor = np.exp(exponent) if exponent != 0 else 1.0
+                a = level[point, recording] * factor
+                known = a * (1 - own)
+                u, u_y = uu_at[recording], uy_at[recording]
+                u_r = (u_y - known * u) * inverse
+                r_r = (yy_at[recording] - known * (2 * u_y - known * u)) * inverse
+                u *= inverse
+                a2 = a * a
+                variance = (gain2 + 0.5 * p2 * p2 * square[recording]) * a2
+                if place.shape[1]:
+                    variance += p2 * place[point, recording] * factor * factor
+                left = 1 + variance * u
+                reduced = 1 / left
+                chi2 += r_r - variance * reduced * u_r * u_r
+                mm[of] += a2 * u * reduced
+                mr[of] += a * u_r * reduced
+                determinant *= left
+                if recording % _TOGETHER == 0:
+                    log_determinant += np.log(determinant)
+                    determinant = 1.0
+            log_determinant += np.log(determinant)
+            for of in range(sensors):
+                chi2 -= tau2 / (1 + tau2 * mm[of]) * mr[of] ** 2
+                log_determinant += np.log1p(tau2 * mm[of])
+            each[point, number] += -0.5 * (chi2 + log_determinant)
+
+
+@compiled(
+    "void(int64[::1], float64[:, ::1], boolean[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], "
+    "float64[:, ::1], float64[::1], float64[:, :, ::1], float64[:, ::1], float64[:, ::1])"
+)
+def log_priors(
+    owner: NDArray[np.int64],
+    fit: Floats,
+    free: NDArray[np.bool_],
+    low: Floats,
+    high: Floats,
+    precision: Floats,
+    centre: Floats,
+    height: Floats,
+    covariances: Floats,
+    plateaus: Floats,
+    each: Floats,
+) -> None:
+    """The logarithms of the prior densities, added to `each` (points, sets).
+
+    Of the coordinates `fit` (points, parameters) that are free in each point's hypothesis a normal or uniform density
+    within bounds; of the covariance's coordinates (points, sets, parameters) `plateaus`, see `Plateau`: low, high,
+    fall_low, fall_high and the logarithm of the area (parameters, 5).
+    """
+    for point in range(len(fit)):
+        of = owner[point]
+        of_mean = height[of]
+        for place in range(fit.shape[1]):
+            if free[of, place]:
+                value = fit[point, place]
+                if value < low[of, place] or value > high[of, place]:
+                    of_mean = -np.inf
+                of_mean -= 0.5 * precision[of, place] * (value - centre[of, place]) ** 2
+        for number in range(covariances.shape[1]):
+            total = of_mean
+            for place in range(covariances.shape[2]):
+                value = covariances[point, number, place]
+                below = max((plateaus[place, 0] - value) / plateaus[place, 2], 0.0)
+                above = max((value - plateaus[place, 1]) / plateaus[place, 3], 0.0)
+                total -= 0.5 * (below + above) ** 2 + plateaus[place, 4]
+            each[point, number] += total
