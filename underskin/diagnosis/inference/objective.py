@@ -76,6 +76,10 @@ class Evaluated:
     def __len__(self) -> int:
         return len(self.points)
 
+    def some(self, points: Places) -> "Evaluated":
+        """At some of the points, in their order: itself where that is all of them."""
+        return self if len(points) == len(self) else self[points]
+
     def __getitem__(self, points: NDArray[np.intp] | NDArray[np.bool_] | slice) -> "Evaluated":
         growth = None if self.growth is None else self.growth[points]
         return Evaluated(self.points[points], self.products[points], self.cost[points], growth)
@@ -269,7 +273,7 @@ class Evaluator:
         points, cost, moving = at.points, at.cost.copy(), np.arange(len(at))
         products = at.products.values
         for _ in range(steps):
-            part = Evaluated(points[moving], products[moving], cost[moving])
+            part = Evaluated(points, products, cost.copy()).some(moving)
             gradient, hessian = self.covariance_equations(part, first_mixed=self._common)
             if held is not None:
                 hessian[:, held, :] = hessian[:, :, held] = gradient[:, held] = 0.0
@@ -284,7 +288,7 @@ class Evaluator:
             trying = np.arange(len(part))
             for _ in range(4):
                 tried = np.clip(here[trying] + step[trying], low, high)
-                costs = self.costs(part[trying], tried[:, None])[:, 0]
+                costs = self.costs(part.some(trying), tried[:, None])[:, 0]
                 lower = costs < part.cost[trying]
                 better = trying[lower]
                 covariance[better], reached[better] = tried[lower], costs[lower]

@@ -165,7 +165,7 @@ class Fitter(Evaluator):
         damping = np.full(len(best), 1e-3)
         moving = np.arange(len(best))
         for _ in range(_MOST_ITERATIONS):
-            part = best[moving]
+            part = best.some(moving)
             step, slope = self._step(part, damping[moving])
             if target is not None:
                 promising = part.cost - _PROMISED * slope - _MARGIN < target(best)[moving]
