@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from underskin.units import Array
+from underskin.units import Array, Indices, Mask
 
 
 class Differentiated:
@@ -80,23 +79,23 @@ class Differentiated:
             np.broadcast_to(self.slopes, (*self.slopes.shape[:-1], rows)),
         )
 
-    def at_points(self, some: NDArray[np.intp] | None) -> Differentiated:
+    def at_points(self, some: Indices | None) -> Differentiated:
         """At some of several points (points, rows), at all for None."""
         if some is None or len(self.value) == 1:
             return self
         return Differentiated(self.value[some], self.slopes[:, some])
 
-    def times(self, factor: Differentiated | None, some: NDArray[np.intp] | None, points: int) -> Differentiated:
+    def times(self, factor: Differentiated | None, some: Indices | None, points: int) -> Differentiated:
         """With those at some of so many points multiplied; None stands for 1, and for all."""
         if factor is None:
             return self
         return self * factor if some is None else self._with(some, self.at_points(some) * factor, points)
 
-    def plus(self, term: Differentiated, some: NDArray[np.intp] | None, points: int) -> Differentiated:
+    def plus(self, term: Differentiated, some: Indices | None, points: int) -> Differentiated:
         """With something added to those at some of so many points; None stands for all."""
         return self + term if some is None else self._with(some, self.at_points(some) + term, points)
 
-    def _with(self, some: NDArray[np.intp], changed: Differentiated, points: int) -> Differentiated:
+    def _with(self, some: Indices, changed: Differentiated, points: int) -> Differentiated:
         shape = points, max(self.value.shape[-1], changed.value.shape[-1])
         dtype = np.result_type(self.value, changed.value)
         value = np.broadcast_to(self.value, shape).astype(dtype)
@@ -141,7 +140,7 @@ def chain(value: Array, *terms: tuple[Array, Differentiated]) -> Differentiated:
     return Differentiated(value, np.asarray(slopes))
 
 
-def where(condition: NDArray[np.bool_], yes: Differentiated, no: Differentiated | float) -> Differentiated:
+def where(condition: Mask, yes: Differentiated, no: Differentiated | float) -> Differentiated:
     """`yes` in the rows where `condition` (rows,) holds, `no` in the others."""
     if not isinstance(no, Differentiated):
         return Differentiated(np.where(condition, yes.value, no), np.where(condition, yes.slopes, 0.0))
@@ -208,7 +207,7 @@ def unfilled(parameters: int, shape: tuple[int, ...]) -> Differentiated:
     return Differentiated(np.empty(shape), np.empty((parameters, *shape)))
 
 
-def sum_rows(x: Differentiated, owner: NDArray[np.intp], rows: int) -> Differentiated:
+def sum_rows(x: Differentiated, owner: Indices, rows: int) -> Differentiated:
     """Sums over groups of rows.
 
     Parameters
@@ -229,7 +228,7 @@ def sum_rows(x: Differentiated, owner: NDArray[np.intp], rows: int) -> Different
     return Differentiated(_summed(x.value, owner, rows), _summed(x.slopes, owner, rows))
 
 
-def _summed(terms: Array, owner: NDArray[np.intp], rows: int) -> Array:
+def _summed(terms: Array, owner: Indices, rows: int) -> Array:
     sets = int(np.prod(terms.shape[:-1]))
     place = (rows * np.arange(sets)[:, None] + owner).ravel()
     return np.bincount(place, terms.ravel(), sets * rows).reshape(*terms.shape[:-1], rows)

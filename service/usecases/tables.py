@@ -1,7 +1,9 @@
 """The tables in use: domain and origin of each; those beside σ's are read when a request first needs them."""
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,23 +14,25 @@ from underskin.surrogate.contact_table import CONTACT_TABLE, ContactTable, load_
 from underskin.surrogate.influence_table import INFLUENCE_TABLE, InfluenceTable, load_influence
 from underskin.surrogate.sigma_table import SigmaTable
 
+_Table = TypeVar("_Table")
 _NAMED = {"schema", "data_sha256", "default"}
 
 
 @cache
 def influence_table(folder: Path) -> InfluenceTable:
     """γ_n and γ_t; raises Refusal 503 with the reason when the table cannot be read."""
-    try:
-        return load_influence(folder / INFLUENCE_TABLE)
-    except TableError as error:
-        raise Refusal(503, str(error)) from error
+    return _read(load_influence, folder / INFLUENCE_TABLE)
 
 
 @cache
 def _contact_table(folder: Path) -> ContactTable:
     """The finite-strain contact; raises Refusal 503 with the reason when the table cannot be read."""
+    return _read(load_contact, folder / CONTACT_TABLE)
+
+
+def _read(load: Callable[[Path], _Table], file: Path) -> _Table:
     try:
-        return load_contact(folder / CONTACT_TABLE)
+        return load(file)
     except TableError as error:
         raise Refusal(503, str(error)) from error
 

@@ -1,11 +1,9 @@
-"""The report as a page: complete, self-contained, safe whatever a campaign holds, and the same from a cluster."""
+"""The report as a page: complete, self-contained, and safe whatever a campaign holds."""
 
 import json
-import os
 import re
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -14,12 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from tests.support.adhesive_curves import adhesive_figure
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.mechanism_campaigns import indentation_campaign
-from underskin.cli.app import app
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.figures import figures
 from underskin.diagnosis.reporting.html_report import page
@@ -27,7 +23,7 @@ from underskin.diagnosis.reporting.report import DiagnosisResult, report
 from underskin.diagnosis.reporting.wording import readable
 from underskin.mechanisms import compose
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, to_dict
+from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording
 from underskin.surrogate.sigma_table import load_table
 
 HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(2)>&amp;<a href='https://example.org'>x</a>"
@@ -259,58 +255,3 @@ def test_every_kind_of_report_has_its_page(make: Callable[[], Campaign], verdict
     assert ("Depth is counted from the fitted contact point" in tags.text) == ("curve" in names)
     for figure in drawn.values():
         json.loads(figure.to_json())
-
-
-@pytest.mark.slow
-def test_reports_and_pages_are_the_same_on_a_dask_cluster_and_in_processes(tmp_path: Path) -> None:
-    distributed = pytest.importorskip("distributed", reason="the cluster extra is not installed")
-    files = [tmp_path / f"palm-{number}.json" for number in range(2)]
-    for number, file in enumerate(files):
-        made = replace(RESONANT, sensors=1, lines=10, seed=number)
-        file.write_text(json.dumps(to_dict(campaign(made, load_table()))), encoding="utf-8")
-    torn = tmp_path / "torn.json"
-    torn.write_text("{", encoding="utf-8")
-    given = ["diagnose", *map(str, files), str(torn), "--html"]
-
-    def written(folder: str, *options: str) -> dict[str, bytes]:
-        result = CliRunner().invoke(app, [*given, "--output-dir", str(tmp_path / folder), *options])
-        assert result.exit_code == 2
-        assert "torn.json" in result.stderr
-        return {file.name: file.read_bytes() for file in (tmp_path / folder).iterdir()}
-
-    here = written("here", "--workers", "1")
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
-    ) as cluster:
-        there = written("there", "--scheduler", cluster.scheduler_address)
-    assert sorted(here) == ["palm-0.html", "palm-0.json", "palm-1.html", "palm-1.json"]
-    assert there == here
-    assert written("processes", "--workers", "2") == here
-
-
-@pytest.mark.slow
-def test_a_single_file_is_diagnosed_with_one_blas_thread(tmp_path: Path) -> None:
-    """As it is in a process of many: so that its report is the same on any machine."""
-    file = tmp_path / "palm.json"
-    file.write_text(json.dumps(to_dict(campaign(ALONE, load_table()))), encoding="utf-8")
-    code = (
-        "import threadpoolctl\nfrom underskin.cli.app import app\n"
-        f"app(['diagnose', {str(file)!r}, '--output-dir', {str(tmp_path)!r} + '/reports'], standalone_mode=False)\n"
-        "print({pool['num_threads'] for pool in threadpoolctl.threadpool_info()})"
-    )
-    environment = {name: value for name, value in os.environ.items() if not name.endswith("NUM_THREADS")}
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "{1}"
-
-
-@pytest.mark.slow
-def test_a_cluster_that_does_not_answer_is_named(tmp_path: Path) -> None:
-    pytest.importorskip("distributed", reason="the cluster extra is not installed")
-    address = "tcp://127.0.0.1:1"
-    file = tmp_path / "palm.json"
-    file.write_text("{}", encoding="utf-8")
-    result = CliRunner().invoke(
-        app, ["diagnose", str(file), "--output-dir", str(tmp_path / "reports"), "--scheduler", address]
-    )
-    assert isinstance(result.exception, Exception)
-    assert address in str(result.exception)

@@ -27,6 +27,7 @@ from typing import Any
 UNDERSKIN = Path(sys.executable).with_name("underskin")
 _MODULES = ("service.cli.serve", "service.cli.keys", "service.cli.backup", "alembic.runtime.migration", "psycopg")
 _LONGEST = 1 << 17  # bytes of a request
+_LIMIT = 300.0  # s, for a command to end by itself
 _STATUS = struct.Struct("i")
 # Read when the interpreter starts: a process that has them otherwise must be started anew.
 _AT_THE_START = ("PYTHON", "LD_", "MALLOC_")
@@ -102,7 +103,10 @@ def run(
         told.write(given)
         told.seek(0)
         process = start(words, environment or os.environ, (told.fileno(), out.fileno(), err.fileno()), folder)
-        status = process.wait()
+        try:
+            status = process.wait(_LIMIT)
+        finally:
+            process.kill()
         out.seek(0)
         err.seek(0)
         return subprocess.CompletedProcess(words, status, out.read(), err.read())

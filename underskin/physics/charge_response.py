@@ -7,10 +7,10 @@ positive in compression for a positive d33; in the base model it is real and doe
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from underskin.errors import too_few
-from underskin.units import Floats
+from underskin.units import Floats, Mask
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Sigma:
 
     sigma: Floats
     rel_error: Floats
-    inside: NDArray[np.bool_]
+    inside: Mask
 
 
 def gain(sigma: ArrayLike, rt_over_h: ArrayLike) -> Floats:
@@ -88,7 +88,7 @@ def mean_stress(preload: ArrayLike, sigma: ArrayLike, thickness: ArrayLike) -> F
     return 1.5 / np.pi * np.asarray(preload, dtype=float) * np.asarray(sigma) / np.square(thickness)
 
 
-def plateau(lines: Floats, in_band: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+def plateau(lines: Floats, in_band: Mask) -> tuple[Floats, Floats]:
     """Mean of the FRF lines inside a band, and its standard error.
 
     The standard error is the scatter between lines alone: a gain error is common to all lines of a recording.

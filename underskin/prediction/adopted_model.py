@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from underskin.errors import InvalidInput, conflicting
@@ -25,7 +24,7 @@ from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 from underskin.recordings.conditions import Conditions, SkinDescription, frf_of
 from underskin.recordings.frf.estimation import lines_of
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Complexes, to_si
+from underskin.units import Complexes, Indices, Mask, to_si
 
 _DECLARED = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio")
 NOT_ADOPTED = {
@@ -47,8 +46,8 @@ class Response:
     """FRF over d33 [-], one row a line: recordings one behind another, as in the campaign."""
 
     value: Complexes  # (rows,)
-    recording: NDArray[np.intp]  # (rows,)
-    inside: NDArray[np.bool_]  # (rows,) False where the contact lies beyond the table
+    recording: Indices  # (rows,)
+    inside: Mask  # (rows,) False where the contact lies beyond the table
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.findings.finding import Finding
 from underskin.physics import half_space
@@ -13,7 +12,7 @@ from underskin.physics.skin import Indenter, Skin
 from underskin.prediction import plausibility
 from underskin.prediction.pressed_skin import Transmission, transmission
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats, checked, finite, non_negative, to_lab, to_si
+from underskin.units import Floats, Mask, checked, finite, non_negative, to_lab, to_si
 
 SigmaModelName = Literal["layer", "half_space"]
 _SKIN = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio")
@@ -25,7 +24,7 @@ class ComputedColumns:
     """Columns by field name, and which rows are inside the `domain` (NaN in what depends on σ where not)."""
 
     columns: Mapping[str, Floats]
-    inside: NDArray[np.bool_]
+    inside: Mask
     domain: str
     findings: Sequence[Finding] = ()
 

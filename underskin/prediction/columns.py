@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.errors import ErrorCode, InvalidInput, Mention, Requirement
-from underskin.units import Floats
+from underskin.units import Floats, Mask
 
 
 class CsvError(ValueError):
@@ -32,7 +31,7 @@ def rows(columns: Mapping[str, Floats]) -> int:
     return 1 if first is None else long[first]
 
 
-def statuses(inside: NDArray[np.bool_], count: int) -> list[str]:
+def statuses(inside: Mask, count: int) -> list[str]:
     """`ok` or `out_of_domain` for each of `count` rows."""
     return ["ok" if row else "out_of_domain" for row in np.broadcast_to(inside, (count,)).tolist()]
 

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -13,7 +12,7 @@ from underskin.prediction.pressed_skin import Transmission
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.conditions import SkinDescription
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats
+from underskin.units import Floats, Mask
 
 _MOST_CHARGE = 1.0  # C/N
 _LIKE_MILLI = 100.0  # N: from here on a preload that fits as 1/1000 may be in mN
@@ -29,7 +28,7 @@ class RowConditions:
     poisson_ratio: float
 
 
-def usable(level: Floats, noise: Floats, sigma: Floats, transmitted: Transmission) -> NDArray[np.bool_]:
+def usable(level: Floats, noise: Floats, sigma: Floats, transmitted: Transmission) -> Mask:
     """The rows inside the table's domain, at an offset that it reaches, with a line in the band and below 1 C/N."""
     return transmitted.inside & np.isfinite(sigma) & (np.hypot(level, noise) < _MOST_CHARGE)
 

@@ -18,7 +18,7 @@ from underskin.mechanisms.models.composition import chosen, kind_of, parameters_
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.conditions import Conditions, FrfConditions
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Array, to_lab
+from underskin.units import Array, Indices, Mask, to_lab
 
 _NOTHING: Mapping[str, float] = {}
 
@@ -41,8 +41,8 @@ class Predicted:
 
     value: Array
     derivatives: Mapping[str, Array]
-    recording: NDArray[np.intp]
-    inside: NDArray[np.bool_]
+    recording: Indices
+    inside: Mask
 
 
 def predict(

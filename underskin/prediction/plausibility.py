@@ -6,12 +6,11 @@ The d33 is answered all the same: a wrong gain or unit moves every value alike, 
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.findings.arguments import ImplausibleD33
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.units import LAB, Floats, unusual
+from underskin.units import LAB, Floats, Mask, unusual
 
 _LEAST_D33, _MOST_D33 = 0.05, 1000.0  # pC/N: beyond these no skin's sensors have been
 _OF_PVDF = 1.0, 100.0  # pC/N: PVDF and its copolymers have 10 to 40
@@ -51,7 +50,7 @@ def _first(d33: Floats) -> Iterator[Finding]:
             yield Finding(Reason.D33_OF_ROW, "", "d33_pc_per_n", arguments, index=first if d33.ndim else None)
 
 
-def _implausible_rows(d33: Floats) -> dict[ImplausibleD33, NDArray[np.bool_]]:
+def _implausible_rows(d33: Floats) -> dict[ImplausibleD33, Mask]:
     """Which entries [pC/N] are doubtful; none where there is no value (NaN)."""
     size = np.abs(d33)
     return {

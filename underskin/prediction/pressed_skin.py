@@ -7,12 +7,12 @@ Columns in SI that broadcast. `model` "paper" is the base model: Hertz radius on
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from underskin.physics import charge_response, hertz
 from underskin.physics.skin import INCOMPRESSIBLE, Indenter, Skin
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats
+from underskin.units import Floats, Mask
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Transmission:
     sigma: Floats
     rel_error: Floats
     mean_stress: Floats  # T0 [Pa], compression positive
-    inside: NDArray[np.bool_]
+    inside: Mask
 
     def frf(self, d33: ArrayLike) -> Floats:
         """Charge over force [C/N] for d33 [C/N]."""

@@ -8,13 +8,12 @@ force. Two loads are equal, and their responses add, as on a linear layer.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.physics.skin import Indenter, Skin
 from underskin.prediction.pressed_skin import Transmission, transmission
 from underskin.surrogate.off_centre_sigma import sigma_beside
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats
+from underskin.units import Floats, Mask
 
 _SWEEP = 61  # points of a sweep
 _PLACEMENTS = 24  # of the array against the contacts, over one pitch
@@ -150,7 +149,7 @@ def resolution(offset: Floats, response: Floats, pitch: float, nearest: float, d
     )
 
 
-def _separated(offset: Floats, response: Floats, spacing: float, distance: float, dip: float) -> NDArray[np.bool_]:
+def _separated(offset: Floats, response: Floats, spacing: float, distance: float, dip: float) -> Mask:
     """Whether two contacts show as two, for each placement of the row of sensors."""
     half = distance / 2
     count = int(np.ceil((half + spacing) / spacing)) + 1

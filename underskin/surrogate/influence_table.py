@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_interp_spline
 
 from underskin.surrogate.hdf5_format import INFLUENCE_SCHEMA
 from underskin.surrogate.sigma_table import tables_folder
 from underskin.surrogate.table_file import Table
-from underskin.units import Floats
+from underskin.units import Floats, Mask
 
 INFLUENCE_TABLE = "influence.h5"
 _DEGREE = 5
@@ -34,7 +34,7 @@ class SensorStress:
 
     stress: Floats
     error: Floats
-    inside: NDArray[np.bool_]
+    inside: Mask
 
 
 @dataclass(frozen=True)

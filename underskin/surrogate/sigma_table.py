@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
 
 from underskin.autodiff import contiguous
@@ -19,7 +19,7 @@ from underskin.physics.charge_response import Sigma
 from underskin.surrogate.hdf5_format import SIGMA_SCHEMA
 from underskin.surrogate.point_spline import PointSpline, cell_of, four_functions
 from underskin.surrogate.table_file import Table
-from underskin.units import Floats
+from underskin.units import Floats, Indices, Mask
 
 SIGMA_TABLE = "sigma.h5"
 _MANY = 10_000  # rows
@@ -196,7 +196,7 @@ def _spline(axes: Sequence[Floats], values: Floats) -> NdBSpline:
 
 def _points(
     axes: Sequence[Floats], a_over_h: ArrayLike, second: ArrayLike, load_parameter: ArrayLike
-) -> tuple[Floats, NDArray[np.bool_], tuple[int, ...]]:
+) -> tuple[Floats, Mask, tuple[int, ...]]:
     """Grid coordinates (rows, 3), which rows are inside, and the broadcast shape; outside rows are moved inside."""
     columns = np.broadcast_arrays(
         np.asarray(a_over_h, dtype=float), np.asarray(second, dtype=float), np.cbrt(load_parameter)
@@ -204,13 +204,13 @@ def _points(
     points = np.stack([column.ravel() for column in columns], axis=-1)
     low = np.array([axis[0] for axis in axes])
     high = np.array([axis[-1] for axis in axes])
-    inside: NDArray[np.bool_] = np.all((points >= low) & (points <= high), axis=1)
+    inside: Mask = np.all((points >= low) & (points <= high), axis=1)
     if not inside.all():
         points[~inside] = low
     return points, inside, columns[0].shape
 
 
-def _cells(axes: Sequence[Floats], points: Floats) -> tuple[NDArray[np.intp], ...]:
+def _cells(axes: Sequence[Floats], points: Floats) -> tuple[Indices, ...]:
     return tuple(np.searchsorted(axis[1:-1], points[:, number], side="right") for number, axis in enumerate(axes))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.compiled import compiled
-from underskin.units import Floats
+from underskin.units import Floats, Mask
 
 _TOGETHER = 8  # factors of a determinant whose logarithm is taken together: below 1e38 each, they do not overflow
 
@@ -100,7 +100,7 @@ def log_likelihoods(
 def log_priors(
     owner: NDArray[np.int64],
     fit: Floats,
-    free: NDArray[np.bool_],
+    free: Mask,
     low: Floats,
     high: Floats,
     precision: Floats,

@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.noise.noise_levels import NoiseLevels
-from underskin.units import Floats
+from underskin.units import Floats, Mask
 
 
 @dataclass(frozen=True)
@@ -24,9 +23,7 @@ class CellResponse:
         return force * (1 + self.gain[lines.recording]) + self.offset
 
 
-def cell_response(
-    lines: Lines, levels: NoiseLevels, force: Floats, known: NDArray[np.bool_] | None = None
-) -> CellResponse:
+def cell_response(lines: Lines, levels: NoiseLevels, force: Floats, known: Mask | None = None) -> CellResponse:
     """From the rows that are `known` (default: all): y = F (1 + g) + P c + ε, with the priors of g and c.
 
     `force` (rows,) is what is predicted without them.

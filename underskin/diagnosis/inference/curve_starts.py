@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.diagnosis.inference.least_squares import LeastSquares
-from underskin.diagnosis.inference.objective import Evaluated, Evaluator, Points
+from underskin.diagnosis.inference.objective import Evaluator
+from underskin.diagnosis.inference.points import Evaluated, Points
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, START_GAIN
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.recordings.conditions import curves_of

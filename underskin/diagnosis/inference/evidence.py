@@ -17,8 +17,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from underskin.diagnosis.inference.laplace import Evidence, around, around_levels, around_mean, log_volume
-from underskin.diagnosis.inference.objective import GAIN, POSITION, Evaluated, Points
+from underskin.diagnosis.inference.objective import GAIN, POSITION
 from underskin.diagnosis.inference.optimizer import Fitter
+from underskin.diagnosis.inference.points import Evaluated, Points
 from underskin.units import Floats
 
 __all__ = ["Evidence", "around", "held_points", "integrated", "laplace"]

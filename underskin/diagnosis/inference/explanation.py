@@ -15,8 +15,8 @@ from underskin.diagnosis.inference.evidence import Evidence, around
 from underskin.diagnosis.inference.evidence import integrated as over_all_values
 from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis, own_places
 from underskin.diagnosis.inference.likelihood import Curvature
-from underskin.diagnosis.inference.objective import Points
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
+from underskin.diagnosis.inference.points import Points
 from underskin.diagnosis.inference.position_curvature import curvature
 from underskin.diagnosis.inference.starts import Beginning, best_starts
 from underskin.errors import InvalidInput

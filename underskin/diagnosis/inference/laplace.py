@@ -15,11 +15,10 @@ from scipy.special import log_ndtr
 from underskin.diagnosis.inference.curve_nuisances import cell_response
 from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis
 from underskin.diagnosis.inference.likelihood import Likelihoods
-from underskin.diagnosis.inference.objective import Places
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.noise.noise_levels import NoiseLevels
 from underskin.mechanisms.models.composed import Prediction
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 _NEAR = 4.0  # standard deviations from a bound within which it counts
 _POLISHING, _POLISHED = 4, 0.05  # steps at most, and the gain in log posterior below which it stops
@@ -162,7 +161,7 @@ def _equations(fitter: Fitter, at: Evaluated) -> tuple[Floats, Floats]:
     return information, -ascent
 
 
-def _polish(fitter: Fitter, at: Evaluated, moving: Places) -> tuple[Places, Evaluated]:
+def _polish(fitter: Fitter, at: Evaluated, moving: Indices) -> tuple[Indices, Evaluated]:
     """Newton steps of some points with the whole gradient, within the bounds; and which of them gained."""
     part = at[moving]
     information, gradient = _equations(fitter, part)
@@ -175,7 +174,7 @@ def _polish(fitter: Fitter, at: Evaluated, moving: Places) -> tuple[Places, Eval
     matrix[:, every, every] = np.where(free, matrix[:, every, every], 1.0)
     step = -np.linalg.solve(matrix, np.where(free, gradient, 0.0)[..., None])[..., 0]
     trying = np.flatnonzero(-0.5 * (gradient * step).sum(axis=1) >= _POLISHED)
-    gained: list[Places] = []
+    gained: list[Indices] = []
     for _ in range(5):
         if not len(trying):
             break

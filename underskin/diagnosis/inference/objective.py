@@ -5,21 +5,21 @@ Newton steps on the likelihood of the predictions at hand, which costs no model 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.autodiff import contiguous
 from underskin.diagnosis.inference.frf_products import FrfProducts
 from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis, curvature_of_prior
 from underskin.diagnosis.inference.likelihood import Likelihoods, log_likelihoods, normal_equations
+from underskin.diagnosis.inference.points import Evaluated, Points
 from underskin.diagnosis.inference.products import Products, joined
 from underskin.diagnosis.noise.noise_levels import SeveralLevels
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.frf_models import FrfModels
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 GAIN, LEVEL, POSITION = 0, 1, 2  # places among the covariance's parameters, the last where there is such scatter
 SMOOTH = 2  # of curves, which have no place
@@ -30,65 +30,6 @@ _FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
 _NUMBERS_AT_ONCE = 500_000
 _PREDICTED_AT_ONCE = 2_000_000
 _BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
-
-Places = NDArray[np.intp]
-
-
-@dataclass(frozen=True)
-class Points:
-    """Where fits stand: coordinates of the models (points, parameters), of the covariance, and the sensors' log gains.
-
-    `owner` says which hypothesis each point is of, in rising order; models with fewer parameters than others have
-    zeros behind their own.
-    """
-
-    owner: Places
-    fit: Floats
-    covariance: Floats
-    bend: Floats
-
-    def __len__(self) -> int:
-        return len(self.owner)
-
-    def __getitem__(self, points: NDArray[np.intp] | NDArray[np.bool_] | slice) -> "Points":
-        return Points(self.owner[points], self.fit[points], self.covariance[points], self.bend[points])
-
-
-def together(one: Points, other: Points) -> Points:
-    """The points of both, which are of one hypothesis."""
-    names = "owner", "fit", "covariance", "bend"
-    return Points(*(np.concatenate([getattr(one, name), getattr(other, name)]) for name in names))
-
-
-@dataclass(frozen=True)
-class Evaluated:
-    """Points with what was worked out there; `cost` is minus the log posterior density (up to what all share).
-
-    `growth` ∂ log |t|²/∂θ of the position's slopes (points, recordings, parameters): not finite where a fit has not
-    needed it yet.
-    """
-
-    points: Points
-    products: Products
-    cost: Floats
-    growth: Floats | None = None
-
-    def __len__(self) -> int:
-        return len(self.points)
-
-    def some(self, points: Places) -> "Evaluated":
-        """At some of the points, in their order: itself where that is all of them."""
-        return self if len(points) == len(self) else self[points]
-
-    def __getitem__(self, points: NDArray[np.intp] | NDArray[np.bool_] | slice) -> "Evaluated":
-        growth = None if self.growth is None else self.growth[points]
-        return Evaluated(self.points[points], self.products[points], self.cost[points], growth)
-
-    def best(self) -> Places:
-        """The point of least cost of each hypothesis that has one."""
-        order = np.lexsort((self.cost, self.points.owner))
-        owner = self.points.owner[order]
-        return order[np.append(True, owner[1:] != owner[:-1])] if len(order) else order
 
 
 class Evaluator:
@@ -304,7 +245,7 @@ class Evaluator:
                 break
         return Evaluated(points, at.products, cost, at.growth)
 
-    def _moved(self, points: Points, moving: Places, covariance: Floats) -> Points:
+    def _moved(self, points: Points, moving: Indices, covariance: Floats) -> Points:
         whole = points.covariance.copy()
         whole[moving] = covariance
         return self.with_covariance(points, whole)

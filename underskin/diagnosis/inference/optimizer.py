@@ -9,16 +9,16 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.inference.curve_starts import by_least_squares
 from underskin.diagnosis.inference.frf_products import FrfProducts
 from underskin.diagnosis.inference.hypothesis import FitPoint, own_places
-from underskin.diagnosis.inference.objective import Evaluated, Evaluator, Places, Points
+from underskin.diagnosis.inference.objective import Evaluator
+from underskin.diagnosis.inference.points import Evaluated, Points
 from underskin.diagnosis.inference.products import Products, joined
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR, START_GAIN
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.units import Floats
+from underskin.units import Floats, Indices, Mask
 
 __all__ = ["Evaluated", "Fitter"]
 
@@ -129,13 +129,13 @@ class Fitter(Evaluator):
         return self.settle(self.weighed(*self._scaled(at.points, at.products, np.exp(step))), 2)
 
     @cached_property
-    def _d33(self) -> Places:
+    def _d33(self) -> Indices:
         """Where each hypothesis has the parameter that the prediction is proportional to."""
         proportional = [[entry.proportional for entry in one.model.parameters] for one in self.hypotheses]
         return np.array([own.index(True) for own in proportional])
 
     @cached_property
-    def _moves_place(self) -> NDArray[np.bool_]:
+    def _moves_place(self) -> Mask:
         """Which parameters of each hypothesis may change how σ depends on the contact's place (hypotheses, parameters),
         relative to σ: not d33, nor those of the dynamics."""
         moves = np.zeros(self.low.shape, dtype=bool)
@@ -188,9 +188,7 @@ class Fitter(Evaluator):
                 break
         return best
 
-    def _moved_on(
-        self, at: Evaluated, step: Floats, damping: Floats, settling: int
-    ) -> tuple[Evaluated, Floats, NDArray[np.bool_]]:
+    def _moved_on(self, at: Evaluated, step: Floats, damping: Floats, settling: int) -> tuple[Evaluated, Floats, Mask]:
         """The points after steps, where these gain; their damping; and which of them are to go on.
 
         A point that gains nothing learns first how the position's slopes change, then tries shorter steps.
@@ -212,7 +210,7 @@ class Fitter(Evaluator):
         idle = failed & (gained > -_CONVERGED) & (damping > 1)
         return after, damping, ~(stuck | idle | (better & (gained < _CONVERGED)))
 
-    def grown(self, at: Evaluated) -> NDArray[np.bool_]:
+    def grown(self, at: Evaluated) -> Mask:
         """Which points know how the position's slopes change, or have no use for it."""
         if not self.placed:
             return np.ones(len(at), dtype=bool)
@@ -220,7 +218,7 @@ class Fitter(Evaluator):
             return np.zeros(len(at), dtype=bool)
         return np.asarray(np.isfinite(at.growth).all(axis=(1, 2)))
 
-    def replaced(self, at: Evaluated, where: Places, other: Evaluated) -> Evaluated:
+    def replaced(self, at: Evaluated, where: Indices, other: Evaluated) -> Evaluated:
         """With other points in the place of some."""
         if not len(where):
             return at

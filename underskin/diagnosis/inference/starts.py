@@ -5,16 +5,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 
 from underskin.diagnosis.inference.curve_starts import softer, with_contact_points
 from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis, own_places
-from underskin.diagnosis.inference.objective import Points, together
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
+from underskin.diagnosis.inference.points import Points, together
 from underskin.mechanisms.base import Parameter
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.units import Floats
+from underskin.units import Floats, Indices, Mask
 
 _QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7, 0.9), 3: (0.2, 0.5, 0.8)}
 _KEPT_STARTS = 3
@@ -98,7 +97,7 @@ def _of_curves(fitter: Fitter, lowest: Evaluated, guessed: int, new: Sequence[st
     return together(chosen, begun.points[_cheapest(begun)[:1]])
 
 
-def _cheapest(at: Evaluated) -> NDArray[np.intp]:
+def _cheapest(at: Evaluated) -> Indices:
     """The points in the order of their costs."""
     return np.argsort(at.cost, kind="stable")
 
@@ -122,7 +121,7 @@ def _coordinate(entry: Parameter, values: Mapping[str, float]) -> float:
     return float(np.clip(entry.to_fit(values[entry.name] / unit), *entry.bounds))
 
 
-def _are_lowest(cost: Floats) -> NDArray[np.bool_]:
+def _are_lowest(cost: Floats) -> Mask:
     """Where on a grid no neighbour is lower."""
     around_each = minimum_filter(cost, size=3, mode="nearest")
     return np.asarray(cost <= around_each)

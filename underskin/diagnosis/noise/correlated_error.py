@@ -23,10 +23,9 @@ from itertools import pairwise
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.noise.noise_priors import Plateau
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 USUAL = Plateau.of((1e-3, 1e-2), (1.0, 0.25))
 UNNAMED = Plateau.of((2e-2, 0.5), (0.05, 0.05))
@@ -56,7 +55,7 @@ class CurveError:
 
         return cls(of("scale"), of("place"), np.concatenate(columns), of("count"), of("noise"))
 
-    def part(self, order: NDArray[np.intp]) -> Self:
+    def part(self, order: Indices) -> Self:
         """Of some of the rows."""
         columns = self.columns[order]
         return type(self)(self.scale[order], self.place[order], columns, self.count[order], self.noise[order])
@@ -80,7 +79,7 @@ def instrument_columns(displacement: Floats, time: Floats, zero: float, largest:
 class Whitening:
     """κ² D + η² B as κ² times a unit matrix: each curve's rows over d, turned to where B is diagonal, and weighed."""
 
-    def __init__(self, error: CurveError, deviation: Floats, recording: NDArray[np.intp]) -> None:
+    def __init__(self, error: CurveError, deviation: Floats, recording: Indices) -> None:
         """Find the directions of each curve; `deviation` is D's square root (rows,)."""
         self._deviation = deviation
         edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))

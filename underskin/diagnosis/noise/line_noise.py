@@ -16,10 +16,9 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from underskin.units import Complexes, Floats
+from underskin.units import Complexes, Floats, Indices
 
 _KNOTS_PER_DECADE = 2.0
 _SMOOTH = 1.0  # sd of the second difference of log rel² between knots
@@ -41,7 +40,7 @@ class LineNoise:
 def line_noise(
     value: Complexes,
     frequency: Floats,
-    recording: NDArray[np.intp],
+    recording: Indices,
     coherence: Floats,
     uneven: Floats,
     expected: Complexes | None = None,
@@ -113,7 +112,7 @@ def line_noise(
 _COHERENCE_VARIANCE = 0.5
 
 
-def local_amplitude(value: Complexes, recording: NDArray[np.intp]) -> Floats:
+def local_amplitude(value: Complexes, recording: Indices) -> Floats:
     """|FRF| around each line: the median over five neighbours, or its own where that is larger (a sharp peak)."""
     size = np.abs(value)
     smooth = np.empty(len(size))
@@ -130,7 +129,7 @@ def local_amplitude(value: Complexes, recording: NDArray[np.intp]) -> Floats:
     return np.maximum(size, smooth)
 
 
-def _interior(recording: NDArray[np.intp], frequency: Floats) -> NDArray[np.intp]:
+def _interior(recording: Indices, frequency: Floats) -> Indices:
     """Rows with a lower and a higher neighbour in their own recording."""
     inner = np.arange(1, len(recording) - 1)
     same = (recording[inner - 1] == recording[inner]) & (recording[inner + 1] == recording[inner])
@@ -138,7 +137,7 @@ def _interior(recording: NDArray[np.intp], frequency: Floats) -> NDArray[np.intp
     return inner[same & apart & (frequency[inner - 1] > 0)]
 
 
-def _without_shared(value: Complexes, frequency: Floats, recording: NDArray[np.intp], rest: Complexes) -> Complexes:
+def _without_shared(value: Complexes, frequency: Floats, recording: Indices, rest: Complexes) -> Complexes:
     """`rest` (rows,), the lines or what is left of them, less each recording's level times what all recordings have of
     it at that frequency, where many have it."""
     level = np.array([np.median(value.real[recording == number]) for number in range(int(recording.max()) + 1)])

@@ -11,11 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.recordings.frf.estimation import Frf
 from underskin.recordings.frf.mains import HARMONICS, MAINS_HZ
-from underskin.units import Floats
+from underskin.units import Floats, Indices, Mask
 
 _BETWEEN, _AROUND = 2.5, 12.5  # lines from a multiple of the mains: what is usual there
 _LEAST_AROUND = 10
@@ -31,7 +30,7 @@ class MainsOnCharge:
 
     mains_hz: float
     charge: float
-    spoilt: NDArray[np.bool_]
+    spoilt: Mask
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class _Indicator:
     noise: Floats
 
 
-def mains_on_charge(measured: Frf, powerful: NDArray[np.bool_]) -> MainsOnCharge | None:
+def mains_on_charge(measured: Frf, powerful: Mask) -> MainsOnCharge | None:
     """The mains at a multiple of which the charge stands out and the force does not.
 
     None where there are none, or the lines are too coarse to distinguish 50 from 60 Hz. `powerful` (lines,) are the
@@ -89,7 +88,7 @@ def _of_mains(measured: Frf, mains: float, indicators: Sequence[_Indicator]) -> 
     return highest, MainsOnCharge(mains, float(np.sqrt(power)), spoilt)
 
 
-def _over_usual(indicator: _Indicator, near: NDArray[np.bool_], around: NDArray[np.bool_]) -> float:
+def _over_usual(indicator: _Indicator, near: Mask, around: Mask) -> float:
     """The largest near a multiple over its median around, or over that of its noise; 0 where too few lines have it."""
     usual = indicator.value[around & (indicator.value > 0)]
     if len(usual) < _LEAST_AROUND:
@@ -97,7 +96,7 @@ def _over_usual(indicator: _Indicator, near: NDArray[np.bool_], around: NDArray[
     return float(indicator.value[near].max() / max(np.median(usual), np.median(indicator.noise[around])))
 
 
-def _off_course(measured: Frf, rows: NDArray[np.intp]) -> tuple[Floats, Floats]:
+def _off_course(measured: Frf, rows: Indices) -> tuple[Floats, Floats]:
     """How far each of these lines is off what the two to each side of it predict, as powers of charge [C²].
 
     First the power that each of the five lines would need for that, then that which the line would need alone; 0 at the

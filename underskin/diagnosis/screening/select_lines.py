@@ -18,11 +18,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.screening.mains import MainsOnCharge, mains_on_charge
 from underskin.recordings.frf.estimation import Frf
-from underskin.units import Floats
+from underskin.units import Floats, Indices, Mask
 
 _UNSURE, _SURE = 0.2, 0.05  # relative uncertainty
 _BESIDE_BEST, _BEST = 5.0, 0.1  # the best: this quantile
@@ -73,7 +72,7 @@ def choose_lines(measured: Frf) -> Choice:
     return Choice(kept, len(lines), int((~powerful).sum()), len(strong) - len(kept), mains, uneven, once)
 
 
-def _beyond_chance(measured: Frf) -> NDArray[np.bool_]:
+def _beyond_chance(measured: Frf) -> Mask:
     """Where noise alone would not give this γ²: of n blocks of it, (1 − γ²)^(n − 1) are larger (Carter 1987)."""
     assert measured.coherence is not None
     assert measured.averages is not None
@@ -95,7 +94,7 @@ def _uneven(force: Floats, uncertainty: Floats) -> Floats:
     return np.asarray(np.exp(exponent * size))
 
 
-def _apart(lines: NDArray[np.intp]) -> list[int]:
+def _apart(lines: Indices) -> list[int]:
     """Those of which none is the next to another."""
     kept: list[int] = []
     for line in lines:

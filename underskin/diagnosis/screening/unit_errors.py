@@ -8,12 +8,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import lines_of
+from underskin.units import Mask
 
 _SLIP, _WITHIN = 1000.0, 3.0  # a value is back among the others, within this factor, once the slip is undone
 _ALONE = 0.25  # of the recordings at most, or one of three
@@ -39,7 +39,7 @@ _FIELDS = (
 )
 
 
-def single_unit_errors(entries: Sequence[FrfRecording]) -> tuple[NDArray[np.bool_], list[Finding]]:
+def single_unit_errors(entries: Sequence[FrfRecording]) -> tuple[Mask, list[Finding]]:
     """Which recordings have a value about 1000 × off all others, and the findings on them."""
     off = np.zeros(len(entries), dtype=bool)
     findings: list[Finding] = []

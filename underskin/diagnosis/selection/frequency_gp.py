@@ -7,7 +7,6 @@ of each recording's own best real multiple of the model.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.sparse import csr_array
 from scipy.special import logsumexp
@@ -17,7 +16,7 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.residuals import line_residuals
 from underskin.diagnosis.noise.noise_priors import Plateau, level_prior
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, matern, normalised
-from underskin.units import Array, Floats
+from underskin.units import Array, Floats, Indices
 
 _LINE_LENGTHS = (0.08, 0.25, 0.8)  # of the logarithm of frequency
 _INTERPLAY_LENGTH, _INTERPLAY_LANDMARKS = 0.4, 8  # where both frequency and a recording's axis count
@@ -100,7 +99,7 @@ class _LineNoise:
         return -float(optimum.fun)
 
 
-def frequency_bins(frequency: Floats) -> tuple[NDArray[np.intp], Floats]:
+def frequency_bins(frequency: Floats) -> tuple[Indices, Floats]:
     """Of each row its distinct frequency, or its bin where there are too many, and the frequencies."""
     distinct, line = np.unique(np.round(frequency, 6), return_inverse=True)
     if len(distinct) <= _MOST_LINES:

@@ -6,13 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.autodiff import Differentiated, variables
 from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Unsupported, Values
 from underskin.recordings.conditions import Conditions
-from underskin.units import Array, Floats
+from underskin.units import Array, Floats, Indices, Mask
 
 SENSOR_SPREAD = 0.01  # sd of the logarithms of the sensors' gains, without `sensor_spread`
 
@@ -25,10 +24,10 @@ class Prediction:
     slopes: Array  # (parameters, rows)
     position_slopes: Array | None  # (2, rows) ∂value/∂x, ∂value/∂y of the contact's place [1/m] (frf)
     pickup: Floats | None  # sd of mains pick-up [C/N], of real and of imaginary part, on the rows that it reaches
-    pickup_rows: NDArray[np.intp] | None  # those rows
+    pickup_rows: Indices | None  # those rows
     # (rows,) False where the contact lies beyond the tables, which are continued there, or the sensor's disc beyond the
     # stress profile, behind whose end the value is 0
-    inside: NDArray[np.bool_]
+    inside: Mask
 
     @property
     def pickup_variance(self) -> Floats:

@@ -7,7 +7,6 @@ material → friction at the platens → relaxation.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.autodiff import constant
 from underskin.errors import InvalidInput
@@ -20,7 +19,7 @@ from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings import elastomer
 from underskin.recordings.campaign import CompressionRecording
 from underskin.recordings.conditions import CompressionConditions, Conditions, SkinDescription
-from underskin.units import Floats, to_si
+from underskin.units import Floats, Mask, to_si
 
 _CONTACT_SD, _CONTACT_BOUND = 0.01, 0.1  # of the sample's height: the contact point's prior and bounds
 
@@ -49,9 +48,7 @@ class CompressionModel(CurveModel):
             mechanism.on_curve(curve, own[mechanism.name])
         return curve
 
-    def _force(
-        self, curve: Curve, contact: Floats, held: NDArray[np.bool_] | None
-    ) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+    def _force(self, curve: Curve, contact: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
         strain = (self.displacement - contact) / self._height
         force = numbers(curve.modulus) * self._area * self._relative_stress(curve, strain)
         relaxation = curve.prony_pairs

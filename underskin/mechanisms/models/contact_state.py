@@ -7,10 +7,9 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.autodiff import Differentiated, chain, stacked
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 
 @dataclass
@@ -29,7 +28,7 @@ class Contacts:
     layered: bool = False  # contact by the layer of finite thickness, not by the half space
     stiffness: Differentiated | None = None  # dF/dδ [N/m] at the radius in force, where a mechanism asks
 
-    def at_points(self, some: NDArray[np.intp] | None) -> Contacts:
+    def at_points(self, some: Indices | None) -> Contacts:
         """At some of several points (points, contacts), at all for None."""
         if some is None:
             return self

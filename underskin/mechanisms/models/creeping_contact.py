@@ -23,11 +23,10 @@ Arrays are (points, curves, samples), as in sphere_contact.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.mechanisms.models.relaxation import Relaxation, memories
 from underskin.mechanisms.models.sphere_contact import Sphere
-from underskin.units import Floats
+from underskin.units import Floats, Indices, Mask
 
 _SECANTS, _SHARE = 12, 1e-9  # of the edge's place between two samples
 _ITERATIONS, _SETTLED = 40, 1e-9  # of the depths on a stage that gives; of the largest travel
@@ -52,10 +51,10 @@ class Path:
 
     travel: Floats
     time: Floats
-    begins: NDArray[np.intp]
+    begins: Indices
 
     @property
-    def touched(self) -> NDArray[np.bool_]:
+    def touched(self) -> Mask:
         """From the touch on."""
         return np.asarray(np.arange(self.travel.shape[-1]) >= self.begins[..., None])
 
@@ -100,7 +99,7 @@ class _Rings:
         """Whether there is adhesion."""
         return bool(np.any(self.parting))
 
-    def at(self, index: NDArray[np.intp]) -> "_Rings":
+    def at(self, index: Indices) -> "_Rings":
         """Those reached at samples `index` (points, curves, samples)."""
 
         def of(values: Floats) -> Floats:
@@ -135,9 +134,7 @@ class _Rings:
         )
 
 
-def relaxing(
-    sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, path: Path
-) -> tuple[Floats, NDArray[np.bool_]]:
+def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, path: Path) -> tuple[Floats, Mask]:
     """F (points, curves, samples) [N] where a path's travel is the depth δ, and where there is contact.
 
     The sphere's own stage is not looked at.
@@ -180,7 +177,7 @@ def relaxing(
 
 def relaxing_on_stage(
     sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, path: Path
-) -> tuple[Floats, NDArray[np.bool_]]:
+) -> tuple[Floats, Mask]:
     """The same where the travel is δ + F/k of a stage that gives: depths by secant steps at all samples together."""
     give, travel, touched = sphere.give, path.travel, path.touched
     work = None if adhesion is None else adhesion.work
@@ -218,9 +215,7 @@ def _elastic(sphere: Sphere, a: Floats, adhesion: Adhesion | None) -> tuple[Floa
     return force - stiffness * stretch, stiffness, stretch, sphere.stretch(a, adhesion.separation)
 
 
-def _edge(
-    rings: _Rings, now: _Now, record: NDArray[np.intp], begins: NDArray[np.intp], relaxation: Relaxation
-) -> tuple[_Rings, NDArray[np.bool_]]:
+def _edge(rings: _Rings, now: _Now, record: Indices, begins: Indices, relaxation: Relaxation) -> tuple[_Rings, Mask]:
     """The outermost ring in contact now, and whether any holds.
 
     A ring is reached at a sample deeper than all before: `record` is the last such one. The rings let go one after
@@ -267,7 +262,7 @@ def _first_touch(
     depth: Floats,
     memory: Floats,
     time: Floats,
-) -> tuple[Floats, NDArray[np.bool_]]:
+) -> tuple[Floats, Mask]:
     """F of what is left of the first touch, at the first of the times, and whether it holds."""
     left = relaxation.remaining(time - time[..., :1])
     relaxed = relaxation.convolved(depth, memory) / left

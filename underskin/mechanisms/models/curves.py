@@ -9,14 +9,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.models.pickup import Pickup
 from underskin.recordings.conditions import Conditions, CurveConditions
-from underskin.units import Floats, to_si
+from underskin.units import Floats, Indices, Mask, to_si
 
 _STEP = 1e-5  # of a logarithm or of a prior's width
 _AT_ONCE = 1_000_000  # samples of all points
@@ -25,7 +24,7 @@ _AT_ONCE = 1_000_000  # samples of all points
 class CurveModel(ABC):
     """The force of curves under a set of mechanisms; rows are all samples, one recording after another."""
 
-    sensor: NDArray[np.intp] | None = None
+    sensor: Indices | None = None
     pickup: Pickup | None = None
 
     def __init__(
@@ -62,9 +61,7 @@ class CurveModel(ABC):
         """What governs the curves, its numbers (points, 1), as the mechanisms make it."""
 
     @abstractmethod
-    def _force(
-        self, curve: Curve, contact: Floats, held: NDArray[np.bool_] | None
-    ) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+    def _force(self, curve: Curve, contact: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
         """F (points, curves, samples) [N], which samples are in contact, and which of these the tables reach.
 
         `contact` (points, curves, 1) [m]; the contacts are as `held`, where that is given.
@@ -86,14 +83,12 @@ class CurveModel(ABC):
         value, slopes, inside = self._differentiated(np.asarray(fit, dtype=float))
         return Prediction(value, slopes, None, None, None, inside)
 
-    def _forces(
-        self, fit: Floats, held: NDArray[np.bool_] | None = None
-    ) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+    def _forces(self, fit: Floats, held: Mask | None = None) -> tuple[Floats, Mask, Mask]:
         own, nuisances, _ = self._composition.values(fit, slopes=False)
         contact = 1e-3 * fit[:, self.contact_points, None]
         return self._force(self._curve(own, nuisances), contact, held)
 
-    def _differentiated(self, fit: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    def _differentiated(self, fit: Floats) -> tuple[Floats, Floats, Mask]:
         """F (rows,) at one point, its derivatives (parameters, rows), and which rows are inside."""
         middle, held, inside = self._forces(fit[None])
         points = np.tile(fit, (2 * len(self._moved), 1))

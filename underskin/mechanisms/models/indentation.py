@@ -11,7 +11,6 @@ from dataclasses import replace
 from functools import lru_cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.autodiff import constant
 from underskin.errors import InvalidInput
@@ -32,7 +31,7 @@ from underskin.recordings import elastomer
 from underskin.recordings.campaign import IndentationRecording
 from underskin.recordings.conditions import Conditions, IndentationConditions, SkinDescription
 from underskin.recordings.curve_course import course
-from underskin.units import Floats, to_si
+from underskin.units import Floats, Mask, to_si
 
 _CONTACT_SD, _CONTACT_BOUND = 0.1, 0.8  # of the range of displacement: the contact point's prior and bounds
 
@@ -65,9 +64,7 @@ class IndentationModel(CurveModel):
             mechanism.on_curve(curve, own[mechanism.name])
         return curve
 
-    def _force(
-        self, curve: Curve, contact: Floats, held: NDArray[np.bool_] | None
-    ) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+    def _force(self, curve: Curve, contact: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
         travel = self.displacement - contact
         sphere, adhesion = self._sphere(curve), _adhesion(curve)
         relaxation = curve.prony_pairs
@@ -98,11 +95,11 @@ class IndentationModel(CurveModel):
     def _relaxing(
         self,
         sphere: Sphere,
-        force_on: Callable[[Path], tuple[Floats, NDArray[np.bool_]]],
+        force_on: Callable[[Path], tuple[Floats, Mask]],
         adhesion: Adhesion | None,
         contact: Floats,
-        held: NDArray[np.bool_] | None,
-    ) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+        held: Mask | None,
+    ) -> tuple[Floats, Mask, Mask]:
         """The same through the history, which begins where a recording touches, between two samples."""
         path = _with_touch(self.displacement - contact, self.time)
         force, own = force_on(path)

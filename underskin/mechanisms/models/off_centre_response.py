@@ -13,14 +13,13 @@ r/h = 8, the stress is 0 (below 1e-6 of its peak).
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import j0
 
 from underskin.autodiff import Differentiated, as_columns, contiguous, unfilled
 from underskin.mechanisms.models.cubic_basis import CubicBasis
 from underskin.physics.contact_curves import CurveGrid
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats
+from underskin.units import Floats, Indices, Mask
 
 PROFILE_END = 8.0
 _SPACING = 0.0625  # of the profile and of the offsets; the profile turns over lengths of 0.3 h and more
@@ -83,7 +82,7 @@ class OffsetSigma:
         """The grid of contacts with a layer whose pressures' transforms are at this object's wavenumbers."""
         return CurveGrid(self.wavenumber)
 
-    def contains(self, a_over_h: Floats, cbrt_load: Floats) -> NDArray[np.bool_]:
+    def contains(self, a_over_h: Floats, cbrt_load: Floats) -> Mask:
         """Which contacts the table holds; the others are continued."""
         return np.asarray((a_over_h <= self.bases[0].nodes[-1]) & (cbrt_load <= self.bases[1].nodes[-1]))
 
@@ -94,7 +93,7 @@ class OffsetSigma:
 
     def at(
         self,
-        contact: NDArray[np.intp],
+        contact: Indices,
         a_over_h: Differentiated,
         cbrt_load: Differentiated,
         rt_over_h: Differentiated,
@@ -115,9 +114,7 @@ class OffsetSigma:
         table_sigma(self._strained if strained else self._table, self._ends, *self._axes, contact, *columns)
         return result
 
-    def linear_at(
-        self, transforms: Floats, contact: NDArray[np.intp], offset: Floats, points: tuple[int, ...]
-    ) -> Floats:
+    def linear_at(self, transforms: Floats, contact: Indices, offset: Floats, points: tuple[int, ...]) -> Floats:
         """Hankel integrals of transforms p̂ · M · 2 J1(kρ)/(kρ) (quantities, …, contacts, k) of these contacts (rows,)
         at offsets e/h (…, rows), and the first one's derivative by e/h: (quantities + 1, *points, rows)."""
         from underskin.mechanisms.models.sigma_kernel import linear_sigma

@@ -12,7 +12,6 @@ x = k a/h; on the layer both come from its own contact (contact_curves).
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import j0
 
 from underskin.autodiff import Differentiated, chain, contiguous
@@ -23,7 +22,7 @@ from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactCurves
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average
 from underskin.physics.skin import INCOMPRESSIBLE
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 
 class SigmaOfContacts:
@@ -47,7 +46,7 @@ class SigmaOfContacts:
             self._variables += further
             self.inside = self.inside & (pressed.a_over_h.value < LARGEST_A_OVER_H)
 
-    def at(self, contact: NDArray[np.intp], offset: Differentiated) -> Differentiated:
+    def at(self, contact: Indices, offset: Differentiated) -> Differentiated:
         """σ (…, points) at these offsets e/h from these contacts (points,)."""
         a, x, rho, *further = self._variables
         sigma = self._sigma.at(contact, a, x, rho, offset, strained=self._linear is not None)

@@ -18,12 +18,11 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
 from underskin.physics.elastic_layer import Layer
-from underskin.units import Floats
+from underskin.units import Floats, Mask
 
 _STRAIN = 0.2
 _SMALLEST = 1e-12  # m of depth, below which a radius is not told from 0
@@ -213,7 +212,7 @@ class Sphere:
         """Whether it is JKR's contact on the half space under a stiff stage: one function of one variable."""
         return self.layers is None and self.stiffening is None and not np.any(self.give)
 
-    def inside(self, a: Floats) -> NDArray[np.bool_]:
+    def inside(self, a: Floats) -> Mask:
         """Which contacts the layer's functions reach."""
         if self.layers is None:
             return np.ones(np.shape(a), dtype=bool)
@@ -255,7 +254,7 @@ def _jkr_spline() -> CubicSpline:
     return CubicSpline(np.sqrt(np.maximum(x * x - np.sqrt(x) - _LEAST_TRAVEL, 0.0)), x)
 
 
-def in_contact(travel: Floats, pull_off: Floats) -> NDArray[np.bool_]:
+def in_contact(travel: Floats, pull_off: Floats) -> Mask:
     """Which samples are: from the first that reaches the surface, at 0, to the first below pull-off, and so on."""
     meets = travel >= 0
     changes = meets | (travel < pull_off)
@@ -264,7 +263,7 @@ def in_contact(travel: Floats, pull_off: Floats) -> NDArray[np.bool_]:
     return np.asarray(np.take_along_axis(meets, last, axis=-1))
 
 
-def edges(sphere: Sphere, travel: Floats, held: NDArray[np.bool_], work: Floats, separation: Floats | None) -> Floats:
+def edges(sphere: Sphere, travel: Floats, held: Mask, work: Floats, separation: Floats | None) -> Floats:
     """The edge's radius at each sample (points, curves, samples).
 
     The edge advances where its energy release rate is the `work` of adhesion, recedes where it is that of `separation`,
