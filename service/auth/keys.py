@@ -88,12 +88,12 @@ class KeyStore:
         return self._keys
 
     def find(self, token: bytes) -> Key | None:
-        """The key that `token` is, compared in constant time."""
+        """The key that `token` is, compared in constant time; one that has just been created is known at once."""
         digest = sha256(token).hexdigest()
-        match = None
-        for key in self.entries():
-            if hmac.compare_digest(digest, key.sha256):
-                match = key
+        match = _match(digest, self.entries())
+        if match is None:
+            self._refresh()
+            match = _match(digest, self._readable())
         return match
 
     def create(self, name: str, scope: Scope) -> str:
@@ -134,6 +134,14 @@ class KeyStore:
         with self.path.with_suffix(".lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             yield
+
+
+def _match(digest: str, keys: tuple[Key, ...]) -> Key | None:
+    match = None
+    for key in keys:
+        if hmac.compare_digest(digest, key.sha256):
+            match = key
+    return match
 
 
 def keys_missing(keys: KeyStore) -> str:

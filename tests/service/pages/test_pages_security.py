@@ -140,7 +140,7 @@ def test_a_session_ends_with_its_time_which_nobody_can_move(
     locked: tuple[Server, dict[str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     server, _ = locked
-    (key,) = [one for one in KeyStore(server.place.folder).entries() if one.scope == "read"]
+    (key,) = [one for one in KeyStore(server.place.folder).entries() if one.name == "the reader"]
     good = session.logged_in(key)
     monkeypatch.setattr(session, "LASTS_S", -1)
     over = session.logged_in(key)
