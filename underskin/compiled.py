@@ -20,7 +20,9 @@ KERNELS = (
     "underskin.diagnosis.inference.normal_kernel",
     "underskin.diagnosis.inference.pickup_kernel",
     "underskin.diagnosis.selection.process_kernel",
+    "underskin.mechanisms.models.creep_kernel",
     "underskin.mechanisms.models.sigma_kernel",
+    "underskin.mechanisms.models.sphere_kernel",
     "underskin.surrogate.table_kernel",
 )
 

@@ -24,11 +24,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from underskin.autodiff import contiguous
+from underskin.mechanisms.models.creep_kernel import edge_rows
 from underskin.mechanisms.models.relaxation import Relaxation, memories
 from underskin.mechanisms.models.sphere_contact import Sphere
 from underskin.units import Floats, Indices, Mask
 
-_SECANTS, _SHARE = 12, 1e-9  # of the edge's place between two samples
 _ITERATIONS, _SETTLED = 40, 1e-9  # of the depths on a stage that gives; of the largest travel
 _UNSETTLED = 1e-5
 
@@ -59,81 +60,6 @@ class Path:
         return np.asarray(np.arange(self.travel.shape[-1]) >= self.begins[..., None])
 
 
-@dataclass(frozen=True)
-class _Now:
-    """Depth, time and memory of depth by pair at the samples at which rings are looked at."""
-
-    depth: Floats
-    time: Floats
-    memory: Floats
-
-    def carried(self, rings: "_Rings", relaxation: Relaxation) -> Floats:
-        """H(s,t) of rings."""
-        faded = self.memory - relaxation.decay(self.time - rings.time) * rings.memory
-        return relaxation.convolved(self.depth - rings.depth, faded)
-
-    def excess(self, rings: "_Rings", relaxation: Relaxation) -> Floats:
-        """H(s,t) + ℓ_s − ℓ e(t−s), above 0 where a ring holds."""
-        decay = relaxation.decay(self.time - rings.time)
-        carried = relaxation.convolved(self.depth - rings.depth, self.memory - decay * rings.memory)
-        if not rings.sticks:
-            return carried
-        return carried + rings.parting - rings.slack * relaxation.remaining_of(decay)
-
-
-@dataclass(frozen=True)
-class _Rings:
-    """Depth, time, memory of depth by pair, stretches, force, its memory by pair and stiffness when reached."""
-
-    depth: Floats
-    time: Floats
-    memory: Floats  # (…, pairs)
-    slack: Floats  # ℓ
-    parting: Floats  # ℓ_s
-    force: Floats
-    force_memory: Floats  # (…, pairs)
-    stiffness: Floats
-
-    @property
-    def sticks(self) -> bool:
-        """Whether there is adhesion."""
-        return bool(np.any(self.parting))
-
-    def at(self, index: Indices) -> "_Rings":
-        """Those reached at samples `index` (points, curves, samples)."""
-
-        def of(values: Floats) -> Floats:
-            if values.ndim == index.ndim:
-                return np.take_along_axis(values, index, axis=-1)
-            return np.take_along_axis(values, index[..., None], axis=-2)
-
-        return _Rings(*(of(getattr(self, name)) for name in self.__dataclass_fields__))
-
-    def between(self, other: "_Rings", share: Floats, relaxation: Relaxation) -> "_Rings":
-        """Those reached at a share of the way to the next sample."""
-
-        def along(name: str) -> Floats:
-            one, two = getattr(self, name), getattr(other, name)
-            return np.asarray(one + share * (two - one))
-
-        passed = share * (other.time - self.time)
-
-        def remembered(memory: Floats, change: Floats) -> Floats:
-            lag = relaxation.lagging(passed)
-            return np.asarray(relaxation.decay(passed) * memory + lag * (share * change)[..., None])
-
-        return _Rings(
-            along("depth"),
-            along("time"),
-            remembered(self.memory, other.depth - self.depth),
-            along("slack"),
-            along("parting"),
-            along("force"),
-            remembered(self.force_memory, other.force - self.force),
-            along("stiffness"),
-        )
-
-
 def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, path: Path) -> tuple[Floats, Mask]:
     """F (points, curves, samples) [N] where a path's travel is the depth δ, and where there is contact.
 
@@ -151,23 +77,19 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
     force, stiffness, slack, parting = _elastic(sphere, a, adhesion)
     force = np.where(held, force, 0.0)
     depth_memory, force_memory = memories(depth, time, relaxation), memories(force, time, relaxation)
-    rings = _Rings(depth, time, depth_memory, slack, parting, force, force_memory, stiffness)
-    answer = relaxation.convolved(force, force_memory)
+    growing = relaxation.convolved(force, force_memory)
     record = np.maximum.accumulate(np.where(depth >= np.maximum.accumulate(depth, axis=-1), number, 0), axis=-1)
     record = np.maximum(record, begins)
     back = started & (record < number)
     if not back.any():
-        return np.where(held, answer, 0.0), held
-    late = slice(int(np.argmax(back.any(axis=(0, 1)))), None)  # what was before is not looked at again
-    now = _Now(depth[..., late], time[..., late], depth_memory[..., late, :])
-    edge, stuck = _edge(rings, now, record, begins, relaxation)
-    carried = now.carried(edge, relaxation)
-    reached, stiffness, _, _ = _elastic(sphere, sphere.radius_at(edge.depth, work, np.maximum(least, 1e-12)), adhesion)
-    kept = relaxation.decay(now.time - edge.time) * edge.force_memory
-    answer[..., late] = np.where(
-        back[..., late], relaxation.convolved(reached, kept) + stiffness * carried, answer[..., late]
-    )
-    held[..., late] = np.where(back[..., late], stuck, held[..., late])
+        return np.where(held, growing, 0.0), held
+    edge, carried, kept = (np.zeros(depth.shape) for _ in range(3))
+    stuck = np.zeros(depth.shape, dtype=bool)
+    reached = (depth, time, depth_memory, slack, parting, force, force_memory, record, begins[..., 0])
+    edge_rows(*map(contiguous, reached), *relaxation.of_points(len(depth)), edge, carried, kept, stuck)
+    ring, stiffness, _, _ = _elastic(sphere, sphere.radius_at(edge, work, np.maximum(least, 1e-12)), adhesion)
+    receding = relaxation.unrelaxed * ring + kept + stiffness * carried
+    answer, held = np.where(back, receding, growing), np.where(back, stuck, held)
     touch = back & ~held
     if touch.any() and adhesion is not None:
         of_touch, holds = _first_touch(sphere, relaxation, adhesion, depth, depth_memory, time)
@@ -183,7 +105,7 @@ def relaxing_on_stage(
     work = None if adhesion is None else adhesion.work
     least, _ = sphere.pull_off(work)
     a = sphere.radius_at(travel, work, np.maximum(least, 1e-12))
-    elastic = sphere.force_at(travel, a) if work is not None else sphere.at(a)[1]
+    elastic = sphere.force_at(travel, a) if work is not None else sphere.at(a)[0]
     depth = np.where(touched, travel - give * elastic, travel)
     slope = sphere.at(a)[2]
     scale = np.abs(travel).max(axis=-1, keepdims=True) + 1e-15
@@ -207,52 +129,12 @@ def relaxing_on_stage(
 
 def _elastic(sphere: Sphere, a: Floats, adhesion: Adhesion | None) -> tuple[Floats, Floats, Floats, Floats]:
     """F, K, ℓ and ℓ_s of the elastic contact that grows."""
-    _, force, stiffness, _ = sphere.at(a)
+    force, _, stiffness, _ = sphere.at(a)
     if adhesion is None:
         none = np.zeros_like(force)
         return force, stiffness, none, none
     stretch = sphere.stretch(a, adhesion.work)
     return force - stiffness * stretch, stiffness, stretch, sphere.stretch(a, adhesion.separation)
-
-
-def _edge(rings: _Rings, now: _Now, record: Indices, begins: Indices, relaxation: Relaxation) -> tuple[_Rings, Mask]:
-    """The outermost ring in contact now, and whether any holds.
-
-    A ring is reached at a sample deeper than all before: `record` is the last such one. The rings let go one after
-    another from the outermost; the one about to is between two samples. `begins` (points, curves, 1).
-    """
-
-    def excess(of: _Rings) -> Floats:
-        return now.excess(of, relaxation)
-
-    high = record[..., record.shape[-1] - now.time.shape[-1] :].copy()
-    low = np.broadcast_to(begins, high.shape).copy()
-    stuck = excess(rings.at(low)) >= 0
-    whole = excess(rings.at(high)) >= 0
-    low = np.where(whole, high, low)
-    while (high - low > 1).any():
-        middle = (low + high) // 2
-        # What was reached between two records was not deeper than the first of them.
-        holds = excess(rings.at(np.take_along_axis(record, middle, axis=-1))) >= 0
-        low, high = np.where(holds, middle, low), np.where(holds, high, middle)
-    low = np.where(whole, low, np.maximum(high - 1, low))
-    near, far = rings.at(low), rings.at(high)
-    at_near, at_far = excess(near), excess(far)
-    inner, outer = np.zeros_like(at_near), np.ones_like(at_near)
-    share = inner
-    for _ in range(_SECANTS):  # regula falsi, the end that stays halved (Illinois)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            tried = inner + (outer - inner) * at_near / (at_near - at_far)
-        tried = np.where(whole | ~np.isfinite(tried), 0.0, np.clip(tried, 0.0, 1.0))
-        settled = bool((np.abs(tried - share) < _SHARE).all())
-        share = tried
-        if settled:
-            break
-        value = excess(near.between(far, share, relaxation))
-        positive = value >= 0
-        inner, outer = np.where(positive, share, inner), np.where(positive, outer, share)
-        at_near, at_far = np.where(positive, value, 0.5 * at_near), np.where(positive, 0.5 * at_far, value)
-    return near.between(far, share, relaxation), stuck
 
 
 def _first_touch(

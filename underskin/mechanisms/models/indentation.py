@@ -74,7 +74,7 @@ class IndentationModel(CurveModel):
         if adhesion is None:
             depth = np.maximum(travel, 0.0)
             a = sphere.radius_at(depth, None)
-            force = np.where(travel > 0, sphere.at(a)[1], 0.0)
+            force = np.where(travel > 0, sphere.at(a)[0], 0.0)
             return force, travel > 0, sphere.inside(a) | (travel <= 0)
         if held is None:
             held = in_contact(travel, self._last_travel(sphere, adhesion.separation))

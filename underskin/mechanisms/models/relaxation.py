@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from underskin.autodiff import contiguous
+from underskin.mechanisms.models.creep_kernel import memory_rows
 from underskin.units import Floats
-
-_SERIES = 1e-3
 
 
 @dataclass(frozen=True)
@@ -21,40 +21,31 @@ class Relaxation:
     fraction: Floats
     time: Floats
 
-    def decay(self, age: Floats) -> Floats:
-        """e^(−t/τ) of each pair."""
-        return np.exp(-np.maximum(age, 0.0)[..., None] / self.time)
+    @property
+    def unrelaxed(self) -> Floats:
+        """1 − Σ g (points, 1, 1)."""
+        return np.asarray(1.0 - self.fraction.sum(axis=-1))
 
     def remaining(self, age: Floats) -> Floats:
         """E(t)/E(0)."""
-        return self.remaining_of(self.decay(age))
-
-    def remaining_of(self, decay: Floats) -> Floats:
-        """The same from e^(−t/τ) of each pair."""
+        decay = np.exp(-np.maximum(age, 0.0)[..., None] / self.time)
         return np.asarray(1.0 - (self.fraction * (1.0 - decay)).sum(axis=-1))
-
-    def lagging(self, passed: Floats) -> Floats:
-        """(1 − e^(−x))/x: what is left of a steady change at its end, x of its duration over τ."""
-        x = np.maximum(passed, 0.0)[..., None] / self.time
-        safe = np.maximum(x, _SERIES)
-        return np.where(x < safe, 1 - x / 2 + x**2 / 6, -np.expm1(-safe) / safe)
 
     def convolved(self, history: Floats, memory: Floats) -> Floats:
         """∫ e(t−s) du(s) from u(t) and its memories."""
-        whole = 1.0 - self.fraction.sum(axis=-1)
-        return np.asarray(whole * history + (self.fraction * memory).sum(axis=-1))
+        return np.asarray(self.unrelaxed * history + (self.fraction * memory).sum(axis=-1))
+
+    def of_points(self, count: int) -> tuple[Floats, Floats]:
+        """g and τ of so many points, (points, pairs)."""
+        pairs = self.fraction.shape[-1]
+        fraction, time = (np.broadcast_to(one.reshape(-1, pairs), (count, pairs)) for one in (self.fraction, self.time))
+        return contiguous(fraction), contiguous(time)
 
 
 def memories(history: Floats, time: Floats, relaxation: Relaxation) -> Floats:
-    """Y (…, samples, pairs) of histories u (…, samples) at times [s]; what u is at the first sample came at once."""
-    passed = np.diff(time, axis=-1, prepend=time[..., :1])
-    decay, lag = relaxation.decay(passed), relaxation.lagging(passed)
-    known = lag * np.diff(history, axis=-1, prepend=0.0)[..., None]
-    known[..., 0, :] = history[..., :1]
-    decay, known = np.broadcast_arrays(np.moveaxis(decay, -2, 0), np.moveaxis(known, -2, 0))
-    memory = np.empty(known.shape)
-    memory[0] = known[0]
-    for sample in range(1, len(known)):
-        np.multiply(decay[sample], memory[sample - 1], out=memory[sample])
-        memory[sample] += known[sample]
-    return np.moveaxis(memory, 0, -2)
+    """Y (points, curves, samples, pairs) of histories u (points, curves, samples) at times [s]; what u is at the first
+    sample came at once."""
+    _, times = relaxation.of_points(len(history))
+    memory = np.empty((*history.shape, times.shape[-1]))
+    memory_rows(contiguous(history), contiguous(np.broadcast_to(time, history.shape)), times, memory)
+    return memory

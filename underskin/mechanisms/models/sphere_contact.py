@@ -8,34 +8,28 @@ representative strain 0.2 a/R (Lin, Dimitriadis & Horkay, J. Biomech. Eng. 129 (
 δ + F/k.
 
 Under a given travel the contact is stable where the travel grows with a. It ends at the least travel: at JKR's least
-depth for a stiff stage, at the least force, −3πwR/2 on the half space, for a soft one.
+depth for a stiff stage, at the least force, −3πwR/2 on the half space, for a soft one. The functions of a are compiled
+(sphere_kernel).
 
 Arrays are (points, curves, samples), with 1 where nothing differs: points of the fit coordinates, samples of a curve.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from underskin.autodiff import contiguous
+from underskin.mechanisms.models.sphere_kernel import contact_rows, edge_rows, pull_off_rows, radius_rows
 from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats, Mask
 
-_STRAIN = 0.2
 _SMALLEST = 1e-12  # m of depth, below which a radius is not told from 0
-_STEPS = 40
-_TOLERANCE = 1e-10  # of the contact radius, of the last step
-_DIFFERENCE = 1e-6  # of the contact radius, for the slope of the travel
 _NODES = 401  # of the layer's functions over a/h
-_LEAST, _MOST, _HALVINGS = 0.02, 4.0, 40  # of JKR's unit of length: where the contact ends, and how it is sought
-_LAST = 0.25 ** (2 / 3)  # x of JKR's contact at its least depth
-_LEAST_TRAVEL = _LAST**2 - _LAST**0.5
-_FURTHEST, _FLAT = 300.0, 1e-2  # √(t − t_least) that the spline reaches, and the slope below which it is as good
-_EXPONENTIAL = 1e-6  # |q| below which the stiffening is
-_LARGEST_RATIO = 100.0  # of stiffening: Gent's law ends at its limit
+_NO_LAYER = np.zeros((1, 1, 4, 4))
 
 
 @dataclass(frozen=True)
@@ -49,18 +43,6 @@ class Stiffening:
     form: Floats  # q
     exponent: Floats  # m
 
-    def secant_ratio(self, strain: Floats) -> Floats:
-        """Nominal uniaxial stress at a compressive strain, over E times the strain."""
-        safe = np.maximum(strain, 1e-9)
-        stretch = 1.0 - safe
-        third = np.maximum(stretch * stretch + 2.0 / stretch - 3.0, 1e-18) / 3.0
-        growth = 3.0 * self.coefficient * third ** (0.5 * self.exponent)
-        small = np.abs(self.form) < _EXPONENTIAL
-        q = np.where(small, 1.0, self.form)
-        logarithm = np.where(small, growth, np.log(np.maximum(1.0 + q * growth, 1e-9)) / q)
-        excess = np.exp(np.minimum(logarithm, np.log(_LARGEST_RATIO)))
-        return np.asarray((1.0 / stretch**2 - stretch) / (3.0 * safe) * excess)
-
 
 class LayerRatios:
     """A layer's force, depth, stiffness and adhesive stretch over the half space's, of a/h; and a/h of the depth."""
@@ -69,18 +51,14 @@ class LayerRatios:
         """Solve the layer of this Poisson ratio at the nodes (about a millisecond)."""
         alpha = np.linspace(0.0, LARGEST_A_OVER_H, _NODES)
         ratios = _grid().curves(Layer(poisson_ratio)).ratios_at(np.maximum(alpha, 1e-9))
-        self._ratios = CubicSpline(alpha, ratios)
+        self.cubics = np.ascontiguousarray(CubicSpline(alpha, ratios).c.transpose(1, 0, 2))  # (cells, powers, 4)
         root = alpha * np.sqrt(ratios[:, 1])
         self._alpha = CubicSpline(root, alpha)
-        self.deepest = float(root[-1])
-
-    def __call__(self, alpha: Floats) -> Floats:
-        """Force, depth, stiffness, stretch (…, 4)."""
-        return np.asarray(self._ratios(np.minimum(alpha, LARGEST_A_OVER_H)))
+        self._deepest = float(root[-1])
 
     def alpha_of(self, root: Floats) -> Floats:
         """a/h of √(δR)/h without adhesion."""
-        return np.asarray(self._alpha(np.minimum(root, self.deepest)))
+        return np.asarray(self._alpha(np.minimum(root, self._deepest)))
 
 
 @lru_cache(maxsize=256)
@@ -102,12 +80,10 @@ class Layers:
     thickness: Floats
     each: Sequence[LayerRatios]  # of each point, or one for all
 
-    def at(self, a: Floats) -> Floats:
-        """Force, depth, stiffness, stretch over the half space's at radii a (points, curves, samples): (…, 4)."""
-        alpha = a / self.thickness
-        if len(self.each) == 1:
-            return self.each[0](alpha)
-        return np.stack([ratios(of_point) for ratios, of_point in zip(self.each, alpha, strict=True)])
+    @cached_property
+    def cubics(self) -> Floats:
+        """The functions as cubics (points or 1, cells, powers, 4)."""
+        return np.stack([ratios.cubics for ratios in self.each])
 
     def radius_of(self, root: Floats) -> Floats:
         """a of √(δR) [m] without adhesion."""
@@ -128,89 +104,74 @@ class Sphere:
     stiffening: Stiffening | None = None
     give: Floats | float = 0.0
 
-    def at(self, a: Floats) -> tuple[Floats, Floats, Floats, Floats | float]:
-        """δ, F and K without adhesion at radii a, and the layer's ratio of the stretch ℓ."""
-        modulus = self._modulus_at(a)
-        depth: Floats = a * a / self.radius
-        stiffness: Floats = 2.0 * modulus * a
-        force: Floats = (2 / 3) * stiffness * depth
-        if self.layers is None:
-            return depth, force, stiffness, 1.0
-        ratios = self.layers.at(a)
-        return depth * ratios[..., 1], force * ratios[..., 0], stiffness * ratios[..., 2], ratios[..., 3]
+    def at(self, a: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """F, δ and K without adhesion at radii a, and ℓ/√w of the adhesive stretch."""
+        shape = np.broadcast_shapes(np.shape(a), self._body.shape[:-1])
+        contact = np.empty((4, *shape))
+        contact_rows(_wide(a, shape), self._wide_body(shape), self._cubics, contact)
+        force, depth, stiffness, stretch = contact
+        return force, depth, stiffness, stretch
 
     def stretch(self, a: Floats, work: Floats) -> Floats:
         """ℓ of an edge with the energy release rate `work` [J/m²]."""
-        ratio = 1.0 if self.layers is None else self.layers.at(a)[..., 3]
-        return self._stretch(a, work, ratio)
+        return np.asarray(self.at(a)[3] * np.sqrt(work))
 
-    def travel(self, a: Floats, work: Floats | None) -> Floats:
+    def travel(self, a: Floats, work: Floats) -> Floats:
         """δ + F/k in equilibrium."""
-        depth, force, stiffness, ratio = self.at(a)
-        if work is not None:
-            stretch = self._stretch(a, work, ratio)
-            depth, force = depth - stretch, force - stiffness * stretch
-        return np.asarray(depth + self.give * force)
+        force, depth, stiffness, unit = self.at(a)
+        stretch = unit * np.sqrt(work)
+        return np.asarray(depth - stretch + self.give * (force - stiffness * stretch))
 
     def force_at(self, travel: Floats, a: Floats) -> Floats:
         """F at a travel, where the edge is at a: as its stretch then is."""
-        depth, force, stiffness, _ = self.at(a)
+        force, depth, stiffness, _ = self.at(a)
         stretch = (depth + self.give * force - travel) / (1 + self.give * stiffness)
         return np.asarray(force - stiffness * stretch)
 
     def radius_at(self, travel: Floats, work: Floats | None, least: Floats | float = 0.0) -> Floats:
-        """a of the stable contact at a travel in equilibrium; `least` where there is none: its radius at pull-off.
-
-        Newton's steps from above: the travel is convex in a.
-        """
+        """a of the stable contact at a travel in equilibrium; `least` where there is none: its radius at pull-off."""
         depth = np.maximum(travel, _SMALLEST)
         root = np.sqrt(self.radius * depth)
-        if work is None and not np.any(self.give):
-            return root if self.layers is None else self.layers.radius_of(root)
-        if work is not None and self._plain:
-            unit = self._unit(work)
-            return np.maximum(_jkr_radius(travel * self.radius / unit**2) * unit, least)
         start = root if self.layers is None else self.layers.radius_of(root)
-        if work is not None:
-            pulled = np.sqrt(1.5 * np.pi * work * self.give) * self.radius
-            start = start + (1.0 if self.layers is None else 1.3) * (self._unit(work) + pulled)
-        a = start + np.zeros(np.broadcast_shapes(np.shape(start), np.shape(travel)))
-        a = np.maximum(a, least)
-        for _ in range(_STEPS):
-            here = self.travel(a, work)
-            slope = (self.travel(a * (1 + _DIFFERENCE), work) - here) / (_DIFFERENCE * a)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                step = np.where(slope > 0, (here - travel) / slope, 0.5 * a)
-            moved = np.maximum(a - np.clip(step, -a, 0.9 * a), least)
-            done = bool((np.abs(moved - a) <= _TOLERANCE * a).all())
-            a = moved
-            if done:
-                break
-        return np.asarray(a)
+        if work is None and not np.any(self.give):
+            return start
+        if work is None:
+            work = np.zeros((1, 1, 1))
+        pulled = np.sqrt(1.5 * np.pi * work * self.give) * self.radius
+        start = start + (1.0 if self.layers is None else 1.3) * (self._unit(work) + pulled)
+        shape = np.broadcast_shapes(np.shape(start), np.shape(travel), self._body.shape[:-1])
+        a = np.array(np.broadcast_to(start, shape))
+        of_curve = [_wide(values, shape, np.shape(values)[-1:] or (1,)) for values in (work, least)]
+        radius_rows(_wide(travel, shape), *of_curve, a, self._wide_body(shape), self._cubics)
+        return a
 
     def pull_off(self, work: Floats | None) -> tuple[Floats, Floats]:
         """The radius and travel (points, curves, 1) below which there is no stable contact; 0 without adhesion."""
-        shape = np.broadcast_shapes(np.shape(self.modulus), np.shape(self.radius))
+        shape = self._body.shape[:-1]
         if work is None:
             return np.zeros(shape), np.zeros(shape)
-        unit = self._unit(work)
-        if self._plain:
-            return _LAST * unit, _LEAST_TRAVEL * unit**2 / self.radius
-        unit = unit + np.zeros(shape)
-        low, high = _LEAST * unit, _MOST * unit
-        if self.layers is not None:
-            largest = LARGEST_A_OVER_H * self.layers.thickness
-            low, high = np.minimum(low, 0.1 * largest), np.minimum(high, largest)
-        for _ in range(_HALVINGS):
-            middle = np.sqrt(low * high)
-            rising = self.travel(middle * (1 + _DIFFERENCE), work) > self.travel(middle * (1 - _DIFFERENCE), work)
-            low, high = np.where(rising, low, middle), np.where(rising, middle, high)
-        return high, self.travel(high, work)
+        shape = np.broadcast_shapes(shape, np.shape(work))
+        radius, travel = np.empty(shape), np.empty(shape)
+        pull_off_rows(_wide(work, shape), self._wide_body(shape), self._cubics, radius, travel)
+        return radius, travel
+
+    @cached_property
+    def _body(self) -> Floats:
+        """As the compiled functions take it."""
+        thickness = 0.0 if self.layers is None else self.layers.thickness
+        law = self.stiffening
+        stiffening = (-1.0, 0.0, 0.0) if law is None else (law.coefficient, law.form, law.exponent)
+        columns = (self.modulus, self.radius, self.give, thickness, *stiffening)
+        whole = np.stack(np.broadcast_arrays(*columns), axis=-1)
+        return whole.reshape((1,) * (4 - whole.ndim) + whole.shape)
+
+    def _wide_body(self, shape: tuple[int, ...]) -> Floats:
+        """For points and curves of a shape."""
+        return _wide(self._body, (*shape[:2], *self._body.shape[2:]))
 
     @property
-    def _plain(self) -> bool:
-        """Whether it is JKR's contact on the half space under a stiff stage: one function of one variable."""
-        return self.layers is None and self.stiffening is None and not np.any(self.give)
+    def _cubics(self) -> Floats:
+        return _NO_LAYER if self.layers is None else self.layers.cubics
 
     def inside(self, a: Floats) -> Mask:
         """Which contacts the layer's functions reach."""
@@ -222,36 +183,10 @@ class Sphere:
         """JKR's unit of length [m]: the contact radius at δ = 0 on the half space under a stiff stage."""
         return np.asarray(np.cbrt(2 * np.pi * self.radius**2 * work / self.modulus))
 
-    def _stretch(self, a: Floats, work: Floats, ratio: Floats | float) -> Floats:
-        return np.asarray(np.sqrt(2 * np.pi * a * work / self._modulus_at(a)) * ratio)
 
-    def _modulus_at(self, a: Floats) -> Floats:
-        if self.stiffening is None:
-            return self.modulus
-        return np.asarray(self.modulus * self.stiffening.secant_ratio(np.minimum(_STRAIN * a / self.radius, 0.9)))
-
-
-def _jkr_radius(travel: Floats) -> Floats:
-    """x of x² − √x = t, on the stable side: a and δ R in units of (2πwR²/E')^(1/3), and its square.
-
-    By a spline in √(t − t_least), in which x is smooth, and two of Newton's steps.
-    """
-    above = np.sqrt(np.maximum(travel - _LEAST_TRAVEL, 0.0))
-    x = np.asarray(_jkr_spline()(np.minimum(above, _FURTHEST)))
-    x = np.where(above < _FURTHEST, x, above)
-    for _ in range(2):
-        root = np.sqrt(x)
-        slope = 2 * x - 0.5 / root
-        x = np.where(
-            slope > _FLAT, x - (x * x - root - np.maximum(travel, _LEAST_TRAVEL)) / np.maximum(slope, _FLAT), x
-        )
-    return np.asarray(x)
-
-
-@cache
-def _jkr_spline() -> CubicSpline:
-    x = _LAST + np.concatenate([[0.0], np.geomspace(1e-5, _FURTHEST + 2, 800)])
-    return CubicSpline(np.sqrt(np.maximum(x * x - np.sqrt(x) - _LEAST_TRAVEL, 0.0)), x)
+def _wide(values: Floats | float, shape: tuple[int, ...], last: tuple[int, ...] = ()) -> Floats:
+    """Broadcast to a shape, but along the last axis to what is `last`; contiguous."""
+    return contiguous(np.broadcast_to(values, (*shape[:-1], *last) if last else shape))
 
 
 def in_contact(travel: Floats, pull_off: Floats) -> Mask:
@@ -276,10 +211,5 @@ def edges(sphere: Sphere, travel: Floats, held: Mask, work: Floats, separation: 
     first_least, _ = sphere.pull_off(work)
     advancing, receding = sphere.radius_at(travel, work, first_least), sphere.radius_at(travel, parting, least)
     a = np.empty_like(receding)
-    edge = np.zeros_like(receding[..., 0])
-    for sample in range(travel.shape[-1]):
-        forward, back = advancing[..., sample], receding[..., sample]
-        edge = np.where(held[..., sample] & (edge > 0), np.minimum(np.maximum(edge, forward), back), forward)
-        a[..., sample] = edge
-        edge = np.where(held[..., sample], edge, 0.0)
+    edge_rows(advancing, receding, contiguous(np.broadcast_to(held, a.shape)), a)
     return a

@@ -1,0 +1,186 @@
+"""Compiled: the contact of a sphere as a function of its radius, and the radius at a travel; see sphere_contact.
+
+Arrays are (points, curves, samples). A `body` (points, curves, samples or 1, 7) holds the reduced modulus E', the
+sphere's radius R, 1/k of the stage, the layer's thickness h (0: half space), and of stiffening c (−1: none), q and m.
+`cubics` (layers, cells, powers, 4) are a layer's ratios over a/h from 0 to `LARGEST_A_OVER_H`, highest power first, of
+each point or one for all.
+"""
+
+import math
+
+import numpy as np
+
+from underskin.compiled import compiled
+from underskin.physics.contact_curves import LARGEST_A_OVER_H
+from underskin.units import Floats, Mask
+
+_STRAIN, _LARGEST_STRAIN = 0.2, 0.9  # representative strain over a/R, and where the law ends
+_EXPONENTIAL = 1e-6  # |q| below which the stiffening is
+_LARGEST_RATIO = math.log(100.0)  # of stiffening: Gent's law ends at its limit
+_STEPS = 60
+_TOLERANCE = 1e-8  # of the contact radius, of the last step: what remains is about its square
+_HALVINGS = 40
+_LAST = 0.25 ** (2 / 3)  # a of JKR's contact at its least depth, in units of (2πwR²/E')^(1/3)
+
+_ROWS = "float64[:, :, ::1]"
+_BODY = "float64[:, :, :, ::1], float64[:, :, :, ::1]"
+
+
+@compiled()
+def _secant_ratio(strain: float, coefficient: float, form: float, exponent: float) -> tuple[float, float]:
+    """Nominal uniaxial stress at a compressive strain, over E times the strain, and its logarithmic slope.
+
+    Neo-Hookean times (1 + q c J)^(1/q), J = 3 (I/3)^(m/2) of the invariant I = I1 − 3.
+    """
+    strain = max(strain, 1e-9)
+    stretch = 1.0 - strain
+    stress = 1.0 / stretch**2 - stretch
+    third = max(stretch * stretch + 2.0 / stretch - 3.0, 1e-18) / 3.0
+    growth = 3.0 * coefficient * third ** (0.5 * exponent)
+    slope = growth * exponent * (1.0 / stretch**2 - stretch) / (3.0 * third)
+    logarithm = growth
+    if abs(form) >= _EXPONENTIAL:
+        total = max(1.0 + form * growth, 1e-9)
+        logarithm = math.log(total) / form
+        slope /= total
+    if logarithm > _LARGEST_RATIO:
+        logarithm, slope = _LARGEST_RATIO, 0.0
+    slope += (2.0 / stretch**3 + 1.0) / stress - 1.0 / strain
+    return stress / (3.0 * strain) * math.exp(logarithm), slope
+
+
+@compiled()
+def _contact(a: float, body: Floats, cubics: Floats, contact: Floats) -> None:
+    """Fill F, δ and K without adhesion at the radius a, and ℓ/√w of the adhesive stretch; then their logarithms'
+    derivatives by a."""
+    modulus, radius, thickness, growth = body[0], body[1], body[3], 0.0
+    if body[4] >= 0:
+        strain = _STRAIN * a / radius
+        ratio, slope = _secant_ratio(min(strain, _LARGEST_STRAIN), body[4], body[5], body[6])
+        modulus *= ratio
+        growth = slope * _STRAIN / radius if strain < _LARGEST_STRAIN else 0.0
+    contact[1] = a * a / radius
+    contact[2] = 2.0 * modulus * a
+    contact[0] = 2.0 / 3.0 * contact[2] * contact[1]
+    contact[3] = math.sqrt(2.0 * math.pi * a / modulus)
+    contact[4] = 3.0 / a + growth
+    contact[5] = 2.0 / a
+    contact[6] = 1.0 / a + growth
+    contact[7] = 0.5 / a - 0.5 * growth
+    if thickness > 0:
+        cells = cubics.shape[0]
+        place = min(a / thickness, LARGEST_A_OVER_H) * cells / LARGEST_A_OVER_H
+        cell = min(int(place), cells - 1)
+        u = (place - cell) * LARGEST_A_OVER_H / cells
+        c = cubics[cell]
+        for number in range(4):
+            ratio = ((c[0, number] * u + c[1, number]) * u + c[2, number]) * u + c[3, number]
+            contact[number] *= ratio
+            if place < cells:
+                slope = (3.0 * c[0, number] * u + 2.0 * c[1, number]) * u + c[2, number]
+                contact[4 + number] += slope / (ratio * thickness)
+
+
+@compiled()
+def _travel(a: float, root_work: float, body: Floats, cubics: Floats, contact: Floats) -> tuple[float, float]:
+    """δ + F/k in equilibrium, where δ and F fall by ℓ and K ℓ, and its derivative by a."""
+    _contact(a, body, cubics, contact)
+    force, depth, stiffness, stretch = contact[0], contact[1], contact[2], contact[3] * root_work
+    lost = stiffness * stretch
+    travel = depth - stretch + body[2] * (force - lost)
+    of_depth = depth * contact[5] - stretch * contact[7]
+    of_force = force * contact[4] - lost * (contact[6] + contact[7])
+    return travel, of_depth + body[2] * of_force
+
+
+@compiled(f"void({_ROWS}, {_BODY}, float64[:, :, :, ::1])")
+def contact_rows(a: Floats, body: Floats, cubics: Floats, contact: Floats) -> None:
+    """Fill F, δ, K and ℓ/√w (4, points, curves, samples) at radii a."""
+    points, curves, samples = a.shape
+    here = np.empty(8)
+    for point in range(points):
+        layer = cubics[min(point, len(cubics) - 1)]
+        for curve in range(curves):
+            own = body[point, curve]
+            for sample in range(samples):
+                _contact(a[point, curve, sample], own[min(sample, len(own) - 1)], layer, here)
+                for number in range(4):
+                    contact[number, point, curve, sample] = here[number]
+
+
+@compiled(f"void({_ROWS}, {_ROWS}, {_ROWS}, {_ROWS}, {_BODY})")
+def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Floats, cubics: Floats) -> None:
+    """Solve travel(a) = travel by Newton's steps from radii `a` above, in place: the travel is convex in a.
+
+    `work` and `least`, which no radius falls below, are (points, curves, samples or 1). The tangent that led to the
+    sample before leads above the radius of this one, too.
+    """
+    points, curves, samples = travel.shape
+    here = np.empty(8)
+    alike = work.shape[2] == 1 and body.shape[2] == 1
+    for point in range(points):
+        layer = cubics[min(point, len(cubics) - 1)]
+        for curve in range(curves):
+            touching, at_touching, slope = 0.0, 0.0, 0.0
+            for sample in range(samples):
+                own = body[point, curve, min(sample, body.shape[2] - 1)]
+                lowest = least[point, curve, min(sample, least.shape[2] - 1)]
+                root_work = math.sqrt(work[point, curve, min(sample, work.shape[2] - 1)])
+                aim, radius = travel[point, curve, sample], a[point, curve, sample]
+                if alike and slope > 0:
+                    radius = min(radius, touching + (aim - at_touching) / slope)
+                radius = max(radius, lowest)
+                for _ in range(_STEPS):
+                    touching = radius
+                    at_touching, slope = _travel(radius, root_work, own, layer, here)
+                    step = (at_touching - aim) / slope if slope > 0 else 0.5 * radius
+                    radius = max(radius - min(max(step, -radius), 0.9 * radius), lowest)
+                    if abs(radius - touching) <= _TOLERANCE * touching:
+                        break
+                a[point, curve, sample] = radius
+
+
+@compiled(f"void({_ROWS}, {_BODY}, {_ROWS}, {_ROWS})")
+def pull_off_rows(work: Floats, body: Floats, cubics: Floats, radius: Floats, travel: Floats) -> None:
+    """Fill the radius and the travel at which the travel is least in equilibrium."""
+    points, curves, samples = radius.shape
+    here = np.empty(8)
+    for point in range(points):
+        layer = cubics[min(point, len(cubics) - 1)]
+        for curve in range(curves):
+            for sample in range(samples):
+                own = body[point, curve, min(sample, body.shape[2] - 1)]
+                root_work = math.sqrt(work[point, curve, sample])
+                unit = (2.0 * math.pi * root_work**2 * own[1] ** 2 / own[0]) ** (1 / 3)
+                low, high, thickness = 0.02 * unit, 4.0 * unit, own[3]
+                if thickness > 0:
+                    low, high = min(low, 0.1 * LARGEST_A_OVER_H * thickness), min(high, LARGEST_A_OVER_H * thickness)
+                if own[2] == 0 and thickness == 0 and own[4] < 0:
+                    low = high = _LAST * unit
+                for _ in range(_HALVINGS if low < high else 0):
+                    middle = math.sqrt(low * high)
+                    if _travel(middle, root_work, own, layer, here)[1] > 0:
+                        high = middle
+                    else:
+                        low = middle
+                radius[point, curve, sample] = high
+                travel[point, curve, sample] = _travel(high, root_work, own, layer, here)[0]
+
+
+@compiled(f"void({_ROWS}, {_ROWS}, boolean[:, :, ::1], {_ROWS})")
+def edge_rows(advancing: Floats, receding: Floats, held: Mask, a: Floats) -> None:
+    """Fill the radius of an edge that advances to `advancing`, recedes to `receding`, and rests in between; it begins
+    anew after a sample out of contact."""
+    points, curves, samples = a.shape
+    for point in range(points):
+        for curve in range(curves):
+            edge = 0.0
+            for sample in range(samples):
+                forward = advancing[point, curve, sample]
+                if held[point, curve, sample] and edge > 0:
+                    edge = min(max(edge, forward), receding[point, curve, sample])
+                else:
+                    edge = forward
+                a[point, curve, sample] = edge
+                if not held[point, curve, sample]:
+                    edge = 0.0
