@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from rig.description import parse as rig_experiment
+from rig.elastomer import campaign_of_curves, record_curves
 from tests.support.adhesive_curves import MODULUS_MPA, WORK_J_PER_M2, adhesive_curves
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
@@ -99,6 +101,43 @@ def test_a_jump_into_contact_between_two_samples_asks_for_no_companion(work: flo
     modulus = report["fit"]["after"]["youngs_modulus"]
     assert modulus["low"] <= MODULUS_MPA <= modulus["high"]
     assert report["fit"]["after"]["heldout_rmse_percent"] < 1.2 * report["fit"]["noise_floor_percent"]
+
+
+@pytest.mark.slow
+def test_a_remainder_that_is_small_beside_what_a_law_explains_does_not_contradict_it(table: SigmaTable) -> None:
+    recording = nanoindentation(3)
+    depth, force = np.array(recording["displacement_mm"]), np.array(recording["force_n"])
+    wave = 0.004 * force.max() * np.sin(2 * np.pi * (depth - depth.min()) / 0.5 / np.ptp(depth))
+    recording["force_n"] = (force + wave).tolist()
+    report = diagnosis_report(parse(campaign(recording)), table)
+    assert report["verdict"] == "explained"
+    assert [entry["name"] for entry in report["mechanisms"]] == ["adhesion"]
+
+
+_RIG = {
+    "schema": "experiment/1", "name": "unlisted", "seed": 11, "kind": "indentation",
+    "skin": {"thickness_mm": 0.6, "youngs_modulus_mpa": 1.8, "sensor_radius_mm": 1.0, "d33_pc_per_n": 10.0},
+    "curves": {
+        "indenters_mm": [0.017, 0.012], "largest_displacement_mm": 1.6e-3, "samples": 1000,
+        "speeds_mm_per_s": [4e-4], "repeats": 1, "hold_s": 20.0, "retract": True, "approach_mm": 3e-4,
+        "retreat_mm": 4e-4, "stage_stiffness_n_per_mm": 0.03, "stage_declared": False, "times": True,
+        "modulus_declared": False, "units_checked": True, "contact_point_mm": 4.7e-3, "force_zero_n": 2.6e-7,
+        "gain": 0.004, "cell_gain": 0.01, "force_noise_n": 2.2e-8,
+    },
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "effect", [{"plastic_set": {"ratio": 0.03}}, {"guide_friction": {"friction": 0.05, "slip_mm": 1e-4}}]
+)
+def test_physics_that_no_law_describes_is_unexplained_although_a_law_takes_part_of_it(
+    effect: dict[str, dict[str, float]], table: SigmaTable
+) -> None:
+    experiment = rig_experiment({**_RIG, "effects": effect})
+    report = diagnosis_report(parse(campaign_of_curves(experiment, record_curves(experiment))), table)
+    assert report["verdict"] == "unexplained"
+    assert report["probability"] > 0.9
 
 
 @pytest.mark.parametrize("stiffness", [None, 3e-3, 1e3])

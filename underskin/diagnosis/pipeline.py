@@ -15,7 +15,12 @@ from underskin.diagnosis.inference.residuals import residuals, whole_prediction
 from underskin.diagnosis.localisation.effect_size import effect
 from underskin.diagnosis.localisation.permutation_test import SEED, locate
 from underskin.diagnosis.localisation.region import in_region, region
-from underskin.diagnosis.localisation.residual_shape import above_noise, describe, doubt, largest_floor_percent
+from underskin.diagnosis.localisation.residual_shape import (
+    above_noise,
+    describe,
+    keeps_structure,
+    largest_floor_percent,
+)
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
@@ -118,12 +123,12 @@ def _work_out(
     groups = cross_validation.hold_out(problem, ranked, nothing, result.supported)
     progress(0.95)
     doubted = (nothing, *(ranked if problem.kind == "indentation" else ranked[:1]))
-    doubtful = {entry.names: doubt(problem, entry) for entry in doubted}
+    contradicted = {entry.names for entry in doubted if keeps_structure(problem, entry, nothing)}
     after = cross_validation.total(groups)[1]
     if problem.kind == "indentation" and after.recordings and after.rmse_percent > _FAR_ABOVE * after.floor_percent:
-        doubtful |= {entry.names: 1.0 for entry in ranked[:1] if entry.names}
-    if any(doubtful.values()):
-        result = replace(result, doubtful=doubtful)
+        contradicted |= {entry.names for entry in ranked[:1] if entry.names}
+    if contradicted:
+        result = replace(result, contradicted=frozenset(contradicted))
         leader = result.answers[0]
         shown = result.shown_or_nothing(leader)
     floor = largest_floor_percent(problem, nothing, groups)

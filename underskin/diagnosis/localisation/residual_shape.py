@@ -26,9 +26,10 @@ _GRID = 40
 _LEAST_IN_ORDER = 8  # recordings
 _ABOVE_NOISE, _LEAST_REMAINDER = 2.0, 3e-3  # times the noise, and of the largest force
 NOISY = 2.0  # times what the lines' own roughness says
-_GRANTED = 4.0  # times as much remainder as the null hypothesis is allowed
-_DOUBT = 0.25  # where a law of indentation leaves more than noise, and less than that
-_STRUCTURED = 2.0**0.5  # the same, where what is added is as large as the noise
+_GRANTED = 4.0  # times as much remainder of a compression as the null hypothesis is allowed
+_GRANTED_TO_LAWS = 0.05  # of what the null hypothesis leaves of an indentation
+_STRUCTURED = 2.0**0.5  # times the noise: what is added is as large
+_LEAST_STRUCTURE = 5e-4  # of the largest force
 REACHES_NOISE = 1.5  # times the noise floor: an error that noise explains
 ALONG_CURVES = {"displacement_mm": "mm", "time_s": "s"}
 PRELOAD_BEFORE, ORDER = "preload_before", "order"  # axes that are no fields of the campaign
@@ -108,22 +109,20 @@ def above_noise(problem: FittingProblem, explanation: Explanation, groups: Seque
     return findings
 
 
-def doubt(problem: FittingProblem, explanation: Explanation) -> float:
-    """The share of an explanation's probability that structure in its residual takes away: 1 where the recordings
-    contradict it, however improbable its rivals are, less where it describes most but not all.
+def keeps_structure(problem: FittingProblem, explanation: Explanation, null: Explanation) -> bool:
+    """Whether structure in the residual contradicts an explanation, however improbable its rivals are.
 
-    Of curves structure is a smooth part above the noise; the null hypothesis is granted none of it, laws what
-    idealisations usually cost. Of the null hypothesis on FRFs it is lines that scatter about the model more than about
-    their neighbours by as much as those do.
+    Of indentations structure is a smooth part above the noise; a law is granted a twentieth of what the null hypothesis
+    leaves, since every law of contact idealises. Of a law of compressions more is granted. Of the null hypothesis on
+    FRFs structure is lines that scatter about the model more than about their neighbours by as much as those do.
     """
     if problem.lines.smooth is None:
-        return float(not explanation.names and explanation.best.levels.level > _STRUCTURED)
+        return not explanation.names and explanation.best.levels.level > _STRUCTURED
     smooth, noise = _smooth_part(problem, explanation)
-    if not _is_above_noise(smooth, noise):
-        return 0.0
-    if not explanation.names or _is_above_noise(smooth / _GRANTED, noise):
-        return 1.0
-    return _DOUBT if problem.kind == "indentation" else 0.0
+    if problem.kind == "indentation":
+        granted = _GRANTED_TO_LAWS * _smooth_part(problem, null)[0] if explanation.names else 0.0
+        return smooth > max(_STRUCTURED * noise, _LEAST_STRUCTURE, granted)
+    return _is_above_noise(smooth / _GRANTED if explanation.names else smooth, noise)
 
 
 def largest_floor_percent(problem: FittingProblem, null: Explanation, groups: Sequence[HeldOut]) -> float:
@@ -132,10 +131,13 @@ def largest_floor_percent(problem: FittingProblem, null: Explanation, groups: Se
 
 
 def _smooth_part(problem: FittingProblem, explanation: Explanation) -> tuple[float, float]:
-    """Of curves: the size of what is left smoothly, and a sample's noise, both relative to the largest force."""
+    """Of curves: the size of what is left smoothly, and a sample's noise, both relative to the largest force.
+
+    Noise is at least what neighbouring samples show.
+    """
     lines, levels = problem.lines, explanation.best.levels
     assert lines.smooth is not None
-    return levels.smooth, levels.level * float(np.median(lines.deviation / lines.smooth.scale))
+    return levels.smooth, max(levels.level, 1.0) * float(np.median(lines.deviation / lines.smooth.scale))
 
 
 def _is_above_noise(smooth: float, noise: float) -> bool:

@@ -121,9 +121,11 @@ def shape_statement(shape: Shape | None) -> str:
     """What is known of a residual that no mechanism describes, as one sentence; empty where nothing was looked at."""
     if shape is None:
         return ""
-    beyond = f" beyond {in_words(shape.beyond)}" if shape.beyond else ""
     form = "has no simple form over one axis" if shape.form is None else f"looks like {_form(shape.form, shape)}"
-    return f"What remains{beyond} {form}."
+    if not shape.beyond:
+        return f"What remains {form}."
+    explain = "explains" if len(shape.beyond) == 1 else "explain"
+    return f"{in_words(shape.beyond).capitalize()} {explain} part of the misfit; what remains {form}."
 
 
 def _form(form: ShapeForm, shape: Shape) -> str:

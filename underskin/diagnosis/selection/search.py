@@ -6,8 +6,8 @@ probable. Singles are all fitted; pairs and triples grow greedily from the best,
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -52,14 +52,14 @@ class Answer:
 class Search:
     """What was tried: explanations, processes on top of some of them, and what the campaign does not support.
 
-    `doubtful`: sets under which the residual keeps structure, or its noise is no noise (see residual_shape.py), and the
-    share of their probability that is then that of `none_of_these`.
+    `contradicted`: sets under which the residual keeps structure, or its noise is no noise (see residual_shape.py);
+    their probability is that of `none_of_these`.
     """
 
     explanations: tuple[Explanation, ...]
     discrepancies: tuple[tuple[Explanation, Discrepancy], ...]
     unsupported: dict[str, str]
-    doubtful: Mapping[tuple[str, ...], float] = field(default_factory=dict)
+    contradicted: frozenset[tuple[str, ...]] = frozenset()
     tried: int = 0  # sets, of which the explanations are those that were not left out early
 
     @property
@@ -106,16 +106,10 @@ class Search:
         weights.append(float(np.logaddexp.reduce(showing)) if showing else -math.inf)
         probabilities = (1 - _UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
         probabilities[-1] += _UNTHOUGHT
+        out = np.array([entry.names in self.contradicted for entry in kept] + [False])
+        probabilities[-1] += probabilities[out].sum()
         rivals: list[Explanation | None] = [*kept, None]
-        for number, entry in enumerate(kept):
-            taken = self.doubtful.get(entry.names, 0.0) * probabilities[number]
-            probabilities[-1] += taken
-            probabilities[number] -= taken
-        answers = [
-            Answer(entry, value)
-            for entry, value in zip(rivals, probabilities.tolist(), strict=True)
-            if entry is None or self.doubtful.get(entry.names, 0.0) < 1
-        ]
+        answers = [Answer(rivals[number], float(probabilities[number])) for number in np.flatnonzero(~out)]
         return sorted(answers, key=lambda answer: -answer.probability)
 
 
