@@ -1,10 +1,10 @@
 """Bodies in columns, as JSON, CSV or NumPy's .npz, and the requests in them."""
 
+import sys
 from typing import Any, TypeVar
 
 import numpy as np
 from pydantic_core import from_json
-from simdjson import Array, Object, Parser
 
 from service.middleware.unique_keys import require_unique_keys
 from service.problems import Refusal, validated
@@ -13,8 +13,14 @@ from service.schemas.columns import ColumnsRequest
 from underskin.errors import ErrorCode, InvalidInput, wrong_type
 from underskin.prediction.columns import CsvError, from_csv
 
+try:
+    import simdjson
+except ImportError:  # where no wheel is to be had, all JSON is read as short bodies are
+    _LONG = sys.maxsize
+else:
+    _LONG = 10_000  # bytes, beyond which columns are read as arrays
+
 CSV = "text/csv"
-_LONG = 10_000  # bytes of JSON, from which on lists are read as arrays
 
 _Kind = TypeVar("_Kind", bound=ColumnsRequest)
 
@@ -60,17 +66,20 @@ def media_type_of(content_type: str) -> str:
 def _plain_json(kind: type[ColumnsRequest], body: bytes) -> dict[str, Any] | None:
     """The fields of a JSON object with the columns as arrays, without a Python object for each number.
 
-    None where anything but that is in the body, such as lists in lists, other entries than numbers, or a key that comes
-    again: `json_document` reads it, or what is wrong is said.
+    None where anything but that is in the body, such as lists in lists, an empty one, entries that are no numbers, or a
+    key that comes again: `json_document` reads that, or says what is wrong.
     """
     try:
-        document = Parser().parse(body)
-        if not isinstance(document, Object):
+        document = (
+            simdjson.Parser().parse(body) if body.startswith(b"{") else None
+        )  # not what follows a byte order mark
+        if not isinstance(document, simdjson.Object):
             return None
         names = list(document)
         fields = {name: document[name] for name in names}
-        lists = sum(isinstance(value, Array) for value in fields.values())
-        if len(fields) < len(names) or _comes_more_often(b"[", lists, body) or _comes_more_often(b"{", 1, body):
+        lists = [value for value in fields.values() if isinstance(value, simdjson.Array)]
+        nested = _comes_more_often(b"[", len(lists), body) or _comes_more_often(b"{", 1, body)
+        if nested or len(fields) < len(names) or not all(map(len, lists)):
             return None
         return {name: _plain(kind, name, value) for name, value in fields.items()}
     except (ValueError, TypeError, RuntimeError):
@@ -78,7 +87,7 @@ def _plain_json(kind: type[ColumnsRequest], body: bytes) -> dict[str, Any] | Non
 
 
 def _plain(kind: type[ColumnsRequest], name: str, value: Any) -> Any:
-    if not isinstance(value, Array):
+    if not isinstance(value, simdjson.Array):
         return value
     return np.frombuffer(value.as_buffer(of_type="d")) if kind.is_column(name) else value.as_list()
 

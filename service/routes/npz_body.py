@@ -4,6 +4,7 @@ Nothing is unpickled, and no array is read before its size is known from the arc
 """
 
 import io
+import math
 import zipfile
 from typing import Any
 
@@ -67,9 +68,10 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> Arra
                 data = file.read()  # to the end, where its checksum is compared
             if dtype.hasobject:
                 raise ValueError("it holds Python objects (pickles)")
+            promised = math.prod(shape) * dtype.itemsize
+            if len(data) != promised:
+                raise ValueError(f"it has {len(data)} bytes, and its header says {promised}")
             array = np.ndarray(shape, dtype, data, order="F" if by_columns else "C")
-            if array.nbytes != len(data):
-                raise ValueError(f"it has {len(data)} bytes, and its header says {array.nbytes}")
     except FileError as error:
         reason = error.reason
     else:
@@ -83,10 +85,7 @@ def _value(kind: type[ColumnsRequest], name: str, array: Array) -> Any:
     if name in kind.constants:
         if array.ndim or array.dtype.kind not in "Ub":
             raise wrong_type(name, found, "must be a single text or boolean, of shape ()")
-        try:
-            return array.item()
-        except ValueError as error:
-            raise unreadable(name, found, f"must be a text in Unicode: {error}") from None
+        return _text(name, array) if array.dtype.kind == "U" else array.item()
     if array.dtype.kind not in "fiu":
         raise wrong_type(name, found, "must be an array of floats or integers")
     if name in kind.lists:
@@ -96,3 +95,11 @@ def _value(kind: type[ColumnsRequest], name: str, array: Array) -> Any:
     if not array.size:
         raise too_few(name, found, "must not be empty")
     return array.astype(float, copy=False) if array.ndim else float(array)
+
+
+def _text(name: str, array: Array) -> str:
+    """A text of shape (); NumPy itself would let any 32 bits pass for a character."""
+    try:
+        return array.astype(array.dtype.newbyteorder("<")).tobytes().decode("utf-32-le").rstrip("\0")
+    except UnicodeDecodeError as error:
+        raise unreadable(name, array.dtype.name, f"must be a text in Unicode: {error}") from None
