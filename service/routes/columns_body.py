@@ -69,12 +69,12 @@ def _plain_json(kind: type[ColumnsRequest], body: bytes) -> dict[str, Any] | Non
     None where anything but that is in the body, such as lists in lists, an empty one, entries that are no numbers, or a
     key that comes again: `json_document` reads that, or says what is wrong.
     """
+    if not body.startswith(b"{"):
+        return None
     try:
-        document = (
-            simdjson.Parser().parse(body) if body.startswith(b"{") else None
-        )  # not what follows a byte order mark
-        if not isinstance(document, simdjson.Object):
-            return None
+        document = simdjson.Parser().parse(body)
+        if not isinstance(document, simdjson.Object) or len(document) > len(kind.model_fields):
+            return None  # each key is searched for among all
         names = list(document)
         fields = {name: document[name] for name in names}
         lists = [value for value in fields.values() if isinstance(value, simdjson.Array)]

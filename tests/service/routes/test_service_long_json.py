@@ -103,6 +103,12 @@ def test_frf_and_d33(http: httpx.Client, path: str, fields: dict[str, Any]) -> N
     assert long == short
 
 
+def test_a_great_many_fields_are_refused_at_once(http: httpx.Client) -> None:
+    body = json.dumps({f"field{number}": 0 for number in range(100_000)})
+    answer = http.post("/v1/sigma", content=body, headers={"Content-Type": "application/json"}, timeout=20)
+    assert answer.status_code == 422
+
+
 NUMBERS = st.one_of(st.floats(), st.integers(-(2**70), 2**70), st.floats(0, 3))
 ODD: st.SearchStrategy[Any] = st.one_of(
     st.none(), st.booleans(), st.text(max_size=3), st.lists(NUMBERS, max_size=2), st.just({})
