@@ -36,7 +36,8 @@ _SECTIONS = {
 _EXPLANATIONS = {
     "accuracy": """Errors are relative. The fresh solves share nothing with the table but the code of the elements; an
 independent finite-element code is compared in `tests/surrogate/test_felupe.py`.""",
-    "batch": "One request of 100,000 rows, the server on one core.",
+    "batch": """One request of 100,000 rows, the server on one core; in turns with it a FastAPI route that reads and
+writes JSON by orjson and calls SciPy's `NdBSpline` on the same table (`bench/peers/plain_sigma.py`).""",
     "requests": """8 connections, the server on one core and the load on the other, against the `umbridge` package's own
 server and Tesseract Core's runtime, each serving the same spline.""",
     "start": "From starting the process to the first answer of `/ready`; resident memory after load.",

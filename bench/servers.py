@@ -77,6 +77,15 @@ def umbridge() -> Iterator[Server]:
 
 
 @contextmanager
+def plain_sigma() -> Iterator[Server]:
+    """A FastAPI route around SciPy's spline, on the same event loop and HTTP parser as ours."""
+    port = _free_port()
+    command = [sys.executable, "-m", "bench.peers.plain_sigma", str(TABLE), str(port)]
+    with _running(command, port, "/ready") as server:
+        yield server
+
+
+@contextmanager
 def tesseract() -> Iterator[Server]:
     """Tesseract Core's runtime, from the environment that `make bench` installs for it."""
     port = _free_port()

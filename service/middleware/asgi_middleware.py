@@ -141,7 +141,8 @@ class _Exchange:
 
 def _plain(method: str, headers: Mapping[bytes, bytes]) -> bool:
     """Whether JSON is asked for and, where there is a body, sent."""
-    if b"csv" in headers.get(b"accept", b""):
+    accept = headers.get(b"accept", b"").lower()
+    if b"csv" in accept or b"npz" in accept:
         return False
     return method == "GET" or headers.get(b"content-type", b"").split(b";")[0].strip().lower() == b"application/json"
 

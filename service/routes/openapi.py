@@ -17,8 +17,8 @@ What is happening under the skin: σ, FRF and d33 of a piezoelectric electronic 
 
 Units are spelled in the names (`_mm`, `_mpa`, `_n`, `_pc_per_n`, `_hz`). Requests to `/v1/sigma`, `/v1/frf` and
 `/v1/d33` are in columns: a single number holds for all rows. A row outside the table is answered `out_of_domain` with
-null, never extrapolated. `Accept: text/csv` returns columns as CSV, with NaN. Errors are RFC 9457 problems; under
-`/umbridge` they have the shape of that protocol.
+null, never extrapolated. `Accept: text/csv` returns columns as CSV, `Accept: application/x-npz` as NumPy's .npz, both
+with NaN. Errors are RFC 9457 problems; under `/umbridge` they have the shape of that protocol.
 """
 
 

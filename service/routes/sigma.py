@@ -7,7 +7,7 @@ from orjson import dumps, loads
 
 from service.dependencies import Table
 from service.middleware.asgi_middleware import HotRoute, are_numbers
-from service.routes.columns_endpoint import Accept, add_columns_route, respond
+from service.routes.columns_endpoint import OTHER_ANSWERS, Accept, add_columns_route, respond
 from service.schemas.sigma import OneSigma, SigmaAnswer, SigmaColumns, SigmaQuery
 from service.usecases.sigma import sigma
 from underskin.surrogate.sigma_table import SigmaTable
@@ -39,12 +39,12 @@ def hot_route(table: SigmaTable) -> HotRoute:
     operation_id="sigma_one",
     tags=["sigma"],
     summary="σ at one point",
-    responses={200: {"model": OneSigma, "content": {"text/csv": {}}}},
+    responses={200: {"model": OneSigma, "content": OTHER_ANSWERS}},
 )
 async def sigma_one(
     point: Annotated[SigmaQuery, Query()], table: Table, accept: Accept = "application/json"
 ) -> Response:
-    """One point; Accept: text/csv gives one row."""
+    """One point; Accept chooses CSV or .npz, of one row."""
     return respond(sigma(table, None, SigmaColumns(**point.model_dump())), accept, one=True)
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 from fastapi import APIRouter, Request, Response
 
-from service.routes.columns_endpoint import Accept, answer_json, described_body, respond
+from service.routes.columns_endpoint import OTHER_ANSWERS, Accept, answer_json, described_body, respond
 from service.schemas.stress import StressAnswer
 from service.usecases import stress as usecase
 from service.usecases.tables import influence_table
@@ -25,7 +25,7 @@ EXAMPLE = {
     ],
 }
 
-_ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": StressAnswer, "content": {"text/csv": {}}}}
+_ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": StressAnswer, "content": OTHER_ANSWERS}}
 
 
 @router.post(

@@ -1,15 +1,16 @@
 """Columns. A field of a request is a number for all rows, or a list with an entry a row; an answer is JSON, null where
-there is no value, or CSV, NaN there.
+there is no value, or CSV or NumPy's .npz, NaN there.
 """
 
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import orjson
-from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, WithJsonSchema
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, InstanceOf, Tag, WithJsonSchema
 
 from underskin.findings.codes import FindingCode
 from underskin.prediction.columns import statuses, to_csv
@@ -19,6 +20,8 @@ Status = Literal["ok", "out_of_domain"]
 
 
 def _kind(value: object) -> str:
+    if isinstance(value, np.ndarray):
+        return "array"
     return "column" if isinstance(value, list) else "scalar"
 
 
@@ -29,7 +32,9 @@ def _schema(**bounds: float) -> dict[str, Any]:
 
 _Number = Annotated[float, Field(strict=True)]
 _Column = Annotated[
-    Annotated[_Number, Tag("scalar")] | Annotated[list[_Number], Field(min_length=1, fail_fast=True), Tag("column")],
+    Annotated[_Number, Tag("scalar")]
+    | Annotated[list[_Number], Field(min_length=1, fail_fast=True), Tag("column")]
+    | Annotated[InstanceOf[Floats], Tag("array")],  # a column whose type was checked where it was read
     Discriminator(_kind),
 ]
 # pydantic checks types only, since it would report every bad row; values are checked as arrays, below and in underskin.
@@ -44,17 +49,22 @@ NumbersPerRow = Annotated[list[Numbers], Field(fail_fast=True)]
 
 
 class ColumnsRequest(BaseModel):
-    """A request in columns. Subclasses name the fields that are not columns, so that CSV can treat them."""
+    """A request in columns. Subclasses name the fields that are not columns, since these are read otherwise."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
-    # The same value in every row of a CSV body, and fields that only JSON can carry.
+    # The same text or boolean in every row of a CSV body, and lists of numbers, which CSV cannot carry.
     constants: ClassVar[frozenset[str]] = frozenset({"model"})
-    json_only: ClassVar[frozenset[str]] = frozenset()
+    lists: ClassVar[frozenset[str]] = frozenset()
+
+    @classmethod
+    def is_column(cls, name: str) -> bool:
+        """Whether this field is a number for all rows or a column."""
+        return name in cls.model_fields and name not in cls.constants | cls.lists
 
     def column(self, name: str) -> Floats:
         """A field as an array: shape () for a scalar, (rows,) for a column."""
-        return np.array(getattr(self, name), dtype=float)
+        return np.asarray(getattr(self, name), dtype=float)
 
 
 class AnswerInColumns(BaseModel):
@@ -111,7 +121,7 @@ class Columns:
             **self.shared,
             **self.names,
             **{name: self.full(name) for name in self.columns},
-            "status": self.status(),
+            "status": _json_of_statuses(np.broadcast_to(self.inside, (self.rows,))),
         }
         return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
 
@@ -136,3 +146,29 @@ class Columns:
                 frequencies = self.line_hz.tolist()
                 columns |= {f"{name}[{one!r} Hz]": line for one, line in zip(frequencies, values.T, strict=True)}
         return to_csv({**columns, "status": self.status()}, "\r\n").encode()
+
+    def npz(self) -> bytes:
+        """The answer as arrays in NumPy's .npz, uncompressed, by the names of the JSON; what is null there is left out.
+
+        Model, hash, ids and findings, which are JSON themselves, are texts of shape ().
+        """
+        inside = np.broadcast_to(self.inside, (self.rows,))
+        arrays: dict[str, ArrayLike | None] = {
+            "model": self.model,
+            "table_sha256": self.table_sha256,
+            **self.shared,
+            **self.names,
+            **{name: self.full(name) for name in self.columns},
+            "status": np.full(self.rows, "ok") if inside.all() else np.where(inside, "ok", "out_of_domain"),
+        }
+        if "findings" in self.shared:
+            arrays["findings"] = orjson.dumps(self.shared["findings"]).decode()
+        file = io.BytesIO()
+        np.savez(file, allow_pickle=False, **{name: values for name, values in arrays.items() if values is not None})
+        return file.getvalue()
+
+
+def _json_of_statuses(inside: NDArray[np.bool_]) -> orjson.Fragment:
+    """The list of statuses, without a Python object for each: equally long cells, then without their padding."""
+    cells = np.where(inside, b'"ok",', b'"out_of_domain",').tobytes().translate(None, b"\0")
+    return orjson.Fragment(b"[" + cells[:-1] + b"]")

@@ -87,7 +87,7 @@ class PressedSkinAnswer(AnswerInColumns):
 class FrfColumns(PressedSkinColumns):
     """The skin, the sphere and d33, in columns."""
 
-    json_only: ClassVar[frozenset[str]] = frozenset({"frequency_hz"})
+    lists: ClassVar[frozenset[str]] = frozenset({"frequency_hz"})
 
     d33_pc_per_n: Signed = Field(description="Piezoelectric coefficient d33 of the sensor [pC/N], not 0.")
     frequency_hz: Numbers | None = Field(
@@ -116,7 +116,7 @@ class FrfAnswer(PressedSkinAnswer):
 class D33Columns(PressedSkinColumns):
     """The skin, the sphere and the measured FRF: plateau values, or lines with a band to average over."""
 
-    json_only: ClassVar[frozenset[str]] = frozenset({"frequency_hz", "band_hz", "frf_re_pc_per_n", "frf_im_pc_per_n"})
+    lists: ClassVar[frozenset[str]] = frozenset({"frequency_hz", "band_hz", "frf_re_pc_per_n", "frf_im_pc_per_n"})
 
     frf_pc_per_n: Signed | None = Field(
         default=None, description="Measured FRF on the plateau, real part [pC/N]; or give lines."

@@ -192,4 +192,5 @@ def require_paper(request: PressedSkinColumns) -> None:
     """Raises InvalidInput for a field that only an adopted model uses."""
     for name in ("skin_id", "sensor", *ADOPTED_COLUMNS):
         if getattr(request, name) is not None:
-            raise conflicting(name, getattr(request, name), "is used only with model adopted")
+            given = np.asarray(getattr(request, name)).tolist()
+            raise conflicting(name, given, "is used only with model adopted")

@@ -121,7 +121,7 @@ def _adopted_d33(table: SigmaTable, store: Database, request: D33Columns) -> Col
 
 def _given(request: D33Columns) -> dict[str, Floats]:
     """Plateau values as they were sent."""
-    for name in sorted(request.json_only):
+    for name in sorted(request.lists):
         if getattr(request, name) is not None:
             raise conflicting(name, "given", "goes with lines; leave it out, or leave out frf_pc_per_n")
     return _sent(request, "frf_pc_per_n", "frf_uncertainty_pc_per_n")

@@ -23,9 +23,9 @@ PRESSED: dict[str, Any] = {**SKIN, "indenter_radius_mm": 4.0}
 TABLE = underskin.load_table()
 
 
-@pytest.fixture(scope="module")
-def client(server_url: str) -> Iterator[Client]:
-    with Client(server_url) as opened:
+@pytest.fixture(scope="module", params=[False, True], ids=["json", "npz"])
+def client(server_url: str, request: pytest.FixtureRequest) -> Iterator[Client]:
+    with Client(server_url, npz=request.param) as opened:
         yield opened
 
 

@@ -99,6 +99,23 @@ def test_shapes_broadcast_and_empty_is_empty() -> None:
     assert TABLE.sigma(np.zeros(0), 0.6).sigma.shape == (0,)
 
 
+def test_many_rows_are_answered_as_few_are() -> None:
+    """Also on the nodes and next to them, where a row goes from one cell to the next, and beyond the limits."""
+    rows = 30_000
+    columns = []
+    for nodes in (TABLE.axes[0], TABLE.axes[1], TABLE.axes[2] ** 3):
+        beside = [np.nextafter(nodes, -1), nodes, np.nextafter(nodes, 9), GENERATOR.uniform(0, nodes[-1], 200)]
+        columns.append(GENERATOR.choice(np.concatenate(beside), rows))
+    many = TABLE.sigma(*columns)
+    few = [TABLE.sigma(*part) for part in np.split(np.stack(columns), 10, axis=1)]
+    assert np.array_equal(many.inside, np.concatenate([part.inside for part in few]))
+    assert np.array_equal(many.rel_error, np.concatenate([part.rel_error for part in few]), equal_nan=True)
+    assert many.sigma == pytest.approx(np.concatenate([part.sigma for part in few]), rel=1e-13, nan_ok=True)
+    assert 0.5 * rows < many.inside.sum() < rows
+    single = TABLE.sigma(columns[0][:, None], 0.6, [0.01, 0.02])
+    assert np.array_equal(single.sigma[:, 1], TABLE.sigma(columns[0], 0.6, 0.02).sigma, equal_nan=True)
+
+
 def test_profile_averages_to_sigma_and_is_exact_off_centre() -> None:
     x, w = np.polynomial.legendre.leggauss(30)
     for rho, load in ((0.6, 0.05), (2.0, 0.1)):

@@ -1,15 +1,20 @@
 """HTTP requests to the service, with its errors as exceptions."""
 
+import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 from urllib.parse import quote
 
 import httpx
+import numpy as np
 import orjson
 
 from underskin.errors import InvalidInput, ServiceError, Unreachable
+from underskin.units import Array
+
+_NPZ = "application/x-npz"
 
 _ELSEWHERE = " (where it is elsewhere: base_url of Client, --url or UNDERSKIN_URL of the command line)"
 
@@ -45,6 +50,18 @@ class Session:
         if document is None or not response.is_success:
             raise ServiceError(response.status_code, document or _foreign(response))
         return document, response.headers
+
+    def arrays(self, path: str, sent: Mapping[str, Any]) -> dict[str, Array]:
+        """The arrays of an answer to arrays, texts and booleans that are posted, both ways as NumPy's .npz."""
+        file = io.BytesIO()
+        np.savez(file, allow_pickle=False, **sent)
+        headers = {"Content-Type": _NPZ, "Accept": _NPZ}
+        with self.stream("POST", path, content=file.getvalue(), headers=headers) as response:
+            content = response.read()
+        if response.headers.get("content-type") != _NPZ:
+            raise ServiceError(response.status_code, _foreign(response))
+        with np.load(io.BytesIO(content), allow_pickle=False) as answered:
+            return dict(answered)
 
     @contextmanager
     def stream(self, method: str, path: str, **options: Any) -> Iterator[httpx.Response]:

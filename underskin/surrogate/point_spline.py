@@ -24,17 +24,20 @@ Cell = tuple[int, int, int]
 
 
 class PointSpline:
-    """The three-dimensional cubic `spline`, for one point at a time."""
+    """The three-dimensional cubic `spline`, for one point at a time.
+
+    `cubics` (functions of x, cells of z, functions of y, powers): those in z, highest power first, that go with
+    b_i(x) b_j(y); four of them in a row are read at once.
+    """
 
     def __init__(self, spline: NdBSpline) -> None:
         """Take the spline apart: along z into cubics, along x and y into cubic basis functions, cell by cell."""
         self._nodes = [knots[_DEGREE:-_DEGREE].tolist() for knots in spline.t]
         in_x, in_y, in_z = (_basis_functions(np.asarray(knots)) for knots in spline.t)
         self._basis_x, self._basis_y = _of_cells(in_x), _of_cells(in_y)
-        # [i, cell of z, j, power]: the cubic in z that goes with b_i(x) b_j(y); four of them in a row are read at once.
-        cubics = np.einsum("ijk,ckp->icjp", spline.c, in_z)
-        self._cubics = cubics.astype("<f8").tobytes()
-        self._strides = cubics.astype("<f8", order="C").strides
+        self.cubics: Floats = np.ascontiguousarray(np.einsum("ijk,ckp->icjp", spline.c, in_z))
+        self._bytes = self.cubics.astype("<f8").tobytes()
+        self._strides = self.cubics.strides
 
     def cell(self, x: float, y: float, z: float) -> Cell | None:
         """Where the point lies, or None outside the spline's nodes (NaN included)."""
@@ -52,7 +55,7 @@ class PointSpline:
         next_i, next_cell, next_j, _ = self._strides
         offset = i * next_i + k * next_cell + j * next_j
         for weight in _values(self._basis_x[i], x - x_nodes[i]):
-            a3, a2, a1, a0, b3, b2, b1, b0, c3, c2, c1, c0, d3, d2, d1, d0 = _FOUR_CUBICS(self._cubics, offset)
+            a3, a2, a1, a0, b3, b2, b1, b0, c3, c2, c1, c0, d3, d2, d1, d0 = _FOUR_CUBICS(self._bytes, offset)
             total += weight * (
                 y0 * (((a3 * u + a2) * u + a1) * u + a0)
                 + y1 * (((b3 * u + b2) * u + b1) * u + b0)

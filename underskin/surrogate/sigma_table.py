@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
 
 from underskin.autodiff import contiguous
@@ -19,7 +19,7 @@ from underskin.physics.charge_response import Sigma
 from underskin.surrogate.hdf5_format import SIGMA_SCHEMA
 from underskin.surrogate.point_spline import PointSpline, cell_of, four_functions
 from underskin.surrogate.table_file import Table
-from underskin.units import Floats, Indices, Mask
+from underskin.units import Array, Floats, Indices, Mask
 
 SIGMA_TABLE = "sigma.h5"
 _MANY = 10_000  # rows
@@ -87,22 +87,28 @@ class SigmaTable(Table):
 
         columns = np.asarray(a_over_h, dtype=float), np.asarray(rt_over_h, dtype=float), np.cbrt(load_parameter)
         shape = np.broadcast_shapes(*(column.shape for column in columns))
-        rows = [np.broadcast_to(column, shape).ravel() for column in columns]
-        sigma, rel_error = np.empty(rows[0].size), np.empty(rows[0].size)
-        sigma_rows(self._coefficients, self._cell_error, *self._cells_of_axes, *map(contiguous, rows), sigma, rel_error)
-        return Sigma(sigma.reshape(shape), rel_error.reshape(shape), np.isfinite(sigma).reshape(shape))
+        full = (c if c.size == 1 or c.shape == shape else np.broadcast_to(c, shape) for c in columns)
+        sigma, rel_error = np.empty(shape), np.empty(shape)
+        sigma_rows(
+            self._point_sigma.cubics,
+            self._cell_error,
+            *self._cells_of_axes,
+            *(contiguous(column.ravel()) for column in full),
+            sigma.ravel(),
+            rel_error.ravel(),
+        )
+        return Sigma(sigma, rel_error, np.isfinite(sigma))
 
     @cached_property
-    def _cells_of_axes(self) -> list[Floats]:
-        """Of each axis the table's nodes, and the knots and functions of the spline's cells."""
-        parts: list[Floats] = []
+    def _cells_of_axes(self) -> list[Array]:
+        """Of the axes what leads from a value to a cell of the table, and the spline's cells with their functions."""
+        ends, parts = [], []
         for nodes, knots in zip(self.axes, self._sigma.t, strict=True):
-            parts += [contiguous(np.asarray(nodes)), contiguous(knots[3:-3]), four_functions(knots)]
-        return parts
-
-    @cached_property
-    def _coefficients(self) -> Floats:
-        return np.ascontiguousarray(self._sigma.c)
+            starts, buckets, scale = _buckets(nodes)
+            ends.append([nodes[0], nodes[-1], scale])
+            functions = np.ascontiguousarray(four_functions(knots).transpose(0, 2, 1))
+            parts += [starts, buckets, contiguous(knots[3:-3]), functions]
+        return [np.array(ends), *parts[:-1]]  # along x the spline is in cubics
 
     def at(self, a_over_h: float, rt_over_h: float, load_parameter: float = 0.0) -> tuple[float, float] | None:
         """σ and the bound on its relative error at one point, without the cost of arrays; None outside the domain."""
@@ -208,6 +214,17 @@ def _points(
     if not inside.all():
         points[~inside] = low
     return points, inside, columns[0].shape
+
+
+def _buckets(nodes: Floats) -> tuple[Floats, NDArray[np.int64], float]:
+    """Where an axis' cells start, then infinity; the cell before each part of the axis; and how many parts a unit has.
+
+    The parts are half as long as the shortest cell, so that one cell at most starts in each.
+    """
+    scale = 2 / float(np.diff(nodes).min())
+    parts = ((nodes - nodes[0]) * scale).astype(np.int64)
+    before = np.searchsorted(parts[1:-1], np.arange(parts[-1] + 1))
+    return np.append(nodes[:-1], np.inf), before.astype(np.int64), scale
 
 
 def _cells(axes: Sequence[Floats], points: Floats) -> tuple[Indices, ...]:

@@ -166,8 +166,10 @@ def validator(schema: dict[str, Any], document: dict[str, Any]) -> jsonschema_rs
 
 
 def examples(operation: dict[str, Any], document: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Media type and example of each body; one that has no example of its own has those of its fields."""
+    """Media type and example of each body in text; one that has no example of its own has those of its fields."""
     for media_type, content in operation.get("requestBody", {}).get("content", {}).items():
+        if content["schema"].get("format") == "binary":
+            continue
         example = content.get("example")
         if example is None:
             fields = fields_of(content["schema"], document).items()

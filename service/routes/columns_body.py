@@ -1,0 +1,134 @@
+"""Bodies in columns, as JSON, CSV or NumPy's .npz, and the requests in them."""
+
+import sys
+from typing import Any, TypeVar
+
+import numpy as np
+from pydantic_core import from_json
+
+from service.middleware.unique_keys import require_unique_keys
+from service.problems import Refusal, validated
+from service.routes.npz_body import NPZ, fields_of_npz
+from service.schemas.columns import ColumnsRequest
+from underskin.errors import ErrorCode, InvalidInput, wrong_type
+from underskin.prediction.columns import CsvError, from_csv
+
+try:
+    import simdjson
+except ImportError:  # where no wheel is to be had, all JSON is read as short bodies are
+    _LONG = sys.maxsize
+else:
+    _LONG = 10_000  # bytes, beyond which columns are read as arrays
+
+CSV = "text/csv"
+
+_Kind = TypeVar("_Kind", bound=ColumnsRequest)
+
+
+def parse(kind: type[_Kind], body: bytes, content_type: str, most_bytes: int) -> _Kind:
+    """The request in `body`; an .npz may have `most_bytes` when it is expanded.
+
+    Raises Refusal 400 (unreadable), 413 (too large), 415 (another type) or 422 (a field is wrong), and InvalidInput.
+    """
+    match media_type_of(content_type):
+        case "text/csv":
+            fields: Any = _from_csv(kind, body)
+        case "application/x-npz":
+            fields = fields_of_npz(kind, body, most_bytes)
+        case "" | "application/json" if len(body) > _LONG and (plain := _plain_json(kind, body)) is not None:
+            fields = plain
+        case _:
+            fields = json_document(body, content_type, f", {CSV} or {NPZ}")
+    return validated(kind, fields)
+
+
+def json_document(body: bytes, content_type: str, also: str = "") -> Any:
+    """What a JSON body holds; raises Refusal 400 (unreadable), 422 (a key comes twice) or 415 (another type).
+
+    `also` says what else is read.
+    """
+    media_type = media_type_of(content_type)
+    if media_type not in ("", "application/json"):
+        raise Refusal(415, f"Content-Type {media_type!r} cannot be read; send application/json{also}.")
+    try:
+        document = from_json(body)  # reads NaN too, so that it is refused by field and row
+    except ValueError as error:
+        raise Refusal(400, f"The body is not JSON: {error}.") from None
+    require_unique_keys(body)
+    return document
+
+
+def media_type_of(content_type: str) -> str:
+    """A Content-Type without its parameters."""
+    return content_type.split(";", 1)[0].strip().lower()
+
+
+def _plain_json(kind: type[ColumnsRequest], body: bytes) -> dict[str, Any] | None:
+    """The fields of a JSON object with the columns as arrays, without a Python object for each number.
+
+    None where anything but that is in the body, such as lists in lists, an empty one, entries that are no numbers, or a
+    key that comes again: `json_document` reads that, or says what is wrong.
+    """
+    if not body.startswith(b"{"):
+        return None
+    try:
+        document = simdjson.Parser().parse(body)
+        if not isinstance(document, simdjson.Object) or len(document) > len(kind.model_fields):
+            return None  # each key is searched for among all
+        names = list(document)
+        fields = {name: document[name] for name in names}
+        lists = [value for value in fields.values() if isinstance(value, simdjson.Array)]
+        nested = _comes_more_often(b"[", len(lists), body) or _comes_more_often(b"{", 1, body)
+        if nested or len(fields) < len(names) or not all(map(len, lists)):
+            return None
+        return {name: _plain(kind, name, value) for name, value in fields.items()}
+    except (ValueError, TypeError, RuntimeError):
+        return None
+
+
+def _plain(kind: type[ColumnsRequest], name: str, value: Any) -> Any:
+    if not isinstance(value, simdjson.Array):
+        return value
+    return np.frombuffer(value.as_buffer(of_type="d")) if kind.is_column(name) else value.as_list()
+
+
+def _comes_more_often(mark: bytes, times: int, body: bytes) -> bool:
+    place = -1
+    for _ in range(times + 1):
+        place = body.find(mark, place + 1)
+        if place < 0:
+            return False
+    return True
+
+
+def _from_csv(kind: type[ColumnsRequest], body: bytes) -> dict[str, Any]:
+    try:
+        columns = from_csv(body.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise Refusal(400, f"The body is not CSV in UTF-8: {error}.") from None
+    except CsvError as error:
+        raise Refusal(400, f"The CSV of the body {error}.") from None
+    return {name: _cells(kind, name, cells) for name, cells in columns.items()}
+
+
+def _cells(kind: type[ColumnsRequest], name: str, cells: list[str]) -> Any:
+    if name in kind.lists:
+        raise wrong_type(name, cells[0], f"cannot be sent as CSV; send application/json or {NPZ}")
+    if name in kind.constants:
+        return _constant(name, cells)
+    numbers = []
+    for row, cell in enumerate(cells):
+        try:
+            numbers.append(float(cell))
+        except ValueError:
+            raise wrong_type(name, cell, index=row) from None
+    return numbers
+
+
+def _constant(name: str, cells: list[str]) -> str | bool:
+    for row, cell in enumerate(cells):
+        if cell != cells[0]:
+            raise InvalidInput(
+                name, cell, f"must be the same in every row ({cells[0]!r})", row, code=ErrorCode.CONFLICTING
+            )
+    return {"true": True, "false": False}.get(cells[0].lower(), cells[0])
