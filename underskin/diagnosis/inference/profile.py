@@ -10,7 +10,7 @@ _FALL = 1.92  # of the log posterior density at the ends: half of the 95 % quant
 _STRIDES = 8
 
 
-def profile_end(evidence: Evidence, place: int, limit: float) -> float:
+def profile_end(evidence: Evidence, place: int, limit: float) -> float | None:
     """Where between a limit and the most probable value the log posterior density has fallen by 1.92.
 
     Parameters
@@ -24,8 +24,8 @@ def profile_end(evidence: Evidence, place: int, limit: float) -> float:
 
     Returns
     -------
-    float
-        Fit coordinate; the limit, moved within the parameter's bounds, where the density has not fallen that far there.
+    float or None
+        Fit coordinate; None where the density has not fallen that far at the limit: the interval goes beyond it.
     """
     entry = evidence.hypothesis.model.parameters[place]
     middle = float(evidence.point.fit[place])
@@ -37,7 +37,7 @@ def profile_end(evidence: Evidence, place: int, limit: float) -> float:
     fallen = np.append(fitted.cost - priors - evidence.cost, 0.0)
     beyond = np.flatnonzero(fallen > _FALL)
     if not len(beyond):
-        return float(values[0])
+        return None
     values = np.append(values, middle)
     last = int(beyond[-1])
     share = (fallen[last] - _FALL) / (fallen[last] - fallen[last + 1])

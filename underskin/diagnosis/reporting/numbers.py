@@ -40,7 +40,9 @@ def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
     ends = [max(middle - half_width, low), min(middle + half_width, high)]
     limit = None if entry.moves_covariance else entry.fit_limit
     if limit is not None and ends[0] <= limit <= ends[1] and limit != middle:
-        ends[0 if limit < middle else 1] = profile_end(best, place, limit)
+        side = 0 if limit < middle else 1
+        end = profile_end(best, place, limit)
+        ends[side] = ends[side] if end is None else end
     values = [entry.from_fit(at) for at in (middle, *ends)]
     if entry.relative_to is not None:
         values = _absolute(explanation, place, values)

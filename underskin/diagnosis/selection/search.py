@@ -25,6 +25,7 @@ PRIORS = {"nothing_missing": 0.45, "one": 0.34, "two": 0.14, "three": 0.02, "non
 _PARENTS = 3
 _BEST = 3  # nothing and two more: processes are tried on top of the best two
 SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
+_SHOWS_ON_CURVES = 5.0  # the same where neighbouring samples may share what no noise model knows
 _UNTHOUGHT = 0.015  # probability that none of what was compared is right
 _WITHIN = 8.0  # nats behind the best within which evidence is worth integrating: that moves it by less than 2
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
@@ -77,7 +78,8 @@ class Search:
         evidence = {frozenset(entry.names): entry.log_evidence for entry in self.explanations}
         whole = frozenset(explanation.names)
         smaller = [evidence.get(whole - {name}, -math.inf) for name in whole]
-        return all(explanation.log_evidence > without + SHOWS for without in smaller)
+        least = _SHOWS_ON_CURVES if explanation.best.hypothesis.lines.curves else SHOWS
+        return all(explanation.log_evidence > without + least for without in smaller)
 
     def shown_or_nothing(self, answer: Answer) -> Explanation:
         """The explanation that an answer stands on: for `none_of_these`, the one beneath its best process."""
