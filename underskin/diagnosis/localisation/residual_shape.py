@@ -13,6 +13,7 @@ import numpy as np
 
 from underskin.diagnosis.data.axes import order, preload_before, recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.least_squares import least_squares_percent
 from underskin.diagnosis.inference.residuals import Residuals, residuals, whole_prediction
 from underskin.diagnosis.selection.frequency_gp import frequency_bins
 from underskin.diagnosis.selection.recording_gp import relative_place_slopes
@@ -27,7 +28,7 @@ _LEAST_IN_ORDER = 8  # recordings
 _ABOVE_NOISE, _LEAST_REMAINDER = 2.0, 3e-3  # times the noise, and of the largest force
 NOISY = 2.0  # times what the lines' own roughness says
 _GRANTED = 4.0  # times as much remainder of a compression as the null hypothesis is allowed
-_GRANTED_TO_LAWS = 0.05  # of what the null hypothesis leaves of an indentation
+_GRANTED_TO_LAWS = 0.05  # of what least squares leave under the null hypothesis of an indentation
 _STRUCTURED = 2.0**0.5  # times the noise: what is added is as large
 _LEAST_STRUCTURE = 5e-4  # of the largest force
 REACHES_NOISE = 1.5  # times the noise floor: an error that noise explains
@@ -112,17 +113,20 @@ def above_noise(problem: FittingProblem, explanation: Explanation, groups: Seque
 def keeps_structure(problem: FittingProblem, explanation: Explanation, null: Explanation) -> bool:
     """Whether structure in the residual contradicts an explanation, however improbable its rivals are.
 
-    Of indentations structure is a smooth part above the noise; a law is granted a twentieth of what the null hypothesis
-    leaves, since every law of contact idealises. Of a law of compressions more is granted. Of the null hypothesis on
-    FRFs structure is lines that scatter about the model more than about their neighbours by as much as those do.
+    Of indentations structure is a smooth part above the noise; a law is granted it where plain least squares leave less
+    than a twentieth of what they leave under the null hypothesis, since every law of contact idealises. Of a law of
+    compressions more is granted. Of the null hypothesis on FRFs structure is lines that scatter about the model more
+    than about their neighbours by as much as those do.
     """
     if problem.lines.smooth is None:
         return not explanation.names and explanation.best.levels.level > _STRUCTURED
     smooth, noise = _smooth_part(problem, explanation)
-    if problem.kind == "indentation":
-        granted = _GRANTED_TO_LAWS * _smooth_part(problem, null)[0] if explanation.names else 0.0
-        return smooth > max(_STRUCTURED * noise, _LEAST_STRUCTURE, granted)
-    return _is_above_noise(smooth / _GRANTED if explanation.names else smooth, noise)
+    if problem.kind != "indentation":
+        return _is_above_noise(smooth / _GRANTED if explanation.names else smooth, noise)
+    if smooth <= max(_STRUCTURED * noise, _LEAST_STRUCTURE):
+        return False
+    left, at_first = (least_squares_percent(one.best.hypothesis, one.point.fit) for one in (explanation, null))
+    return left >= _GRANTED_TO_LAWS * at_first
 
 
 def largest_floor_percent(problem: FittingProblem, null: Explanation, groups: Sequence[HeldOut]) -> float:
