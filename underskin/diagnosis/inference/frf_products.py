@@ -1,7 +1,7 @@
 """The inner products over the lines of FRFs: see `products`."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Self
 
@@ -15,7 +15,7 @@ from underskin.diagnosis.inference.sums import SlopeSums, Sums
 from underskin.diagnosis.noise.noise_levels import SeveralLevels
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.models.response import Response
-from underskin.units import Array, Floats
+from underskin.units import Array, Floats, Indices
 
 
 class FrfLines:
@@ -86,8 +86,8 @@ class FrfProducts:
             level=self.level[points],
             level_slopes=None if slopes is None else slopes[points],
             place_slopes=None if place is None else place[:, points],
-            turning=_of_each(lambda values: values[points], self.turning),
-            pickup=_of_each(lambda values: values[points], self.pickup),
+            turning=None if self.turning is None else self.turning[points],
+            pickup=None if self.pickup is None else self.pickup[points],
         )
 
     @property
@@ -105,12 +105,17 @@ class FrfProducts:
             values = [getattr(part, name) for part in filled]
             return None if values[0] is None else np.concatenate(values, axis=axis)
 
-        def of_each(name: str) -> Any:
-            values = [getattr(part, name) for part in filled]
-            return None if values[0] is None else _of_each(lambda *own: np.concatenate(own), *values)
-
         level = of("level"), of("level_slopes"), of("place_slopes", axis=1)
-        return cls(parts[0].yy, of("uu"), of("uy"), *level, of_each("turning"), of_each("pickup"))
+        turning = [part.turning for part in filled if part.turning is not None]
+        pickup = [part.pickup for part in filled if part.pickup is not None]
+        return cls(
+            parts[0].yy,
+            of("uu"),
+            of("uy"),
+            *level,
+            SlopeSums.joined(turning) if turning else None,
+            PickupProducts.joined(pickup) if pickup else None,
+        )
 
     def filled(self, parameters: int, *, turning: bool) -> Self:
         """With derivatives that are 0 by further parameters, so many in all, also those of u where it has none."""
@@ -152,9 +157,11 @@ class FrfProducts:
 
 @dataclass(frozen=True)
 class PickupProducts:
-    """On the rows that pick-up reaches u (points, rows) and v (points, parameters, rows), None where it is 0."""
+    """On the distinct lines of the rows that pick-up reaches u (points, lines) and v (points, parameters, lines), None
+    where it is 0; `line` says which of them each row is on."""
 
     rows: PickupRows
+    line: Indices
     u: Array
     v: Array | None
 
@@ -162,26 +169,52 @@ class PickupProducts:
     def of(cls, rows: PickupRows, points: int, factor: Differentiated | None) -> Self:
         """Of the dynamics' factor on a model's distinct lines."""
         if factor is None:
-            return cls(rows, np.ones((points, len(rows.line))), None)
-        slopes = np.moveaxis(factor.slopes, 0, 1)[..., rows.line] if len(factor.slopes) else None
-        return cls(rows, factor.value[:, rows.line], slopes)
+            return cls(rows, rows.line, np.ones((points, len(rows.lines)), dtype=complex), None)
+        slopes = np.moveaxis(factor.slopes, 0, 1)[..., rows.lines] if len(factor.slopes) else None
+        return cls(rows, rows.line, factor.value[:, rows.lines], slopes)
+
+    def __getitem__(self, points: Array | slice) -> Self:
+        """At some of the points."""
+        return replace(self, u=self.u[points], v=None if self.v is None else self.v[points])
+
+    @classmethod
+    def joined(cls, parts: Sequence["PickupProducts"]) -> Self:
+        """At the points of several, one after another; on the rows themselves where models' distinct lines differ."""
+        first = parts[0]
+        if any(part.line is not first.line for part in parts):
+            parts = [part._on_rows() for part in parts]
+        slopes = [part.v for part in parts if part.v is not None]
+        return cls(
+            first.rows,
+            parts[0].line,
+            np.concatenate([part.u for part in parts]),
+            np.concatenate(slopes) if slopes else None,
+        )
+
+    def _on_rows(self) -> Self:
+        return replace(
+            self,
+            line=self.rows.every,
+            u=self.u[:, self.line],
+            v=None if self.v is None else self.v[..., self.line],
+        )
 
     def filled(self, parameters: int) -> Self:
         """With derivatives that are 0 by further parameters, so many in all."""
-        v = np.zeros((*self.u.shape[:1], 0, self.u.shape[1])) if self.v is None else self.v
+        v = np.zeros((*self.u.shape[:1], 0, self.u.shape[1]), dtype=complex) if self.v is None else self.v
         return replace(self, v=np.pad(v, ((0, 0), (0, parameters - v.shape[1]), (0, 0))))
 
     def less(self, sums: Sums, levels: SeveralLevels) -> Sums:
         """The sums less what rows lose to pick-up."""
         assert levels.pickup is not None
-        return self.rows.less(sums, self.u, levels.pickup, levels.level)
+        return self.rows.less(sums, self.line, self.u, levels.pickup, levels.level)
 
     def slopes_less(self, sums: SlopeSums, levels: SeveralLevels) -> SlopeSums:
         """The sums with derivatives less what rows lose, at the first of the sets of noise levels."""
         assert levels.pickup is not None
         if self.v is None:
             return sums
-        return self.rows.slopes_less(sums, self.u, self.v, levels.pickup[:, 0], levels.level[:, 0, 0])
+        return self.rows.slopes_less(sums, self.line, self.u, self.v, levels.pickup[:, 0], levels.level[:, 0, 0])
 
 
 def _over_rows(matrix: csr_array, values: Floats) -> Floats:
@@ -203,14 +236,3 @@ def _turning(lines: FrfLines, u: Array, slopes: Array) -> SlopeSums:
     for number, (a, b) in enumerate(zip(moving[one], moving[other], strict=True)):
         whole.vv[..., a, b] = whole.vv[..., b, a] = vv[:, number]
     return whole
-
-
-def _of_each(function: Callable[..., Array], *parts: Any) -> Any:
-    """The same of all arrays of a record; None of None."""
-    if parts[0] is None:
-        return None
-    own = {field.name: [getattr(part, field.name) for part in parts] for field in fields(parts[0])}
-    return replace(
-        parts[0],
-        **{name: function(*values) for name, values in own.items() if isinstance(values[0], np.ndarray)},
-    )

@@ -10,7 +10,7 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.curve_products import CurveLines, CurveProducts
 from underskin.diagnosis.inference.frf_products import FrfLines, frf_lines
 from underskin.diagnosis.inference.likelihood import Curvature
-from underskin.diagnosis.inference.pickup_rows import PickupRows
+from underskin.diagnosis.inference.pickup_rows import PickupRows, pickup_rows
 from underskin.diagnosis.noise.correlated_error import USUAL
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR, Plateau, level_prior
 from underskin.mechanisms.base import Normal, Parameter
@@ -109,7 +109,7 @@ class Hypothesis:
     def pickup_rows(self) -> PickupRows | None:
         """The rows that pick-up reaches, where the model has any."""
         pickup, design = self.model.pickup, self.frf_model.design
-        return None if pickup is None else PickupRows(self.lines, pickup.rows, design.line)
+        return None if pickup is None else pickup_rows(self.lines, pickup, design)
 
 
 @dataclass(frozen=True)

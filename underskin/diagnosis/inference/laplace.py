@@ -76,7 +76,9 @@ class Evidence:
     @property
     def pickup_variance(self) -> Floats:
         """Of real and of imaginary part of each row [(C/N)²]."""
-        return replace(self.prediction, pickup=self.levels.pickup).pickup_variance
+        pickup, found = self.hypothesis.model.pickup, self.levels.pickup
+        on_rows = None if pickup is None or found is None else pickup.on_rows(found)
+        return replace(self.prediction, pickup=on_rows).pickup_variance
 
 
 def around(fitter: Fitter, at: Evaluated) -> list[Evidence]:

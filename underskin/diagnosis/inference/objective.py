@@ -174,7 +174,7 @@ class Evaluator:
 
         pickup = self.hypotheses[0].model.pickup
         if pickup is not None or self.lines.curves:
-            rows = len(self.lines.value) if pickup is None else self.lines.recordings + len(pickup.rows)
+            rows = len(self.lines.value) if pickup is None else 4 * self.lines.recordings
             at_once = max(_NUMBERS_AT_ONCE // (covariances.shape[1] * rows), 1)
             if len(points) > at_once:
                 parts = [slice(first, first + at_once) for first in range(0, len(points), at_once)]

@@ -61,19 +61,24 @@ class MainsPickup(Mechanism):
 
     def pickup(self, conditions: Conditions, design: FrfDesign) -> Pickup:
         """Of the lines within the reach of the mains that stand out, each by the nearest multiple."""
-        away = np.abs(design.row_frequency[:, None] - _outstanding_mains(conditions) * HARMONICS)
-        rows = np.flatnonzero(away.min(axis=1) < _FURTHEST_HZ)
-        harmonic = HARMONICS[away[rows].argmin(axis=1)]
-        alike = np.column_stack([harmonic, 0.5 * away[rows].min(axis=1) ** 2, design.row_dynamic_force[rows]])
-        distinct, row = np.unique(alike, axis=0, return_inverse=True)
-        number, half_square, force = distinct.T
+        return _pickup(conditions, design)
 
-        def deviation(values: Mapping[str, Floats]) -> Floats:
-            line = np.exp(-half_square / values["pickup_width"] ** 2)
-            share = np.where(number == 1, 1.0, values["pickup_harmonics"] / number)
-            return np.asarray(1e-12 * values["pickup_charge"] * share * line / force)[..., row]
 
-        return Pickup(rows, deviation)
+@lru_cache(maxsize=4)  # by identity: a diagnosis composes dozens of models of one campaign
+def _pickup(conditions: Conditions, design: FrfDesign) -> Pickup:
+    away = np.abs(design.row_frequency[:, None] - _outstanding_mains(conditions) * HARMONICS)
+    rows = np.flatnonzero(away.min(axis=1) < _FURTHEST_HZ)
+    harmonic = HARMONICS[away[rows].argmin(axis=1)]
+    alike = np.column_stack([harmonic, 0.5 * away[rows].min(axis=1) ** 2, design.row_dynamic_force[rows]])
+    distinct, row = np.unique(alike, axis=0, return_inverse=True)
+    number, half_square, force = distinct.T
+
+    def deviation(values: Mapping[str, Floats]) -> Floats:
+        line = np.exp(-half_square / values["pickup_width"] ** 2)
+        share = np.where(number == 1, 1.0, values["pickup_harmonics"] / number)
+        return np.asarray(1e-12 * values["pickup_charge"] * share * line / force)
+
+    return Pickup(rows, deviation, row.reshape(-1))
 
 
 @lru_cache(maxsize=4)  # by the conditions' identity: a diagnosis composes dozens of models of one campaign

@@ -105,7 +105,7 @@ class FrfModel:
             value=value,
             slopes=slopes[:count],
             position_slopes=slopes[count:],
-            pickup=None if self.pickup is None else self.pickup.deviation(_by_name(own)),
+            pickup=None if self.pickup is None else self.pickup.on_rows(self.pickup.deviation(_by_name(own))),
             pickup_rows=None if self.pickup is None else self.pickup.rows,
             inside=response.inside[self.recording],
         )
