@@ -21,6 +21,7 @@ KERNELS = (
     "underskin.diagnosis.inference.pickup_kernel",
     "underskin.diagnosis.selection.process_kernel",
     "underskin.mechanisms.models.sigma_kernel",
+    "underskin.physics.bessel_kernel",
     "underskin.surrogate.table_kernel",
 )
 
