@@ -115,11 +115,11 @@ class Lines:
 
     def part(self, kept: Mask) -> "Lines":
         """Only some of the rows, each with the noise it had; recordings without a row are left out."""
-        recordings = np.unique(self.recording[kept])
+        order = np.flatnonzero(kept)
+        recordings, first = np.unique(self.recording[order], return_index=True)
         entries = [self.campaign.recordings[number] for number in recordings]
-        rows = [np.flatnonzero(kept & (self.recording == number)) for number in recordings]
+        rows = np.split(order, first[1:])
         kept_entries = tuple(_with_rows(entry, self, own) for entry, own in zip(entries, rows, strict=True))
-        order = np.concatenate(rows)
         return replace(
             self,
             campaign=replace(self.campaign, recordings=kept_entries),
