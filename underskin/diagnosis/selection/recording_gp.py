@@ -7,7 +7,7 @@ FRF = model · (1 + δ), linear in the model's parameters at their best fit, in 
 Scatter of gain, and beside a wandering place scatter of position too, are marginalised over their priors.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,7 +20,7 @@ from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, normalised
 from underskin.mechanisms.base import Normal, Parameter
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 _LENGTHS = (0.15, 0.4, 1.2)  # of a recording's axis, over its range
 _LEAST_RECORDINGS, _LEAST_IN_ORDER = 4, 8
@@ -70,6 +70,11 @@ class _WithoutProcess:
         log_density = nodes.log_weights - 0.5 * (weighed @ nodes.residual + log_determinant)
         return cls(log_density, np.sqrt(precision), taken, weighed)
 
+    def summed(self, alike: Indices) -> "_WithoutProcess":
+        """With the sums over recordings that are alike, which have the same features, in their place."""
+        each = np.eye(int(alike.max()) + 1)[alike]
+        return replace(self, root=np.sqrt(self.root**2 @ each), taken=self.taken @ each, weighed=self.weighed @ each)
+
 
 def over_recordings(problem: FittingProblem, explanation: Explanation) -> dict[str, float]:
     """The log evidence that a process of each kind gains over none."""
@@ -97,8 +102,9 @@ def mean_of_logs(log_values: list[float] | Floats) -> float:
 
 
 def _smooth(residual: "GainResidual", column: Floats) -> float:
-    sets = np.stack([features(column, length) for length in _LENGTHS])
-    return mean_of_logs(residual.gains(sets, AMPLITUDES))
+    values, alike = np.unique(column, axis=0, return_inverse=True)
+    sets = np.stack([features(values, length) for length in _LENGTHS])
+    return mean_of_logs(residual.gains(sets, AMPLITUDES, alike.reshape(-1)))
 
 
 def _sines(rank: Floats) -> Floats:
@@ -167,12 +173,14 @@ class GainResidual:
     def _usual(self) -> list[_WithoutProcess]:
         return [_WithoutProcess.of(nodes, self.fixed) for nodes in self.usual]
 
-    def gains(self, sets: Floats, amplitudes: Floats) -> Floats:
+    def gains(self, sets: Floats, amplitudes: Floats, alike: Indices | None = None) -> Floats:
         """What each set of features (sets, recordings, features) gains over none at all, in log evidence (sets,).
 
+        Where recordings are `alike` (recordings,), features are those of the distinct ones (sets, distinct, features).
         Over the priors of the scatters, and of the amplitudes, each as probable as the others.
         """
-        each = np.concatenate([_with(sets, amplitudes, entry) for entry in self._usual])
+        without = self._usual if alike is None else [entry.summed(alike) for entry in self._usual]
+        each = np.concatenate([_with(sets, amplitudes, entry) for entry in without])
         return np.asarray(logsumexp(each, axis=0) - self._plain)
 
 
