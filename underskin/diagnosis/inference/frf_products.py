@@ -96,11 +96,11 @@ class FrfProducts:
     def of(cls, lines: FrfLines, pickup: PickupRows | None, response: Response) -> Self:
         """Of a model's response at several points, and the rows that its pick-up reaches."""
         level, factor = response.level, response.lines
-        slopes = np.moveaxis(level.slopes, 0, -1) if len(level.slopes) else None
+        slopes = level.slopes.transpose(1, 2, 0) if len(level.slopes) else None
         uu, uy = np.broadcast_to(lines.uu, level.value.shape), np.broadcast_to(lines.uy, level.value.shape)
         turning = None
         if factor is not None:
-            uu, uy, turning = _turned(lines, factor.value, np.moveaxis(factor.slopes, 0, 1))
+            uu, uy, turning = _turned(lines, factor.value, factor.slopes.transpose(1, 0, 2))
             turning = None if slopes is None else turning
         of_pickup = None if pickup is None else PickupProducts.of(pickup, len(level.value), factor)
         return cls(lines.yy, uu, uy, level.value, slopes, response.place_slopes, turning, of_pickup)
@@ -202,7 +202,7 @@ class PickupProducts:
         """Of the dynamics' factor on a model's distinct lines."""
         if factor is None:
             return cls(rows, rows.line, np.ones((points, len(rows.lines)), dtype=complex), None)
-        slopes = np.moveaxis(factor.slopes, 0, 1)[..., rows.lines] if len(factor.slopes) else None
+        slopes = factor.slopes.transpose(1, 0, 2)[..., rows.lines] if len(factor.slopes) else None
         return cls(rows, rows.line, factor.value[:, rows.lines], slopes)
 
     def __getitem__(self, points: Array | slice) -> Self:
@@ -258,9 +258,9 @@ def _turned(lines: FrfLines, u: Array, slopes: Array) -> tuple[Floats, Floats, S
     both = lines.weight(real[:, one] * real[:, other] + imag[:, one] * imag[:, other])
     with_y = lines.real(real) + lines.imag(imag)
     uv, vy, vv = (np.zeros((len(u), both.shape[-1], *further)) for further in ((count,), (count,), (count, count)))
-    uv[..., moving] = np.moveaxis(both[:, 1 : each.shape[1]], 1, -1)
-    vy[..., moving] = np.moveaxis(with_y[:, 1:], 1, -1)
-    for a, b, products in zip(one.tolist(), other.tolist(), np.moveaxis(both, 1, 0), strict=True):
+    uv[..., moving] = both[:, 1 : each.shape[1]].transpose(0, 2, 1)
+    vy[..., moving] = with_y[:, 1:].transpose(0, 2, 1)
+    for a, b, products in zip(one.tolist(), other.tolist(), both.transpose(1, 0, 2), strict=True):
         if a:
             p, q = moving[a - 1], moving[b - 1]
             vv[..., p, q] = vv[..., q, p] = products

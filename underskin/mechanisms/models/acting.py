@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 
 import numpy as np
 
@@ -51,8 +52,7 @@ class Acting:
         self.has = np.zeros(models, dtype=bool)
         self._places = {name: np.zeros(models, dtype=np.intp) for name in parameters}
         self._relative = [(name, entry.relative_to) for name, entry in parameters.items() if entry.relative_to]
-        own = type(mechanism)
-        self._hooks = {name for name in dir(Mechanism) if getattr(own, name) is not getattr(Mechanism, name)}
+        self._hooks = _overridden(type(mechanism))
 
     def add(self, model: int, places: Mapping[str, int]) -> None:
         """Note that a model has it, its parameters at these places."""
@@ -70,3 +70,9 @@ class Acting:
         for name, other in self._relative:
             values[name] = values[name] * values[other]
         return values
+
+
+@cache
+def _overridden(own: type[Mechanism]) -> frozenset[str]:
+    """What a class of mechanisms has of its own."""
+    return frozenset(name for name in dir(Mechanism) if getattr(own, name) is not getattr(Mechanism, name))
