@@ -89,7 +89,9 @@ def line_noise(
         cost += 0.5 * bend @ bend + 0.5 * np.sum(((p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2)
         cost += 0.5 * ((p[-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2 + 0.5 * (p[-1] + 3.5) ** 2
         by_p = np.zeros(len(p))
-        by_p[:-2] = hats.T @ np.bincount(line, by_d2 * relative, len(distinct)) + (p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD**2
+        by_p[:-2] = (
+            hats.T @ np.bincount(line, by_d2 * relative, len(distinct)) + (p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD**2
+        )
         by_p[:-2] += np.convolve(bend, [1, -2, 1]) / _SMOOTH if len(bend) else 0.0
         by_p[-2] = by_d2.sum() * floor + (p[-2] - np.log(_TYPICAL)) / _TYPICAL_SD**2
         by_p[-1] = (p[-1] + 3.5) - (gap.sum() / _COHERENCE_VARIANCE if from_coherence is not None else 0.0)
