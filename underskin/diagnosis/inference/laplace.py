@@ -18,6 +18,7 @@ from underskin.diagnosis.inference.likelihood import Likelihoods
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.noise.noise_levels import NoiseLevels
 from underskin.mechanisms.models.composed import Prediction
+from underskin.mechanisms.models.frf import FrfModel
 from underskin.units import Floats, Indices
 
 _NEAR = 4.0  # standard deviations from a bound within which it counts
@@ -56,10 +57,12 @@ class Evidence:
 
     @cached_property
     def prediction(self) -> Prediction:
-        """The model's prediction there, on the rows of the hypothesis; of curves with what the cell adds."""
-        prediction = self.hypothesis.model.predict(self.point.fit)
-        if not self.hypothesis.lines.curves:
-            return prediction
+        """The model's prediction there, on the rows of the hypothesis: of FRFs without derivatives by the parameters, of
+        curves with what the cell adds."""
+        model = self.hypothesis.model
+        if isinstance(model, FrfModel):
+            return model.predict(self.point.fit, slopes=False)
+        prediction = model.predict(self.point.fit)
         added = cell_response(self.hypothesis.lines, self.levels, prediction.value.real).offset
         return replace(prediction, value=prediction.value + added)
 

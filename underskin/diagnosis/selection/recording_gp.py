@@ -72,8 +72,12 @@ class _WithoutProcess:
 
     def summed(self, alike: Indices) -> "_WithoutProcess":
         """With the sums over recordings that are alike, which have the same features, in their place."""
-        each = np.eye(int(alike.max()) + 1)[alike]
-        return replace(self, root=np.sqrt(self.root**2 @ each), taken=self.taken @ each, weighed=self.weighed @ each)
+        order = np.argsort(alike, kind="stable")
+        first = np.searchsorted(alike[order], np.arange(int(alike.max()) + 1))
+        square, taken, weighed = (
+            np.add.reduceat(values[..., order], first, axis=-1) for values in (self.root**2, self.taken, self.weighed)
+        )
+        return replace(self, root=np.sqrt(square), taken=taken, weighed=weighed)
 
 
 def over_recordings(problem: FittingProblem, explanation: Explanation) -> dict[str, float]:
@@ -103,6 +107,8 @@ def mean_of_logs(log_values: list[float] | Floats) -> float:
 
 def _smooth(residual: "GainResidual", column: Floats) -> float:
     values, alike = np.unique(column, axis=0, return_inverse=True)
+    if len(values) == len(column):
+        return mean_of_logs(residual.gains(np.stack([features(column, length) for length in _LENGTHS]), AMPLITUDES))
     sets = np.stack([features(values, length) for length in _LENGTHS])
     return mean_of_logs(residual.gains(sets, AMPLITUDES, alike.reshape(-1)))
 

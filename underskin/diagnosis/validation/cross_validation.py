@@ -18,6 +18,7 @@ from underskin.diagnosis.inference.curve_nuisances import cell_response
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.noise.noise_levels import NoiseLevels
 from underskin.diagnosis.selection.search import log_prior
+from underskin.mechanisms.models.frf import FrfModel
 from underskin.recordings.conditions import curves_of, frf_of
 from underskin.units import Floats, Indices, Mask
 
@@ -140,7 +141,7 @@ def _predict(smaller: FittingProblem, explanation: Explanation, problem: Fitting
     left = problem.lines.part(rows)
     model = problem.hypothesis(explanation.names, placed=False, whole=True).model
     point, levels = explanation.point, explanation.best.levels
-    whole = model.predict(point.fit)
+    whole = model.predict(point.fit, slopes=False) if isinstance(model, FrfModel) else model.predict(point.fit)
     if left.curves:
         return _predict_curves(problem.lines, levels, whole.value.real, rows, smaller)
     seen = np.isin(left.sensor, smaller.lines.sensor)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
 
 import numpy as np
 
@@ -72,7 +71,10 @@ class Acting:
         return values
 
 
-@cache
+_HOOKS: dict[type[Mechanism], frozenset[str]] = {}  # what each class has of its own
+
+
 def _overridden(own: type[Mechanism]) -> frozenset[str]:
-    """What a class of mechanisms has of its own."""
-    return frozenset(name for name in dir(Mechanism) if getattr(own, name) is not getattr(Mechanism, name))
+    if own not in _HOOKS:
+        _HOOKS[own] = frozenset(name for name in dir(Mechanism) if getattr(own, name) is not getattr(Mechanism, name))
+    return _HOOKS[own]
