@@ -23,6 +23,7 @@ KERNELS = (
     "underskin.diagnosis.selection.process_kernel",
     "underskin.mechanisms.models.sigma_kernel",
     "underskin.physics.bessel_kernel",
+    "underskin.physics.contact_kernel",
     "underskin.surrogate.table_kernel",
 )
 
