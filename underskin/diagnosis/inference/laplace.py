@@ -57,8 +57,8 @@ class Evidence:
 
     @cached_property
     def prediction(self) -> Prediction:
-        """The model's prediction there, on the rows of the hypothesis: of FRFs without derivatives by parameters, of curves
-        with what the cell adds."""
+        """The model's prediction there, on the rows of the hypothesis: of FRFs without derivatives by parameters, of
+        curves with what the cell adds."""
         model = self.hypothesis.model
         if isinstance(model, FrfModel):
             return model.predict(self.point.fit, slopes=False)
