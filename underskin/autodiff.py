@@ -32,6 +32,8 @@ class Differentiated:
         if isinstance(other, Differentiated):
             return Differentiated(self.value + other.value, self.slopes + other.slopes)
         value = self.value + other
+        if self.slopes.shape[1:] == value.shape:
+            return Differentiated(value, self.slopes)
         return Differentiated(value, np.broadcast_to(self.slopes, (len(self.slopes), *value.shape)))
 
     __radd__ = __add__
@@ -74,6 +76,8 @@ class Differentiated:
 
     def spread(self, rows: int) -> Differentiated:
         """The same with that many rows, where a single row stands for all."""
+        if self.value.shape[-1] == self.slopes.shape[-1] == rows:
+            return self
         return Differentiated(
             np.broadcast_to(self.value, (*self.value.shape[:-1], rows)),
             np.broadcast_to(self.slopes, (*self.slopes.shape[:-1], rows)),

@@ -19,10 +19,13 @@ KERNELS = (
     "underskin.diagnosis.inference.cost_kernel",
     "underskin.diagnosis.inference.normal_kernel",
     "underskin.diagnosis.inference.pickup_kernel",
+    "underskin.diagnosis.noise.roughness_kernel",
     "underskin.diagnosis.selection.process_kernel",
     "underskin.mechanisms.models.creep_kernel",
     "underskin.mechanisms.models.sigma_kernel",
     "underskin.mechanisms.models.sphere_kernel",
+    "underskin.physics.bessel_kernel",
+    "underskin.physics.contact_kernel",
     "underskin.surrogate.table_kernel",
 )
 

@@ -97,6 +97,10 @@ def test_the_evidence_of_a_process_is_that_of_the_whole_covariance(table: SigmaT
         logsumexp([log_density(entry, size * own) for entry in residual.usual for size in amplitudes]) for own in sets
     ]
     assert found - found[0] == pytest.approx(np.array(expected) - expected[0], abs=1e-6)
+    # Recordings that are alike have the same features.
+    alike = np.arange(problem.lines.recordings) % 4
+    few = sets[:, :4]
+    assert residual.gains(few, amplitudes, alike) == pytest.approx(residual.gains(few[:, alike], amplitudes), abs=1e-8)
     # With hardly any amplitude nothing is gained, but for the grids of scatter: usual ones, and any.
     assert residual.gains(sets, np.array([1e-9])) == pytest.approx(0.0, abs=0.3)
 

@@ -128,7 +128,7 @@ class Parameter:
     def start(self) -> float:
         """The prior's centre on the fit coordinate."""
         low, high = self.bounds
-        return float(np.clip(self.prior.mean, low, high)) if isinstance(self.prior, Normal) else (low + high) / 2
+        return min(max(self.prior.mean, low), high) if isinstance(self.prior, Normal) else (low + high) / 2
 
     @property
     def typical(self) -> float:

@@ -31,7 +31,6 @@ _NODES = 28
 _TABLE: Floats = LARGEST_A_OVER_H / 128 * np.arange(1.0, 129.0)  # of a/h, for first guesses
 _SMALLEST = 1e-12
 _TOLERANCE = 1e-7  # of the last step; the remaining error is about its square
-_ITERATIONS = 60
 
 # Sums of terms: factor, exponent of α, the curve among A, G, B, V, S, and whether U multiplies it.
 _Law = tuple[tuple[float, float, int, bool], ...]
@@ -110,6 +109,8 @@ class ContactCurves:
         coefficients = self.interval.coefficients(at_nodes)  # (count, 3, 5)
         slopes = self.interval.derivative(coefficients[:, :1])
         self._coefficients = np.concatenate([coefficients[:, :1], slopes, coefficients[:, 1:]], axis=1)
+        # A, G and their slopes, as compiled functions take them.
+        self._of_load = np.ascontiguousarray(self._coefficients[:, :2, :2].reshape(-1, 4).T)
         at = self._evaluated(grid.table_basis)
         self._start = _Start(at)
         shapes = np.concatenate([_stacked(solved.sphere_shape), _stacked(solved.punch_shape)]).transpose(1, 0, 2)
@@ -173,17 +174,13 @@ class ContactCurves:
         ratios = self._evaluated(self.interval.basis(alpha))[0]
         return np.stack([ratios[0], ratios[2], ratios[4], ratios[3]], axis=-1)
 
-    def _newton(self, target: Floats, root_adhesion: Floats, start: Floats) -> Floats:
-        """α; the law of load is convex: from the stable side the steps end at its root, or cross its minimum."""
-        alpha = np.clip(start, _SMALLEST, LARGEST_A_OVER_H)
-        for _ in range(_ITERATIONS):
-            value, by_alpha, *_rest = _law(_LOAD, alpha, root_adhesion, self._evaluated(self.interval.basis(alpha)))
-            lost = (by_alpha <= 0) | ((alpha == LARGEST_A_OVER_H) & (value < target))
-            step = np.where(lost, np.nan, (value - target) / by_alpha)
-            alpha = np.clip(alpha - step, alpha / 4, LARGEST_A_OVER_H)
-            if not (np.abs(step) > _TOLERANCE * alpha).any():
-                break
-        return np.where(alpha > 2 * _SMALLEST, alpha, np.nan)
+    def _newton(self, load: Floats, root_adhesion: Floats, start: Floats) -> Floats:
+        """α from first guesses; NaN where there is none."""
+        from underskin.physics.contact_kernel import radii_under_load
+
+        alpha, of_load = start.copy(), (np.ascontiguousarray(x) for x in (load, root_adhesion))
+        radii_under_load(self._of_load, LARGEST_A_OVER_H, *of_load, _SMALLEST, _TOLERANCE, alpha)
+        return alpha
 
     def _evaluated(self, basis: Floats) -> Floats:
         """The curves' values and derivatives with respect to α, ν and slip: (4, curves, rows)."""

@@ -15,7 +15,6 @@ What depends on the layer carries its derivatives by the Poisson ratio and by th
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import spherical_jn
 
 from underskin.autodiff import Differentiated, constant
 from underskin.physics.elastic_layer import Layer
@@ -123,8 +122,11 @@ def mode_transforms(s: Floats, modes: int) -> Floats:
     -------
     ndarray, (*s.shape, modes)
     """
-    order = np.arange(modes)
-    return np.sqrt(4 * order + 1) * np.asarray(spherical_jn(2 * order, s[..., None]))
+    from underskin.physics.bessel_kernel import even_orders
+
+    values = np.empty((s.size, modes))
+    even_orders(np.ascontiguousarray(s, dtype=float).ravel(), values)
+    return np.sqrt(4 * np.arange(modes) + 1) * values.reshape(*s.shape, modes)
 
 
 def _nodes(largest: float) -> tuple[Floats, Floats]:

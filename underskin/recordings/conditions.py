@@ -84,8 +84,11 @@ class FrfConditions:
 
     def without_measurements(self, **changes: Any) -> "FrfConditions":
         """These conditions alone, with some of them changed."""
-        own = {entry.name: getattr(self, entry.name) for entry in fields(FrfConditions)}
-        return FrfConditions(**(own | changes))
+        own = vars(self)
+        return FrfConditions(**({name: own[name] for name in _OF_FRF} | changes))
+
+
+_OF_FRF = [entry.name for entry in fields(FrfConditions)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -115,11 +115,11 @@ class Lines:
 
     def part(self, kept: Mask) -> "Lines":
         """Only some of the rows, each with the noise it had; recordings without a row are left out."""
-        recordings = np.unique(self.recording[kept])
+        order = np.flatnonzero(kept)
+        recordings, first = np.unique(self.recording[order], return_index=True)
         entries = [self.campaign.recordings[number] for number in recordings]
-        rows = [np.flatnonzero(kept & (self.recording == number)) for number in recordings]
+        rows = np.split(order, first[1:])
         kept_entries = tuple(_with_rows(entry, self, own) for entry, own in zip(entries, rows, strict=True))
-        order = np.concatenate(rows)
         return replace(
             self,
             campaign=replace(self.campaign, recordings=kept_entries),
@@ -133,10 +133,12 @@ class Lines:
         )
 
 
-def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None, expected: Complexes | None = None) -> Lines:
+def lines(
+    campaign: Campaign, uneven: Mapping[str, Floats] | None = None, known: tuple[Lines, Complexes] | None = None
+) -> Lines:
     """The FRF lines of a campaign, sorted by frequency, those that are not finite left out. `uneven` is, of recordings
-    by their id, the noise of each line over its course along frequency (1 where not given); `expected` a prediction of
-    the rows (rows,), whose course is not counted as noise.
+    by their id, the noise of each line over its course along frequency (1 where not given); `known` the same lines and
+    a prediction of the rows (rows,), whose course is not counted as noise.
 
     Recordings of another kind and recordings without a finite line are left out of the `campaign` that comes with them.
     """
@@ -152,7 +154,8 @@ def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None, expect
         if len(order) == 0:
             continue
         value, frequency = measured.values[order], measured.frequency[order]
-        entries.append(FrfRecording.of_lines(entry, frequency, value))
+        if known is None:
+            entries.append(FrfRecording.of_lines(entry, frequency, value))
         values.append(value)
         frequencies.append(frequency)
         coherences.append(measured.coherence_or_nan[order])
@@ -163,9 +166,9 @@ def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None, expect
     frequency, coherence, unevenness = (
         np.concatenate([*columns, np.zeros(0)]) for columns in (frequencies, coherences, unevens)
     )
-    noise = line_noise(value, frequency, recording, coherence, unevenness, expected)
+    noise = line_noise(value, frequency, recording, coherence, unevenness, None if known is None else known[1])
     return Lines(
-        campaign=replace(campaign, recordings=tuple(entries)),
+        campaign=replace(campaign, recordings=tuple(entries)) if known is None else known[0].campaign,
         value=value,
         deviation=noise.deviation,
         frequency=frequency,

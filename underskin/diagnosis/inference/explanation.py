@@ -101,15 +101,20 @@ class FittingProblem:
         self.collapsed = lines.collapsed() if kind == "frf" else lines
         none = np.zeros(lines.recordings)
         self.curvature = curvature(self.collapsed, table) if kind == "frf" else Curvature(none, none)
-        self._models: dict[tuple[frozenset[str], bool], Model] = {}
+        self._hypotheses: dict[tuple[frozenset[str], bool, bool], Hypothesis] = {}
 
     def hypothesis(self, names: Sequence[str], placed: bool, *, whole: bool = False) -> Hypothesis:
         """The set's model on the lines that it needs; raises Unsupported."""
         whole = whole or any(CATALOGUE[name].needs_lines for name in names)
-        lines, key = self.lines if whole else self.collapsed, (frozenset(names), whole)
-        if key not in self._models:
-            self._models[key] = compose(names, lines.campaign, self.table, self.kind)
-        return Hypothesis(self._models[key], lines, self.curvature, placed)
+        key = frozenset(names), whole, placed
+        if key not in self._hypotheses:
+            other = self._hypotheses.get((frozenset(names), whole, not placed))
+            if other is None:
+                lines = self.lines if whole else self.collapsed
+                model = compose(names, lines.campaign, self.table, self.kind)
+                other = Hypothesis(model, lines, self.curvature, placed)
+            self._hypotheses[key] = replace(other, placed=placed)
+        return self._hypotheses[key]
 
     def explain(self, requests: Sequence[Request], best: float = np.inf) -> list[Explanation | None]:
         """The sets' explanations.
@@ -118,8 +123,9 @@ class FittingProblem:
         not show; and where a set of mechanisms is hopeless, by `_HOPELESS` nats behind the others or what is the `best`
         cost so far. Evidences are Laplace approximations, until they are `integrated`. Raises Unsupported.
         """
-        plain = [self.hypothesis(request.names, False) for request in requests]
-        placed = [replace(hypothesis, placed=True) for hypothesis in plain]
+        plain, placed = (
+            [self.hypothesis(request.names, scattered) for request in requests] for scattered in (False, True)
+        )
         scattered = {number for number, request in enumerate(requests) if not request.without_scatter}
         starts = _starts(
             {number: plain[number] for number in range(len(requests)) if number not in scattered}, requests

@@ -1,8 +1,9 @@
 """The inner products over the lines of FRFs: see `products`."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
@@ -15,28 +16,61 @@ from underskin.diagnosis.inference.sums import SlopeSums, Sums
 from underskin.diagnosis.noise.noise_levels import SeveralLevels
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.models.response import Response
-from underskin.units import Array, Floats
+from underskin.units import Array, Floats, Indices
+
+_LARGE, _FULL = 2000, 0.7  # rows for each contact, and their share of a block, from which on a block is dense
 
 
 class FrfLines:
-    """The measured lines of FRFs as matrices that sum a model's distinct lines over the rows of each recording."""
+    """The measured lines of FRFs as sums of what a model's distinct lines have over the rows of each recording.
+
+    `weight` are those with 1/d², `real` and `imag` with the parts of y/d²; `uu`, `uy` and `yy` are sums for u = 1.
+    """
 
     def __init__(self, lines: Lines, design: FrfDesign) -> None:
         """Place the weights; the design says which distinct line each row is."""
         weight = lines.deviation**-2.0
-        by_recording = np.append(lines.first, len(lines.value))
-        shape = (lines.recordings, len(design.line_frequency))
-
-        def matrix(values: Floats) -> csr_array:
-            return csr_array((values, design.line, by_recording), shape=shape)
-
-        self.weight, self.real, self.imag = (
-            matrix(weight * values) for values in (np.ones(len(weight)), lines.value.real, lines.value.imag)
-        )
-        self.uu, self.uy = (
-            np.add.reduceat(weight * values, lines.first) for values in (np.ones(len(weight)), lines.value.real)
-        )
+        rows = weight, weight * lines.value.real, weight * lines.value.imag
+        self.weight, self.real, self.imag = (RowSums(values, lines, design) for values in rows)
+        self.uu, self.uy = (np.add.reduceat(values, lines.first) for values in rows[:2])
         self.yy = np.abs(np.add.reduceat(weight * lines.value, lines.first)) ** 2 / self.uu
+
+
+class RowSums:
+    """Sums over the rows of each recording, each row with a weight: of values on distinct lines (…, lines), (…,
+    recordings).
+
+    A contact's distinct lines stand together, so its recordings are a block of one matrix. Where blocks are large and
+    full they are dense.
+    """
+
+    def __init__(self, weight: Floats, lines: Lines, design: FrfDesign) -> None:
+        """`weight` (rows,)."""
+        shape = lines.recordings, len(design.line_frequency)
+        by_recording = np.append(lines.first, len(weight))
+        self._sparse = csr_array((weight, design.line, by_recording), shape=shape)
+        self._blocks: list[tuple[Indices, slice, Floats]] = []
+        contact = design.line_contact[design.line[lines.first]]
+        own = [np.flatnonzero(contact == number) for number in np.unique(contact)]
+        edges = np.searchsorted(design.line_contact, [*np.unique(contact), contact.max() + 1])
+        spans = [slice(low, high) for low, high in pairwise(edges.tolist())]
+        numbers = sum(len(some) * (span.stop - span.start) for some, span in zip(own, spans, strict=True))
+        if len(weight) > max(_LARGE * len(own), _FULL * numbers):
+            self._blocks = [(some, span, self._block(some, span)) for some, span in zip(own, spans, strict=True)]
+
+    def _block(self, recordings: Indices, span: slice) -> Floats:
+        """(recordings, lines) of one contact."""
+        return np.ascontiguousarray(self._sparse[recordings][:, span].toarray())
+
+    def __call__(self, values: Floats) -> Floats:
+        """Of values on distinct lines."""
+        flat = values.reshape(-1, values.shape[-1])
+        if not self._blocks:
+            return np.asarray((self._sparse @ flat.T).T.reshape(*values.shape[:-1], -1))
+        total = np.empty((len(flat), self._sparse.shape[0]))
+        for recordings, span, block in self._blocks:
+            total[:, recordings] = flat[:, span] @ block.T
+        return total.reshape(*values.shape[:-1], -1)
 
 
 @lru_cache(maxsize=4)  # by identity: a diagnosis weighs dozens of models of one design
@@ -62,14 +96,12 @@ class FrfProducts:
     def of(cls, lines: FrfLines, pickup: PickupRows | None, response: Response) -> Self:
         """Of a model's response at several points, and the rows that its pick-up reaches."""
         level, factor = response.level, response.lines
-        slopes = np.moveaxis(level.slopes, 0, -1) if len(level.slopes) else None
+        slopes = level.slopes.transpose(1, 2, 0) if len(level.slopes) else None
         uu, uy = np.broadcast_to(lines.uu, level.value.shape), np.broadcast_to(lines.uy, level.value.shape)
         turning = None
         if factor is not None:
-            u = factor.value
-            uu = _over_rows(lines.weight, u.real**2 + u.imag**2)
-            uy = _over_rows(lines.real, u.real) + _over_rows(lines.imag, u.imag)
-            turning = None if slopes is None else _turning(lines, u, np.moveaxis(factor.slopes, 0, 1))
+            uu, uy, turning = _turned(lines, factor.value, factor.slopes.transpose(1, 0, 2))
+            turning = None if slopes is None else turning
         of_pickup = None if pickup is None else PickupProducts.of(pickup, len(level.value), factor)
         return cls(lines.yy, uu, uy, level.value, slopes, response.place_slopes, turning, of_pickup)
 
@@ -86,8 +118,8 @@ class FrfProducts:
             level=self.level[points],
             level_slopes=None if slopes is None else slopes[points],
             place_slopes=None if place is None else place[:, points],
-            turning=_of_each(lambda values: values[points], self.turning),
-            pickup=_of_each(lambda values: values[points], self.pickup),
+            turning=None if self.turning is None else self.turning[points],
+            pickup=None if self.pickup is None else self.pickup[points],
         )
 
     @property
@@ -105,12 +137,17 @@ class FrfProducts:
             values = [getattr(part, name) for part in filled]
             return None if values[0] is None else np.concatenate(values, axis=axis)
 
-        def of_each(name: str) -> Any:
-            values = [getattr(part, name) for part in filled]
-            return None if values[0] is None else _of_each(lambda *own: np.concatenate(own), *values)
-
         level = of("level"), of("level_slopes"), of("place_slopes", axis=1)
-        return cls(parts[0].yy, of("uu"), of("uy"), *level, of_each("turning"), of_each("pickup"))
+        turning = [part.turning for part in filled if part.turning is not None]
+        pickup = [part.pickup for part in filled if part.pickup is not None]
+        return cls(
+            parts[0].yy,
+            of("uu"),
+            of("uy"),
+            *level,
+            SlopeSums.joined(turning) if turning else None,
+            PickupProducts.joined(pickup) if pickup else None,
+        )
 
     def filled(self, parameters: int, *, turning: bool) -> Self:
         """With derivatives that are 0 by further parameters, so many in all, also those of u where it has none."""
@@ -152,9 +189,11 @@ class FrfProducts:
 
 @dataclass(frozen=True)
 class PickupProducts:
-    """On the rows that pick-up reaches u (points, rows) and v (points, parameters, rows), None where it is 0."""
+    """On the distinct lines of the rows that pick-up reaches u (points, lines) and v (points, parameters, lines), None
+    where it is 0; `line` says which of them each row is on."""
 
     rows: PickupRows
+    line: Indices
     u: Array
     v: Array | None
 
@@ -162,55 +201,67 @@ class PickupProducts:
     def of(cls, rows: PickupRows, points: int, factor: Differentiated | None) -> Self:
         """Of the dynamics' factor on a model's distinct lines."""
         if factor is None:
-            return cls(rows, np.ones((points, len(rows.line))), None)
-        slopes = np.moveaxis(factor.slopes, 0, 1)[..., rows.line] if len(factor.slopes) else None
-        return cls(rows, factor.value[:, rows.line], slopes)
+            return cls(rows, rows.line, np.ones((points, len(rows.lines)), dtype=complex), None)
+        slopes = factor.slopes.transpose(1, 0, 2)[..., rows.lines] if len(factor.slopes) else None
+        return cls(rows, rows.line, factor.value[:, rows.lines], slopes)
+
+    def __getitem__(self, points: Array | slice) -> Self:
+        """At some of the points."""
+        return replace(self, u=self.u[points], v=None if self.v is None else self.v[points])
+
+    @classmethod
+    def joined(cls, parts: Sequence["PickupProducts"]) -> Self:
+        """At the points of several, one after another; on the rows themselves where models' distinct lines differ."""
+        first = parts[0]
+        if any(part.line is not first.line for part in parts):
+            parts = [part._on_rows() for part in parts]
+        slopes = [part.v for part in parts if part.v is not None]
+        return cls(
+            first.rows,
+            parts[0].line,
+            np.concatenate([part.u for part in parts]),
+            np.concatenate(slopes) if slopes else None,
+        )
+
+    def _on_rows(self) -> Self:
+        return replace(
+            self,
+            line=self.rows.every,
+            u=self.u[:, self.line],
+            v=None if self.v is None else self.v[..., self.line],
+        )
 
     def filled(self, parameters: int) -> Self:
         """With derivatives that are 0 by further parameters, so many in all."""
-        v = np.zeros((*self.u.shape[:1], 0, self.u.shape[1])) if self.v is None else self.v
+        v = np.zeros((*self.u.shape[:1], 0, self.u.shape[1]), dtype=complex) if self.v is None else self.v
         return replace(self, v=np.pad(v, ((0, 0), (0, parameters - v.shape[1]), (0, 0))))
 
     def less(self, sums: Sums, levels: SeveralLevels) -> Sums:
         """The sums less what rows lose to pick-up."""
         assert levels.pickup is not None
-        return self.rows.less(sums, self.u, levels.pickup, levels.level)
+        return self.rows.less(sums, self.line, self.u, levels.pickup, levels.level)
 
     def slopes_less(self, sums: SlopeSums, levels: SeveralLevels) -> SlopeSums:
         """The sums with derivatives less what rows lose, at the first of the sets of noise levels."""
         assert levels.pickup is not None
         if self.v is None:
             return sums
-        return self.rows.slopes_less(sums, self.u, self.v, levels.pickup[:, 0], levels.level[:, 0, 0])
+        return self.rows.slopes_less(sums, self.line, self.u, self.v, levels.pickup[:, 0], levels.level[:, 0, 0])
 
 
-def _over_rows(matrix: csr_array, values: Floats) -> Floats:
-    """Sums over the rows of each recording of values on distinct lines: (…, lines) to (…, recordings)."""
-    flat = matrix @ values.reshape(-1, values.shape[-1]).T
-    return np.asarray(flat.T.reshape(*values.shape[:-1], -1))
-
-
-def _turning(lines: FrfLines, u: Array, slopes: Array) -> SlopeSums:
-    """The sums with the derivatives v of u (points, parameters, lines)."""
-    moving = np.flatnonzero(slopes.any(axis=(0, 2)))
-    v, count = slopes[:, moving], slopes.shape[1]
-    uv = np.moveaxis(_over_rows(lines.weight, (u.conj()[:, None] * v).real), 1, -1)
-    vy = np.moveaxis(_over_rows(lines.real, v.real) + _over_rows(lines.imag, v.imag), 1, -1)
-    one, other = np.triu_indices(len(moving))
-    vv = _over_rows(lines.weight, (v[:, one].conj() * v[:, other]).real)
-    whole = SlopeSums(*(np.zeros((*uv.shape[:2], *further)) for further in ((count,), (count,), (count, count))))
-    whole.uv[..., moving], whole.vy[..., moving] = uv, vy
-    for number, (a, b) in enumerate(zip(moving[one], moving[other], strict=True)):
-        whole.vv[..., a, b] = whole.vv[..., b, a] = vv[:, number]
-    return whole
-
-
-def _of_each(function: Callable[..., Array], *parts: Any) -> Any:
-    """The same of all arrays of a record; None of None."""
-    if parts[0] is None:
-        return None
-    own = {field.name: [getattr(part, field.name) for part in parts] for field in fields(parts[0])}
-    return replace(
-        parts[0],
-        **{name: function(*values) for name, values in own.items() if isinstance(values[0], np.ndarray)},
-    )
+def _turned(lines: FrfLines, u: Array, slopes: Array) -> tuple[Floats, Floats, SlopeSums]:
+    """Re u*u, Re u*y and the sums with the derivatives v of u (points, parameters, lines)."""
+    moving, count = np.flatnonzero(slopes.any(axis=(0, 2))), slopes.shape[1]
+    each = np.concatenate([u[:, None], slopes[:, moving]], axis=1)
+    real, imag = np.ascontiguousarray(each.real), np.ascontiguousarray(each.imag)
+    one, other = np.triu_indices(each.shape[1])
+    both = lines.weight(real[:, one] * real[:, other] + imag[:, one] * imag[:, other])
+    with_y = lines.real(real) + lines.imag(imag)
+    uv, vy, vv = (np.zeros((len(u), both.shape[-1], *further)) for further in ((count,), (count,), (count, count)))
+    uv[..., moving] = both[:, 1 : each.shape[1]].transpose(0, 2, 1)
+    vy[..., moving] = with_y[:, 1:].transpose(0, 2, 1)
+    for a, b, products in zip(one.tolist(), other.tolist(), both.transpose(1, 0, 2), strict=True):
+        if a:
+            p, q = moving[a - 1], moving[b - 1]
+            vv[..., p, q] = vv[..., q, p] = products
+    return both[:, 0], with_y[:, 0], SlopeSums(uv, vy, vv)

@@ -10,7 +10,7 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.curve_products import CurveLines, CurveProducts
 from underskin.diagnosis.inference.frf_products import FrfLines, frf_lines
 from underskin.diagnosis.inference.likelihood import Curvature
-from underskin.diagnosis.inference.pickup_rows import PickupRows
+from underskin.diagnosis.inference.pickup_rows import PickupRows, pickup_rows
 from underskin.diagnosis.noise.correlated_error import USUAL
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR, Plateau, level_prior
 from underskin.mechanisms.base import Normal, Parameter
@@ -47,7 +47,7 @@ class Hypothesis:
     position: Plateau = POSITION_PRIOR
     smooth: Plateau = USUAL  # η of curves
 
-    @property
+    @cached_property
     def mean_places(self) -> list[int]:
         """The places of the model's parameters that move the mean."""
         return [index for index, entry in enumerate(self.model.parameters) if not entry.moves_covariance]
@@ -72,6 +72,21 @@ class Hypothesis:
             if entry.moves_covariance
         ]
         return (*common, *own)
+
+    @cached_property
+    def bounds(self) -> Floats:
+        """Lowest and highest coordinates of the model's parameters (2, parameters)."""
+        return np.array([entry.bounds for entry in self.model.parameters]).T
+
+    @cached_property
+    def priors(self) -> Floats:
+        """Of the model's parameters' priors precision and centre (see `curvature_of_prior`), and the logarithm of their
+        height (3, parameters)."""
+        rows = []
+        for entry in self.model.parameters:
+            (precision, centre), start = curvature_of_prior(entry), entry.start
+            rows.append((precision, centre, entry.log_prior(start) + 0.5 * precision * (start - centre) ** 2))
+        return np.array(rows).T
 
     @cached_property
     def own_parameters(self) -> int:
@@ -109,7 +124,7 @@ class Hypothesis:
     def pickup_rows(self) -> PickupRows | None:
         """The rows that pick-up reaches, where the model has any."""
         pickup, design = self.model.pickup, self.frf_model.design
-        return None if pickup is None else PickupRows(self.lines, pickup.rows, design.line)
+        return None if pickup is None else pickup_rows(self.lines, pickup, design)
 
 
 @dataclass(frozen=True)

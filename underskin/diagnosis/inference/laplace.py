@@ -18,6 +18,7 @@ from underskin.diagnosis.inference.likelihood import Likelihoods
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.noise.noise_levels import NoiseLevels
 from underskin.mechanisms.models.composed import Prediction
+from underskin.mechanisms.models.frf import FrfModel
 from underskin.units import Floats, Indices
 
 _NEAR = 4.0  # standard deviations from a bound within which it counts
@@ -56,10 +57,12 @@ class Evidence:
 
     @cached_property
     def prediction(self) -> Prediction:
-        """The model's prediction there, on the rows of the hypothesis; of curves with what the cell adds."""
-        prediction = self.hypothesis.model.predict(self.point.fit)
-        if not self.hypothesis.lines.curves:
-            return prediction
+        """The model's prediction there, on the rows of the hypothesis: of FRFs without derivatives by parameters, of
+        curves with what the cell adds."""
+        model = self.hypothesis.model
+        if isinstance(model, FrfModel):
+            return model.predict(self.point.fit, slopes=False)
+        prediction = model.predict(self.point.fit)
         added = cell_response(self.hypothesis.lines, self.levels, prediction.value.real).offset
         return replace(prediction, value=prediction.value + added)
 
@@ -76,7 +79,9 @@ class Evidence:
     @property
     def pickup_variance(self) -> Floats:
         """Of real and of imaginary part of each row [(C/N)²]."""
-        return replace(self.prediction, pickup=self.levels.pickup).pickup_variance
+        pickup, found = self.hypothesis.model.pickup, self.levels.pickup
+        on_rows = None if pickup is None or found is None else pickup.on_rows(found)
+        return replace(self.prediction, pickup=on_rows).pickup_variance
 
 
 def around(fitter: Fitter, at: Evaluated) -> list[Evidence]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from underskin.autodiff import contiguous
 from underskin.diagnosis.inference.frf_products import FrfProducts
-from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis, curvature_of_prior
+from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis
 from underskin.diagnosis.inference.likelihood import Likelihoods, log_likelihoods, normal_equations
 from underskin.diagnosis.inference.points import Evaluated, Points
 from underskin.diagnosis.inference.products import Products, joined
@@ -51,16 +51,11 @@ class Evaluator:
         self.low, self.high, self._precision, self._centre = (np.zeros(shape) for _ in range(4))
         self._log_prior_height = np.zeros(len(hypotheses))
         for number, hypothesis in enumerate(hypotheses):
-            parameters = hypothesis.model.parameters
-            whole = slice(0, len(parameters))
             places = [place for place in hypothesis.mean_places if held is None or place != held[number]]
             self.free[number, places] = True
-            self.low[number, whole], self.high[number, whole] = np.array([entry.bounds for entry in parameters]).T
-            priors = np.array([curvature_of_prior(entry) for entry in parameters])
-            self._precision[number, places], self._centre[number, places] = priors[places].T
-            starts = np.array([parameters[place].start for place in places])
-            height = sum(parameters[place].log_prior(parameters[place].start) for place in places)
-            self._log_prior_height[number] = height + 0.5 * priors[places, 0] @ (starts - priors[places, 1]) ** 2
+            self.low[number, : self.counts[number]], self.high[number, : self.counts[number]] = hypothesis.bounds
+            self._precision[number, places], self._centre[number, places], height = hypothesis.priors[:, places]
+            self._log_prior_height[number] = height.sum()
         # Where each hypothesis has the covariance parameters that are its mechanisms' own, which come last.
         self.own = np.array(
             [
@@ -174,7 +169,7 @@ class Evaluator:
 
         pickup = self.hypotheses[0].model.pickup
         if pickup is not None or self.lines.curves:
-            rows = len(self.lines.value) if pickup is None else self.lines.recordings + len(pickup.rows)
+            rows = len(self.lines.value) if pickup is None else 4 * self.lines.recordings
             at_once = max(_NUMBERS_AT_ONCE // (covariances.shape[1] * rows), 1)
             if len(points) > at_once:
                 parts = [slice(first, first + at_once) for first in range(0, len(points), at_once)]

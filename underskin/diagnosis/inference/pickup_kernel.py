@@ -1,74 +1,84 @@
-"""Compiled: what sums over rows lose to mains pick-up, at many sets of noise levels."""
+"""Compiled: what sums over rows lose to mains pick-up, at many sets of noise levels.
+
+A row of variance κ² d² has κ² d² + q² with pick-up, so that its weight 1/d² in the sums (over κ²) becomes
+1/d² · 1/(1 + x), x = (q/κ)²/d², and log|C| grows by 2 log(1 + x).
+"""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from underskin.compiled import compiled
-from underskin.units import Array, Floats
+from underskin.units import Array, Complexes, Floats
 
 _TOGETHER = 8  # factors of the determinant whose logarithm is taken together: below 1e38 each, they do not overflow
+_NONE = 1e-17  # of x, below which a row loses nothing that its sum could tell
 _SUMS = "float64[:, :, ::1]"
+_ROWS = "int64[::1], float64[::1], int64[::1], complex128[::1], int64[::1]"
 
 
-@compiled(
-    "void(float64[:, :, ::1], float64[:, ::1], float64[::1], int64[::1], float64[::1], float64[:, ::1], "
-    f"float64[:, ::1], {_SUMS}, {_SUMS}, {_SUMS}, float64[:, ::1])"
-)
+@compiled(f"void(float64[:, :, ::1], {_ROWS}, complex128[:, ::1], {_SUMS}, {_SUMS}, {_SUMS}, float64[:, ::1])")
 def lost(
     pickup: Floats,
-    level: Floats,
-    variance: Floats,
+    alike: NDArray[np.int64],
+    precision: Floats,
     recording: NDArray[np.int64],
-    yy_row: Floats,
-    uu_row: Floats,
-    uy_row: Floats,
+    y: Complexes,
+    line: NDArray[np.int64],
+    u: Array,
     uu: Floats,
     uy: Floats,
     yy: Floats,
     log_determinant: Floats,
 ) -> None:
-    """Take from `uu`, `uy` and `yy` (points, sets, recordings) what rows lose, 1/d² less 1/(d² + q²/κ²) of each, and
-    add what that does to the log of the determinant (points, sets).
+    """Take from `uu`, `uy` and `yy` (points, sets, recordings) what rows lose, x/(1 + x)/d² of each, and add 2 log(1 +
+    x) to `log_determinant` (points, sets).
 
     Parameters
     ----------
-    pickup, level
-        q (points, sets, rows) and κ (points, sets).
-    variance, recording, yy_row
-        d², the recording and |y|² of each row.
-    uu_row, uy_row
-        |u|² and Re u*y of each row (points, rows).
+    pickup
+        (q/κ)² (points, distinct, sets).
+    alike, precision, recording, y, line
+        Of each row: which of the distinct q it has, 1/d², the recording, the measured value and the line.
+    u
+        The direction (points, lines).
     """
-    points, sets, rows = pickup.shape
+    points, _, sets = pickup.shape
+    factors, total, count = np.empty(sets), np.empty(sets), np.empty(sets, dtype=np.int64)
     for point in range(points):
+        factors[:], total[:], count[:] = 1.0, 0.0, 0
+        for row in range(len(y)):
+            of, square, weight = recording[row], pickup[point, alike[row]], precision[row]
+            at, measured = u[point, line[row]], y[row]
+            uu_row = at.real * at.real + at.imag * at.imag
+            uy_row = at.real * measured.real + at.imag * measured.imag
+            yy_row = measured.real * measured.real + measured.imag * measured.imag
+            for number in range(sets):
+                x = square[number] * weight
+                if x > _NONE:
+                    less = x / (1 + x) * weight
+                    uu[point, number, of] -= less * uu_row
+                    uy[point, number, of] -= less * uy_row
+                    yy[point, number, of] -= less * yy_row
+                    factors[number] *= 1 + x
+                    count[number] += 1
+                    if count[number] == _TOGETHER:
+                        total[number] += np.log(factors[number])
+                        factors[number], count[number] = 1.0, 0
         for number in range(sets):
-            inverse = 1 / level[point, number] ** 2
-            determinant, total = 1.0, 0.0
-            for row in range(rows):
-                ratio = pickup[point, number, row] ** 2 * inverse / variance[row]
-                more = 1 + ratio
-                less = ratio / (more * variance[row])
-                of = recording[row]
-                uu[point, number, of] -= less * uu_row[point, row]
-                uy[point, number, of] -= less * uy_row[point, row]
-                yy[point, number, of] -= less * yy_row[row]
-                determinant *= more
-                if row % _TOGETHER == 0:
-                    total += np.log(determinant)
-                    determinant = 1.0
-            log_determinant[point, number] += 2 * (total + np.log(determinant))
+            log_determinant[point, number] += 2 * (total[number] + np.log(factors[number]))
 
 
 @compiled(
-    f"void(float64[:, ::1], float64[::1], float64[::1], int64[::1], complex128[::1], complex128[:, ::1], "
-    f"complex128[:, :, ::1], {_SUMS}, {_SUMS}, float64[:, :, :, ::1])"
+    f"void(float64[:, ::1], {_ROWS}, complex128[:, ::1], complex128[:, :, ::1], {_SUMS}, {_SUMS}, "
+    "float64[:, :, :, ::1])"
 )
 def slopes_lost(
     pickup: Floats,
-    level: Floats,
-    variance: Floats,
+    alike: NDArray[np.int64],
+    precision: Floats,
     recording: NDArray[np.int64],
-    y: Array,
+    y: Complexes,
+    line: NDArray[np.int64],
     u: Array,
     v: Array,
     uv: Floats,
@@ -79,23 +89,34 @@ def slopes_lost(
 
     Parameters
     ----------
-    pickup, level
-        q (points, rows) and κ (points,).
-    variance, recording, y
-        d², the recording and the measured value of each row.
+    pickup
+        (q/κ)² (points, distinct).
+    alike, precision, recording, y, line
+        See `lost`.
     u, v
-        The direction (points, rows), and its derivatives (points, P, rows).
+        The direction (points, lines), and its derivatives (points, P, lines).
     """
-    points, count, rows = v.shape
+    points, count, lines = v.shape
+    moving = np.empty(count, dtype=np.int64)
     for point in range(points):
-        inverse = 1 / level[point] ** 2
-        for row in range(rows):
-            ratio = pickup[point, row] ** 2 * inverse / variance[row]
-            less, of = ratio / ((1 + ratio) * variance[row]), recording[row]
-            for p in range(count):
-                of_p = v[point, p, row]
-                uv[point, of, p] -= less * (u[point, row].real * of_p.real + u[point, row].imag * of_p.imag)
-                vy[point, of, p] -= less * (y[row].real * of_p.real + y[row].imag * of_p.imag)
-                for q in range(count):
-                    of_q = v[point, q, row]
-                    vv[point, of, p, q] -= less * (of_p.real * of_q.real + of_p.imag * of_q.imag)
+        moves = 0
+        for p in range(count):
+            for at in range(lines):
+                if v[point, p, at] != 0:
+                    moving[moves] = p
+                    moves += 1
+                    break
+        for row in range(len(y)):
+            x = pickup[point, alike[row]] * precision[row]
+            if x > _NONE and moves:
+                less, of, at = x / (1 + x) * precision[row], recording[row], line[row]
+                direction, measured = u[point, at], y[row]
+                for one in range(moves):
+                    p = moving[one]
+                    of_p = v[point, p, at]
+                    uv[point, of, p] -= less * (direction.real * of_p.real + direction.imag * of_p.imag)
+                    vy[point, of, p] -= less * (measured.real * of_p.real + measured.imag * of_p.imag)
+                    for other in range(moves):
+                        q = moving[other]
+                        of_q = v[point, q, at]
+                        vv[point, of, p, q] -= less * (of_p.real * of_q.real + of_p.imag * of_q.imag)

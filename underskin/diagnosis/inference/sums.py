@@ -1,8 +1,12 @@
 """Sums over the rows of each recording, of which the likelihood of a prediction is made: see `products`."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
-from underskin.units import Floats
+import numpy as np
+
+from underskin.units import Array, Floats
 
 
 @dataclass(frozen=True)
@@ -25,3 +29,12 @@ class SlopeSums:
     uv: Floats
     vy: Floats
     vv: Floats
+
+    def __getitem__(self, points: Array | slice) -> "SlopeSums":
+        """At some of the points."""
+        return SlopeSums(self.uv[points], self.vy[points], self.vv[points])
+
+    @classmethod
+    def joined(cls, parts: Sequence["SlopeSums"]) -> Self:
+        """At the points of several, one after another."""
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("uv", "vy", "vv")))

@@ -49,11 +49,14 @@ def line_noise(
 
     `expected` (rows,) is a prediction whose course along frequency is no noise.
     """
+    from underskin.diagnosis.noise.roughness_kernel import roughness_cost
+
     if len(value) == 0:
         return LineNoise(np.zeros(0), 1.0, 0.0)
     amplitude = local_amplitude(value, recording)
     middle = _interior(recording, frequency)
     z = _without_shared(value, frequency, recording, value if expected is None else value - expected)
+    distinct, line = np.unique(frequency, return_inverse=True)
     log_f = np.log(frequency)
     span = log_f[middle + 1] - log_f[middle - 1]
     share = (log_f[middle + 1] - log_f[middle]) / span
@@ -61,26 +64,22 @@ def line_noise(
     rows = np.stack([middle, middle - 1, middle + 1])
     rough = np.abs(z[middle] - share * z[middle - 1] - (1 - share) * z[middle + 1]) ** 2 / 2
     knots = _knots(log_f)
-    hats = _hats(log_f, knots)
+    hats = _hats(np.log(distinct), knots)
     scale = float(np.median(amplitude))
+    rough /= scale**2
     size2 = (amplitude / scale) ** 2
     weighed2 = size2 * uneven**2
     known = np.isfinite(coherence) & (coherence > 0) & (coherence < 1)
     from_coherence = np.log((1 - coherence[known]) / coherence[known]) if known.any() else None
 
     def variance(p: Floats) -> Floats:
-        return np.exp(hats @ p[:-2]) * weighed2 + np.exp(p[-2])
+        return np.exp(hats @ p[:-2])[line] * weighed2 + np.exp(p[-2])
 
     def objective(p: Floats) -> tuple[float, Floats]:
-        relative, floor = np.exp(hats @ p[:-2]) * weighed2, np.exp(p[-2])
+        relative, floor = np.exp(hats @ p[:-2])[line] * weighed2, np.exp(p[-2])
         d2 = relative + floor
-        v = (weights * d2[rows]).sum(axis=0)
-        u = rough / scale**2 / v
-        cost = np.sum(np.log(v)) + (_FREEDOM / 2 + 1) * np.sum(np.log1p(2 * u / _FREEDOM))
-        by_v = (1 - (_FREEDOM / 2 + 1) * (2 * u / _FREEDOM) / (1 + 2 * u / _FREEDOM)) / v
         by_d2 = np.zeros(len(d2))
-        for row, weight in zip(rows, weights, strict=True):
-            by_d2 += np.bincount(row, by_v * weight, len(d2))
+        cost = roughness_cost(d2, middle, share, rough, _FREEDOM, by_d2)
         if from_coherence is not None:
             # Noisy, and with an unknown n: one loose Gaussian a line; p[-1] is log(1/2n).
             gap = np.log(d2[known] / size2[known]) - from_coherence - p[-1]
@@ -90,19 +89,21 @@ def line_noise(
         cost += 0.5 * bend @ bend + 0.5 * np.sum(((p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2)
         cost += 0.5 * ((p[-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2 + 0.5 * (p[-1] + 3.5) ** 2
         by_p = np.zeros(len(p))
-        by_p[:-2] = hats.T @ (by_d2 * relative) + (p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD**2
+        by_p[:-2] = (
+            hats.T @ np.bincount(line, by_d2 * relative, len(distinct)) + (p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD**2
+        )
         by_p[:-2] += np.convolve(bend, [1, -2, 1]) / _SMOOTH if len(bend) else 0.0
         by_p[-2] = by_d2.sum() * floor + (p[-2] - np.log(_TYPICAL)) / _TYPICAL_SD**2
         by_p[-1] = (p[-1] + 3.5) - (gap.sum() / _COHERENCE_VARIANCE if from_coherence is not None else 0.0)
         return float(cost), by_p
 
-    level = np.log(max(float(np.median(rough)) / scale**2, 1e-14)) if len(middle) else np.log(_TYPICAL)
+    level = np.log(max(float(np.median(rough)), 1e-14)) if len(middle) else np.log(_TYPICAL)
     start = np.concatenate([np.full(len(knots), level - 1.0), [level - 2.0, -3.5]])
     p = minimize(objective, start, jac=True, method="L-BFGS-B", options={"maxiter": 200}).x
     d2 = variance(p)
     freedom = len(middle) / 1.5  # neighbouring differences share lines
     if len(middle) > 10:
-        median = float(np.median(rough / scale**2 / (weights * d2[rows]).sum(axis=0)))
+        median = float(np.median(rough / (weights * d2[rows]).sum(axis=0)))
         d2 = d2 * (median / np.log(2.0)) ** (freedom / (freedom + 30.0))
     d2 = np.maximum(d2, (1e-5) ** 2 * size2)
     sd = float(np.hypot(0.03, 1.0 / np.sqrt(1.0 + 2.0 * freedom)))
@@ -115,17 +116,17 @@ _COHERENCE_VARIANCE = 0.5
 def local_amplitude(value: Complexes, recording: Indices) -> Floats:
     """|FRF| around each line: the median over five neighbours, or its own where that is larger (a sharp peak)."""
     size = np.abs(value)
-    smooth = np.empty(len(size))
+    smooth = size.copy()
+    half = _WINDOW // 2
+    if len(size) >= _WINDOW:
+        windows = np.lib.stride_tricks.sliding_window_view(size, _WINDOW)
+        smooth[half:-half] = np.partition(windows, half, axis=1)[:, half]
     edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
-    for low, high in itertools.pairwise(edges):
-        own = size[low:high]
-        width = min(_WINDOW, len(own))
-        windows = np.lib.stride_tricks.sliding_window_view(own, width)
-        middle = np.median(windows, axis=1)
-        before = (width - 1) // 2
-        smooth[low:high] = np.concatenate(
-            [np.full(before, middle[0]), middle, np.full(len(own) - before - len(middle), middle[-1])]
-        )
+    for low, high in itertools.pairwise(edges.tolist()):
+        if high - low < _WINDOW:
+            smooth[low:high] = np.median(size[low:high])
+        else:  # windows lie within a recording; its ends have the next one's
+            smooth[low : low + half], smooth[high - half : high] = smooth[low + half], smooth[high - half - 1]
     return np.maximum(size, smooth)
 
 
@@ -140,16 +141,17 @@ def _interior(recording: Indices, frequency: Floats) -> Indices:
 def _without_shared(value: Complexes, frequency: Floats, recording: Indices, rest: Complexes) -> Complexes:
     """`rest` (rows,), the lines or what is left of them, less each recording's level times what all recordings have of
     it at that frequency, where many have it."""
-    level = np.array([np.median(value.real[recording == number]) for number in range(int(recording.max()) + 1)])
+    edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
+    level = np.array([np.median(value.real[low:high]) for low, high in itertools.pairwise(edges.tolist())])
     ratio = rest / np.where(level == 0, 1.0, level)[recording]
     _, line, count = np.unique(np.round(frequency, 9), return_inverse=True, return_counts=True)
     if count[line].min() < _SHARED:
         return rest
     shared = np.empty(len(count), dtype=complex)
     strong = np.abs(level)[recording] > 0.3 * np.median(np.abs(level))
-    for number in range(len(count)):
-        chosen = ratio[(line == number) & strong]
-        chosen = chosen if len(chosen) else ratio[line == number]
+    for number, rows in enumerate(np.split(np.argsort(line, kind="stable"), np.cumsum(count)[:-1])):
+        chosen = ratio[rows[strong[rows]]]
+        chosen = chosen if len(chosen) else ratio[rows]
         shared[number] = np.median(chosen.real) + 1j * np.median(chosen.imag)
     return rest - level[recording] * shared[line]
 

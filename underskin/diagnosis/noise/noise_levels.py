@@ -7,7 +7,7 @@ from underskin.units import Floats
 
 @dataclass(frozen=True)
 class NoiseLevels:
-    """`gain` s, `level` κ, `position` p [m] (0: none), `spread` τ, `pickup` q on the rows it reaches, `smooth` η."""
+    """`gain` s, `level` κ, `position` p [m] (0: none), `spread` τ, `pickup` the distinct q, `smooth` η."""
 
     gain: float
     level: float
@@ -19,7 +19,7 @@ class NoiseLevels:
 
 @dataclass(frozen=True)
 class SeveralLevels:
-    """Sets of noise levels (…, 1); of pick-up (…, pick-up rows)."""
+    """Sets of noise levels (…, 1); of pick-up its distinct deviations (…, distinct)."""
 
     gain: Floats
     level: Floats

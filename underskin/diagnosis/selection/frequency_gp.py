@@ -7,7 +7,6 @@ of each recording's own best real multiple of the model.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 from scipy.sparse import csr_array
 from scipy.special import logsumexp
 
@@ -37,16 +36,16 @@ def over_lines(problem: FittingProblem, explanation: Explanation) -> dict[str, f
         2 * len(relative) + lines.scatter[1] - lines.recordings,
         level_prior(lines.noise.log_level_sd),
     )
-    plain = noise.best(np.zeros(0), np.zeros(0))
+    plain = noise.plain
     line, centres = frequency_bins(lines.frequency)
     total = np.bincount(line, weight, len(centres))
     sums = np.bincount(line, weight * relative.real, len(centres))
     sums = sums + 1j * np.bincount(line, weight * relative.imag, len(centres))
     distance = np.abs(np.log(centres[:, None] / centres[None]))
-    each = []
+    each: list[float] = []
     for length in _LINE_LENGTHS:
         root = np.linalg.cholesky(matern(distance / length) + 1e-9 * np.eye(len(centres)))
-        each += noise.gains(root.T @ (total[:, None] * root), root.T @ sums)
+        each += noise.gains(root.T @ (total[:, None] * root), root.T @ sums).tolist()
     gains = {"frequency_hz": float(logsumexp(each) - np.log(len(each)) - plain)}
     if lines.recordings < _LEAST_RECORDINGS:
         return gains
@@ -79,24 +78,23 @@ class _LineNoise:
     freedom: int
     prior: Plateau
 
-    def gains(self, gram: Array, moment: Array) -> list[float]:
+    def gains(self, gram: Array, moment: Array) -> Floats:
         """log p of the lines with a process of each amplitude, at the level that suits it best."""
         eigenvalues, vectors = np.linalg.eigh(gram)
-        eigenvalues = np.maximum(eigenvalues, 0.0)
-        square = np.abs(vectors.T @ moment) ** 2
-        return [self.best(eigenvalues * amplitude**2, square * amplitude**2) for amplitude in AMPLITUDES]
+        return self._best(np.maximum(eigenvalues, 0.0), np.abs(vectors.T @ moment) ** 2, AMPLITUDES)
 
-    def best(self, eigenvalues: Array, square: Array) -> float:
-        """With AᵀW A's eigenvalues and |AᵀW r|² along them, at κ: χ²/κ² less Σ square/(κ⁴ (1 + λ/κ²))."""
+    @property
+    def plain(self) -> float:
+        """The same without a process."""
+        return float(self._best(np.zeros(0), np.zeros(0), np.zeros(1))[0])
 
-        def cost(log_level: float) -> float:
-            k2 = np.exp(2 * log_level)
-            inner = 1 + eigenvalues / k2
-            value = 0.5 * self.chi2 / k2 + self.freedom * log_level - self.prior.log_density(log_level)
-            return float(value - 0.5 * (square / inner).sum() / k2**2 + np.log(inner).sum())
+    def _best(self, eigenvalues: Floats, square: Floats, amplitudes: Floats) -> Floats:
+        """With AᵀW A's eigenvalues and |AᵀW r|² along them."""
+        from underskin.diagnosis.selection.process_kernel import at_best_level
 
-        optimum = minimize_scalar(cost, bounds=(-1.0, 5.0), method="bounded", options={"xatol": 1e-3})
-        return -float(optimum.fun)
+        each = np.empty(len(amplitudes))
+        at_best_level(self.chi2, self.freedom, np.array(self.prior.row), eigenvalues, square, amplitudes, each)
+        return each
 
 
 def frequency_bins(frequency: Floats) -> tuple[Indices, Floats]:

@@ -34,7 +34,7 @@ def frf_problem(
     best = max(fixed, key=lambda entry: entry.log_evidence, default=nothing)
     if best.log_evidence <= nothing.log_evidence + _SPEAKS:
         return problem, known
-    refined = lines(campaign, uneven, best.best.prediction.value)
+    refined = lines(campaign, uneven, (problem.lines, best.best.prediction.value))
     change = np.abs(refined.deviation / problem.lines.deviation - 1).max()
     return (FittingProblem(refined, table), []) if change > _CHANGED else (problem, known)
 

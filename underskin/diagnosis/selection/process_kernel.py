@@ -1,9 +1,14 @@
-"""Compiled: what a Gaussian process of several amplitudes gains, from its features' moments."""
+"""Compiled: what Gaussian processes of several amplitudes gain, from their features' moments."""
 
 import numpy as np
 
 from underskin.compiled import compiled
 from underskin.units import Floats
+
+_TOGETHER = 8  # factors of a determinant whose logarithm is taken together: below 1e38 each, they do not overflow
+_LOWEST, _HIGHEST = -1.0, 5.0  # of log κ
+_TOLERANCE = 1e-3
+_SECTION = 0.6180339887498949  # golden
 
 
 @compiled("void(float64[:, :, ::1], float64[:, ::1], float64[::1], float64[:, ::1])")
@@ -42,3 +47,66 @@ def gained(grams: Floats, moments: Floats, amplitudes: Floats, gains: Floats) ->
                 determinant += np.log(total)
                 square += solved[i] ** 2
             gains[number, which] = 0.5 * (a2 * square - determinant)
+
+
+@compiled()
+def _log_density(
+    log_level: float, chi2: float, freedom: float, prior: Floats, eigenvalues: Floats, squares: Floats, a2: float
+) -> float:
+    """See `at_best_level`."""
+    inverse = np.exp(-2 * log_level)
+    below = max((prior[0] - log_level) / prior[2], 0.0)
+    above = max((log_level - prior[1]) / prior[3], 0.0)
+    total = -0.5 * (below + above) ** 2 - prior[4] - 0.5 * chi2 * inverse - freedom * log_level
+    determinant = 1.0
+    for number in range(len(eigenvalues)):
+        inner = 1 + a2 * eigenvalues[number] * inverse
+        total += 0.5 * a2 * squares[number] / inner * inverse * inverse
+        determinant *= inner
+        if number % _TOGETHER == 0:
+            total -= np.log(determinant)
+            determinant = 1.0
+    return total - np.log(determinant)
+
+
+@compiled("void(float64, float64, float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])")
+def at_best_level(
+    chi2: float,
+    freedom: float,
+    prior: Floats,
+    eigenvalues: Floats,
+    squares: Floats,
+    amplitudes: Floats,
+    log_densities: Floats,
+) -> None:
+    """ln p(r, κ) of complex lines with a process, at the level κ of their noise that is most probable.
+
+    −½ (χ²/κ² − Σ a² sₙ/(κ⁴ (1 + a² λₙ/κ²))) − ν ln κ − Σ ln(1 + a² λₙ/κ²) + ln p(κ), by golden sections.
+
+    Parameters
+    ----------
+    chi2, freedom
+        χ² of the lines at κ = 1 without a process, and ν.
+    prior
+        Of ln κ, see `Plateau.row`.
+    eigenvalues, squares
+        λₙ of the features' products AᵀWA, and sₙ = |vₙᵀAᵀW r|² along its eigenvectors vₙ.
+    amplitudes, log_densities
+        a, and the result for each, to be filled.
+    """
+    for which in range(len(amplitudes)):
+        a2 = amplitudes[which] ** 2
+        low, high = _LOWEST, _HIGHEST
+        left, right = high - _SECTION * (high - low), low + _SECTION * (high - low)
+        at_left = _log_density(left, chi2, freedom, prior, eigenvalues, squares, a2)
+        at_right = _log_density(right, chi2, freedom, prior, eigenvalues, squares, a2)
+        while high - low > _TOLERANCE:
+            if at_left > at_right:
+                high, right, at_right = right, left, at_left
+                left = high - _SECTION * (high - low)
+                at_left = _log_density(left, chi2, freedom, prior, eigenvalues, squares, a2)
+            else:
+                low, left, at_left = left, right, at_right
+                right = low + _SECTION * (high - low)
+                at_right = _log_density(right, chi2, freedom, prior, eigenvalues, squares, a2)
+        log_densities[which] = max(at_left, at_right)

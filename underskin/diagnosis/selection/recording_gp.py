@@ -7,7 +7,7 @@ FRF = model · (1 + δ), linear in the model's parameters at their best fit, in 
 Scatter of gain, and beside a wandering place scatter of position too, are marginalised over their priors.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,7 +20,7 @@ from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, normalised
 from underskin.mechanisms.base import Normal, Parameter
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 _LENGTHS = (0.15, 0.4, 1.2)  # of a recording's axis, over its range
 _LEAST_RECORDINGS, _LEAST_IN_ORDER = 4, 8
@@ -33,7 +33,7 @@ _ANY_POSITION = np.geomspace(0.03e-3, 0.6e-3, 12)
 _FAINT = 1e-12  # of the largest response, below which a recording has no direction
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ScatterNodes:
     """One scatter of place with several of gain: log weights (gains,), and under it each recording's residual, and its
     variances (gains, recordings)."""
@@ -41,6 +41,43 @@ class ScatterNodes:
     log_weights: Floats
     residual: Floats
     variances: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class _WithoutProcess:
+    """Scatter nodes with what is fixed taken out: C = V + F Fᵀ, V the variances and F the `fixed` columns.
+
+    `log_density` of the residual r (gains,); C⁻¹ = V⁻¹ − Tᵀ T with `taken` T = L⁻¹ Fᵀ V⁻¹, L Lᵀ = 1 + Fᵀ V⁻¹ F (gains,
+    columns, recordings); `root` V^(−½) and `weighed` C⁻¹ r (gains, recordings).
+    """
+
+    log_density: Floats
+    root: Floats
+    taken: Floats
+    weighed: Floats
+
+    @classmethod
+    def of(cls, nodes: ScatterNodes, fixed: Floats) -> "_WithoutProcess":
+        """With these columns (recordings, columns)."""
+        precision = 1 / nodes.variances
+        across = fixed.T * precision[:, None]
+        lower = np.linalg.cholesky(across @ fixed + np.eye(fixed.shape[1]))
+        taken = np.linalg.solve(lower, across)
+        of_fixed = taken @ nodes.residual
+        weighed = nodes.residual * precision - (of_fixed[:, None] @ taken)[:, 0]
+        log_determinant = np.log(nodes.variances).sum(axis=1)
+        log_determinant += 2 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
+        log_density = nodes.log_weights - 0.5 * (weighed @ nodes.residual + log_determinant)
+        return cls(log_density, np.sqrt(precision), taken, weighed)
+
+    def summed(self, alike: Indices) -> "_WithoutProcess":
+        """With the sums over recordings that are alike, which have the same features, in their place."""
+        order = np.argsort(alike, kind="stable")
+        first = np.searchsorted(alike[order], np.arange(int(alike.max()) + 1))
+        square, taken, weighed = (
+            np.add.reduceat(values[..., order], first, axis=-1) for values in (self.root**2, self.taken, self.weighed)
+        )
+        return replace(self, root=np.sqrt(square), taken=taken, weighed=weighed)
 
 
 def over_recordings(problem: FittingProblem, explanation: Explanation) -> dict[str, float]:
@@ -69,8 +106,11 @@ def mean_of_logs(log_values: list[float] | Floats) -> float:
 
 
 def _smooth(residual: "GainResidual", column: Floats) -> float:
-    sets = np.stack([features(column, length) for length in _LENGTHS])
-    return mean_of_logs(residual.gains(sets, AMPLITUDES))
+    values, alike = np.unique(column, axis=0, return_inverse=True)
+    if len(values) == len(column):
+        return mean_of_logs(residual.gains(np.stack([features(column, length) for length in _LENGTHS]), AMPLITUDES))
+    sets = np.stack([features(values, length) for length in _LENGTHS])
+    return mean_of_logs(residual.gains(sets, AMPLITUDES, alike.reshape(-1)))
 
 
 def _sines(rank: Floats) -> Floats:
@@ -132,40 +172,36 @@ class GainResidual:
     @cached_property
     def _plain(self) -> float:
         """log p(residual) without a process."""
-        nothing = np.zeros((1, len(self._known), 1))
-        each = [self._with(nothing, np.ones(1), entry) for entry in self._scatters(_ANY_POSITION)]
+        each = [_WithoutProcess.of(nodes, self.fixed).log_density for nodes in self._scatters(_ANY_POSITION)]
         return float(logsumexp(each))
 
-    def gains(self, sets: Floats, amplitudes: Floats) -> Floats:
+    @cached_property
+    def _usual(self) -> list[_WithoutProcess]:
+        return [_WithoutProcess.of(nodes, self.fixed) for nodes in self.usual]
+
+    def gains(self, sets: Floats, amplitudes: Floats, alike: Indices | None = None) -> Floats:
         """What each set of features (sets, recordings, features) gains over none at all, in log evidence (sets,).
 
+        Where recordings are `alike` (recordings,), features are those of the distinct ones (sets, distinct, features).
         Over the priors of the scatters, and of the amplitudes, each as probable as the others.
         """
-        each = np.concatenate([self._with(sets, amplitudes, entry) for entry in self.usual])
+        without = self._usual if alike is None else [entry.summed(alike) for entry in self._usual]
+        each = np.concatenate([_with(sets, amplitudes, entry) for entry in without])
         return np.asarray(logsumexp(each, axis=0) - self._plain)
 
-    def _with(self, sets: Floats, amplitudes: Floats, scatter: ScatterNodes) -> Floats:
-        """log p(residual, features) at one scatter of place and each of gain (gains, sets)."""
-        from underskin.diagnosis.selection.process_kernel import gained
 
-        count, rows, size = sets.shape
-        root = 1 / np.sqrt(scatter.variances)[:, :, None]
-        fixed = self.fixed * root
-        shapes = sets.transpose(1, 0, 2).reshape(rows, -1)
-        z, shapes = scatter.residual[:, None] * root, shapes * root  # (gains, recordings, columns)
-        lower = np.linalg.cholesky(fixed.transpose(0, 2, 1) @ fixed + np.eye(fixed.shape[2]))
-        taken = np.linalg.solve(lower, fixed.transpose(0, 2, 1) @ np.concatenate([z, shapes], axis=2))
-        chi2 = (z**2).sum(axis=(1, 2)) - (taken[..., 0] ** 2).sum(axis=1)
-        log_determinant = np.log(scatter.variances).sum(axis=1)
-        log_determinant = log_determinant + 2 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
-        moment = shapes.transpose(0, 2, 1) @ z - taken[..., 1:].transpose(0, 2, 1) @ taken[..., :1]
-        moment = moment.reshape(-1, count, size).swapaxes(0, 1)
-        gram = _grams(shapes, count) - _grams(taken[..., 1:], count)
-        each = np.empty((count * len(scatter.variances), len(amplitudes)))
-        gained(gram.reshape(-1, size, size), np.ascontiguousarray(moment.reshape(-1, size)), amplitudes, each)
-        each = each.reshape(count, -1, len(amplitudes))
-        more = np.logaddexp.reduce(each, axis=-1) - np.log(len(amplitudes))
-        return np.asarray((scatter.log_weights - 0.5 * (chi2 + log_determinant))[:, None] + more.T)
+def _with(sets: Floats, amplitudes: Floats, without: _WithoutProcess) -> Floats:
+    """log p(residual, features) at one scatter of place and each of gain (gains, sets)."""
+    from underskin.diagnosis.selection.process_kernel import gained
+
+    count, rows, size = sets.shape
+    columns = sets.transpose(1, 0, 2).reshape(rows, -1)
+    gram = _grams(columns * without.root[:, :, None], count) - _grams(without.taken @ columns, count)
+    moment = (without.weighed @ columns).reshape(-1, count, size).swapaxes(0, 1)
+    each = np.empty((count * len(without.root), len(amplitudes)))
+    gained(gram.reshape(-1, size, size), np.ascontiguousarray(moment).reshape(-1, size), amplitudes, each)
+    more = np.logaddexp.reduce(each.reshape(count, -1, len(amplitudes)), axis=-1) - np.log(len(amplitudes))
+    return np.asarray(without.log_density[:, None] + more.T)
 
 
 def _grams(columns: Floats, count: int) -> Floats:

@@ -18,7 +18,7 @@ from underskin.diagnosis.inference.curve_nuisances import cell_response
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.noise.noise_levels import NoiseLevels
 from underskin.diagnosis.selection.search import log_prior
-from underskin.mechanisms.models.composed import compose
+from underskin.mechanisms.models.frf import FrfModel
 from underskin.recordings.conditions import curves_of, frf_of
 from underskin.units import Floats, Indices, Mask
 
@@ -139,9 +139,9 @@ def hold_out(
 def _predict(smaller: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: Mask) -> PredictionScore:
     """Some of the rows from a fit to others; sensors that were seen keep the gain that was found for them."""
     left = problem.lines.part(rows)
-    model = compose(explanation.names, problem.lines.campaign, problem.table, problem.kind)
+    model = problem.hypothesis(explanation.names, placed=False, whole=True).model
     point, levels = explanation.point, explanation.best.levels
-    whole = model.predict(point.fit)
+    whole = model.predict(point.fit, slopes=False) if isinstance(model, FrfModel) else model.predict(point.fit)
     if left.curves:
         return _predict_curves(problem.lines, levels, whole.value.real, rows, smaller)
     seen = np.isin(left.sensor, smaller.lines.sensor)

@@ -8,7 +8,6 @@ with each further parameter at either end of its usual range.
 """
 
 from collections.abc import Sequence
-from functools import cached_property
 
 import numpy as np
 
@@ -18,10 +17,13 @@ from underskin.diagnosis.inference.likelihood import Likelihoods
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.noise.noise_levels import NoiseLevels, SeveralLevels
 from underskin.mechanisms.base import Normal, Parameter, Unsupported
+from underskin.mechanisms.models.composed import Model
+from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Array, Floats
 
 _ENDS = (0.1, 0.9)  # of a shape's usual range
+_AT_ONCE = 1 << 16  # numbers
 
 
 class Signatures:
@@ -38,7 +40,9 @@ class Signatures:
         point = self._fitter.begin([np.zeros((1, 0))]).points.fit[0]
         self._base = self._fitter.hypotheses[0].model.predict(point)
         self.owners: list[str] = []
+        self.percent: list[float] = []
         self._values: list[tuple[Array, Lines]] = []
+        self._known_products: dict[float, tuple[Floats, Floats]] = {}
         for name, mechanism in CATALOGUE.items():
             if problem.kind not in mechanism.kinds:
                 continue
@@ -51,17 +55,13 @@ class Signatures:
                 continue
             for own in _shapes(parameters):
                 self.owners.append(name)
-                value = hypothesis.model.predict(np.concatenate([own, point])).value
-                self._values.append((value, hypothesis.lines))
+                self._add(_predicted(hypothesis.model, np.concatenate([own, point])), hypothesis.lines)
 
-    @cached_property
-    def percent(self) -> list[float]:
-        """100 · √(Σ|change|² / Σ|base|²) over the rows on which a mechanism is judged."""
-        sizes = []
-        for value, lines in self._values:
-            base = self._base.value if len(value) == len(self._base.value) else self._base.value[lines.recording]
-            sizes.append(100 * float(np.sqrt((np.abs(value - base) ** 2).sum() / (np.abs(base) ** 2).sum())))
-        return sizes
+    def _add(self, value: Array, lines: Lines) -> None:
+        """The change is judged on the rows of these lines: 100 · √(Σ|change|² / Σ|base|²)."""
+        base = self._base.value if len(value) == len(self._base.value) else self._base.value[lines.recording]
+        self.percent.append(100 * float(np.sqrt((np.abs(value - base) ** 2).sum() / (np.abs(base) ** 2).sum())))
+        self._values.append((value, lines))
 
     def left(self, levels: NoiseLevels) -> tuple[Floats, Floats]:
         """The information on the signatures (signatures, signatures) under this noise: what the nuisances leave of it,
@@ -73,23 +73,29 @@ class Signatures:
         own, shared, beside = information[count:, count:], information[count:, :count], information[:count, :count]
         return own - shared @ np.linalg.solve(beside + prior, shared.T), own
 
+    def _products(self, smooth: float) -> tuple[Floats, Floats]:
+        """Re u*J and Re JᵀJ of the nuisances and the signatures; of curves with a smooth error of that share."""
+        if smooth not in self._known_products:
+            rows = _Rows(self._problem, self._base.value, smooth)
+            parts = [rows.split(slope, self._fitter.lines) for slope in self._base.slopes]
+            for value, lines in self._values:
+                along, across = rows.split(value, lines)
+                parts.append((along - rows.base, across))
+            self._known_products[smooth] = rows.products(parts)
+        return self._known_products[smooth]
+
     def _information(self, levels: NoiseLevels) -> Floats:
         """On the nuisances and then on every signature."""
         hypothesis = self._problem.hypothesis((), placed=levels.position > 0)
         fitter = Fitter([hypothesis])
         base = fitter.begin([np.zeros((1, 0))])
-        rows = _Rows(self._problem, self._base.value, levels.smooth)
-        parts = [rows.split(slope, fitter.lines) for slope in self._base.slopes]
-        for value, lines in self._values:
-            along, across = rows.split(value, lines)
-            parts.append((along - rows.base, across))
         gain, level, position, spread, smooth = (
             np.full((1, 1, 1), value)
             for value in (levels.gain, levels.level, levels.position, levels.spread, levels.smooth)
         )
         several = SeveralLevels(gain, level, position, spread, None, smooth)
         likelihood = Likelihoods(fitter.lines, self._problem.curvature, base.products, several, base.points.bend)
-        along, square = rows.products(parts)
+        along, square = self._products(levels.smooth if fitter.lines.curves else 0.0)
         return likelihood.information(along / levels.level**2, square / levels.level**2)[0]
 
 
@@ -120,8 +126,10 @@ class _Rows:
         square = along @ along.T
         beside = [number for number, (_, rest) in enumerate(parts) if rest is not None]
         if beside:
-            across = np.array([rest for _, rest in parts if rest is not None])
-            square[np.ix_(beside, beside)] += across @ across.T
+            across = [rest for _, rest in parts if rest is not None]
+            for first in range(0, len(across[0]), _AT_ONCE):
+                some = np.array([rest[first : first + _AT_ONCE] for rest in across])
+                square[np.ix_(beside, beside)] += some @ some.T
         return (along * self._size).T[None], square[None]
 
     def _whitened(self, rows: Floats) -> Floats:
@@ -131,6 +139,10 @@ class _Rows:
 
     def _sums(self, rows: Floats) -> Floats:
         return np.add.reduceat(rows, self._lines.first)
+
+
+def _predicted(model: Model, fit: Floats) -> Array:
+    return model.predict(fit, slopes=False).value if isinstance(model, FrfModel) else model.predict(fit).value
 
 
 def _shapes(parameters: Sequence[Parameter]) -> list[Floats]:

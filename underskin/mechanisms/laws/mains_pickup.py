@@ -1,6 +1,7 @@
 """The mechanism `mains_pickup`."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache, partial
 
 import numpy as np
@@ -61,19 +62,24 @@ class MainsPickup(Mechanism):
 
     def pickup(self, conditions: Conditions, design: FrfDesign) -> Pickup:
         """Of the lines within the reach of the mains that stand out, each by the nearest multiple."""
-        away = np.abs(design.row_frequency[:, None] - _outstanding_mains(conditions) * HARMONICS)
-        rows = np.flatnonzero(away.min(axis=1) < _FURTHEST_HZ)
-        harmonic = HARMONICS[away[rows].argmin(axis=1)]
-        alike = np.column_stack([harmonic, 0.5 * away[rows].min(axis=1) ** 2, design.row_dynamic_force[rows]])
-        distinct, row = np.unique(alike, axis=0, return_inverse=True)
-        number, half_square, force = distinct.T
+        return _pickup(conditions, design)
 
-        def deviation(values: Mapping[str, Floats]) -> Floats:
-            line = np.exp(-half_square / values["pickup_width"] ** 2)
-            share = np.where(number == 1, 1.0, values["pickup_harmonics"] / number)
-            return np.asarray(1e-12 * values["pickup_charge"] * share * line / force)[..., row]
 
-        return Pickup(rows, deviation)
+@lru_cache(maxsize=4)  # by identity: a diagnosis composes dozens of models of one campaign
+def _pickup(conditions: Conditions, design: FrfDesign) -> Pickup:
+    away = np.abs(design.row_frequency[:, None] - _outstanding_mains(conditions) * HARMONICS)
+    rows = np.flatnonzero(away.min(axis=1) < _FURTHEST_HZ)
+    harmonic = HARMONICS[away[rows].argmin(axis=1)]
+    alike = np.column_stack([harmonic, 0.5 * away[rows].min(axis=1) ** 2, design.row_dynamic_force[rows]])
+    distinct, row = np.unique(alike, axis=0, return_inverse=True)
+    number, half_square, force = distinct.T
+
+    def deviation(values: Mapping[str, Floats]) -> Floats:
+        line = np.exp(-half_square / values["pickup_width"] ** 2)
+        share = np.where(number == 1, 1.0, values["pickup_harmonics"] / number)
+        return np.asarray(1e-12 * values["pickup_charge"] * share * line / force)
+
+    return Pickup(rows, deviation, row.reshape(-1))
 
 
 @lru_cache(maxsize=4)  # by the conditions' identity: a diagnosis composes dozens of models of one campaign
@@ -90,19 +96,39 @@ def _excess(recordings: Sequence[Frf], mains: float) -> float:
     the next ones do from each other: Σ shape² (|stray|² over theirs − 1)/√Σ shape⁴, the score of a variance of that
     shape in units of its own scatter."""
     score = weight = 0.0
+    reaches: dict[bytes, _Reach] = {}  # most recordings have the same lines
     for lines in recordings:
-        shape = _shape(lines.frequency, mains)
-        near, far = shape > _REACHED, np.flatnonzero(shape <= _REACHED)
-        if not near.any() or len(far) < _LEAST_LINES:
+        key = lines.frequency.tobytes()
+        if key not in reaches:
+            reaches[key] = _Reach.of(lines.frequency, mains)
+        reach = reaches[key]
+        if not len(reach.near) or len(reach.far) < _LEAST_LINES:
             continue
         size = np.maximum(np.abs(lines.values), max(float(np.median(np.abs(lines.values))), 1e-300))
-        odd, even = far[1::2], far[::2]
-        stray = _stray(lines, size, np.flatnonzero(near), far)
-        beside = np.abs(lines.frequency[near, None] - lines.frequency[odd]).argsort(axis=1)[:, :_BESIDE]
-        usual = np.median(_stray(lines, size, odd, even)[beside] ** 2, axis=1) / np.log(2.0)  # median = mean · ln 2
-        score += float((shape[near] ** 2 * (stray**2 - usual) / np.maximum(usual, _LEAST_STRAY**2)).sum())
-        weight += float((shape[near] ** 4).sum())
+        stray = _stray(lines, size, reach.near, reach.far)
+        others = _stray(lines, size, reach.far[1::2], reach.far[::2])
+        usual = np.median(others[reach.beside] ** 2, axis=1) / np.log(2.0)  # median = mean · ln 2
+        score += float((reach.shape**2 * (stray**2 - usual) / np.maximum(usual, _LEAST_STRAY**2)).sum())
+        weight += float((reach.shape**4).sum())
     return score / np.sqrt(weight) if weight else 0.0
+
+
+@dataclass(frozen=True)
+class _Reach:
+    """Of the lines of a recording: those that the mains reach, `near` with their shape, the others, and of each near
+    one which of every second other are next to it."""
+
+    near: Indices
+    shape: Floats
+    far: Indices
+    beside: Indices
+
+    @classmethod
+    def of(cls, frequency: Floats, mains: float) -> "_Reach":
+        shape = _shape(frequency, mains)
+        near, far = np.flatnonzero(shape > _REACHED), np.flatnonzero(shape <= _REACHED)
+        beside = np.abs(frequency[near, None] - frequency[far[1::2]]).argsort(axis=1)[:, :_BESIDE]
+        return cls(near, shape[near], far, beside)
 
 
 def _stray(lines: Frf, size: Floats, rows: Indices, beside: Indices) -> Floats:

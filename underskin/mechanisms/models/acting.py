@@ -51,8 +51,7 @@ class Acting:
         self.has = np.zeros(models, dtype=bool)
         self._places = {name: np.zeros(models, dtype=np.intp) for name in parameters}
         self._relative = [(name, entry.relative_to) for name, entry in parameters.items() if entry.relative_to]
-        own = type(mechanism)
-        self._hooks = {name for name in dir(Mechanism) if getattr(own, name) is not getattr(Mechanism, name)}
+        self._hooks = _overridden(type(mechanism))
 
     def add(self, model: int, places: Mapping[str, int]) -> None:
         """Note that a model has it, its parameters at these places."""
@@ -70,3 +69,12 @@ class Acting:
         for name, other in self._relative:
             values[name] = values[name] * values[other]
         return values
+
+
+_HOOKS: dict[type[Mechanism], frozenset[str]] = {}  # what each class has of its own
+
+
+def _overridden(own: type[Mechanism]) -> frozenset[str]:
+    if own not in _HOOKS:
+        _HOOKS[own] = frozenset(name for name in dir(Mechanism) if getattr(own, name) is not getattr(Mechanism, name))
+    return _HOOKS[own]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from copy import copy
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -37,15 +38,18 @@ class Contacts:
     @classmethod
     def stacked(cls, parts: Sequence[Contacts], points: Sequence[int]) -> Contacts:
         """Contacts of the same structure at several sets of points, of so many each."""
+        if len(parts) == 1:
+            return parts[0]
         each = [part._differentiated() for part in parts]
         return parts[0]._with({name: stacked([own[name] for own in each], points) for name in each[0]})
 
     def _with(self, changed: dict[str, Any]) -> Contacts:
-        return replace(self, **changed)
+        other = copy(self)
+        vars(other).update(changed)
+        return other
 
     def _differentiated(self) -> dict[str, Differentiated]:
-        own = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {name: value for name, value in own.items() if isinstance(value, Differentiated)}
+        return {name: value for name, value in vars(self).items() if isinstance(value, Differentiated)}
 
     @property
     def reduced_modulus(self) -> Differentiated:

@@ -76,8 +76,8 @@ class FrfModel:
         """Which rows lie inside the table as declared."""
         return self._declared_inside(self._table)[self.design.point][self.recording]
 
-    def predict(self, fit: Floats) -> Prediction:
-        """The FRF on every row with its derivatives.
+    def predict(self, fit: Floats, *, slopes: bool = True) -> Prediction:
+        """The FRF on every row with its derivatives, those by the parameters on request.
 
         Parameters
         ----------
@@ -98,14 +98,14 @@ class FrfModel:
         if fit.ndim != 1:
             raise InvalidInput("fit", fit.shape, "must be one point: (parameters,)", code=ErrorCode.UNEQUAL_LENGTHS)
         own, _, _ = self._composition.values(fit)
-        response = self.respond(fit, place=True)
-        value, slopes = response.on_rows(self.design)
-        count = len(self.parameters)
+        response = self.respond(fit, slopes=slopes, place=True)
+        value, by_all = response.on_rows(self.design)
+        count = len(response.level.slopes)
         return Prediction(
             value=value,
-            slopes=slopes[:count],
-            position_slopes=slopes[count:],
-            pickup=None if self.pickup is None else self.pickup.deviation(_by_name(own)),
+            slopes=by_all[:count],
+            position_slopes=by_all[count:],
+            pickup=None if self.pickup is None else self.pickup.on_rows(self.pickup.deviation(_by_name(own))),
             pickup_rows=None if self.pickup is None else self.pickup.rows,
             inside=response.inside[self.recording],
         )

@@ -57,6 +57,7 @@ class FrfModels:
                 mechanisms[key].add(number, places)
             self._alike.setdefault(model.structure, []).append(number)
         self._mechanisms = sorted(mechanisms.values(), key=_place_in_order)
+        self._with_hook: dict[str, list[Acting]] = {}
 
     def respond(self, owner: Indices, fit: Floats, *, slopes: bool, place: bool, lines: bool = True) -> list[Part]:
         """The responses at points (points, parameters) of these models, in rising order of `owner`; each part holds
@@ -120,15 +121,15 @@ class FrfModels:
     def _acting(self, hook: str, points: Indices, seeds: Seeds) -> Iterator[tuple[Mechanism, Indices | None, Values]]:
         """The mechanisms with this hook: each with those among the points whose models have it, None where all have,
         and their values."""
+        if hook not in self._with_hook:
+            self._with_hook[hook] = [entry for entry in self._mechanisms if entry.on(hook)]
         owner = seeds.owner[points]
-        for entry in self._mechanisms:
-            if entry.on(hook):
-                has = entry.has[owner]
-                if has.all():
-                    yield entry.mechanism, None, entry.values(points, seeds)
-                elif has.any():
-                    some = np.flatnonzero(has)
-                    yield entry.mechanism, some, entry.values(points[some], seeds)
+        for entry in self._with_hook[hook]:
+            some = np.flatnonzero(entry.has[owner])
+            if len(some) == len(points):
+                yield entry.mechanism, None, entry.values(points, seeds)
+            elif len(some):
+                yield entry.mechanism, some, entry.values(points[some], seeds)
 
     def _level_and_inside(
         self, model: FrfModel, points: Indices, contacts: Contacts, seeds: Seeds

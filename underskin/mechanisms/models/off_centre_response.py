@@ -144,23 +144,16 @@ def _kept(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: f
 
 def _disc_averages(along: CubicBasis, offsets: Floats, rt_over_h: float) -> Floats:
     """The matrix (offsets, radii) that averages a profile given at its radii over the offset disc; 0 beyond them."""
+    from underskin.mechanisms.models.sigma_kernel import disc_averages
+
     x, weight = np.polynomial.legendre.leggauss(_RADIAL)
-    s = rt_over_h * (x + 1) / 2
-    weight = np.repeat(weight * (x + 1) / 2 / _ANGULAR, _ANGULAR)
-    angle = np.pi * (np.arange(_ANGULAR) + 0.5) / _ANGULAR
-    across = offsets[:, None, None]
-    distance = np.sqrt(across**2 + s[:, None] ** 2 + 2 * across * s[:, None] * np.cos(angle)).reshape(-1)
-    reached = distance <= along.nodes[-1]
-    first, functions, _ = along.weights(np.where(reached, distance, 0.0))
-    weights = np.where(reached, np.tile(weight, len(offsets)), 0.0)
-    # Sums over each disc of the four functions at each of its points.
-    count = len(along.nodes)
-    disc = np.repeat(np.arange(len(offsets)) * count, len(weight))
-    place = (disc + first)[:, None] + np.arange(4)
-    total: Floats = np.bincount(place.ravel(), (weights[:, None] * functions).ravel(), len(offsets) * count).astype(
-        float
+    radius = rt_over_h * (x + 1) / 2
+    cosine = np.cos(np.pi * (np.arange(_ANGULAR) + 0.5) / _ANGULAR)
+    total = np.zeros((len(offsets), len(along.nodes)))
+    disc_averages(
+        offsets, radius, weight * (x + 1) / 2 / _ANGULAR, cosine, along.nodes[-1], along.knots, along.cubics, total
     )
-    return total.reshape(len(offsets), -1) @ along.to_coefficients
+    return total @ along.to_coefficients
 
 
 def _panels(highest: float) -> int:

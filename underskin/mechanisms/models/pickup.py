@@ -8,15 +8,21 @@ import numpy as np
 from underskin.units import Floats, Indices
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pickup:
     """`deviation`: of real and of imaginary part on these rows [C/N], from the parameters by name in their units.
 
-    Parameters (…, 1) give (…, rows).
+    Parameters (…, 1) give (…, rows); where rows are `alike` (rows,), they give (…, distinct), of which each row has the
+    one named there.
     """
 
     rows: Indices
     deviation: Callable[[Mapping[str, Floats]], Floats]
+    alike: Indices | None = None
+
+    def on_rows(self, distinct: Floats) -> Floats:
+        """Deviations as `deviation` gives them (…, distinct), on the rows (…, rows)."""
+        return distinct if self.alike is None else distinct[..., self.alike]
 
 
 def together(pickups: Sequence[Pickup]) -> Pickup | None:
@@ -26,7 +32,7 @@ def together(pickups: Sequence[Pickup]) -> Pickup | None:
     rows = np.unique(np.concatenate([pickup.rows for pickup in pickups]))
 
     def deviation(values: Mapping[str, Floats]) -> Floats:
-        each = [(np.searchsorted(rows, pickup.rows), pickup.deviation(values)) for pickup in pickups]
+        each = [(np.searchsorted(rows, pickup.rows), pickup.on_rows(pickup.deviation(values))) for pickup in pickups]
         variance = np.zeros((*np.broadcast_shapes(*(sd.shape[:-1] for _, sd in each)), len(rows)))
         for places, sd in each:
             variance[..., places] += sd**2

@@ -235,3 +235,40 @@ def sphere_and_punch(k: Floats, panel: int, alpha: Floats, shapes: Floats) -> No
                 shapes[2, number, place] = 3 * (punch - sphere) / a
                 shapes[3, number, place] = (cosine - punch) / a
                 sine, cosine = sine * turn_cos + cosine * turn_sin, cosine * turn_cos - sine * turn_sin
+
+
+@compiled(f"void(float64[::1], float64[::1], float64[::1], float64[::1], float64, {_AXIS}, {_COLUMNS})")
+def disc_averages(
+    offsets: Floats,
+    radius: Floats,
+    weight: Floats,
+    cosine: Floats,
+    end: float,
+    knots: Floats,
+    cubics: Floats,
+    total: Floats,
+) -> None:
+    """Averages of a radial profile's basis functions over discs beside its centre, ∫ f(√(e² + s² + 2 e s cos φ)) dA/A.
+
+    Parameters
+    ----------
+    offsets
+        e of each disc.
+    radius, weight, cosine
+        s of the rings of a disc with the weight of each of their points, and cos φ of these.
+    end, knots, cubics
+        Of the profile; beyond its end it is 0.
+    total
+        (discs, functions), to which the averages are added.
+    """
+    functions = np.empty(8)
+    for disc in range(len(offsets)):
+        e = offsets[disc]
+        for ring in range(len(radius)):
+            s = radius[ring]
+            for turn in range(len(cosine)):
+                distance = np.sqrt(e * e + s * s + 2 * e * s * cosine[turn])
+                if distance <= end:
+                    first = four_functions(distance, 0.0, end, knots, cubics, functions)
+                    for number in range(4):
+                        total[disc, first + number] += weight[ring] * functions[number]

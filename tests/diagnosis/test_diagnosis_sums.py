@@ -1,0 +1,103 @@
+"""Compiled sums of a diagnosis against the plain formulas."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+from tests.support.diagnosis_campaigns import Made, design
+from underskin.diagnosis.data.dataset import lines
+from underskin.diagnosis.inference.frf_products import RowSums
+from underskin.diagnosis.inference.pickup_kernel import lost, slopes_lost
+from underskin.diagnosis.noise.noise_priors import level_prior
+from underskin.diagnosis.noise.roughness_kernel import roughness_cost
+from underskin.diagnosis.selection.process_kernel import at_best_level
+from underskin.mechanisms.models.frf_design import frf_design
+
+
+@pytest.mark.parametrize(
+    "made", [Made(lines=5), Made(lines=400, sensors=6, preloads_n=(0.5, 2.0), spheres_mm=(4.0,))], ids=["few", "many"]
+)
+def test_sums_over_rows_are_those_of_each_recordings_lines(made: Made) -> None:
+    """By a sparse matrix, and by dense blocks of each contact."""
+    random = np.random.default_rng(1)
+    rows = lines(design(made))
+    layout = frf_design(rows.campaign, (), neighbours=False)
+    weight, values = random.normal(size=len(rows.value)), random.normal(size=(2, 3, len(layout.line_frequency)))
+    found = RowSums(weight, rows, layout)(values)
+    assert found.shape == (2, 3, rows.recordings)
+    expected = np.add.reduceat(weight * values[..., layout.line], rows.first, axis=-1)
+    assert found == pytest.approx(expected, rel=1e-10, abs=1e-10)
+
+
+def test_what_pick_up_takes_is_the_difference_of_the_weights() -> None:
+    random = np.random.default_rng(2)
+    points, sets, rows, recordings, of_lines, distinct = 2, 3, 40, 4, 7, 5
+    alike, line = random.integers(0, distinct, rows), random.integers(0, of_lines, rows)
+    recording = np.sort(random.integers(0, recordings, rows))
+    precision = random.uniform(0.5, 2.0, rows)
+    y = random.normal(size=rows) + 1j * random.normal(size=rows)
+    u = random.normal(size=(points, of_lines)) + 1j * random.normal(size=(points, of_lines))
+    v = random.normal(size=(points, 2, of_lines)) + 1j * random.normal(size=(points, 2, of_lines))
+    v[:, 1] *= np.array([0.0, 1.0])[:, None]  # the first point's direction does not change with the second parameter
+    square = random.exponential(size=(points, distinct, sets)) ** 4
+    square[:, 0] = 0.0
+    sums = [np.zeros((points, sets, recordings)) for _ in range(3)]
+    determinant = np.zeros((points, sets))
+    lost(square, alike, precision, recording, y, line, u, *sums, determinant)
+    taken = precision[:, None] - 1 / (1 / precision[:, None] + square[:, alike])  # (points, rows, sets)
+    on_rows, v_rows, each = u[:, line], v[..., line], np.eye(recordings)[recording]
+
+    def summed(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
+        return np.asarray(-(values * weight) @ each)
+
+    expected = np.abs(on_rows) ** 2, (on_rows.conj() * y).real, np.abs(y) ** 2 * np.ones((points, 1))
+    for found, values in zip(sums, expected, strict=True):
+        assert found == pytest.approx(summed(values[:, None], np.moveaxis(taken, 1, 2)))
+    assert determinant == pytest.approx(2 * np.log1p(square[:, alike] * precision[:, None]).sum(axis=1))
+
+    uv, vy, vv = (
+        np.zeros((points, recordings, 2)),
+        np.zeros((points, recordings, 2)),
+        np.zeros((points, recordings, 2, 2)),
+    )
+    slopes_lost(np.ascontiguousarray(square[..., 0]), alike, precision, recording, y, line, u, v, uv, vy, vv)
+    first = taken[:, None, :, 0]
+    assert np.swapaxes(uv, 1, 2) == pytest.approx(summed((on_rows.conj()[:, None] * v_rows).real, first))
+    assert np.swapaxes(vy, 1, 2) == pytest.approx(summed((v_rows.conj() * y).real, first))
+    products = (v_rows.conj()[:, :, None] * v_rows[:, None]).real
+    assert np.moveaxis(vv, 1, -1) == pytest.approx(summed(products, first[:, None]))
+
+
+def test_the_roughness_of_lines_has_students_likelihood() -> None:
+    random = np.random.default_rng(3)
+    variance, middle = random.uniform(0.5, 2.0, 30), np.arange(1, 29)
+    share, rough, freedom = random.uniform(0.2, 0.8, 28), random.exponential(size=28), 6.0
+
+    def cost(d2: np.ndarray) -> float:
+        v = d2[middle] + share**2 * d2[middle - 1] + (1 - share) ** 2 * d2[middle + 1]
+        return float(np.log(v).sum() + (freedom / 2 + 1) * np.log1p(2 * rough / v / freedom).sum())
+
+    by_variance = np.zeros(30)
+    assert roughness_cost(variance, middle, share, rough, freedom, by_variance) == pytest.approx(cost(variance))
+    step = 1e-6 * np.eye(30)
+    slopes = [(cost(variance + one) - cost(variance - one)) / 2e-6 for one in step]
+    assert by_variance == pytest.approx(np.array(slopes), rel=1e-6, abs=1e-7)
+
+
+def test_a_process_along_frequency_is_weighed_at_the_best_level_of_the_noise() -> None:
+    random = np.random.default_rng(4)
+    eigenvalues = random.exponential(300.0, 12)
+    squares = eigenvalues * random.exponential(20.0, 12)  # less than χ² allows
+    chi2, freedom, prior, amplitudes = 900.0, 600.0, level_prior(0.1), np.array([0.0, 0.05, 0.5])
+    found = np.empty(3)
+    at_best_level(chi2, freedom, np.array(prior.row), eigenvalues, squares, amplitudes, found)
+    for amplitude, value in zip(amplitudes, found, strict=True):
+
+        def cost(level: float, a2: float = float(amplitude) ** 2) -> float:
+            k2 = np.exp(2 * level)
+            inner = 1 + a2 * eigenvalues / k2
+            left = 0.5 * (chi2 / k2 - (a2 * squares / inner).sum() / k2**2)
+            return float(left + freedom * level + np.log(inner).sum() - prior.log_density(level))
+
+        best = minimize_scalar(cost, bounds=(-1.0, 5.0), method="bounded", options={"xatol": 1e-9})
+        assert value == pytest.approx(-float(best.fun), abs=2e-3)
