@@ -215,6 +215,29 @@ def test_plain_least_squares_leaves_what_scipy_leaves(table: SigmaTable) -> None
 
 
 @pytest.mark.slow
+def test_a_drift_as_large_as_the_force_is_told_by_the_samples_in_the_air(table: SigmaTable) -> None:
+    """A slow curve runs off by nearly its own force, a fast one hardly; both show it before contact."""
+    random = np.random.default_rng(6)
+    depth = np.concatenate([np.linspace(-0.2, 0.2, 400), np.linspace(0.2, -0.2, 400)])
+    hertz = 16 / 9 * 2.0 * np.sqrt(5.0) * np.maximum(depth, 0) ** 1.5
+    recordings = []
+    for number, (seconds, share) in enumerate(((10.0, 0.05), (200.0, 0.9))):
+        time = np.linspace(0, seconds, len(depth))
+        noise = random.normal(0, 1e-3 * hertz.max(), len(depth))
+        force = hertz + share * hertz.max() * time / seconds + noise
+        seen = course(depth, force, time)
+        assert seen.drift == pytest.approx(share * hertz.max() / seconds, rel=0.1)
+        assert depth[seen.air[-1]] == pytest.approx(0.0, abs=0.02)
+        curve = {"displacement_mm": depth.tolist(), "force_n": force.tolist(), "time_s": time.tolist()}
+        recordings.append({"id": f"c{number}", "kind": "indentation", "indenter_radius_mm": 5.0, **curve})
+    skin = {"thickness_mm": 80.0, "youngs_modulus_mpa": 2.0, "poisson_ratio": 0.5}
+    report = diagnosis_report(
+        parse({"schema": "campaign/1", "name": "drift", "skin": skin, "recordings": recordings}), table
+    )
+    assert (report["verdict"], report["probability"] > 0.95) == ("no_mismatch", True)
+
+
+@pytest.mark.slow
 def test_a_drift_in_time_is_no_mismatch_where_the_file_has_no_times(table: SigmaTable) -> None:
     """Way in, hold and way back at a steady rate; the zero runs off by 3 % of the largest force."""
     random = np.random.default_rng(5)

@@ -15,6 +15,10 @@ _BLOCKS = 60  # of a curve, over whose means jumps are sought
 _AIR = 5  # samples at least that tell what the cell shows in the air
 _BEYOND_JUMP, _LEAST_JUMP = 6.0, 2e-3  # standard deviations, and of the range of force, of a jump of contact
 _HELD = 0.2  # of the usual step between samples, below which a sphere is held
+_FITTED, _LEAST_FITTED = 200, 40  # samples that tell a drift in the air
+_LEAST_AIR = 0.1  # of the samples of the way in
+_PLAIN = 60.0  # F of a drift, beyond which it is plain
+_STRAIGHT = 1.5  # times the noise: samples about the line of a drift
 _RISE = 0.02  # of the range of force: below that a sphere has not yet pressed
 
 
@@ -32,6 +36,7 @@ class Course:
     pull_off: int | None
     air: Indices
     zero: float  # what the cell shows in the air, or at the first sample
+    drift: float  # of the force in the air in time, where it is plain; else 0
 
     @property
     def has_air(self) -> bool:
@@ -39,8 +44,9 @@ class Course:
         return len(self.air) >= _AIR
 
 
-def course(displacement: Floats, force: Floats) -> Course:
-    """Of samples (samples,), all finite."""
+def course(displacement: Floats, force: Floats, time: Floats | None = None) -> Course:
+    """Of samples (samples,), all finite; without times they were taken at a steady rate."""
+    time = np.arange(float(len(force))) if time is None else time
     noise = roughness(force)
     block = int(np.ceil(len(force) / _BLOCKS))
     turn = int(np.argmax(displacement))
@@ -61,9 +67,10 @@ def course(displacement: Floats, force: Floats) -> Course:
     steps = np.abs(np.diff(displacement[turn:], append=-np.inf))
     still = steps <= _HELD * float(np.median(np.abs(np.diff(displacement)))) + 1e-300
     leave = turn + int(np.argmin(still))
-    air = _air(force, turn, snap_in, pull_off, noise, span)
+    drifting = None if snap_in is not None else _drifting_air(displacement, force, time, turn + 1, noise)
+    air = _air(force, turn, snap_in, pull_off, noise, span) if drifting is None else np.arange(drifting[0])
     zero = float(np.median(force[air])) if len(air) >= _AIR else float(force[0])
-    return Course(noise, turn, leave, snap_in, pull_off, air, zero)
+    return Course(noise, turn, leave, snap_in, pull_off, air, zero, 0.0 if drifting is None else drifting[1])
 
 
 def roughness(force: Floats) -> float:
@@ -115,3 +122,31 @@ def _air(force: Floats, turn: int, snap_in: int | None, pull_off: int | None, no
     if first >= _AIR:
         return np.arange(first)
     return np.arange(pull_off, len(force)) if pull_off is not None else np.zeros(0, dtype=np.intp)
+
+
+def _drifting_air(
+    displacement: Floats, force: Floats, time: Floats, count: int, noise: float
+) -> tuple[int, float] | None:
+    """How many of the first `count` samples, the way in, lie before contact, and the drift of the force in time; None
+    where it does not plainly drift.
+
+    F = b + s t + k (d − d0)^(3/2) by least squares with and without the drift s over a grid of contact points d0; the
+    samples in the air must lie on a straight line.
+    """
+    at = np.linspace(0, count - 1, min(count, _FITTED)).round().astype(int)
+    if len(at) < _LEAST_FITTED or not np.ptp(time) > 0:
+        return None
+    left = np.full((2, len(at)), np.inf)  # without and with the drift, for contact at each of the samples
+    for place in range(0, len(at) - _LEAST_FITTED // 2, 2):
+        hertz = np.maximum(displacement[at] - displacement[at[place]], 0.0) ** 1.5
+        design = np.column_stack([hertz, np.ones(len(at)), (time[at] - time[0]) / np.ptp(time)])
+        for drifts, columns in enumerate((design[:, :2], design)):
+            residual = force[at] - columns @ np.linalg.lstsq(columns, force[at], rcond=None)[0]
+            left[drifts, place] = residual @ residual
+    steady, drifting = left.min(axis=1)
+    first = int(at[left[1].argmin()])
+    if first < _LEAST_AIR * count or steady < (1 + _PLAIN / len(at)) * drifting:
+        return None
+    line = np.polyfit(time[:first], force[:first], 1)
+    about = float(np.std(force[:first] - np.polyval(line, time[:first])))
+    return (first, float(line[0])) if about < _STRAIGHT * noise else None

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.noise.correlated_error import CurveError, instrument_columns
+from underskin.diagnosis.noise.correlated_error import USUAL_DRIFT, CurveError, instrument_columns
 from underskin.diagnosis.noise.line_noise import LineNoise
 from underskin.mechanisms.base import Kind
 from underskin.recordings.campaign import Campaign, CurveRecording
@@ -31,6 +31,7 @@ _NEAR_JUMP = np.array([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])  # samples 
 _BESIDE = 5  # samples on either side of the deepest one
 _STEP, _RESTS = 0.2, 1e-3  # of the usual step: the smaller way's, and that between samples at which a sphere rests
 _IN_THE_AIR, _AT_CONTACT = 0.2, 0.7  # of the largest force, what the smooth error counts where there is less
+_SURE = 4.0  # standard deviations
 _FEW_FOR_ZERO = 0.01  # of the largest force: how well a cell's zero is known that no sample shows
 
 
@@ -44,7 +45,7 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         columns = finite_samples(entry)
         if len(columns[0]) < _LEAST_SAMPLES:
             continue
-        seen = course(columns[0], columns[1])
+        seen = course(*columns)
         force_zero = seen.zero if kind == "indentation" else 0.0
         columns[1] = columns[1] - force_zero
         thinned, deviation, way, counts = _thinned(_with_corner(columns, seen.turn), seen)
@@ -56,7 +57,8 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         entries.append(replace(entry, displacement_mm=displacement, force_n=force, time_s=time))
         forces.append(force)
         deviations.append(deviation)
-        errors.append(_error(kind, seen, displacement, force, time, way, counts))
+        drift = _drift_in_air(seen, columns[1], columns[2] if len(columns) > 2 else None)
+        errors.append(_error(kind, seen, displacement, force, time, way, counts, drift))
         span = float(np.ptp(displacement)) or 1.0
         places.append(_PLACE[0] + (_PLACE[1] - _PLACE[0]) * (displacement - displacement.min()) / span)
     value = _joined(forces)
@@ -200,10 +202,33 @@ def _around(seen: Course, count: int) -> Indices:
     return np.unique(near[(near >= 0) & (near < count)])
 
 
+def _drift_in_air(seen: Course, force: Floats, time: Floats | None) -> float:
+    """How far [N] the cell runs off over the whole curve if it goes on as in the air; 0 where noise explains that.
+
+    Without times, samples are taken at a steady rate.
+    """
+    if not seen.has_air:
+        return 0.0
+    along = np.arange(float(len(force))) if time is None else time
+    air = along[seen.air] - along[seen.air].mean()
+    square = float(air @ air)
+    if not square > 0:
+        return 0.0
+    slope = abs(float(air @ force[seen.air])) / square
+    return slope * float(np.ptp(along)) if slope > _SURE * seen.noise / np.sqrt(square) else 0.0
+
+
 def _error(
-    kind: Kind, seen: Course, displacement: Floats, force: Floats, time: Floats | None, way: Floats, counts: Floats
+    kind: Kind,
+    seen: Course,
+    displacement: Floats,
+    force: Floats,
+    time: Floats | None,
+    way: Floats,
+    counts: Floats,
+    drift: float,
 ) -> CurveError:
-    """What the samples of one curve share."""
+    """What the samples of one curve share; `drift` [N] is what the air shows."""
     largest = float(np.abs(force).max()) or 1.0
     noise = np.full(len(force), seen.noise)
     if kind == "compression":
@@ -215,7 +240,8 @@ def _error(
     zero = largest if seen.has_air else _FEW_FOR_ZERO * largest
     # Without times, samples are taken at a steady rate: an hour's drift follows their order, not the travel.
     order = np.cumsum(counts) - counts / 2
-    columns = instrument_columns(displacement, order if time is None else time, zero, largest, drifts=seen.has_air)
+    size = max(USUAL_DRIFT * largest, drift) if seen.has_air else 0.0
+    columns = instrument_columns(displacement, order if time is None else time, zero, size)
     return CurveError(scale, way, columns, counts, noise)
 
 

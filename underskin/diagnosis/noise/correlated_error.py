@@ -3,8 +3,8 @@
 A cell shows its zero F0 and a drift b in time (without times, in the order of the samples) or along the travel beside
 the force (its gain is the recording's, as of FRFs): columns P with normal coefficients, whose scale is the prior's
 standard deviation. Where samples in the air show the zero, F0 is as good as free; else a tared cell is within a
-hundredth of what it measures. The drift over the curve is 2 % of the largest force, and none is looked for where no air
-shows it.
+hundredth of what it measures. The drift over the curve is 2 % of the largest force, or as much as samples in the air
+show where that is more, and none is looked for where no air shows it.
 
 The position of the surface, friction in a stage and the idealisation of every law bend a curve a little. Neighbouring
 samples share that error too. Within each curve, with s the force (or, near the contact's beginning and in the air, 0.7
@@ -31,7 +31,7 @@ USUAL = Plateau.of((1e-3, 1e-2), (1.0, 0.25))
 UNNAMED = Plateau.of((2e-2, 0.5), (0.05, 0.05))
 TYPICAL = 3e-3
 _LENGTHS = (0.025, 0.1, 0.4)
-_DRIFT = 0.02  # of the largest force, over the curve
+USUAL_DRIFT = 0.02  # of the largest force, over the curve
 _COLUMNS = 3
 
 
@@ -65,14 +65,13 @@ class CurveError:
         return np.asarray(size**2 * np.outer(self.scale, self.scale) * _likeness(self.place))
 
 
-def instrument_columns(displacement: Floats, time: Floats, zero: float, largest: float, *, drifts: bool) -> Floats:
-    """P of one curve (rows, 3): zero, drift in time, drift along the travel."""
+def instrument_columns(displacement: Floats, time: Floats, zero: float, drift: float) -> Floats:
+    """P of one curve (rows, 3): zero, drift in time, drift along the travel; `zero` and `drift` are deviations [N]."""
     columns = np.zeros((len(displacement), _COLUMNS))
     columns[:, 0] = zero
-    if drifts:
-        for place, axis in ((1, time), (2, displacement)):
-            if np.ptp(axis) > 0:
-                columns[:, place] = _DRIFT * largest * ((axis - axis[0]) / np.ptp(axis))
+    for place, axis in ((1, time), (2, displacement)):
+        if np.ptp(axis) > 0:
+            columns[:, place] = drift * ((axis - axis[0]) / np.ptp(axis))
     return columns
 
 

@@ -17,7 +17,7 @@ from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Mechanism, Parameter, Values
 from underskin.mechanisms.models.creeping_contact import Adhesion, Path, relaxing, relaxing_on_stage
 from underskin.mechanisms.models.curve_state import Curve, numbers
-from underskin.mechanisms.models.curves import CurveModel, declared_modulus
+from underskin.mechanisms.models.curves import CurveModel, declared_modulus, times_of
 from underskin.mechanisms.models.nuisances import THICKNESS, contact_point, modulus_parameter, required_modulus
 from underskin.mechanisms.models.sphere_contact import (
     Layers,
@@ -152,15 +152,16 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
         span = float(np.ptp(to_si("displacement_mm", entry.displacement_mm)))
         begins = 0.0
         if isinstance(entry, IndentationRecording):
-            columns = [np.asarray(column, dtype=float).tobytes() for column in (entry.displacement_mm, entry.force_n)]
-            seen = course(entry.displacement_mm, entry.force_n)
+            seen = course(entry.displacement_mm, entry.force_n, entry.time_s)
+            force = entry.force_n - seen.drift * times_of(entry)
+            columns = [np.asarray(column, dtype=float).tobytes() for column in (entry.displacement_mm, force)]
             try:
                 modulus, begins = _hertz(*columns, entry.indenter_radius_mm, skin.poisson_ratio)
                 estimates.append(modulus)
             except InvalidInput as refusal:
                 refused = refusal.at(f"recordings[{entry.id}].{refusal.field}")
                 # A curve that does not load begins where it shows least force.
-                begins = float(to_si("displacement_mm", entry.displacement_mm[int(np.abs(entry.force_n).argmin())]))
+                begins = float(to_si("displacement_mm", entry.displacement_mm[int(np.abs(force).argmin())]))
             if seen.snap_in is not None:
                 begins = float(to_si("displacement_mm", entry.displacement_mm[max(seen.snap_in - 1, 0)]))
             if refused is not None and span == 0:
