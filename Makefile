@@ -7,6 +7,9 @@ TESTS  ?= tests
 # From Debian: the proxy with TLS, its certificate, and what runs the examples.
 TEST_PACKAGES = nginx openssl octave curl postgresql chromium
 
+# What `make bench` measures against and `.venv` does not hold: each in an environment of its own.
+PEERS = tesseract nanite
+
 # Two processes; the tests of one file stay in one of them, since they share servers.
 PYTEST = $(PYTHON) -m pytest --numprocesses 2 --dist loadfile
 
@@ -63,7 +66,7 @@ mechanisms: $(VENV)/.dev ## regenerate docs/mechanisms.md and its figures
 proof: $(VENV)/.dev ## judge the diagnosis on concealed campaigns and real recordings (hours; resumes)
 	$(VENV)/bin/underskin prove
 
-bench: $(VENV)/.dev $(VENV)-tesseract/.installed ## measure speed, as ratios against peers in the same run
+bench: $(VENV)/.dev $(PEERS:%=$(VENV)-%/.installed) ## measure speed, as ratios against peers in the same run
 	@scripts/system-packages.sh wrk chromium
 	$(PYTHON) -m bench
 
@@ -71,7 +74,7 @@ lock: $(VENV)/.dev ## resolve pyproject.toml into the lock files
 	scripts/lock.sh $(PYTHON)
 
 clean: ## remove the environment and all caches
-	rm -rf $(VENV) $(VENV)-tesseract build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(PEERS:%=$(VENV)-%) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 $(VENV)/.created: scripts/make-venv.sh
@@ -91,8 +94,8 @@ $(VENV)/.dev: $(VENV)/.runtime requirements-dev.lock
 	@$(PIP_INSTALL) --require-hashes -r requirements-dev.lock
 	@touch $@
 
-$(VENV)-tesseract/.installed: requirements-tesseract.lock
-	@scripts/make-venv.sh $(VENV)-tesseract
-	@echo "Installing Tesseract Core, a peer to measure against, into $(VENV)-tesseract ..."
-	@$(VENV)-tesseract/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $<
+$(VENV)-%/.installed: requirements-%.lock
+	@scripts/make-venv.sh $(VENV)-$*
+	@echo "Installing $*, a peer to measure against, into $(VENV)-$* ..."
+	@$(VENV)-$*/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $<
 	@touch $@

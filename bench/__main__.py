@@ -10,6 +10,7 @@ from pathlib import Path
 from bench import (
     accuracy,
     batch,
+    curves,
     diagnosis,
     mechanisms,
     nested,
@@ -32,6 +33,7 @@ PARTS = {
     "accuracy": accuracy.measure,
     "mechanisms": mechanisms.measure,
     "diagnosis": diagnosis.measure,
+    "curves": curves.measure,
     "nested": nested.measure,
     "store": store.measure,
     "pages": pages.measure,

@@ -1,10 +1,11 @@
-"""A whole diagnosis of a campaign of 100 recordings × 60 lines: processor time on one core, and memory."""
+"""A whole diagnosis of campaigns of the virtual rig: processor time on one core, and memory."""
 
 import json
 import os
 import subprocess
 import sys
 from statistics import median
+from typing import Any
 
 from bench.diagnosed import Effects
 from bench.figures import Figure
@@ -18,16 +19,17 @@ CASES: dict[str, tuple[Effects, float]] = {  # what is hidden, and the scatter o
 }
 PRELOADS_N = (0.3, 0.5, 0.7, 1, 1.3, 1.6, 2, 2.3, 2.6, 3)
 ROUNDS = 3
+_MEMORY = 400.0  # MB
+_SMALL: dict[str, Any] = {"columns": 5, "preloads_n": PRELOADS_N, "lines": 60}
+_LARGE: dict[str, Any] = {"columns": 41, "preloads_n": (0.3, 0.6, 1, 1.4, 1.8, 2.2, 2.6, 3), "lines": 400}
 _ONE = """
 import json, resource, sys, time
 from bench.diagnosed import recorded
-from bench.diagnosis import PRELOADS_N
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.surrogate.sigma_table import load_table
 
-effects, position_mm = json.loads(sys.argv[1])
-hidden = recorded(effects, columns=5, preloads_n=PRELOADS_N, lines=60, position_mm=position_mm)
-assert len(hidden.recordings) == 100
+effects, design = json.loads(sys.argv[1])
+hidden = recorded(effects, **design)
 start = time.process_time()
 verdict = diagnosis_report(hidden, load_table())["verdict"]
 print(time.process_time() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3, verdict)
@@ -36,20 +38,30 @@ print(time.process_time() - start, resource.getrusage(resource.RUSAGE_SELF).ru_m
 
 def measure() -> list[Figure]:
     """Seconds of processor time and peak memory of a process that diagnoses once, for each campaign."""
-    figures, memory = [], []
+    figures, memory = [], 0.0
     for name, (effects, position_mm) in CASES.items():
-        times = []
-        for _ in range(ROUNDS):
-            seconds, peak = _diagnosed(effects, position_mm)
-            times.append(seconds)
-            memory.append(peak)
-        figures.append(Figure(f"100 recordings × 60 lines, {name}", median(times), "s", 5.0, "lower"))
-    return [*figures, Figure("Peak memory of the process", max(memory), "MB", 500.0, "lower")]
+        seconds, peak = _diagnosed(effects, {**_SMALL, "position_mm": position_mm})
+        figures.append(Figure(f"100 recordings × 60 lines, {name}", seconds, "s", 5.0, "lower"))
+        memory = max(memory, peak)
+    figures.append(Figure("Peak memory of the process", memory, "MB", _MEMORY, "lower"))
+    effects, _ = CASES["one mechanism"]
+    seconds, peak = _diagnosed(effects, _LARGE)
+    return [
+        *figures,
+        Figure("656 recordings × 400 lines, one mechanism", seconds, "s", 4.0, "lower"),
+        Figure("656 recordings × 400 lines, peak memory of the process", peak, "MB", _MEMORY, "lower"),
+    ]
 
 
-def _diagnosed(effects: Effects, position_mm: float) -> tuple[float, float]:
+def _diagnosed(effects: Effects, design: dict[str, Any]) -> tuple[float, float]:
+    """Median seconds and the largest peak memory [MB] over the rounds."""
+    seconds, memory = zip(*(_once(effects, design) for _ in range(ROUNDS)), strict=True)
+    return median(seconds), max(memory)
+
+
+def _once(effects: Effects, design: dict[str, Any]) -> tuple[float, float]:
     run = subprocess.run(
-        [sys.executable, "-c", _ONE, json.dumps([effects, position_mm])],
+        [sys.executable, "-c", _ONE, json.dumps([effects, design])],
         env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
         check=True,
         capture_output=True,

@@ -30,6 +30,7 @@ _SECTIONS = {
     "pages": "Pages",
     "mechanisms": "Predictions of composed mechanisms",
     "diagnosis": "A whole diagnosis",
+    "curves": "Curves of spheres",
     "nested": "Evidences against nested sampling",
 }
 
@@ -48,6 +49,12 @@ server and Tesseract Core's runtime, each serving the same spline.""",
 server, over HTTP on one machine, the median of nine after the first; weight as sent, without plotly's script. The
 main thread is Chromium's, from the start of the page on, with plotly's script in its cache.""",
     "diagnosis": "Campaigns of the virtual rig; each diagnosis in a fresh process with one BLAS thread.",
+    "curves": """Ratios are of the root mean squares that plain least squares leave of one curve alone, the modulus, the
+contact point and the force's zero free: the diagnosis' own fit, by which it states `fit.before.rmse_percent`, beside
+SciPy's `least_squares` from several starts, with Hertz' and Johnson, Kendall and Roberts' laws written out in
+`bench/curve_peers.py`, and beside nanite's `hertz_paraboloidal` under lmfit. Real curves are those of the folder that
+`UNDERSKIN_RECORDINGS` names, spheres that stick those of `UNDERSKIN_CAMPAIGNS`. Times are of the processor, of a whole
+diagnosis in a fresh process with one BLAS thread, the median of three.""",
     "nested": """Nothing and three single mechanisms on campaigns of 24 recordings × 20 lines of the virtual rig: the
 diagnosis' fits from many starts and Laplace's method, against dynesty with its own defaults. Both call the same code
 for a likelihood, with the same priors and noise. Differences are of all hypotheses within 10 nats of the winner.""",

@@ -15,5 +15,7 @@ compile() { # OUTPUT ARGUMENT...
 compile requirements.lock pyproject.toml --extra server --extra fem --group build
 # The same versions, and everything that tests, checks, documents and measures.
 compile requirements-dev.lock pyproject.toml --all-extras --group build --constraint requirements.lock
-# A peer of `make bench` that caps versions we are past: it gets an environment of its own.
-compile requirements-tesseract.lock --group tesseract
+# Peers of `make bench`, each in an environment of its own.
+for peer in tesseract nanite; do
+    compile "requirements-$peer.lock" --group "$peer"
+done

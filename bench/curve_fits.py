@@ -1,0 +1,128 @@
+"""How far the diagnosis' plain least squares of one curve lie beside those of others."""
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.curve_peers import Curve, hertz_left, jkr_left, nanite_left
+from bench.figures import Figure
+from proof.real import recorded
+from underskin.diagnosis.data.curve_samples import curve_lines, finite_samples
+from underskin.diagnosis.inference.explanation import FittingProblem, Request
+from underskin.diagnosis.inference.least_squares import least_squares_percent
+from underskin.recordings.campaign import IndentationRecording, parse
+from underskin.recordings.curve_course import course
+from underskin.surrogate.sigma_table import SigmaTable, load_table
+
+_LARGEST, _SMALLEST = 1.02, 0.98
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What our least squares leave of one curve."""
+
+    percent: float  # root mean square over all raw samples, of the force's
+    left: float  # [N²], weighted, of the means over samples
+    thinned: Curve  # these means
+    raw: Curve
+    size: float  # [N²], the sum of squares of the raw force about its zero
+
+
+def real_campaigns() -> dict[str, dict[str, Any]]:
+    """The campaigns of real indentations (`campaign/1`), where their folder is named."""
+    folder = os.environ.get("UNDERSKIN_RECORDINGS")
+    made = {entry.name: entry.make(Path(folder)) for entry in recorded()} if folder else {}
+    return {name: document for name, document in made.items() if _indents(document)}
+
+
+def accuracy() -> list[Figure]:
+    """Ratios of what is left, over the curves of all campaigns that are there."""
+    table = load_table()
+    return [*_of_hertz(table), *_of_jkr(table)]
+
+
+def _of_hertz(table: SigmaTable) -> list[Figure]:
+    ours = [fitted(one, (), table) for document in real_campaigns().values() for one in _each(document)]
+    if not ours:
+        return []
+    scipy = np.array([hertz_left(entry.thinned) for entry in ours])
+    raw = np.array([100 * np.sqrt(hertz_left(entry.raw) / entry.size) for entry in ours])
+    nanite = np.array(nanite_left([entry.thinned for entry in ours]))
+    means = np.sqrt(np.array([entry.left for entry in ours]) / scipy)
+    whole = np.array([entry.percent for entry in ours]) / raw
+    beside = np.sqrt(nanite / scipy)
+    name = f"{len(ours)} real curves, Hertz"
+    return [
+        Figure(f"{name}: ours over SciPy's, same means over samples, largest", means.max(), "×", _LARGEST, "lower"),
+        Figure(f"{name}: nanite's over SciPy's, same means over samples, largest", beside.max(), "×"),
+        Figure(f"{name}: ours over SciPy's on all raw samples, largest", whole.max(), "×", _LARGEST, "lower"),
+        Figure(f"{name}: ours over SciPy's on all raw samples, smallest", whole.min(), "×", _SMALLEST),
+    ]
+
+
+def _of_jkr(table: SigmaTable) -> list[Figure]:
+    ours = [fitted(_way_in(one), ("adhesion",), table) for document in _sticking() for one in _each(document)]
+    if not ours:
+        return []
+    ratios = np.sqrt([entry.left / jkr_left(entry.thinned) for entry in ours])
+    name = f"{len(ours)} ways in of a sphere that sticks, JKR"
+    return [
+        Figure(f"{name}: ours over SciPy's, same means over samples, largest", ratios.max(), "×", _LARGEST, "lower")
+    ]
+
+
+def fitted(document: Mapping[str, Any], names: tuple[str, ...], table: SigmaTable) -> Fitted:
+    """Our least squares of one curve under a set of mechanisms."""
+    campaign = parse(dict(document))
+    lines = curve_lines(campaign, "indentation")
+    (entry,) = campaign.recordings
+    (means,) = lines.campaign.recordings
+    assert isinstance(entry, IndentationRecording)
+    assert isinstance(means, IndentationRecording)
+    assert lines.smooth is not None
+    (explanation,) = FittingProblem(lines, table).explain([Request(names)])
+    assert explanation is not None
+    percent = least_squares_percent(explanation.best.hypothesis, explanation.point.fit)
+    count, measured = lines.smooth.count, lines.value.real
+    within = float(((count - 1) * lines.smooth.noise**2).sum())
+    left = (percent / 100) ** 2 * float((count * measured**2).sum()) - within
+    displacement, force = finite_samples(entry)[:2]
+    about_zero = force - course(displacement, force).zero
+    radius, poisson = 1e-3 * entry.indenter_radius_mm, campaign.skin.poisson_ratio
+    thinned = Curve(radius, poisson, 1e-3 * means.displacement_mm, measured, count)
+    raw = Curve(radius, poisson, 1e-3 * displacement, about_zero, np.ones(len(force)))
+    return Fitted(percent, left, thinned, raw, float((about_zero**2).sum()))
+
+
+def _indents(document: Mapping[str, Any]) -> bool:
+    return all(entry.get("kind") == "indentation" for entry in document["recordings"])
+
+
+def _each(document: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """A campaign of each recording alone, with the modulus free."""
+    skin = {**document["skin"], "youngs_modulus_mpa": None}
+    for entry in document["recordings"]:
+        yield {**document, "skin": skin, "recordings": [entry]}
+
+
+def _sticking() -> list[dict[str, Any]]:
+    """The open campaigns of curves that hide adhesion alone, where their folder is named."""
+    folder = os.environ.get("UNDERSKIN_CAMPAIGNS")
+    if not folder:
+        return []
+    truth = json.loads((Path(folder) / "curves-open-truth.json").read_text(encoding="utf-8"))
+    files = [Path(folder) / "curves-open" / f"{name}.json" for name in truth if truth[name]["effects"] == ["adhesion"]]
+    return [json.loads(file.read_text(encoding="utf-8")) for file in files]
+
+
+def _way_in(document: dict[str, Any]) -> dict[str, Any]:
+    """With the samples up to the deepest one alone."""
+    (entry,) = document["recordings"]
+    last = int(np.argmax(entry["displacement_mm"])) + 1
+    columns = {name: values[:last] for name, values in entry.items() if isinstance(values, list)}
+    return {**document, "recordings": [entry | columns]}
