@@ -6,6 +6,8 @@ with the fit, do not. Where a sphere snaps in, the force jumps at the contact po
 there: the curve is fitted again between those samples where it fits best.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -83,18 +85,10 @@ class LeastSquares:
         count = len(low)
         gains = np.full(len(start) - count, 0.5)
         margin = _INSIDE * (high - low)
-        result = least_squares(
-            self._residuals,
-            np.append(np.clip(start[:count], low + margin, high - margin), start[count:]),
-            self._jacobian,
-            bounds=(np.append(low, -gains), np.append(high, gains)),
-            x_scale="jac",
-            ftol=_TOLERANCE,
-            xtol=_TOLERANCE,
-            gtol=1e-12,
-            max_nfev=_EVALUATIONS,
-        )
-        return np.asarray(result.x), float(result.cost)
+        begin = np.append(np.clip(start[:count], low + margin, high - margin), start[count:])
+        bounds = np.append(low, -gains), np.append(high, gains)
+        unit = np.append(_units(self._model, self._precision), np.ones(len(gains)))
+        return _solved(self._residuals, self._jacobian, begin, bounds, unit)
 
     def _residuals(self, x: Floats) -> Floats:
         count = len(self._low)
@@ -148,16 +142,47 @@ def least_squares_percent(hypothesis: Hypothesis, start: Floats) -> float:
     unit = float(np.sqrt((about_zero(measured) ** 2).sum()))
     low, high = np.array([entry.bounds for entry in model.parameters]).T
     margin = _INSIDE * (high - low)
+    begin = np.clip(start, low + margin, high - margin)
+    precision = np.sqrt([curvature_of_prior(entry)[0] for entry in model.parameters])
+    _, cost = _solved(residuals, jacobian, begin, (low, high), _units(model, precision))
+    within = (count - 1) * lines.smooth.noise**2  # of raw samples about their blocks' means
+    left = 2 * cost * unit**2 + float(within.sum())
+    return 100 * float(np.sqrt(left / (count * measured**2).sum()))
+
+
+def _units(model: CurveModel, precision: Floats) -> Floats:
+    """Of the fit coordinates (parameters,): of contact points their prior's deviation, else 1."""
+    units = np.ones(len(precision))
+    units[model.contact_points] = 1 / precision[model.contact_points]
+    return units
+
+
+def _solved(
+    residuals: Callable[[Floats], Floats],
+    jacobian: Callable[[Floats], Floats],
+    start: Floats,
+    bounds: tuple[Floats, Floats],
+    unit: Floats,
+) -> tuple[Floats, float]:
+    """The solution and half the sum of squares, sought in steps from the start: what a step is small against must not
+    depend on where the travel has its zero."""
+    low, high = bounds
+
+    def residuals_at(moved: Floats) -> Floats:
+        return residuals(start + unit * moved)
+
+    def jacobian_at(moved: Floats) -> Floats:
+        return jacobian(start + unit * moved) * unit
+
     result = least_squares(
-        residuals,
-        np.clip(start, low + margin, high - margin),
-        jacobian,
-        bounds=(low, high),
+        residuals_at,
+        np.zeros(len(start)),
+        jacobian_at,
+        bounds=((low - start) / unit, (high - start) / unit),
         x_scale="jac",
         ftol=_TOLERANCE,
         xtol=_TOLERANCE,
+        gtol=1e-12,
         max_nfev=_EVALUATIONS,
     )
-    within = (count - 1) * lines.smooth.noise**2  # of raw samples about their blocks' means
-    left = 2 * float(result.cost) * unit**2 + float(within.sum())
-    return 100 * float(np.sqrt(left / (count * measured**2).sum()))
+    return start + unit * np.asarray(result.x), float(result.cost)
