@@ -8,8 +8,6 @@ each point or one for all.
 
 import math
 
-import numpy as np
-
 from underskin.compiled import compiled
 from underskin.physics.contact_curves import LARGEST_A_OVER_H
 from underskin.units import Floats, Mask
@@ -18,9 +16,12 @@ _STRAIN, _LARGEST_STRAIN = 0.2, 0.9  # representative strain over a/R, and where
 _EXPONENTIAL = 1e-6  # |q| below which the stiffening is
 _LARGEST_RATIO = math.log(100.0)  # of stiffening: Gent's law ends at its limit
 _STEPS = 60
-_TOLERANCE = 1e-8  # of the contact radius, of the last step: what remains is about its square
+_TOLERANCE = 3e-7  # of the contact radius, of the last step: what remains is about its square
 _HALVINGS = 40
 _LAST = 0.25 ** (2 / 3)  # a of JKR's contact at its least depth, in units of (2πwR²/E')^(1/3)
+
+Own = tuple[float, float, float, float, float, float, float]  # a body's numbers
+Four = tuple[float, float, float, float]
 
 _ROWS = "float64[:, :, ::1]"
 _BODY = "float64[:, :, :, ::1], float64[:, :, :, ::1]"
@@ -50,60 +51,70 @@ def _secant_ratio(strain: float, coefficient: float, form: float, exponent: floa
 
 
 @compiled()
-def _contact(a: float, body: Floats, cubics: Floats, contact: Floats) -> None:
-    """Fill F, δ and K without adhesion at the radius a, and ℓ/√w of the adhesive stretch; then their logarithms'
-    derivatives by a."""
-    modulus, radius, thickness, growth = body[0], body[1], body[3], 0.0
-    if body[4] >= 0:
+def _of(body: Floats, point: int, curve: int, sample: int) -> Own:
+    own = body[point, curve, min(sample, body.shape[2] - 1)]
+    return own[0], own[1], own[2], own[3], own[4], own[5], own[6]
+
+
+@compiled()
+def _contact(a: float, own: Own, cubics: Floats) -> tuple[Four, Four]:
+    """F, δ and K without adhesion at the radius a, and ℓ/√w of the adhesive stretch; and their logarithms' derivatives
+    by a."""
+    modulus, radius, _, thickness, coefficient, form, exponent = own
+    growth, inverse = 0.0, 1.0 / a
+    if coefficient >= 0:
         strain = _STRAIN * a / radius
-        ratio, slope = _secant_ratio(min(strain, _LARGEST_STRAIN), body[4], body[5], body[6])
+        ratio, slope = _secant_ratio(min(strain, _LARGEST_STRAIN), coefficient, form, exponent)
         modulus *= ratio
         growth = slope * _STRAIN / radius if strain < _LARGEST_STRAIN else 0.0
-    contact[1] = a * a / radius
-    contact[2] = 2.0 * modulus * a
-    contact[0] = 2.0 / 3.0 * contact[2] * contact[1]
-    contact[3] = math.sqrt(2.0 * math.pi * a / modulus)
-    contact[4] = 3.0 / a + growth
-    contact[5] = 2.0 / a
-    contact[6] = 1.0 / a + growth
-    contact[7] = 0.5 / a - 0.5 * growth
+    depth, stiffness = a * a / radius, 2.0 * modulus * a
+    force, stretch = 2.0 / 3.0 * stiffness * depth, math.sqrt(2.0 * math.pi * a / modulus)
+    by_force, by_depth, by_stiffness = 3.0 * inverse + growth, 2.0 * inverse, inverse + growth
+    by_stretch = 0.5 * (inverse - growth)
     if thickness > 0:
         cells = cubics.shape[0]
         place = min(a / thickness, LARGEST_A_OVER_H) * cells / LARGEST_A_OVER_H
         cell = min(int(place), cells - 1)
         u = (place - cell) * LARGEST_A_OVER_H / cells
-        c = cubics[cell]
-        for number in range(4):
-            ratio = ((c[0, number] * u + c[1, number]) * u + c[2, number]) * u + c[3, number]
-            contact[number] *= ratio
-            if place < cells:
-                slope = (3.0 * c[0, number] * u + 2.0 * c[1, number]) * u + c[2, number]
-                contact[4 + number] += slope / (ratio * thickness)
+        per_h = 1.0 / thickness if place < cells else 0.0
+        c3, c2, c1, c0 = cubics[cell, 0], cubics[cell, 1], cubics[cell, 2], cubics[cell, 3]
+        of_force = ((c3[0] * u + c2[0]) * u + c1[0]) * u + c0[0]
+        of_depth = ((c3[1] * u + c2[1]) * u + c1[1]) * u + c0[1]
+        of_stiffness = ((c3[2] * u + c2[2]) * u + c1[2]) * u + c0[2]
+        of_stretch = ((c3[3] * u + c2[3]) * u + c1[3]) * u + c0[3]
+        by_force += ((3.0 * c3[0] * u + 2.0 * c2[0]) * u + c1[0]) / of_force * per_h
+        by_depth += ((3.0 * c3[1] * u + 2.0 * c2[1]) * u + c1[1]) / of_depth * per_h
+        by_stiffness += ((3.0 * c3[2] * u + 2.0 * c2[2]) * u + c1[2]) / of_stiffness * per_h
+        by_stretch += ((3.0 * c3[3] * u + 2.0 * c2[3]) * u + c1[3]) / of_stretch * per_h
+        force, depth, stiffness, stretch = (
+            force * of_force,
+            depth * of_depth,
+            stiffness * of_stiffness,
+            stretch * of_stretch,
+        )
+    return (force, depth, stiffness, stretch), (by_force, by_depth, by_stiffness, by_stretch)
 
 
 @compiled()
-def _travel(a: float, root_work: float, body: Floats, cubics: Floats, contact: Floats) -> tuple[float, float]:
+def _travel(a: float, root_work: float, own: Own, cubics: Floats) -> tuple[float, float]:
     """δ + F/k in equilibrium, where δ and F fall by ℓ and K ℓ, and its derivative by a."""
-    _contact(a, body, cubics, contact)
-    force, depth, stiffness, stretch = contact[0], contact[1], contact[2], contact[3] * root_work
+    (force, depth, stiffness, unit), (by_force, by_depth, by_stiffness, by_stretch) = _contact(a, own, cubics)
+    stretch = unit * root_work
     lost = stiffness * stretch
-    travel = depth - stretch + body[2] * (force - lost)
-    of_depth = depth * contact[5] - stretch * contact[7]
-    of_force = force * contact[4] - lost * (contact[6] + contact[7])
-    return travel, of_depth + body[2] * of_force
+    travel = depth - stretch + own[2] * (force - lost)
+    of_force = force * by_force - lost * (by_stiffness + by_stretch)
+    return travel, depth * by_depth - stretch * by_stretch + own[2] * of_force
 
 
 @compiled(f"void({_ROWS}, {_BODY}, float64[:, :, :, ::1])")
 def contact_rows(a: Floats, body: Floats, cubics: Floats, contact: Floats) -> None:
     """Fill F, δ, K and ℓ/√w (4, points, curves, samples) at radii a."""
     points, curves, samples = a.shape
-    here = np.empty(8)
     for point in range(points):
         layer = cubics[min(point, len(cubics) - 1)]
         for curve in range(curves):
-            own = body[point, curve]
             for sample in range(samples):
-                _contact(a[point, curve, sample], own[min(sample, len(own) - 1)], layer, here)
+                here, _ = _contact(a[point, curve, sample], _of(body, point, curve, sample), layer)
                 for number in range(4):
                     contact[number, point, curve, sample] = here[number]
 
@@ -116,23 +127,24 @@ def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Fl
     sample before leads above the radius of this one, too.
     """
     points, curves, samples = travel.shape
-    here = np.empty(8)
     alike = work.shape[2] == 1 and body.shape[2] == 1
     for point in range(points):
         layer = cubics[min(point, len(cubics) - 1)]
         for curve in range(curves):
+            own, root_work = _of(body, point, curve, 0), math.sqrt(work[point, curve, 0])
             touching, at_touching, slope = 0.0, 0.0, 0.0
             for sample in range(samples):
-                own = body[point, curve, min(sample, body.shape[2] - 1)]
+                if not alike:
+                    own = _of(body, point, curve, sample)
+                    root_work = math.sqrt(work[point, curve, min(sample, work.shape[2] - 1)])
                 lowest = least[point, curve, min(sample, least.shape[2] - 1)]
-                root_work = math.sqrt(work[point, curve, min(sample, work.shape[2] - 1)])
                 aim, radius = travel[point, curve, sample], a[point, curve, sample]
                 if alike and slope > 0:
                     radius = min(radius, touching + (aim - at_touching) / slope)
                 radius = max(radius, lowest)
                 for _ in range(_STEPS):
                     touching = radius
-                    at_touching, slope = _travel(radius, root_work, own, layer, here)
+                    at_touching, slope = _travel(radius, root_work, own, layer)
                     step = (at_touching - aim) / slope if slope > 0 else 0.5 * radius
                     radius = max(radius - min(max(step, -radius), 0.9 * radius), lowest)
                     if abs(radius - touching) <= _TOLERANCE * touching:
@@ -144,12 +156,11 @@ def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Fl
 def pull_off_rows(work: Floats, body: Floats, cubics: Floats, radius: Floats, travel: Floats) -> None:
     """Fill the radius and the travel at which the travel is least in equilibrium."""
     points, curves, samples = radius.shape
-    here = np.empty(8)
     for point in range(points):
         layer = cubics[min(point, len(cubics) - 1)]
         for curve in range(curves):
             for sample in range(samples):
-                own = body[point, curve, min(sample, body.shape[2] - 1)]
+                own = _of(body, point, curve, sample)
                 root_work = math.sqrt(work[point, curve, sample])
                 unit = (2.0 * math.pi * root_work**2 * own[1] ** 2 / own[0]) ** (1 / 3)
                 low, high, thickness = 0.02 * unit, 4.0 * unit, own[3]
@@ -159,12 +170,12 @@ def pull_off_rows(work: Floats, body: Floats, cubics: Floats, radius: Floats, tr
                     low = high = _LAST * unit
                 for _ in range(_HALVINGS if low < high else 0):
                     middle = math.sqrt(low * high)
-                    if _travel(middle, root_work, own, layer, here)[1] > 0:
+                    if _travel(middle, root_work, own, layer)[1] > 0:
                         high = middle
                     else:
                         low = middle
                 radius[point, curve, sample] = high
-                travel[point, curve, sample] = _travel(high, root_work, own, layer, here)[0]
+                travel[point, curve, sample] = _travel(high, root_work, own, layer)[0]
 
 
 @compiled(f"void({_ROWS}, {_ROWS}, boolean[:, :, ::1], {_ROWS})")
