@@ -4,6 +4,7 @@ Displacement grows into the sample. All is found from the samples alone, without
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -47,6 +48,12 @@ class Course:
 def course(displacement: Floats, force: Floats, time: Floats | None = None) -> Course:
     """Of samples (samples,), all finite; without times they were taken at a steady rate."""
     time = np.arange(float(len(force))) if time is None else time
+    return _course(*(np.asarray(column, dtype=float).tobytes() for column in (displacement, force, time)))
+
+
+@lru_cache(maxsize=256)  # a diagnosis asks again for every model that it composes of the same recordings
+def _course(*columns: bytes) -> Course:
+    displacement, force, time = map(np.frombuffer, columns)
     noise = roughness(force)
     block = int(np.ceil(len(force) / _BLOCKS))
     turn = int(np.argmax(displacement))

@@ -19,7 +19,7 @@ from underskin.recordings.conditions import curves_of
 from underskin.units import Floats
 
 _ERROR = 3e-3  # of the largest force: the unit of the residuals
-_TOLERANCE, _EVALUATIONS = 1e-4, 40
+_TOLERANCE, _OF_STARTS, _EVALUATIONS = 1e-4, 1e-3, 40  # of the sum of squares; the likelihood goes on from starts
 _PASSED = 4  # samples at most, either way, past which a contact point is moved
 _INSIDE = 1e-9  # of a parameter's range, off its bounds
 
@@ -88,7 +88,7 @@ class LeastSquares:
         begin = np.append(np.clip(start[:count], low + margin, high - margin), start[count:])
         bounds = np.append(low, -gains), np.append(high, gains)
         unit = np.append(_units(self._model, self._precision), np.ones(len(gains)))
-        return _solved(self._residuals, self._jacobian, begin, bounds, unit)
+        return _solved(self._residuals, self._jacobian, begin, bounds, unit, _OF_STARTS)
 
     def _residuals(self, x: Floats) -> Floats:
         count = len(self._low)
@@ -144,7 +144,7 @@ def least_squares_percent(hypothesis: Hypothesis, start: Floats) -> float:
     margin = _INSIDE * (high - low)
     begin = np.clip(start, low + margin, high - margin)
     precision = np.sqrt([curvature_of_prior(entry)[0] for entry in model.parameters])
-    _, cost = _solved(residuals, jacobian, begin, (low, high), _units(model, precision))
+    _, cost = _solved(residuals, jacobian, begin, (low, high), _units(model, precision), _TOLERANCE)
     within = (count - 1) * lines.smooth.noise**2  # of raw samples about their blocks' means
     left = 2 * cost * unit**2 + float(within.sum())
     return 100 * float(np.sqrt(left / (count * measured**2).sum()))
@@ -163,6 +163,7 @@ def _solved(
     start: Floats,
     bounds: tuple[Floats, Floats],
     unit: Floats,
+    tolerance: float,
 ) -> tuple[Floats, float]:
     """The solution and half the sum of squares, sought in steps from the start: what a step is small against must not
     depend on where the travel has its zero."""
@@ -180,8 +181,8 @@ def _solved(
         jacobian_at,
         bounds=((low - start) / unit, (high - start) / unit),
         x_scale="jac",
-        ftol=_TOLERANCE,
-        xtol=_TOLERANCE,
+        ftol=tolerance,
+        xtol=tolerance,
         gtol=1e-12,
         max_nfev=_EVALUATIONS,
     )
