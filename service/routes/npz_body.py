@@ -25,6 +25,9 @@ from underskin.errors import (
 from underskin.units import Array
 
 NPZ = "application/x-npz"
+_MOST_HEADER = 1000  # characters; np.savez writes some hundred
+_MOST_MEMBERS = 64
+_DIRECTORY_END = 22  # bytes of a zip archive's last record
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # what np.savez and np.savez_compressed write
 _HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
@@ -38,6 +41,8 @@ def fields_of_npz(kind: type[ColumnsRequest], body: bytes, most_bytes: int) -> d
     """
     try:
         with damage_said("", "", str):
+            if int.from_bytes(body[-_DIRECTORY_END:][12:16], "little") > _MOST_MEMBERS * _MOST_HEADER:
+                raise ValueError("its directory is too long")
             archive = zipfile.ZipFile(io.BytesIO(body))
     except FileError as error:
         raise Refusal(400, f"The body is not an .npz file: {error.reason}.") from None
@@ -64,8 +69,8 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> Arra
             if member.compress_type not in _COMPRESSIONS:
                 raise ValueError("it is neither stored nor deflated")
             with archive.open(member) as file:
-                shape, by_columns, dtype = _HEADERS[np.lib.format.read_magic(file)](file)
-                data = file.read()  # to the end, where its checksum is compared
+                shape, by_columns, dtype = _HEADERS[np.lib.format.read_magic(file)](file, max_header_size=_MOST_HEADER)
+                data = file.read(member.file_size)  # no more than is declared; at its end the checksum is compared
             if dtype.hasobject:
                 raise ValueError("it holds Python objects (pickles)")
             promised = math.prod(shape) * dtype.itemsize

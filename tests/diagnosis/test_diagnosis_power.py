@@ -14,7 +14,7 @@ from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.reporting.numbers import parameter, without_effect
 from underskin.diagnosis.reporting.report import DiagnosisResult, verdict
-from underskin.diagnosis.selection.search import Search
+from underskin.diagnosis.selection.search import SHOWS, Search
 from underskin.diagnosis.validation.power import least_chi2, power
 from underskin.diagnosis.validation.signatures import Signatures
 from underskin.mechanisms import compose
@@ -96,8 +96,9 @@ def test_two_recordings_that_agree_tell_nothing(table: SigmaTable) -> None:
 
 
 def test_what_must_be_gained_grows_with_the_number_of_rivals() -> None:
-    assert least_chi2(4) < least_chi2(20) < 16.0
-    assert least_chi2(1) > 2 * np.log(4.0)
+    assert least_chi2(4, SHOWS) < least_chi2(20, SHOWS) < 16.0
+    assert least_chi2(1, SHOWS) > 2 * np.log(4.0)
+    assert least_chi2(4, 5.0) > 10.0
 
 
 def best_of(name: str, made: Made, table: SigmaTable) -> tuple[FittingProblem, Explanation, Explanation]:

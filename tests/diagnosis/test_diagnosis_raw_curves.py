@@ -237,6 +237,21 @@ def test_a_drift_as_large_as_the_force_is_told_by_the_samples_in_the_air(table: 
     assert (report["verdict"], report["probability"] > 0.95) == ("no_mismatch", True)
 
 
+@pytest.mark.parametrize("exponent", [1.5, 2.0, 2.5])
+@pytest.mark.parametrize("noise", [1e-4, 1e-2])
+def test_the_foot_of_a_contact_is_no_drift(exponent: float, noise: float) -> None:
+    random = np.random.default_rng(7)
+    for begin in (0.0, -0.2):  # in contact from the first sample, or air without a drift
+        depth = np.concatenate([np.linspace(begin, 0.2, 400), np.linspace(0.2, begin, 400)])
+        force = np.maximum(depth / 0.2, 0) ** exponent + noise * random.normal(size=len(depth))
+        seen = course(depth, force, np.linspace(0, 10, len(depth)))
+        assert 10 * abs(seen.drift) < 5 * noise
+        curve = IndentationRecording("i", 5.0, depth, force)
+        lines = curve_lines(Campaign("c", SkinDescription(poisson_ratio=0.5), (curve,)), "indentation")
+        assert lines.smooth is not None
+        assert np.abs(lines.smooth.columns[:, 1:]).max() < 0.03 * force.max()
+
+
 @pytest.mark.slow
 def test_a_drift_in_time_is_no_mismatch_where_the_file_has_no_times(table: SigmaTable) -> None:
     """Way in, hold and way back at a steady rate; the zero runs off by 3 % of the largest force."""

@@ -6,6 +6,7 @@ from scipy.optimize import brentq
 
 from tests.mechanisms.indentation_loops import E_MPA, NO_CREEP, R_MM, REDUCED, R, force_at, jkr
 from tests.support.mechanism_campaigns import SKIN, hertz_force, predicted
+from underskin.mechanisms.models.sphere_contact import Sphere, Stiffening
 from underskin.recordings.campaign import Campaign, IndentationRecording
 from underskin.units import Floats
 
@@ -65,3 +66,28 @@ def test_two_prony_pairs_relax_as_their_sum() -> None:
     fast, slow = 2.0 * np.exp(-3.0 * 0.7), 2.0 * np.exp(3.0 * 0.3)
     left = 1 - 0.5 * (0.3 * (1 - np.exp(-ages / fast)) + 0.7 * (1 - np.exp(-ages / slow)))
     assert found[-8:] == pytest.approx(found[1999] * left, rel=1e-4)
+
+
+def test_the_radius_at_a_travel_has_that_travel_also_where_a_stiffening_law_ends() -> None:
+    random = np.random.default_rng(8)
+    count = 400
+
+    def drawn(low: float, high: float) -> Floats:
+        return np.exp(random.uniform(np.log(low), np.log(high), (count, 1, 1)))
+
+    law = Stiffening(drawn(0.1, 20), random.uniform(-2, 2, (count, 1, 1)), random.uniform(1, 2, (count, 1, 1)))
+    sphere = Sphere(drawn(1e5, 1e7), np.full((1, 1), 7.5e-6), stiffening=law, give=1 / drawn(1, 1e3))
+    work = drawn(1e-3, 1.0)
+    least, lowest = sphere.pull_off(work)
+    travel = lowest + np.linspace(0.01, 1, 40) * (2e-6 - np.minimum(lowest, 0))
+    found = sphere.travel(sphere.radius_at(travel, work, least), work)
+    assert np.abs(found - travel).max() < 1e-6 * np.ptp(travel)
+
+
+def test_without_adhesion_the_edge_is_hertz_s() -> None:
+    sphere = Sphere(np.full((1, 1, 1), 2e6), np.full((1, 1), 1e-3), give=np.full((1, 1, 1), 1e-5))
+    travel = np.linspace(1e-6, 1e-4, 20)[None, None]
+    a = sphere.radius_at(travel, np.zeros((1, 1, 1)))
+    force, depth, _, _ = sphere.at(a)
+    assert depth + 1e-5 * force == pytest.approx(travel, rel=1e-9)
+    assert force == pytest.approx(4 / 3 * 2e6 * a**3 / 1e-3, rel=1e-12)

@@ -3,8 +3,9 @@
 Displacement grows into the sample. All is found from the samples alone, without a law of contact.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -16,9 +17,11 @@ _BLOCKS = 60  # of a curve, over whose means jumps are sought
 _AIR = 5  # samples at least that tell what the cell shows in the air
 _BEYOND_JUMP, _LEAST_JUMP = 6.0, 2e-3  # standard deviations, and of the range of force, of a jump of contact
 _HELD = 0.2  # of the usual step between samples, below which a sphere is held
-_FITTED, _LEAST_FITTED = 200, 40  # samples that tell a drift in the air
+_FITTED, _LEAST_FITTED, _CLOSER = 200, 40, 3  # samples that tell a drift in the air; grids of contact points
 _LEAST_AIR = 0.1  # of the samples of the way in
 _PLAIN = 60.0  # F of a drift, beyond which it is plain
+_BACK = 0.25  # of the range of displacement, from where it began
+_QUIET = 3e-3  # of the range of force
 _STRAIGHT = 1.5  # times the noise: samples about the line of a drift
 _RISE = 0.02  # of the range of force: below that a sphere has not yet pressed
 
@@ -143,17 +146,50 @@ def _drifting_air(
     at = np.linspace(0, count - 1, min(count, _FITTED)).round().astype(int)
     if len(at) < _LEAST_FITTED or not np.ptp(time) > 0:
         return None
-    left = np.full((2, len(at)), np.inf)  # without and with the drift, for contact at each of the samples
-    for place in range(0, len(at) - _LEAST_FITTED // 2, 2):
-        hertz = np.maximum(displacement[at] - displacement[at[place]], 0.0) ** 1.5
-        design = np.column_stack([hertz, np.ones(len(at)), (time[at] - time[0]) / np.ptp(time)])
-        for drifts, columns in enumerate((design[:, :2], design)):
-            residual = force[at] - columns @ np.linalg.lstsq(columns, force[at], rcond=None)[0]
-            left[drifts, place] = residual @ residual
-    steady, drifting = left.min(axis=1)
-    first = int(at[left[1].argmin()])
+    travel, columns = displacement[at], np.column_stack([np.ones(len(at)), (time[at] - time[0]) / np.ptp(time)])
+
+    def left(begins: float, drifts: bool) -> float:
+        hertz = np.maximum(travel - begins, 0.0) ** 1.5
+        design = np.column_stack([hertz, columns[:, : 1 + drifts]])
+        residual = force[at] - design @ np.linalg.lstsq(design, force[at], rcond=None)[0]
+        return float(residual @ residual)
+
+    (steady, _), (drifting, begins) = (_least(travel, partial(left, drifts=drifts)) for drifts in (False, True))
+    first = int(np.argmax(displacement[:count] > begins))
     if first < _LEAST_AIR * count or steady < (1 + _PLAIN / len(at)) * drifting:
         return None
     line = np.polyfit(time[:first], force[:first], 1)
     about = float(np.std(force[:first] - np.polyval(line, time[:first])))
-    return (first, float(line[0])) if about < _STRAIGHT * noise else None
+    slope = float(line[0])
+    return (
+        (first, slope)
+        if about < _STRAIGHT * noise and _believed(displacement, force, time, count, noise, slope)
+        else None
+    )
+
+
+def _least(travel: Floats, left: Callable[[float], float]) -> tuple[float, float]:
+    """The least misfit over contact points along the way in, and that point: on a grid, then ever closer around it."""
+    grid = travel[: len(travel) - _LEAST_FITTED // 2 : 2]
+    for _ in range(_CLOSER):
+        misfits = [left(begins) for begins in grid.tolist()]
+        best = int(np.argmin(misfits))
+        low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+        least, begins = misfits[best], float(grid[best])
+        grid = np.linspace(low, high, _LEAST_FITTED // 4)
+    return least, begins
+
+
+def _believed(displacement: Floats, force: Floats, time: Floats, count: int, noise: float, slope: float) -> bool:
+    """Whether what looks like a drift is none of the foot of a law that rises otherwise than Hertz's.
+
+    A contact does not lower the force; a drift is still there where the way back has returned; a small noise shows how
+    straight the samples in the air are.
+    """
+    if slope < 0:
+        return True
+    returned = count + int(np.argmin(displacement[count:])) if count < len(force) else 0
+    if returned and displacement[returned] <= displacement[0] + _BACK * float(np.ptp(displacement)):
+        expected = slope * float(time[returned] - time[0])
+        return abs(float(force[returned] - force[0]) - expected) < 0.5 * expected + 4 * noise
+    return noise < _QUIET * float(np.ptp(force))

@@ -240,6 +240,23 @@ def test_what_is_no_archive_is_said(http: httpx.Client, body: bytes) -> None:
     assert "The body is not an .npz file" in problem_of(post(http, "/v1/sigma", body), 400)["detail"]
 
 
+def test_a_header_that_no_parser_bears_is_refused(http: httpx.Client) -> None:
+    buffer = io.BytesIO()
+    header = b"-" * 9000 + b"1"
+    with zipfile.ZipFile(buffer, "w") as file:
+        file.writestr("a_over_h.npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header)
+    (error,) = problem_of(post(http, "/v1/sigma", buffer.getvalue()), 422)["errors"]
+    assert error["field"] == "a_over_h"
+
+
+def test_a_long_directory_is_refused_unread(http: httpx.Client) -> None:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as file:
+        for number in range(5000):
+            file.writestr(f"{number}.npy", b"")
+    assert "directory" in problem_of(post(http, "/v1/sigma", buffer.getvalue()), 400)["detail"]
+
+
 LARGE = {"a_over_h": np.zeros(10_000_000), "rt_over_h": 0.6}
 
 
@@ -250,9 +267,10 @@ def test_an_archive_that_expands_beyond_the_limit_is_refused_unread(http: httpx.
     assert "80 MB, which exceeds 64 MB (UNDERSKIN_MAX_BODY_MB)" in problem["detail"]
 
 
-def test_an_archive_that_lies_about_its_size_is_refused(http: httpx.Client) -> None:
+@pytest.mark.parametrize("declared", [144, 100_000])
+def test_an_archive_that_lies_about_its_size_is_refused(http: httpx.Client, declared: int) -> None:
     honest = archive(LARGE, np.savez_compressed)
-    lying = honest.replace(struct.pack("<I", 80_000_128), struct.pack("<I", 144))
+    lying = honest.replace(struct.pack("<I", 80_000_128), struct.pack("<I", declared))
     assert lying != honest
     (error,) = problem_of(post(http, "/v1/sigma", lying), 422)["errors"]
     assert error["field"] == "a_over_h"

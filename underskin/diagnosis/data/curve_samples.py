@@ -203,13 +203,16 @@ def _around(seen: Course, count: int) -> Indices:
 
 
 def _drift_in_air(seen: Course, force: Floats, time: Floats | None) -> float:
-    """How far [N] the cell runs off over the whole curve if it goes on as in the air; 0 where noise explains that.
+    """How far [N] the cell runs off over the whole curve if it goes on as in the air; 0 where no plain drift and no
+    snap-in tells the air from the foot of a contact.
 
     Without times, samples are taken at a steady rate.
     """
-    if not seen.has_air:
-        return 0.0
     along = np.arange(float(len(force))) if time is None else time
+    if seen.drift:
+        return abs(seen.drift) * float(np.ptp(along))
+    if seen.snap_in is None or not seen.has_air:
+        return 0.0
     air = along[seen.air] - along[seen.air].mean()
     square = float(air @ air)
     if not square > 0:

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from underskin.diagnosis.inference.hypothesis import Hypothesis, curvature_of_prior
+from underskin.diagnosis.noise.correlated_error import USUAL_DRIFT
 from underskin.diagnosis.noise.noise_priors import START_GAIN
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.registry import CATALOGUE
@@ -119,19 +120,21 @@ class LeastSquares:
 def least_squares_percent(hypothesis: Hypothesis, start: Floats) -> float:
     """The root mean square that a plain least-squares fit of the law leaves of all raw samples [% of the force's own].
 
-    Without priors, gains and drifts: the parameters and a zero of each curve are free. From a start (parameters,).
+    Without priors and gains: the parameters and a zero of each curve are free, and its drift where that is plain in the
+    air. From a start (parameters,).
     """
     lines, model = hypothesis.lines, hypothesis.model
     assert isinstance(model, CurveModel)
     assert lines.smooth is not None
-    count, first = lines.smooth.count, lines.first
+    count = lines.smooth.count
     root, measured = np.sqrt(count), lines.value.real
-    total = np.add.reduceat(count, first)
+    drifts = [_cell_columns(lines.smooth.columns[own], root[own], measured[own]) for own in lines.spans]
 
     def about_zero(rows: Floats) -> Floats:
-        """Rows (…, rows) less their mean over each curve's samples: what a zero takes of them."""
-        mean = np.add.reduceat(count * rows, first, axis=-1) / total
-        return np.asarray(root * (rows - mean[..., lines.recording]))
+        """Weighed rows (…, rows) less what zero and drift of each curve take of them."""
+        weighed = root * rows
+        parts = [weighed[..., own] for own in lines.spans]
+        return np.concatenate([part - part @ own @ own.T for part, own in zip(parts, drifts, strict=True)], axis=-1)
 
     def residuals(x: Floats) -> Floats:
         return about_zero(measured - model.forces(x[None])[0]) / unit
@@ -150,6 +153,16 @@ def least_squares_percent(hypothesis: Hypothesis, start: Floats) -> float:
     return 100 * float(np.sqrt(left / (count * measured**2).sum()))
 
 
+def _cell_columns(columns: Floats, root: Floats, force: Floats) -> Floats:
+    """An orthonormal basis (rows, 1 or 2) of the zero of one curve and, where more of it than usual is expected, its
+    drift in time; `root` are the roots of the rows' weights."""
+    time = columns[:, 1]
+    plain = float(np.abs(time).max()) > 1.001 * USUAL_DRIFT * float(np.abs(force).max())
+    return np.asarray(
+        np.linalg.qr(root[:, None] * np.column_stack([np.ones(len(time)), *([time] if plain else [])]))[0]
+    )
+
+
 def _units(model: CurveModel, precision: Floats) -> Floats:
     """Of the fit coordinates (parameters,): of contact points their prior's deviation, else 1."""
     units = np.ones(len(precision))
@@ -165,8 +178,8 @@ def _solved(
     unit: Floats,
     tolerance: float,
 ) -> tuple[Floats, float]:
-    """The solution and half the sum of squares, sought in steps from the start: what a step is small against must not
-    depend on where the travel has its zero."""
+    """The solution and half the sum of squares, sought in steps from the start: they are
+    shifted to the start and scaled, so that the tolerance does not depend on the displacement's zero."""
     low, high = bounds
 
     def residuals_at(moved: Floats) -> Floats:

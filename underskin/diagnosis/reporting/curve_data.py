@@ -98,8 +98,8 @@ def _predictions(problem: FittingProblem, explanation: Explanation) -> list[Curv
 def _shown(
     raw: CurveRecording, displacement: Floats, force: Floats, before: CurvePrediction, after: CurvePrediction
 ) -> ShownCurve:
-    place, measured = finite_samples(raw)[:2]
-    seen = course(place, measured)
+    place, measured, *times = finite_samples(raw)
+    seen = course(place, measured, *times)
     jumps: list[int | None] = [None, None]
     if raw.kind == "indentation":
         measured = measured - seen.zero

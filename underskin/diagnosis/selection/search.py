@@ -78,8 +78,7 @@ class Search:
         evidence = {frozenset(entry.names): entry.log_evidence for entry in self.explanations}
         whole = frozenset(explanation.names)
         smaller = [evidence.get(whole - {name}, -math.inf) for name in whole]
-        least = _SHOWS_ON_CURVES if explanation.best.hypothesis.lines.curves else SHOWS
-        return all(explanation.log_evidence > without + least for without in smaller)
+        return all(explanation.log_evidence > without + least_evidence(explanation) for without in smaller)
 
     def shown_or_nothing(self, answer: Answer) -> Explanation:
         """The explanation that an answer stands on: for `none_of_these`, the one beneath its best process."""
@@ -103,7 +102,7 @@ class Search:
         showing = [
             self._log_weight_beneath(entry, process)
             for entry, process in self.discrepancies
-            if process.log_evidence > entry.log_evidence + SHOWS
+            if process.log_evidence > entry.log_evidence + least_evidence(entry)
         ]
         weights.append(float(np.logaddexp.reduce(showing)) if showing else -math.inf)
         probabilities = (1 - _UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
@@ -113,6 +112,11 @@ class Search:
         rivals: list[Explanation | None] = [*kept, None]
         answers = [Answer(rivals[number], float(probabilities[number])) for number in np.flatnonzero(~out)]
         return sorted(answers, key=lambda answer: -answer.probability)
+
+
+def least_evidence(explanation: Explanation) -> float:
+    """Nats of evidence that a mechanism, or a process, must bring on recordings of this kind."""
+    return _SHOWS_ON_CURVES if explanation.best.hypothesis.lines.curves else SHOWS
 
 
 def log_prior(size: int, supported: int) -> float:

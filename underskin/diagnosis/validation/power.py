@@ -12,7 +12,7 @@ import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.inference.explanation import Explanation
-from underskin.diagnosis.selection.search import log_prior
+from underskin.diagnosis.selection.search import least_evidence, log_prior
 from underskin.diagnosis.validation.signatures import Signatures
 
 _LARGEST = 100.0  # % of the response: what changes less than that nowhere is not told from the nuisances
@@ -42,7 +42,7 @@ def power(signatures: Signatures, explanation: Explanation, supported: int) -> l
     if not signatures.owners:
         return []
     chi2 = np.diag(signatures.left(explanation.best.levels)[0])
-    least = least_chi2(supported)
+    least = least_chi2(supported, least_evidence(explanation))
     visible = []
     for name in dict.fromkeys(signatures.owners):
         typical = signatures.owners.index(name)
@@ -54,9 +54,9 @@ def power(signatures: Signatures, explanation: Explanation, supported: int) -> l
     return sorted(visible, key=lambda entry: entry.smallest_visible_percent)
 
 
-def least_chi2(supported: int) -> float:
-    """The χ² from which on one of so many mechanisms is expected to be named."""
-    odds = log_prior(0, supported) - log_prior(1, supported) + np.log(EXPLAINED / (1 - EXPLAINED))
+def least_chi2(supported: int, shows: float) -> float:
+    """The χ² from which on one of so many mechanisms is expected to be named, which must bring `shows` nats."""
+    odds = max(log_prior(0, supported) - log_prior(1, supported) + np.log(EXPLAINED / (1 - EXPLAINED)), shows)
     chi2 = 2 * odds
     for _ in range(_ROUNDS):
         chi2 = 2 * odds + np.log1p(chi2)

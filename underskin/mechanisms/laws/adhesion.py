@@ -92,7 +92,7 @@ def _comes_back(entry: IndentationConditions) -> bool:
 
 def _works(entry: IndentationRecording) -> tuple[float, float]:
     """What the least forces on the way in and on the way back would be with -4πwR/3 and -3πwR/2 [J/m²]."""
-    seen = course(entry.displacement_mm, entry.force_n)
+    seen = course(entry.displacement_mm, entry.force_n, entry.time_s)
     force = entry.force_n - seen.zero
     radius = float(to_si("indenter_radius_mm", entry.indenter_radius_mm))
     least = [-float(part.min()) / (np.pi * radius) for part in (force[: seen.turn + 1], force[seen.turn :])]

@@ -106,6 +106,32 @@ def _travel(a: float, root_work: float, own: Own, cubics: Floats) -> tuple[float
     return travel, depth * by_depth - stretch * by_stretch + own[2] * of_force
 
 
+@compiled()
+def _solved(aim: float, start: float, lowest: float, root_work: float, own: Own, cubics: Floats) -> Four:
+    """The radius, not below `lowest`, at which the travel is `aim`; and the last tangent: where, its travel and slope.
+
+    Newton's steps, and halvings where one leaves the bracket known so far.
+    """
+    radius, below, above, bounded = start, lowest, math.inf, False
+    touching = at_touching = slope = 0.0
+    for _ in range(_STEPS):
+        touching = radius
+        at_touching, slope = _travel(radius, root_work, own, cubics)
+        if at_touching > aim:
+            above = radius
+        else:
+            below, bounded = radius, True
+        step = (at_touching - aim) / slope if slope > 0 else 0.5 * radius
+        radius = max(radius - min(max(step, -radius), 0.9 * radius), lowest)
+        if slope > 0 and abs(radius - touching) <= _TOLERANCE * touching:
+            break
+        if radius >= above or (bounded and radius <= below):
+            radius = 0.5 * (below + above) if above < math.inf else 2 * touching
+            if above - below <= _TOLERANCE * above:
+                break
+    return radius, touching, at_touching, slope
+
+
 @compiled(f"void({_ROWS}, {_BODY}, float64[:, :, :, ::1])")
 def contact_rows(a: Floats, body: Floats, cubics: Floats, contact: Floats) -> None:
     """Fill F, δ, K and ℓ/√w (4, points, curves, samples) at radii a."""
@@ -121,10 +147,11 @@ def contact_rows(a: Floats, body: Floats, cubics: Floats, contact: Floats) -> No
 
 @compiled(f"void({_ROWS}, {_ROWS}, {_ROWS}, {_ROWS}, {_BODY})")
 def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Floats, cubics: Floats) -> None:
-    """Solve travel(a) = travel by Newton's steps from radii `a` above, in place: the travel is convex in a.
+    """Solve travel(a) = travel by Newton's steps from radii `a` above, in place.
 
-    `work` and `least`, which no radius falls below, are (points, curves, samples or 1). The tangent that led to the
-    sample before leads above the radius of this one, too.
+    `work` and `least`, which no radius falls below, are (points, curves, samples or 1). Where a law has not reached its
+    limit the travel is convex in a, and the tangent that led to the sample before leads above the radius of this one,
+    too; elsewhere halvings of the bracket take over.
     """
     points, curves, samples = travel.shape
     alike = work.shape[2] == 1 and body.shape[2] == 1
@@ -141,14 +168,7 @@ def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Fl
                 aim, radius = travel[point, curve, sample], a[point, curve, sample]
                 if alike and slope > 0:
                     radius = min(radius, touching + (aim - at_touching) / slope)
-                radius = max(radius, lowest)
-                for _ in range(_STEPS):
-                    touching = radius
-                    at_touching, slope = _travel(radius, root_work, own, layer)
-                    step = (at_touching - aim) / slope if slope > 0 else 0.5 * radius
-                    radius = max(radius - min(max(step, -radius), 0.9 * radius), lowest)
-                    if abs(radius - touching) <= _TOLERANCE * touching:
-                        break
+                radius, touching, at_touching, slope = _solved(aim, max(radius, lowest), lowest, root_work, own, layer)
                 a[point, curve, sample] = radius
 
 
