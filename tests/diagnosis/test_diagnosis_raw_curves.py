@@ -2,6 +2,7 @@
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,13 @@ from rig.description import parse as rig_experiment
 from rig.elastomer import campaign_of_curves, record_curves
 from tests.support.adhesive_curves import MODULUS_MPA, WORK_J_PER_M2, adhesive_curves
 from underskin.diagnosis.data.curve_samples import curve_lines
+from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.diagnosis.inference.least_squares import least_squares_percent
 from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.reporting.goodness_of_fit import modulus
+from underskin.diagnosis.selection.search import Search
+from underskin.diagnosis.selection.unnamed_rivals import Discrepancy
 from underskin.prediction.forward_model import predict
 from underskin.recordings.campaign import Campaign, IndentationRecording, parse
 from underskin.recordings.conditions import Conditions, IndentationConditions, SkinDescription
@@ -235,6 +240,46 @@ def test_a_drift_as_large_as_the_force_is_told_by_the_samples_in_the_air(table: 
         parse({"schema": "campaign/1", "name": "drift", "skin": skin, "recordings": recordings}), table
     )
     assert (report["verdict"], report["probability"] > 0.95) == ("no_mismatch", True)
+
+
+def hertzian(table: SigmaTable, declared_mpa: float = 2.0, zero_mm: float = 0.0) -> FittingProblem:
+    """A curve of 2 MPa on a layer that is hardly felt."""
+    depth = np.linspace(-0.1, 0.2, 400)
+    hertz = 16 / 9 * 2.0 * np.sqrt(5.0) * np.maximum(depth, 0) ** 1.5
+    force = hertz + 1e-3 * hertz.max() * np.random.default_rng(9).normal(size=len(depth))
+    skin = SkinDescription(poisson_ratio=0.5, youngs_modulus_mpa=declared_mpa, thickness_mm=80.0)
+    curve = IndentationRecording("i", 5.0, depth + zero_mm, force)
+    return FittingProblem(curve_lines(Campaign("c", skin, (curve,)), "indentation"), table)
+
+
+def test_on_curves_a_mechanism_or_a_process_must_bring_five_nats(table: SigmaTable) -> None:
+    nothing, layer = hertzian(table).explain([Request(()), Request(("layered_contact",))])
+    assert nothing is not None
+    assert layer is not None
+    process = Discrepancy(nothing.log_evidence + 4.0, {})
+    for nats, leader in ((4.9, NOTHING_MISSING), (5.1, "layered_contact")):
+        law = replace(layer, log_evidence=nothing.log_evidence + nats)
+        search = Search((nothing, law), ((nothing, process),), {})
+        assert search.answers[0].names == (leader,)
+
+
+@pytest.mark.parametrize("declared", [1.98, 2.0, 2.02])
+def test_the_interval_of_a_modulus_goes_past_the_declared_value(declared: float, table: SigmaTable) -> None:
+    problem = hertzian(table, declared)
+    (nothing,) = problem.explain([Request(())])
+    assert nothing is not None
+    stated = modulus(problem, nothing)
+    assert stated["low"] < 0.99 * declared < 1.01 * declared < stated["high"]
+    assert stated["low"] < 2.0 < stated["high"]
+
+
+def test_a_fit_does_not_depend_on_where_the_displacement_has_its_zero(table: SigmaTable) -> None:
+    here, there = (hertzian(table, zero_mm=zero).explain([Request(())])[0] for zero in (0.0, 77.0))
+    assert here is not None
+    assert there is not None
+    assert there.log_evidence == pytest.approx(here.log_evidence, abs=0.02)
+    left = [least_squares_percent(one.best.hypothesis, one.point.fit) for one in (here, there)]
+    assert left[1] == pytest.approx(left[0], rel=1e-4)
 
 
 @pytest.mark.parametrize("exponent", [1.5, 2.0, 2.5])

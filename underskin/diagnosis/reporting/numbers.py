@@ -24,8 +24,11 @@ def place_of(explanation: Explanation, name: str) -> int:
 
 
 def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
-    """A parameter's most probable value and 95 % interval, within its bounds: 1.96 standard deviations either way, and
-    by the profile of the posterior where these reach the value at which a mechanism does nothing."""
+    """A parameter's most probable value and 95 % interval, within its bounds: 1.96 standard deviations either way.
+
+    Where these reach the value at which a mechanism does nothing, and the profile of the posterior falls off before it,
+    the interval ends where the profile does.
+    """
     best, point = explanation.best, explanation.point
     entry = explanation.model.parameters[place]
     if entry.moves_covariance:
