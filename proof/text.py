@@ -20,8 +20,9 @@ _HEAD = """\
 # Proof: the diagnosis judged on what it cannot know
 
 Everything on this page, figures and numbers, is written by `make proof` (`underskin prove`, `proof/`). The full run
-takes hours on two cores; it keeps what it has worked out and goes on from there. Shares have Wilson's 95 % interval
-in brackets. The diagnosis is called as `underskin diagnose` calls it: it gets the campaign and nothing else.
+takes three quarters of an hour on two cores; it keeps what it has worked out and goes on from there. Shares have
+Wilson's 95 % interval in brackets. The diagnosis is called as `underskin diagnose` calls it: it gets the campaign and
+nothing else.
 
 An answer is *right* if the set of mechanisms that leads is exactly the set that was hidden: for nothing by the
 verdict `no_mismatch`, for physics outside the catalogue by the verdict `unexplained`. A leading set counts under
