@@ -272,7 +272,7 @@ def test_what_would_settle_the_paper_s_question_does() -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(RECORDINGS is None, reason="UNDERSKIN_RECORDINGS names no folder of recordings")
 def test_real_recordings() -> None:
-    """The main outcomes: stiffening PDMS, creeping gel, relaxing cell, a layer in one of the wells."""
+    """The main outcomes: stiffening PDMS, creeping gel, relaxing cell, a well that no law fits to its noise."""
     assert RECORDINGS is not None
     found = {}
     for entry in recorded():
@@ -280,9 +280,7 @@ def test_real_recordings() -> None:
             document = entry.make(Path(RECORDINGS))
             made = diagnosis_report(parse(document), load_table())
             found[entry.name] = made, {mechanism["name"] for mechanism in made["mechanisms"]}
-    well = found["well-E5"][0]
-    rivals = {name for entry in well["alternatives"] if entry["probability"] > 0.3 for name in entry["mechanisms"]}
-    assert "layered_contact" in found["well-E5"][1] | rivals  # a stiffening elastomer would do the same here
+    assert found["well-E5"][0]["verdict"] == "unexplained"  # with a layer, too, several times the noise remain
     tied = {(entry["mechanism"], entry["confounded_with"]) for entry in found["well-E5"][0]["not_identifiable"]}
     assert any("instrument_compliance" in pair for pair in tied)
     assert "strain_stiffening" in found["tension-RTV615"][1]

@@ -1,6 +1,7 @@
 """The course of an indentation curve: how noisy it is, where it turns, where it jumps, what the cell shows in the air.
 
-Displacement grows into the sample. All is found from the samples alone, without a law of contact.
+Displacement grows into the sample. All is found from the samples alone, without a law of contact but for a drift of the
+force in the air, which is told from the foot of a Hertzian contact.
 """
 
 from collections.abc import Callable

@@ -183,20 +183,20 @@ def _solved(
     low, high = bounds
 
     def residuals_at(moved: Floats) -> Floats:
-        return residuals(start + unit * moved)
+        return residuals(start + unit * (moved - 1))
 
     def jacobian_at(moved: Floats) -> Floats:
-        return jacobian(start + unit * moved) * unit
+        return jacobian(start + unit * (moved - 1)) * unit
 
     result = least_squares(
         residuals_at,
-        np.zeros(len(start)),
+        np.ones(len(start)),  # scipy's first trust region is as large as that
         jacobian_at,
-        bounds=((low - start) / unit, (high - start) / unit),
+        bounds=(1 + (low - start) / unit, 1 + (high - start) / unit),
         x_scale="jac",
         ftol=tolerance,
         xtol=tolerance,
         gtol=1e-12,
         max_nfev=_EVALUATIONS,
     )
-    return start + unit * np.asarray(result.x), float(result.cost)
+    return start + unit * (np.asarray(result.x) - 1), float(result.cost)

@@ -3,8 +3,8 @@
 A cell shows its zero F0 and a drift b in time (without times, in the order of the samples) or along the travel beside
 the force (its gain is the recording's, as of FRFs): columns P with normal coefficients, whose scale is the prior's
 standard deviation. Where samples in the air show the zero, F0 is as good as free; else a tared cell is within a
-hundredth of what it measures. The drift over the curve is 2 % of the largest force, or as much as samples in the air
-show where that is more, and none is looked for where no air shows it.
+hundredth of what it measures. The drift over the curve is 2 % of the largest force, or as much as a plain drift or
+the air before a snap-in shows where that is more, and none is looked for where no air shows it.
 
 The position of the surface, friction in a stage and the idealisation of every law bend a curve a little. Neighbouring
 samples share that error too. Within each curve, with s the force (or, near the contact's beginning and in the air, 0.7
@@ -12,7 +12,7 @@ and 0.2 of the largest), x the place along the curve from 0 to 1 and η the size
 
     ε ~ N(0, η² B + P Pᵀ),  B = s s' k(x − x'),
 
-k the mean of Matérn-3/2 kernels of length 0.1 (the beginning of a contact, a grip that seats) and 0.4 (the
+k the mean of Matérn-3/2 kernels of length 0.025 and 0.1 (the beginning of a contact, a grip that seats) and 0.4 (the
 idealisation of a law). η is a parameter of every hypothesis: log-uniform from 0.1 to 1 %, falling off outside, slowly
 downwards. An unmodelled discrepancy is the same process with η from 2 to 50 %.
 """
