@@ -9,7 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -67,21 +67,21 @@ def underskin(data: Path | None = None) -> Iterator[Server]:
         yield server
 
 
-@contextmanager
-def umbridge() -> Iterator[Server]:
+def umbridge() -> AbstractContextManager[Server]:
     """The umbridge package's server."""
-    port = _free_port()
-    command = [sys.executable, "-m", "bench.peers.umbridge_server", str(TABLE), str(port)]
-    with _running(command, port, "/Info") as server:
-        yield server
+    return _peer("umbridge_server", "/Info")
+
+
+def plain_sigma() -> AbstractContextManager[Server]:
+    """A FastAPI route around SciPy's spline, on the same event loop and HTTP parser as ours."""
+    return _peer("plain_sigma", "/ready")
 
 
 @contextmanager
-def plain_sigma() -> Iterator[Server]:
-    """A FastAPI route around SciPy's spline, on the same event loop and HTTP parser as ours."""
+def _peer(module: str, path: str) -> Iterator[Server]:
+    """A server in bench/peers, which answers from our table and is up once `path` answers."""
     port = _free_port()
-    command = [sys.executable, "-m", "bench.peers.plain_sigma", str(TABLE), str(port)]
-    with _running(command, port, "/ready") as server:
+    with _running([sys.executable, "-m", f"bench.peers.{module}", str(TABLE), str(port)], port, path) as server:
         yield server
 
 

@@ -7,9 +7,9 @@ import json
 import sys
 from typing import Any
 
-import lmfit  # type: ignore[import-not-found]
+import lmfit  # type: ignore[import-not-found]  # in an environment of its own
 import numpy as np
-from nanite.model import model_hertz_paraboloidal as hertz  # type: ignore[import-not-found]
+from nanite.model import model_hertz_paraboloidal as hertz  # type: ignore[import-not-found]  # as well
 
 
 def fitted(curve: dict[str, Any]) -> dict[str, float]:

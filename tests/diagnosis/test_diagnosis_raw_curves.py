@@ -219,29 +219,6 @@ def test_plain_least_squares_leaves_what_scipy_leaves(table: SigmaTable) -> None
     assert ours == pytest.approx(plain, rel=0.02)
 
 
-@pytest.mark.slow
-def test_a_drift_as_large_as_the_force_is_told_by_the_samples_in_the_air(table: SigmaTable) -> None:
-    """A slow curve runs off by nearly its own force, a fast one hardly; both show it before contact."""
-    random = np.random.default_rng(6)
-    depth = np.concatenate([np.linspace(-0.2, 0.2, 400), np.linspace(0.2, -0.2, 400)])
-    hertz = 16 / 9 * 2.0 * np.sqrt(5.0) * np.maximum(depth, 0) ** 1.5
-    recordings = []
-    for number, (seconds, share) in enumerate(((10.0, 0.05), (200.0, 0.9))):
-        time = np.linspace(0, seconds, len(depth))
-        noise = random.normal(0, 1e-3 * hertz.max(), len(depth))
-        force = hertz + share * hertz.max() * time / seconds + noise
-        seen = course(depth, force, time)
-        assert seen.drift == pytest.approx(share * hertz.max() / seconds, rel=0.1)
-        assert depth[seen.air[-1]] == pytest.approx(0.0, abs=0.02)
-        curve = {"displacement_mm": depth.tolist(), "force_n": force.tolist(), "time_s": time.tolist()}
-        recordings.append({"id": f"c{number}", "kind": "indentation", "indenter_radius_mm": 5.0, **curve})
-    skin = {"thickness_mm": 80.0, "youngs_modulus_mpa": 2.0, "poisson_ratio": 0.5}
-    report = diagnosis_report(
-        parse({"schema": "campaign/1", "name": "drift", "skin": skin, "recordings": recordings}), table
-    )
-    assert (report["verdict"], report["probability"] > 0.95) == ("no_mismatch", True)
-
-
 def hertzian(table: SigmaTable, declared_mpa: float = 2.0, zero_mm: float = 0.0) -> FittingProblem:
     """A curve of 2 MPa on a layer that is hardly felt."""
     depth = np.linspace(-0.1, 0.2, 400)
@@ -280,38 +257,6 @@ def test_a_fit_does_not_depend_on_where_the_displacement_has_its_zero(table: Sig
     assert there.log_evidence == pytest.approx(here.log_evidence, abs=0.02)
     left = [least_squares_percent(one.best.hypothesis, one.point.fit) for one in (here, there)]
     assert left[1] == pytest.approx(left[0], rel=1e-4)
-
-
-@pytest.mark.parametrize("exponent", [1.5, 2.0, 2.5])
-@pytest.mark.parametrize("noise", [1e-4, 1e-2])
-def test_the_foot_of_a_contact_is_no_drift(exponent: float, noise: float) -> None:
-    random = np.random.default_rng(7)
-    for begin in (0.0, -0.2):  # in contact from the first sample, or air without a drift
-        depth = np.concatenate([np.linspace(begin, 0.2, 400), np.linspace(0.2, begin, 400)])
-        force = np.maximum(depth / 0.2, 0) ** exponent + noise * random.normal(size=len(depth))
-        seen = course(depth, force, np.linspace(0, 10, len(depth)))
-        assert 10 * abs(seen.drift) < 5 * noise
-        curve = IndentationRecording("i", 5.0, depth, force)
-        lines = curve_lines(Campaign("c", SkinDescription(poisson_ratio=0.5), (curve,)), "indentation")
-        assert lines.smooth is not None
-        assert np.abs(lines.smooth.columns[:, 1:]).max() < 0.03 * force.max()
-
-
-@pytest.mark.slow
-def test_a_drift_in_time_is_no_mismatch_where_the_file_has_no_times(table: SigmaTable) -> None:
-    """Way in, hold and way back at a steady rate; the zero runs off by 3 % of the largest force."""
-    random = np.random.default_rng(5)
-    depth = np.concatenate([np.linspace(-0.3, 0.2, 250), np.full(80, 0.2), np.linspace(0.2, -0.3, 250)])
-    hertz = 16 / 9 * 2.0 * np.sqrt(5.0) * np.maximum(depth, 0) ** 1.5
-    recordings = []
-    for number in range(3):
-        drift = 0.03 * hertz.max() * np.linspace(0, 1, len(depth)) + random.normal(0, 1e-3 * hertz.max(), len(depth))
-        curve = {"displacement_mm": (depth + 0.05 * number).tolist(), "force_n": (hertz + drift).tolist()}
-        recordings.append({"id": f"c{number}", "kind": "indentation", "indenter_radius_mm": 5.0, **curve})
-    skin = {"thickness_mm": 80.0, "youngs_modulus_mpa": 2.0, "poisson_ratio": 0.5}
-    document = {"schema": "campaign/1", "name": "drift", "skin": skin, "recordings": recordings}
-    report = diagnosis_report(parse(document), table)
-    assert (report["verdict"], report["probability"] > 0.95) == ("no_mismatch", True)
 
 
 def test_a_sensor_s_radius_is_no_matter_of_an_indentation(table: SigmaTable) -> None:

@@ -162,11 +162,8 @@ def _drifting_air(
     line = np.polyfit(time[:first], force[:first], 1)
     about = float(np.std(force[:first] - np.polyval(line, time[:first])))
     slope = float(line[0])
-    return (
-        (first, slope)
-        if about < _STRAIGHT * noise and _believed(displacement, force, time, count, noise, slope)
-        else None
-    )
+    plain = about < _STRAIGHT * noise and _believed(displacement, force, time, count, noise, slope)
+    return (first, slope) if plain else None
 
 
 def _least(travel: Floats, left: Callable[[float], float]) -> tuple[float, float]:

@@ -178,8 +178,8 @@ def _solved(
     unit: Floats,
     tolerance: float,
 ) -> tuple[Floats, float]:
-    """The solution and half the sum of squares, sought in steps from the start: they are
-    shifted to the start and scaled, so that the tolerance does not depend on the displacement's zero."""
+    """The solution and half the sum of squares there. Coordinates are shifted to the start and scaled by `unit`, so that
+    the tolerance on steps does not depend on where the displacement has its zero."""
     low, high = bounds
 
     def residuals_at(moved: Floats) -> Floats:

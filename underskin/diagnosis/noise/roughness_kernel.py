@@ -6,9 +6,7 @@ from numpy.typing import NDArray
 from underskin.compiled import compiled
 from underskin.units import Floats
 
-_TOGETHER = (
-    4  # factors whose logarithm is taken together: between 1e-70 and 1e70 each, they neither vanish nor overflow
-)
+_TOGETHER = 4  # factors, of 1e-70 to 1e70 each, whose logarithm is taken of their product
 
 
 @compiled("float64(float64[::1], int64[::1], float64[::1], float64[::1], float64, float64[::1])")

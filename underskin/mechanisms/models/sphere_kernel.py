@@ -38,7 +38,7 @@ def _secant_ratio(strain: float, coefficient: float, form: float, exponent: floa
     stress = 1.0 / stretch**2 - stretch
     third = max(stretch * stretch + 2.0 / stretch - 3.0, 1e-18) / 3.0
     growth = 3.0 * coefficient * third ** (0.5 * exponent)
-    slope = growth * exponent * (1.0 / stretch**2 - stretch) / (3.0 * third)
+    slope = growth * exponent * stress / (3.0 * third)
     logarithm = growth
     if abs(form) >= _EXPONENTIAL:
         total = max(1.0 + form * growth, 1e-9)
