@@ -178,8 +178,11 @@ def _solved(
     unit: Floats,
     tolerance: float,
 ) -> tuple[Floats, float]:
-    """The solution and half the sum of squares there. Coordinates are shifted to the start and scaled by `unit`, so that
-    the tolerance on steps does not depend on where the displacement has its zero."""
+    """The solution and half the sum of squares there.
+
+    Coordinates are shifted to the start and scaled by `unit`, so that the tolerance on steps does not depend on where
+    the displacement has its zero.
+    """
     low, high = bounds
 
     def residuals_at(moved: Floats) -> Floats:
