@@ -41,8 +41,7 @@ def fields_of_npz(kind: type[ColumnsRequest], body: bytes, most_bytes: int) -> d
     """
     try:
         with damage_said("", "", str):
-            if int.from_bytes(body[-_DIRECTORY_END:][12:16], "little") > _MOST_MEMBERS * _MOST_HEADER:
-                raise ValueError("its directory is too long")
+            _require_short_directory(body[-_DIRECTORY_END:])
             archive = zipfile.ZipFile(io.BytesIO(body))
     except FileError as error:
         raise Refusal(400, f"The body is not an .npz file: {error.reason}.") from None
@@ -61,6 +60,15 @@ def fields_of_npz(kind: type[ColumnsRequest], body: bytes, most_bytes: int) -> d
             raise InvalidInput(name, None, "is not a field of this request", code=ErrorCode.UNKNOWN_FIELD)
         fields[name] = _value(kind, name, _array(archive, member, name))
     return fields
+
+
+def _require_short_directory(end: bytes) -> None:
+    """Raises ValueError unless an archive ends as NumPy's do, with a record that says that its directory is short:
+    zipfile reads that as a whole."""
+    if not end.startswith(b"PK\x05\x06"):
+        raise ValueError("it does not end as NumPy's archives do")
+    if int.from_bytes(end[12:16], "little") > _MOST_MEMBERS * _MOST_HEADER:
+        raise ValueError("its directory is too long")
 
 
 def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> Array:

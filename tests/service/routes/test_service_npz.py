@@ -255,6 +255,9 @@ def test_a_long_directory_is_refused_unread(http: httpx.Client) -> None:
         for number in range(5000):
             file.writestr(f"{number}.npy", b"")
     assert "directory" in problem_of(post(http, "/v1/sigma", buffer.getvalue()), 400)["detail"]
+    with zipfile.ZipFile(buffer, "a") as file:
+        file.comment = bytes(40)  # behind which the directory's length would not be seen
+    assert "does not end as" in problem_of(post(http, "/v1/sigma", buffer.getvalue()), 400)["detail"]
 
 
 LARGE = {"a_over_h": np.zeros(10_000_000), "rt_over_h": 0.6}
