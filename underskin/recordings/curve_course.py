@@ -19,7 +19,7 @@ _AIR = 5  # samples at least that tell what the cell shows in the air
 _BEYOND_JUMP, _LEAST_JUMP = 6.0, 2e-3  # standard deviations, and of the range of force, of a jump of contact
 _HELD = 0.2  # of the usual step between samples, below which a sphere is held
 _FITTED, _LEAST_FITTED, _CLOSER = 200, 40, 3  # samples that tell a drift in the air; grids of contact points
-_LEAST_AIR = 0.1  # of the samples of the way in
+_LEAST_AIR, _SHORTER = 0.1, 0.9  # of the samples of a way; of those in the air, where these do not lie straight
 _PLAIN = 60.0  # F of a drift, beyond which it is plain
 _BACK = 0.25  # of the range of displacement, from where it began
 _QUIET = 3e-3  # of the range of force
@@ -79,9 +79,13 @@ def _course(*columns: bytes) -> Course:
     still = steps <= _HELD * float(np.median(np.abs(np.diff(displacement)))) + 1e-300
     leave = turn + int(np.argmin(still))
     drifting = None if snap_in is not None else _drifting_air(displacement, force, time, turn + 1, noise)
-    air = _air(force, turn, snap_in, pull_off, noise, span) if drifting is None else np.arange(drifting[0])
+    drift = 0.0 if drifting is None else drifting[1]
+    if drifting is None and snap_in is None and pull_off is None:
+        drift = _drift_after(displacement, force, time, leave, noise)
+    steady = force - drift * (time - time[0])
+    air = _air(steady, turn, snap_in, pull_off, noise, span) if drifting is None else np.arange(drifting[0])
     zero = float(np.median(force[air])) if len(air) >= _AIR else float(force[0])
-    return Course(noise, turn, leave, snap_in, pull_off, air, zero, 0.0 if drifting is None else drifting[1])
+    return Course(noise, turn, leave, snap_in, pull_off, air, zero, drift)
 
 
 def roughness(force: Floats) -> float:
@@ -141,9 +145,33 @@ def _drifting_air(
     """How many of the first `count` samples, the way in, lie before contact, and the drift of the force in time; None
     where it does not plainly drift.
 
+    See `_straight_air`.
+    """
+    air = _straight_air(displacement[:count], force[:count], time[:count], noise)
+    return air if air is not None and _believed(displacement, force, time, count, noise, air[1]) else None
+
+
+def _drift_after(displacement: Floats, force: Floats, time: Floats, leave: int, noise: float) -> float:
+    """The drift of the force in time that the air after contact plainly shows; 0 where it does not.
+
+    It is believed if it leads from where the force began to where it ended.
+    """
+    after = slice(None, leave, -1)
+    air = _straight_air(displacement[after], force[after], time[after], noise)
+    if air is None:
+        return 0.0
+    expected = air[1] * float(time[-1] - time[0])
+    return air[1] if abs(float(force[-1] - force[0]) - expected) < 0.5 * abs(expected) + 4 * noise else 0.0
+
+
+def _straight_air(displacement: Floats, force: Floats, time: Floats, noise: float) -> tuple[int, float] | None:
+    """How many samples, the first of which lie in the air and the last deepest, lie before contact, and the drift of
+    the force in time; None where it does not plainly drift.
+
     F = b + s t + k (d − d0)^(3/2) by least squares with and without the drift s over a grid of contact points d0; the
     samples in the air must lie on a straight line.
     """
+    count = len(displacement)
     at = np.linspace(0, count - 1, min(count, _FITTED)).round().astype(int)
     if len(at) < _LEAST_FITTED or not np.ptp(time) > 0:
         return None
@@ -156,14 +184,15 @@ def _drifting_air(
         return float(residual @ residual)
 
     (steady, _), (drifting, begins) = (_least(travel, partial(left, drifts=drifts)) for drifts in (False, True))
-    first = int(np.argmax(displacement[:count] > begins))
+    first = int(np.argmax(displacement > begins))
     if first < _LEAST_AIR * count or steady < (1 + _PLAIN / len(at)) * drifting:
         return None
-    line = np.polyfit(time[:first], force[:first], 1)
-    about = float(np.std(force[:first] - np.polyval(line, time[:first])))
-    slope = float(line[0])
-    plain = about < _STRAIGHT * noise and _believed(displacement, force, time, count, noise, slope)
-    return (first, slope) if plain else None
+    while first >= _LEAST_AIR * count:
+        line = np.polyfit(time[:first], force[:first], 1)
+        if np.std(force[:first] - np.polyval(line, time[:first])) < _STRAIGHT * noise:
+            return first, float(line[0])
+        first = int(_SHORTER * first)  # a law that rises otherwise than Hertz's begins earlier
+    return None
 
 
 def _least(travel: Floats, left: Callable[[float], float]) -> tuple[float, float]:

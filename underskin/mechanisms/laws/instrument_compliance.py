@@ -1,11 +1,19 @@
 """The mechanism `instrument_compliance`."""
 
 import math
+from dataclasses import replace
 
-from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
+import numpy as np
+
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.curve_state import Curve
+from underskin.recordings.conditions import Conditions, IndentationConditions
 
-_REASON = "robot stages 10 to 100 N/mm, testing machines 1000 to 50000; 150 within a factor of 7"
+_REASON = """an instrument is about as stiff as what it presses: stages of spheres of millimetres 10 to 1000 N/mm,
+cantilevers of spheres of micrometres 0.01 to 100 N/m; 30 N/mm for each mm of the sphere's radius (of several, the
+median), within a factor of 7"""
+_OF_RADIUS, _USUAL_RADIUS_MM = 30.0, 5.0  # N/mm for each mm
+_SD = 2.0
 
 
 class InstrumentCompliance(Mechanism):
@@ -23,9 +31,25 @@ class InstrumentCompliance(Mechanism):
     axes = ("force_n",)
     parameters_stated = (
         Parameter(
-            "stage_stiffness", "N/mm", 0.01, 1e5, Normal(5.0, 2.0), "log", limit=math.inf, shown=20.0, reason=_REASON
+            "stage_stiffness",
+            "N/mm",
+            1e-6,
+            1e5,
+            Normal(math.log(_OF_RADIUS * _USUAL_RADIUS_MM), _SD),
+            "log",
+            limit=math.inf,
+            shown=20.0,
+            reason=_REASON,
         ),
     )
+
+    def parameters(self, conditions: Conditions, kind: Kind = "indentation") -> tuple[Parameter, ...]:
+        """The stiffness, expected for the spheres of the recordings."""
+        radii = [one.indenter_radius_mm for one in conditions.recordings if isinstance(one, IndentationConditions)]
+        if not radii:
+            return self.parameters_stated
+        usual = Normal(math.log(_OF_RADIUS * float(np.median(radii))), _SD)
+        return tuple(replace(entry, prior=usual) for entry in self.parameters_stated)
 
     def on_curve(self, curve: Curve, values: Values) -> None:
         """Let the stage give."""
