@@ -10,7 +10,7 @@ import scipy
 
 import underskin
 from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.inference.explanation import FittingProblem
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import residuals, whole_prediction
 from underskin.diagnosis.localisation.effect_size import effect
 from underskin.diagnosis.localisation.permutation_test import SEED, locate
@@ -32,6 +32,7 @@ from underskin.diagnosis.selection.noise_refinement import frf_problem
 from underskin.diagnosis.selection.search import Search, search
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import confounding, left_open
+from underskin.diagnosis.validation.imitation import imitation
 from underskin.diagnosis.validation.platen_seating import without_seating
 from underskin.diagnosis.validation.power import power
 from underskin.diagnosis.validation.signatures import Signatures
@@ -46,6 +47,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 _CURVES: tuple[Kind, ...] = ("indentation", "compression")
 _FAR_ABOVE = 3.0  # times the noise floor, beyond which an error of indentations held out contradicts an explanation
+_WORTH_SAYING = 0.05  # odds of an unlisted law
 _LEAST_TO_AGREE = 3  # FRFs: d33 takes up what two have in common, and their gain scatters by what they differ
 _LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
 
@@ -131,6 +133,7 @@ def _work_out(
         result = replace(result, contradicted=frozenset(contradicted))
         leader = result.answers[0]
         shown = result.shown_or_nothing(leader)
+    begun, result = _beside_unlisted(begun, problem, result, nothing)
     floor = largest_floor_percent(problem, nothing, groups)
     if leader.explanation is nothing and floor > _LARGEST_FLOOR:
         return replace(begun, lacking=Lacking(Lack.NOISE, {"floor_percent": floor}))
@@ -151,6 +154,22 @@ def _work_out(
         shape=shape,
         plan=plan(problem, result, limits),
     )
+
+
+def _beside_unlisted(
+    begun: DiagnosisResult, problem: FittingProblem, result: Search, nothing: Explanation
+) -> tuple[DiagnosisResult, Search]:
+    """Of indentations, with the unlisted laws that the leading set of mechanisms imitates, and a finding on them."""
+    leader = result.answers[0].explanation
+    if problem.kind != "indentation" or leader is None or not leader.names:
+        return begun, result
+    found = imitation(leader, nothing, result.supported)
+    if found is None:
+        return begun, result
+    if found.odds > _WORTH_SAYING:
+        arguments = {"laws": found.laws, "imitated": found.imitated, "mechanisms": leader.names}
+        begun = begun.with_findings(Finding(Reason.IMITATED, "", "force_n", arguments))
+    return begun, replace(result, imitating={leader.names: found.odds})
 
 
 def diagnosis_report(campaign: Campaign, table: SigmaTable, refused: Sequence[RecordingProblem] = ()) -> dict[str, Any]:

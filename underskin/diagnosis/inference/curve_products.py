@@ -81,12 +81,16 @@ class CurveProducts:
         by_slopes = taken.along(slopes)  # (points, parameters, recordings, columns)
         uv = taken.products(slopes, force, by_slopes, taken.along(force))
         vy = taken.products(slopes, measured, by_slopes, taken.along(measured))
-        edges = [*self.lines.first, self.force.shape[-1]]
-        weighed = taken.weight * slopes
-        vv = [weighed[..., low:high] @ slopes[..., low:high].transpose(0, 2, 1) for low, high in pairwise(edges)]
-        columns = np.moveaxis(by_slopes, 1, 2)  # (points, recordings, parameters, columns)
-        less = columns @ taken.inverse[:, 0] @ columns.swapaxes(-1, -2)
-        return SlopeSums(np.moveaxis(uv, 1, -1), np.moveaxis(vy, 1, -1), np.stack(vv, axis=1) - less)
+        return SlopeSums(np.moveaxis(uv, 1, -1), np.moveaxis(vy, 1, -1), taken.squares(slopes, by_slopes))
+
+    def of_rows(self, rows: Floats, levels: SeveralLevels) -> tuple[Floats, Floats]:
+        """Re u*J (recordings, P) and Re JᵀJ (P, P) of changes of the force J (P, samples), at the first point and set
+        of noise levels."""
+        taken = _Taken(self.lines, levels.at_first)
+        turned, force = self.lines.whitening.turned(rows)[None], self.force[:1, None]
+        by_rows = taken.along(turned)
+        along = taken.products(turned, force, by_rows, taken.along(force))
+        return along[0].T, taken.squares(turned, by_rows)[0].sum(axis=0)
 
 
 class _Taken:
@@ -112,6 +116,14 @@ class _Taken:
         """Pᵀ times turned rows (points, sets, rows): (points, sets, recordings, columns)."""
         weighed = (self.weight * rows)[..., None, :] * self._lines.columns
         return np.moveaxis(self._lines.sums(weighed), -2, -1)
+
+    def squares(self, rows: Floats, by_rows: Floats) -> Floats:
+        """Of turned rows (points, P, samples) with each other (points, recordings, P, P), at the first set."""
+        edges = [*self._lines.first, rows.shape[-1]]
+        weighed = self.weight * rows
+        whole = [weighed[..., low:high] @ rows[..., low:high].transpose(0, 2, 1) for low, high in pairwise(edges)]
+        columns = np.moveaxis(by_rows, 1, 2)  # (points, recordings, P, columns)
+        return np.asarray(np.stack(whole, axis=1) - columns @ self.inverse[:, 0] @ columns.swapaxes(-1, -2))
 
     def products(self, rows: Floats, others: Floats, by_rows: Floats, by_others: Floats) -> Floats:
         """Of turned rows (points, sets, rows) of each recording."""

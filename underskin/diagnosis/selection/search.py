@@ -6,8 +6,8 @@ probable. Singles are all fitted; pairs and triples grow greedily from the best,
 
 import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from underskin.diagnosis.selection.occam_correction import without_occam
 from underskin.diagnosis.selection.unnamed_rivals import Discrepancy, discrepancy
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.registry import CATALOGUE
+from underskin.units import Floats
 
 # "Nothing" stands for all that does not show as well, which is every other campaign.
 PRIORS = {"nothing_missing": 0.45, "one": 0.34, "two": 0.14, "three": 0.02, "none_of_these": 0.05}
@@ -54,13 +55,15 @@ class Search:
     """What was tried: explanations, processes on top of some of them, and what the campaign does not support.
 
     `contradicted`: sets under which the residual keeps structure, or its noise is no noise (see residual_shape.py);
-    their probability is that of `none_of_these`.
+    their probability is that of `none_of_these`. `imitating`: the odds of an unlisted law that looks like a set on
+    these recordings, at most 1; `none_of_these` has them beside the leading set.
     """
 
     explanations: tuple[Explanation, ...]
     discrepancies: tuple[tuple[Explanation, Discrepancy], ...]
     unsupported: dict[str, str]
     contradicted: frozenset[tuple[str, ...]] = frozenset()
+    imitating: Mapping[tuple[str, ...], float] = field(default_factory=dict)
     tried: int = 0  # sets, of which the explanations are those that were not left out early
 
     @property
@@ -109,9 +112,21 @@ class Search:
         probabilities[-1] += _UNTHOUGHT
         out = np.array([entry.names in self.contradicted for entry in kept] + [False])
         probabilities[-1] += probabilities[out].sum()
+        probabilities = self._beside_unlisted(kept, np.where(out, 0.0, probabilities))
         rivals: list[Explanation | None] = [*kept, None]
         answers = [Answer(rivals[number], float(probabilities[number])) for number in np.flatnonzero(~out)]
         return sorted(answers, key=lambda answer: -answer.probability)
+
+    def _beside_unlisted(self, kept: Sequence[Explanation], probabilities: Floats) -> Floats:
+        """With the unlisted laws that the leading set imitates among `none_of_these`, the last: no more probable than
+        that set."""
+        leader = int(np.argmax(probabilities))
+        if leader == len(kept):
+            return probabilities
+        further = self.imitating.get(kept[leader].names, 0.0) * probabilities[leader]
+        beside = probabilities.copy()
+        beside[-1] += min(further, probabilities[leader] - probabilities[-1])
+        return np.asarray(beside / beside.sum())
 
 
 def least_evidence(explanation: Explanation) -> float:

@@ -1,0 +1,116 @@
+"""How many laws that no catalogue lists would look like an explanation of curves, at the strength that is seen.
+
+Such a law acts as listed ones do: it multiplies the force, shifts the travel or adds a force, by a simple form of the
+force, the depth, the time or the way back. Each is given the strength that the explanation's own mechanisms show, χ²
+beyond what the nuisances take up, under the noise that was found. It is imitated if what the explanation's parameters
+leave of it is too little to be named (to first order in the parameters). The prior of unlisted physics is shared evenly
+by these laws; one that is imitated explains the recordings as well as the set that imitates it, never better.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from underskin.diagnosis.data.names import NONE_OF_THESE
+from underskin.diagnosis.inference.curve_products import CurveProducts
+from underskin.diagnosis.inference.explanation import Explanation
+from underskin.diagnosis.inference.likelihood import Likelihoods
+from underskin.diagnosis.inference.optimizer import Fitter
+from underskin.diagnosis.selection.search import PRIORS, least_evidence, log_prior
+from underskin.diagnosis.validation.power import least_chi2
+from underskin.mechanisms.models.curves import CurveModel, times_of
+from underskin.recordings.conditions import CurveConditions
+from underskin.units import Floats, Indices
+
+_FORMS: Mapping[str, Callable[[Floats], Floats]] = {  # of a variable from 0 to 1
+    "root": np.sqrt,
+    "linear": lambda x: x,
+    "square": np.square,
+    "exponential approach": lambda x: 1 - np.exp(-5 * x),
+    "threshold": lambda x: np.maximum(x - 0.5, 0.0),
+    "step": lambda x: (x > 0.5).astype(float),
+}
+_TAKEN_UP = 1e-6  # of a law's own χ²: what is left beside the nuisances is rounding
+
+
+@dataclass(frozen=True)
+class Imitation:
+    """How many of so many unlisted laws an explanation imitates, and how probable these are beside it."""
+
+    laws: int
+    imitated: int
+    odds: float  # at most 1
+
+
+def imitation(explanation: Explanation, null: Explanation, supported: int) -> Imitation | None:
+    """Of an explanation of curves by one or more of so many supported mechanisms; None where these change nothing.
+
+    Parameters
+    ----------
+    explanation, null
+        The set of mechanisms, and the null hypothesis, at their most probable parameters.
+    supported
+        How many mechanisms the campaign supports, among which the prior is shared.
+    """
+    hypothesis = explanation.best.hypothesis
+    model, fit = hypothesis.model, explanation.point.fit
+    assert isinstance(model, CurveModel)
+    force, slopes = (values[0] for values in model.forces_and_slopes(fit[None]))
+    stiffness = -slopes[model.contact_points].sum(axis=0)
+    recordings = [one for one in hypothesis.lines.campaign.recordings if isinstance(one, CurveConditions)]
+    unlisted = _unlisted(recordings, fit[model.contact_points], force, stiffness)
+    change = force - null.best.prediction.value.real
+    information = _information(explanation, np.concatenate([slopes, unlisted, change[None]]))
+    count, own = len(fit), hypothesis.own_parameters
+    precision = hypothesis.priors[0]
+    shown, left = (_left(information, places, precision) for places in (np.arange(own, count), np.arange(count)))
+    laws = shown[:-1] > _TAKEN_UP * np.diag(information)[count:-1]
+    if not (laws.any() and shown[-1] > 0):
+        return None
+    least = least_chi2(supported, least_evidence(explanation))
+    imitated = shown[-1] * left[:-1][laws] < least * shown[:-1][laws]
+    unlisted_prior = PRIORS[NONE_OF_THESE] * float(imitated.mean())
+    odds = unlisted_prior / np.exp(log_prior(len(explanation.names), supported))
+    return Imitation(int(laws.sum()), int(imitated.sum()), float(min(odds, 1.0)))
+
+
+def _unlisted(
+    recordings: Sequence[CurveConditions], contact_points: Floats, force: Floats, stiffness: Floats
+) -> Floats:
+    """What each unlisted law changes in the force (laws, samples), up to its strength.
+
+    `contact_points` (recordings,) [mm]; `force` and `stiffness`, its derivative by the travel, (samples,).
+    """
+    travel = [np.asarray(one.displacement_mm) for one in recordings]
+    depth = np.concatenate([np.maximum(one - at, 0.0) for one, at in zip(travel, contact_points, strict=True)])
+    time = np.concatenate([times_of(one) - times_of(one)[0] for one in recordings])
+    back = np.concatenate([np.arange(len(one)) > int(np.argmax(one)) for one in travel]).astype(float)
+    followed = {"force": np.maximum(force, 0.0), "depth": depth, "time": time}
+    shapes = [back]
+    for variable in followed.values():
+        largest = float(variable.max())
+        shapes += [form(variable / largest) for form in _FORMS.values() if largest > 0]
+    laws = [factor * shape for factor in (force, stiffness) for shape in shapes]
+    return np.array([*laws, *shapes[-len(_FORMS) :]])  # a force of its own follows time
+
+
+def _information(explanation: Explanation, rows: Floats) -> Floats:
+    """Jᵀ C⁻¹ J of changes of the force J (changes, samples) under the noise that the explanation found."""
+    fitter = Fitter([explanation.best.hypothesis])
+    at = fitter.evaluate(fitter.at(explanation.point))
+    levels = fitter.levels(at.points.covariance[:, None])
+    assert isinstance(at.products, CurveProducts)
+    along, square = at.products.of_rows(rows, levels)
+    likelihood = Likelihoods(fitter.lines, fitter.curvature, at.products, levels, at.points.bend)
+    level2 = float(levels.level.flat[0]) ** 2
+    return np.asarray(likelihood.information(along[None] / level2, square[None] / level2)[0])
+
+
+def _left(information: Floats, places: Indices, precision: Floats) -> Floats:
+    """χ² that the parameters at `places`, with their priors' precision, leave of each change behind them (changes,)."""
+    first = len(precision)
+    own = information[np.ix_(places, places)] + np.diag(precision[places])
+    own += 1e-12 * np.diag(np.diag(own))  # of a parameter that changes nothing
+    shared = information[first:, places]
+    return np.asarray(np.diag(information)[first:] - np.einsum("ij,ji->i", shared, np.linalg.solve(own, shared.T)))
