@@ -1,4 +1,5 @@
-"""Compiled: how probable recordings are under predictions (see `likelihood`), and priors, at many sets of noise levels.
+"""Compiled: how probable recordings are under predictions (see `likelihood`), and priors, at many sets of noise levels;
+and steps of these.
 
 Arrays are (points, sets, recordings) where an axis may be 1 and then stands for all.
 """
@@ -9,7 +10,61 @@ from numpy.typing import NDArray
 from underskin.compiled import compiled
 from underskin.units import Floats, Mask
 
+STEP = 0.05  # of the finite differences in the covariance's logarithms
+LARGEST_STEP = 0.7  # of a Newton step in a noise level's logarithm: a factor of 2
+TRIES, SHORTER, LEAST_GAIN = 4, 4.0, 1e-3  # of a step that may gain nothing; gain that ends the steps
 _TOGETHER = 8  # factors of a determinant whose logarithm is taken together: below 1e38 each, they do not overflow
+
+
+@compiled()
+def _log_likelihood(
+    level: Floats,
+    uu: Floats,
+    uy: Floats,
+    yy: Floats,
+    place: Floats,
+    sensor: NDArray[np.int64],
+    bend: Floats,
+    laplacian: Floats,
+    square: Floats,
+    noise: Floats,
+    mm: Floats,
+    mr: Floats,
+) -> float:
+    """Of one point and set, see `log_likelihoods`; `mm` and `mr` (sensors,) are overwritten."""
+    gain2, k2, p2, tau2 = noise[0] ** 2, noise[1] ** 2, noise[2] ** 2, noise[3] ** 2
+    mm[:], mr[:] = 0.0, 0.0
+    chi2 = log_determinant = 0.0
+    determinant, inverse = 1.0, 1 / k2
+    for recording in range(len(level)):
+        of = sensor[recording]
+        own = bend[of]
+        exponent = own + 0.5 * p2 * laplacian[recording]
+        factor = np.exp(exponent) if exponent != 0 else 1.0
+        a = level[recording] * factor
+        known = a * (1 - own)
+        u, u_y = uu[recording], uy[recording]
+        u_r = (u_y - known * u) * inverse
+        r_r = (yy[recording] - known * (2 * u_y - known * u)) * inverse
+        u *= inverse
+        a2 = a * a
+        variance = (gain2 + 0.5 * p2 * p2 * square[recording]) * a2
+        if len(place):
+            variance += p2 * place[recording] * factor * factor
+        left = 1 + variance * u
+        reduced = 1 / left
+        chi2 += r_r - variance * reduced * u_r * u_r
+        mm[of] += a2 * u * reduced
+        mr[of] += a * u_r * reduced
+        determinant *= left
+        if recording % _TOGETHER == 0:
+            log_determinant += np.log(determinant)
+            determinant = 1.0
+    log_determinant += np.log(determinant)
+    for of in range(len(mm)):
+        chi2 -= tau2 / (1 + tau2 * mm[of]) * mr[of] ** 2
+        log_determinant += np.log1p(tau2 * mm[of])
+    return -0.5 * (chi2 + log_determinant)
 
 
 @compiled(
@@ -48,49 +103,35 @@ def log_likelihoods(
     noise
         (points, sets, 4): gain, level, position and spread.
     """
-    points, sets = each.shape
-    recordings, sensors = level.shape[1], bend.shape[1]
-    mm, mr = np.empty(sensors), np.empty(sensors)
-    for point in range(points):
-        for number in range(sets):
-            gain2, k2, p2, tau2 = noise[min(point, len(noise) - 1), number] ** 2
-            uu_at, uy_at, yy_at = (
+    mm, mr = np.empty(bend.shape[1]), np.empty(bend.shape[1])
+    for point in range(each.shape[0]):
+        for number in range(each.shape[1]):
+            each[point, number] += _log_likelihood(
+                level[point],
                 uu[min(point, uu.shape[0] - 1), min(number, uu.shape[1] - 1)],
                 uy[min(point, uy.shape[0] - 1), min(number, uy.shape[1] - 1)],
                 yy[min(point, yy.shape[0] - 1), min(number, yy.shape[1] - 1)],
+                place[point],
+                sensor,
+                bend[point],
+                laplacian,
+                square,
+                noise[min(point, len(noise) - 1), number],
+                mm,
+                mr,
             )
-            mm[:], mr[:] = 0.0, 0.0
-            chi2 = log_determinant = 0.0
-            determinant, inverse = 1.0, 1 / k2
-            for recording in range(recordings):
-                of = sensor[recording]
-                own = bend[point, of]
-                exponent = own + 0.5 * p2 * laplacian[recording]
-                factor = np.exp(exponent) if exponent != 0 else 1.0
-                a = level[point, recording] * factor
-                known = a * (1 - own)
-                u, u_y = uu_at[recording], uy_at[recording]
-                u_r = (u_y - known * u) * inverse
-                r_r = (yy_at[recording] - known * (2 * u_y - known * u)) * inverse
-                u *= inverse
-                a2 = a * a
-                variance = (gain2 + 0.5 * p2 * p2 * square[recording]) * a2
-                if place.shape[1]:
-                    variance += p2 * place[point, recording] * factor * factor
-                left = 1 + variance * u
-                reduced = 1 / left
-                chi2 += r_r - variance * reduced * u_r * u_r
-                mm[of] += a2 * u * reduced
-                mr[of] += a * u_r * reduced
-                determinant *= left
-                if recording % _TOGETHER == 0:
-                    log_determinant += np.log(determinant)
-                    determinant = 1.0
-            log_determinant += np.log(determinant)
-            for of in range(sensors):
-                chi2 -= tau2 / (1 + tau2 * mm[of]) * mr[of] ** 2
-                log_determinant += np.log1p(tau2 * mm[of])
-            each[point, number] += -0.5 * (chi2 + log_determinant)
+
+
+@compiled()
+def _log_plateaus(covariance: Floats, plateaus: Floats) -> float:
+    """The log prior density of covariance parameters (parameters,)."""
+    total = 0.0
+    for place in range(len(covariance)):
+        value = covariance[place]
+        below = max((plateaus[place, 0] - value) / plateaus[place, 2], 0.0)
+        above = max((value - plateaus[place, 1]) / plateaus[place, 3], 0.0)
+        total -= 0.5 * (below + above) ** 2 + plateaus[place, 4]
+    return total
 
 
 @compiled(
@@ -126,10 +167,112 @@ def log_priors(
                     of_mean = -np.inf
                 of_mean -= 0.5 * precision[of, place] * (value - centre[of, place]) ** 2
         for number in range(covariances.shape[1]):
-            total = of_mean
-            for place in range(covariances.shape[2]):
-                value = covariances[point, number, place]
-                below = max((plateaus[place, 0] - value) / plateaus[place, 2], 0.0)
-                above = max((value - plateaus[place, 1]) / plateaus[place, 3], 0.0)
-                total -= 0.5 * (below + above) ** 2 + plateaus[place, 4]
-            each[point, number] += total
+            each[point, number] += of_mean + _log_plateaus(covariances[point, number], plateaus)
+
+
+@compiled(
+    "void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], int64[::1], "
+    "float64[:, ::1], float64[::1], float64[::1], float64, float64, float64, boolean, float64[:, ::1], float64[::1], "
+    "float64[::1], int64, int64, float64[:, ::1], float64[::1])"
+)
+def settle(
+    level: Floats,
+    uu: Floats,
+    uy: Floats,
+    yy: Floats,
+    place: Floats,
+    sensor: NDArray[np.int64],
+    bend: Floats,
+    laplacian: Floats,
+    square: Floats,
+    about_means: float,
+    numbers: float,
+    spread: float,
+    placed: bool,
+    plateaus: Floats,
+    lowest: Floats,
+    highest: Floats,
+    steps: int,
+    held: int,
+    covariance: Floats,
+    cost: Floats,
+) -> None:
+    """Newton steps of gain, level and, where `placed`, position scatter, each on its own: `covariance` (points,
+    parameters) and `cost` (points,) are overwritten with where they end.
+
+    Parameters
+    ----------
+    level, uu, uy, place
+        (points, recordings); `place` may be (points, 0).
+    yy, sensor, laplacian, square
+        (recordings,).
+    bend
+        (points, sensors).
+    about_means, numbers
+        What lines scatter about their recordings' means, and how many numbers all lines are.
+    spread
+        Of the sensors' gains.
+    plateaus, lowest, highest
+        Prior (parameters, 5) and bounds (parameters,).
+    steps, held
+        Steps at most, and the parameter that stays; -1 for none.
+    """
+    count = covariance.shape[1]
+    noise, mm, mr = np.zeros(4), np.empty(bend.shape[1]), np.empty(bend.shape[1])
+    noise[3] = spread
+
+    def at(point: int, values: Floats) -> float:
+        for parameter in range(2 + placed):
+            noise[parameter] = np.exp(values[parameter])
+        of_lines = -numbers * values[1] - 0.5 * about_means / noise[1] ** 2
+        likelihood = _log_likelihood(
+            level[point], uu[point], uy[point], yy, place[point], sensor, bend[point], laplacian, square, noise, mm, mr
+        )
+        return -(of_lines + likelihood + _log_plateaus(values, plateaus))
+
+    centre, step, tried = np.empty(count), np.empty(count), np.empty(count)
+    for point in range(len(cost)):
+        if not np.isfinite(cost[point]):
+            continue
+        here = covariance[point]
+        best = begun = at(point, here)
+        for _ in range(steps):
+            for parameter in range(count):
+                inside = max(here[parameter], lowest[parameter] + 2 * STEP)
+                centre[parameter] = min(inside, highest[parameter] - 2 * STEP)
+            middle = at(point, centre)
+            largest = 1e-12
+            for parameter in range(count):
+                step[parameter] = 0.0
+                if parameter == held:
+                    continue
+                value = centre[parameter]
+                centre[parameter] = value + STEP
+                up = at(point, centre)
+                centre[parameter] = value - STEP
+                down = at(point, centre)
+                centre[parameter] = value
+                bent = (up + down - 2 * middle) / STEP**2
+                slope = (up - down) / (2 * STEP) + bent * (here[parameter] - value)
+                move = -slope / max(abs(bent), 1.0)
+                low, high = here[parameter] <= lowest[parameter], here[parameter] >= highest[parameter]
+                if (low and move < 0) or (high and move > 0):
+                    continue
+                step[parameter] = move
+                largest = max(largest, abs(move))
+            step *= min(1.0, LARGEST_STEP / largest)
+            gained = 0.0
+            for _ in range(TRIES):
+                for parameter in range(count):
+                    moved = here[parameter] + step[parameter]
+                    tried[parameter] = min(max(moved, lowest[parameter]), highest[parameter])
+                reached = at(point, tried)
+                if reached < best:
+                    gained = best - reached
+                    best = reached
+                    here[:] = tried
+                    break
+                step /= SHORTER
+            if gained < LEAST_GAIN:
+                break
+        cost[point] += best - begun

@@ -24,8 +24,6 @@ from underskin.units import Floats, Indices
 GAIN, LEVEL, POSITION = 0, 1, 2  # places among the covariance's parameters, the last where there is such scatter
 SMOOTH = 2  # of curves, which have no place
 
-_LARGEST_STEP = 0.7  # of a Newton step in a noise level's logarithm: a factor of 2
-_STEP = 0.05  # of the finite differences in the covariance's logarithms
 _FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
 _NUMBERS_AT_ONCE = 500_000
 _PREDICTED_AT_ONCE = 2_000_000
@@ -205,6 +203,10 @@ class Evaluator:
 
         Several of a mechanism's own hang together, so that steps of one at a time would creep.
         """
+        if isinstance(at.products, FrfProducts) and not self.own.size and self.hypotheses[0].model.pickup is None:
+            return self._settled_apart(at, at.products, steps, held)
+        from underskin.diagnosis.inference.cost_kernel import LARGEST_STEP, LEAST_GAIN, SHORTER, TRIES
+
         low, high = self._lowest, self._highest
         points, cost, moving = at.points, at.cost.copy(), np.arange(len(at))
         products = at.products.values
@@ -219,10 +221,10 @@ class Evaluator:
             here = part.points.covariance
             outwards = ((here <= low) & (step < 0)) | ((here >= high) & (step > 0))
             step = np.where(outwards, 0.0, step)
-            step *= np.minimum(1.0, _LARGEST_STEP / np.maximum(np.abs(step).max(axis=1), 1e-12))[:, None]
+            step *= np.minimum(1.0, LARGEST_STEP / np.maximum(np.abs(step).max(axis=1), 1e-12))[:, None]
             covariance, reached, gained = here.copy(), part.cost.copy(), np.zeros(len(part))
             trying = np.arange(len(part))
-            for _ in range(4):
+            for _ in range(TRIES):
                 tried = np.clip(here[trying] + step[trying], low, high)
                 costs = self.costs(part.some(trying), tried[:, None])[:, 0]
                 lower = costs < part.cost[trying]
@@ -232,13 +234,41 @@ class Evaluator:
                 trying = trying[~lower]
                 if not len(trying):
                     break
-                step = step / 4
+                step = step / SHORTER
             points = self._moved(points, moving, covariance)
             cost[moving] = reached
-            moving = moving[gained >= 1e-3]
+            moving = moving[gained >= LEAST_GAIN]
             if not len(moving):
                 break
         return Evaluated(points, at.products, cost, at.growth)
+
+    def _settled_apart(self, at: Evaluated, products: FrfProducts, steps: int, held: int | None) -> Evaluated:
+        """The same where no mechanism acts on the covariance: each parameter moves on its own."""
+        from underskin.diagnosis.inference.cost_kernel import settle
+
+        covariance, cost = at.points.covariance.copy(), at.cost.copy()
+        about_means, numbers = self.lines.about_means
+        place = products.place_slopes
+        size = np.zeros((len(at), 0)) if place is None or not self.placed else place[0] ** 2 + place[1] ** 2
+        settle(
+            *map(contiguous, (products.level, products.uu, products.uy, products.yy, size)),
+            self.lines.sensor,
+            contiguous(at.points.bend),
+            self.curvature.laplacian,
+            self.curvature.square,
+            about_means,
+            float(numbers),
+            SENSOR_SPREAD,
+            self.placed,
+            self._covariance_prior,
+            self._lowest,
+            self._highest,
+            steps,
+            -1 if held is None else held,
+            covariance,
+            cost,
+        )
+        return replace(at, points=replace(at.points, covariance=covariance), cost=cost)
 
     def _moved(self, points: Points, moving: Indices, covariance: Floats) -> Points:
         whole = points.covariance.copy()
@@ -254,21 +284,23 @@ class Evaluator:
     def covariance_equations(self, at: Evaluated, *, first_mixed: int = 0) -> tuple[Floats, Floats]:
         """Gradient and Hessian of the costs in the covariance parameters, by differences; without mixed terms of the
         parameters before the `first_mixed`."""
+        from underskin.diagnosis.inference.cost_kernel import STEP
+
         here = at.points.covariance
         count = here.shape[1]
-        steps = _STEP * np.eye(count)
+        steps = STEP * np.eye(count)
         # Far enough inside the bounds for the differences
-        centre = np.clip(here, self._lowest + 2 * _STEP, self._highest - 2 * _STEP)
+        centre = np.clip(here, self._lowest + 2 * STEP, self._highest - 2 * STEP)
         pairs = [(a, b) for a in range(count) for b in range(first_mixed, a)]
         both = [steps[a] + steps[b] for a, b in pairs]
         shifts = np.array([np.zeros(count), *steps, *-steps, *both, *(-step for step in both)])
         costs = self.costs(at, centre[:, None] + shifts)
         middle, up, down = costs[:, :1], costs[:, 1 : count + 1], costs[:, count + 1 : 2 * count + 1]
         alone = up + down - 2 * middle
-        gradient = (up - down) / (2 * _STEP)
-        hessian = alone[:, :, None] / _STEP**2 * np.eye(count)
+        gradient = (up - down) / (2 * STEP)
+        hessian = alone[:, :, None] / STEP**2 * np.eye(count)
         together = costs[:, 2 * count + 1 :].reshape(len(at), 2, -1).sum(axis=1) - 2 * middle
         for place, (a, b) in enumerate(pairs):
-            hessian[:, a, b] = (together[:, place] - alone[:, a] - alone[:, b]) / (2 * _STEP**2)
+            hessian[:, a, b] = (together[:, place] - alone[:, a] - alone[:, b]) / (2 * STEP**2)
             hessian[:, b, a] = hessian[:, a, b]
         return gradient + np.einsum("nij,nj->ni", hessian, here - centre), hessian
