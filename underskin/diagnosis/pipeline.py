@@ -134,13 +134,15 @@ def _work_out(
         leader = result.answers[0]
         shown = result.shown_or_nothing(leader)
     begun, result = _beside_unlisted(begun, problem, result, nothing)
+    leader = result.answers[0]
+    shown = result.shown_or_nothing(leader)
     floor = largest_floor_percent(problem, nothing, groups)
     if leader.explanation is nothing and floor > _LARGEST_FLOOR:
         return replace(begun, lacking=Lacking(Lack.NOISE, {"floor_percent": floor}))
     if leader.explanation is nothing and problem.kind == "frf" and problem.lines.recordings < _LEAST_TO_AGREE:
         few = {"recordings": problem.lines.recordings, "least": _LEAST_TO_AGREE}
         return replace(begun, lacking=Lacking(Lack.FEW_TO_AGREE, few))
-    shape = describe(problem, shown) if leader.explanation is None else None
+    shape = describe(problem, shown) if leader.explanation is None and shown.names not in result.imitating else None
     return replace(
         begun.with_findings(*above_noise(problem, shown, groups)),
         search=result,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.compiled import compiled
-from underskin.units import Floats, Mask
+from underskin.units import Array, Floats, Mask
 
 STEP = 0.05  # of the finite differences in the covariance's logarithms
 LARGEST_STEP = 0.7  # of a Newton step in a noise level's logarithm: a factor of 2
@@ -170,6 +170,65 @@ def log_priors(
             each[point, number] += of_mean + _log_plateaus(covariances[point, number], plateaus)
 
 
+@compiled()
+def _cost(
+    covariance: Floats,
+    noise: Floats,
+    of_point: tuple[Array, ...],
+    sums: tuple[Floats, Floats],
+    known: tuple[float, float, bool, Floats],
+) -> float:
+    """The cost with covariance parameters (parameters,), up to what no noise level changes; `noise` and `sums` are
+    overwritten."""
+    about_means, numbers, placed, plateaus = known
+    noise[0], noise[1] = np.exp(covariance[0]), np.exp(covariance[1])
+    if placed:
+        noise[2] = np.exp(covariance[2])
+    of_lines = -numbers * covariance[1] - 0.5 * about_means / noise[1] ** 2
+    return -(of_lines + _log_likelihood(*of_point, noise, *sums) + _log_plateaus(covariance, plateaus))
+
+
+@compiled()
+def _inside(here: Floats, step: Floats, lowest: Floats, highest: Floats, moved: Floats) -> None:
+    """`moved` becomes where a step from here leads, within the bounds (parameters,)."""
+    for parameter in range(len(here)):
+        moved[parameter] = min(max(here[parameter] + step[parameter], lowest[parameter]), highest[parameter])
+
+
+@compiled()
+def _newton_step(
+    here: Floats,
+    lowest: Floats,
+    highest: Floats,
+    held: int,
+    noise: Floats,
+    of_point: tuple[Array, ...],
+    sums: tuple[Floats, Floats],
+    known: tuple[float, float, bool, Floats],
+    step: Floats,
+) -> None:
+    """`step` becomes that of each parameter on its own, by central differences; 0 where it would leave the bounds."""
+    centre = np.empty(len(here))
+    _inside(here, 0 * here, lowest + 2 * STEP, highest - 2 * STEP, centre)  # far enough inside for the differences
+    middle = _cost(centre, noise, of_point, sums, known)
+    largest = 1e-12
+    for parameter in range(len(here)):
+        value = centre[parameter]
+        centre[parameter] = value + STEP
+        up = _cost(centre, noise, of_point, sums, known)
+        centre[parameter] = value - STEP
+        down = _cost(centre, noise, of_point, sums, known)
+        centre[parameter] = value
+        bent = (up + down - 2 * middle) / STEP**2
+        slope = (up - down) / (2 * STEP) + bent * (here[parameter] - value)
+        step[parameter] = -slope / max(abs(bent), 1.0)
+        low, high = here[parameter] <= lowest[parameter], here[parameter] >= highest[parameter]
+        if parameter == held or (low and step[parameter] < 0) or (high and step[parameter] > 0):
+            step[parameter] = 0.0
+        largest = max(largest, abs(step[parameter]))
+    step *= min(1.0, LARGEST_STEP / largest)
+
+
 @compiled(
     "void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], int64[::1], "
     "float64[:, ::1], float64[::1], float64[::1], float64, float64, float64, boolean, float64[:, ::1], float64[::1], "
@@ -218,55 +277,22 @@ def settle(
         Steps at most, and the parameter that stays; -1 for none.
     """
     count = covariance.shape[1]
-    noise, mm, mr = np.zeros(4), np.empty(bend.shape[1]), np.empty(bend.shape[1])
+    noise, step, tried = np.zeros(4), np.empty(count), np.empty(count)
     noise[3] = spread
-
-    def at(point: int, values: Floats) -> float:
-        for parameter in range(2 + placed):
-            noise[parameter] = np.exp(values[parameter])
-        of_lines = -numbers * values[1] - 0.5 * about_means / noise[1] ** 2
-        likelihood = _log_likelihood(
-            level[point], uu[point], uy[point], yy, place[point], sensor, bend[point], laplacian, square, noise, mm, mr
-        )
-        return -(of_lines + likelihood + _log_plateaus(values, plateaus))
-
-    centre, step, tried = np.empty(count), np.empty(count), np.empty(count)
+    sums = np.empty(bend.shape[1]), np.empty(bend.shape[1])
     for point in range(len(cost)):
         if not np.isfinite(cost[point]):
             continue
         here = covariance[point]
-        best = begun = at(point, here)
+        of_point = level[point], uu[point], uy[point], yy, place[point], sensor, bend[point], laplacian, square
+        known = about_means, numbers, placed, plateaus
+        best = begun = _cost(here, noise, of_point, sums, known)
         for _ in range(steps):
-            for parameter in range(count):
-                inside = max(here[parameter], lowest[parameter] + 2 * STEP)
-                centre[parameter] = min(inside, highest[parameter] - 2 * STEP)
-            middle = at(point, centre)
-            largest = 1e-12
-            for parameter in range(count):
-                step[parameter] = 0.0
-                if parameter == held:
-                    continue
-                value = centre[parameter]
-                centre[parameter] = value + STEP
-                up = at(point, centre)
-                centre[parameter] = value - STEP
-                down = at(point, centre)
-                centre[parameter] = value
-                bent = (up + down - 2 * middle) / STEP**2
-                slope = (up - down) / (2 * STEP) + bent * (here[parameter] - value)
-                move = -slope / max(abs(bent), 1.0)
-                low, high = here[parameter] <= lowest[parameter], here[parameter] >= highest[parameter]
-                if (low and move < 0) or (high and move > 0):
-                    continue
-                step[parameter] = move
-                largest = max(largest, abs(move))
-            step *= min(1.0, LARGEST_STEP / largest)
+            _newton_step(here, lowest, highest, held, noise, of_point, sums, known, step)
             gained = 0.0
             for _ in range(TRIES):
-                for parameter in range(count):
-                    moved = here[parameter] + step[parameter]
-                    tried[parameter] = min(max(moved, lowest[parameter]), highest[parameter])
-                reached = at(point, tried)
+                _inside(here, step, lowest, highest, tried)
+                reached = _cost(tried, noise, of_point, sums, known)
                 if reached < best:
                     gained = best - reached
                     best = reached

@@ -249,12 +249,18 @@ class PickupProducts:
         return self.rows.slopes_less(sums, self.line, self.u, self.v, levels.pickup[:, 0], levels.level[:, 0, 0])
 
 
+@lru_cache(maxsize=64)
+def _pairs(count: int) -> tuple[Indices, Indices]:
+    """All pairs of so many, each with itself too."""
+    return np.triu_indices(count)
+
+
 def _turned(lines: FrfLines, u: Array, slopes: Array) -> tuple[Floats, Floats, SlopeSums]:
     """Re u*u, Re u*y and the sums with the derivatives v of u (points, parameters, lines)."""
     moving, count = np.flatnonzero(slopes.any(axis=(0, 2))), slopes.shape[1]
     each = np.concatenate([u[:, None], slopes[:, moving]], axis=1)
     real, imag = np.ascontiguousarray(each.real), np.ascontiguousarray(each.imag)
-    one, other = np.triu_indices(each.shape[1])
+    one, other = _pairs(each.shape[1])
     both = lines.weight(real[:, one] * real[:, other] + imag[:, one] * imag[:, other])
     with_y = lines.real(real) + lines.imag(imag)
     uv, vy, vv = (np.zeros((len(u), both.shape[-1], *further)) for further in ((count,), (count,), (count, count)))

@@ -219,9 +219,11 @@ class Fitter(Evaluator):
         return np.asarray(np.isfinite(at.growth).all(axis=(1, 2)))
 
     def replaced(self, at: Evaluated, where: Indices, other: Evaluated) -> Evaluated:
-        """With other points in the place of some."""
+        """With other points in the place of some, which are in rising order."""
         if not len(where):
             return at
+        if len(where) == len(at) and (at.growth is None or other.growth is not None):
+            return other
         order = np.arange(len(at))
         order[where] = len(at) + np.arange(len(other))
 

@@ -55,6 +55,8 @@ class Evaluated:
         return self if len(points) == len(self) else self[points]
 
     def __getitem__(self, points: Indices | Mask | slice) -> "Evaluated":
+        if isinstance(points, np.ndarray) and points.dtype == bool and points.all():
+            return self
         growth = None if self.growth is None else self.growth[points]
         return Evaluated(self.points[points], self.products[points], self.cost[points], growth)
 

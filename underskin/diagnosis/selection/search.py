@@ -56,7 +56,7 @@ class Search:
 
     `contradicted`: sets under which the residual keeps structure, or its noise is no noise (see residual_shape.py);
     their probability is that of `none_of_these`. `imitating`: the odds of an unlisted law that looks like a set on
-    these recordings, at most 1; `none_of_these` has them beside the leading set.
+    these recordings; `none_of_these` has them beside the leading set.
     """
 
     explanations: tuple[Explanation, ...]
@@ -84,9 +84,13 @@ class Search:
         return all(explanation.log_evidence > without + least_evidence(explanation) for without in smaller)
 
     def shown_or_nothing(self, answer: Answer) -> Explanation:
-        """The explanation that an answer stands on: for `none_of_these`, the one beneath its best process."""
+        """The explanation that an answer stands on: for `none_of_these`, the one that looks like an unlisted law, or
+        else the one beneath its best process."""
         if answer.explanation is not None:
             return answer.explanation
+        imitating = [entry for entry in self.explanations if entry.names in self.imitating]
+        if imitating:
+            return imitating[0]
         beneath = [pair for pair in self.discrepancies if self.shows(pair[0])]
         return max(beneath, key=lambda pair: self._log_weight_beneath(*pair))[0]
 
@@ -118,14 +122,14 @@ class Search:
         return sorted(answers, key=lambda answer: -answer.probability)
 
     def _beside_unlisted(self, kept: Sequence[Explanation], probabilities: Floats) -> Floats:
-        """With the unlisted laws that the leading set imitates among `none_of_these`, the last: no more probable than
-        that set."""
+        """With the unlisted laws that the leading set imitates among `none_of_these`, the last."""
         leader = int(np.argmax(probabilities))
         if leader == len(kept):
             return probabilities
-        further = self.imitating.get(kept[leader].names, 0.0) * probabilities[leader]
         beside = probabilities.copy()
-        beside[-1] += min(further, probabilities[leader] - probabilities[-1])
+        beside[-1] += self.imitating.get(kept[leader].names, 0.0) * probabilities[leader]
+        if len(kept[leader].names) == 1:
+            beside[-1] = max(probabilities[-1], min(beside[-1], probabilities[leader]))
         return np.asarray(beside / beside.sum())
 
 

@@ -4,7 +4,8 @@ Such a law acts as listed ones do: it multiplies the force, shifts the travel or
 force, the depth, the time or the way back. Each is given the strength that the explanation's own mechanisms show, χ²
 beyond what the nuisances take up, under the noise that was found. It is imitated if what the explanation's parameters
 leave of it is too little to be named (to first order in the parameters). The prior of unlisted physics is shared evenly
-by these laws; one that is imitated explains the recordings as well as the set that imitates it, never better.
+by these laws; one that is imitated explains the recordings as well as the set that imitates it. It is never more
+probable than one listed mechanism that does the same, but it may be than two or three that do so together.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -40,7 +41,7 @@ class Imitation:
 
     laws: int
     imitated: int
-    odds: float  # at most 1
+    odds: float  # beside one mechanism at most 1
 
 
 def imitation(explanation: Explanation, null: Explanation, supported: int) -> Imitation | None:
@@ -71,8 +72,9 @@ def imitation(explanation: Explanation, null: Explanation, supported: int) -> Im
     least = least_chi2(supported, least_evidence(explanation))
     imitated = shown[-1] * left[:-1][laws] < least * shown[:-1][laws]
     unlisted_prior = PRIORS[NONE_OF_THESE] * float(imitated.mean())
-    odds = unlisted_prior / np.exp(log_prior(len(explanation.names), supported))
-    return Imitation(int(laws.sum()), int(imitated.sum()), float(min(odds, 1.0)))
+    size = len(explanation.names)
+    odds = float(unlisted_prior / np.exp(log_prior(size, supported)))
+    return Imitation(int(laws.sum()), int(imitated.sum()), min(odds, 1.0) if size == 1 else odds)
 
 
 def _unlisted(

@@ -170,8 +170,11 @@ class FrfModels:
     def _offset(self, model: FrfModel, points: Indices, seeds: Seeds) -> Differentiated:
         """The distance of each place's contact from its sensor's centre [m], where positions vary, with them."""
         design = model.design
-        still = constant(0.0, seeds.variables, (len(points),))
         moved = [(some, mechanism.offset(values)) for mechanism, some, values in self._acting("offset", points, seeds)]
+        if not (seeds.position or moved):
+            distance = np.tile(np.hypot(design.point_x, design.point_y), (len(points), 1))
+            return Differentiated(distance, np.zeros((seeds.variables, *distance.shape)))
+        still = constant(0.0, seeds.variables, (len(points),))
         x, y = (
             own + shift
             for own, shift in zip((design.point_x, design.point_y), seeds.position or 2 * [still], strict=True)
