@@ -42,28 +42,37 @@ def lost(
     u
         The direction (points, lines).
     """
-    points, _, sets = pickup.shape
-    factors, total, count = np.empty(sets), np.empty(sets), np.empty(sets, dtype=np.int64)
+    points, distinct, sets = pickup.shape
+    factors, total, taken, largest = np.empty(sets), np.empty(sets), np.zeros((3, sets)), np.empty(distinct)
     for point in range(points):
-        factors[:], total[:], count[:] = 1.0, 0.0, 0
+        factors[:], total[:] = 1.0, 0.0
+        count = 0
+        for number in range(distinct):
+            largest[number] = pickup[point, number].max()
         for row in range(len(y)):
-            of, square, weight = recording[row], pickup[point, alike[row]], precision[row]
-            at, measured = u[point, line[row]], y[row]
-            uu_row = at.real * at.real + at.imag * at.imag
-            uy_row = at.real * measured.real + at.imag * measured.imag
-            yy_row = measured.real * measured.real + measured.imag * measured.imag
-            for number in range(sets):
-                x = square[number] * weight
-                if x > _NONE:
+            square, weight = pickup[point, alike[row]], precision[row]
+            if largest[alike[row]] * weight > _NONE:
+                at, measured = u[point, line[row]], y[row]
+                uu_row = at.real * at.real + at.imag * at.imag
+                uy_row = at.real * measured.real + at.imag * measured.imag
+                yy_row = measured.real * measured.real + measured.imag * measured.imag
+                for number in range(sets):
+                    x = square[number] * weight
                     less = x / (1 + x) * weight
-                    uu[point, number, of] -= less * uu_row
-                    uy[point, number, of] -= less * uy_row
-                    yy[point, number, of] -= less * yy_row
+                    taken[0, number] += less * uu_row
+                    taken[1, number] += less * uy_row
+                    taken[2, number] += less * yy_row
                     factors[number] *= 1 + x
-                    count[number] += 1
-                    if count[number] == _TOGETHER:
+                count += 1
+                if count == _TOGETHER:
+                    for number in range(sets):
                         total[number] += np.log(factors[number])
-                        factors[number], count[number] = 1.0, 0
+                    factors[:], count = 1.0, 0
+            if row + 1 == len(y) or recording[row + 1] != recording[row]:
+                uu[point, :, recording[row]] -= taken[0]
+                uy[point, :, recording[row]] -= taken[1]
+                yy[point, :, recording[row]] -= taken[2]
+                taken[:] = 0.0
         for number in range(sets):
             log_determinant[point, number] += 2 * (total[number] + np.log(factors[number]))
 

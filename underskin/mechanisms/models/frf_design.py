@@ -4,7 +4,7 @@ Recordings share contacts (sphere, preload and what else a mechanism asks for), 
 are points, and a contact at one frequency is a line. Only these distinct ones are computed.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -56,8 +56,12 @@ class FrfDesign:
         self.recording: Indices = np.repeat(np.arange(count), [len(column) for column in lines_hz])
         self.row_frequency = np.concatenate(lines_hz)
         self.row_dynamic_force: Floats = np.array([entry.dynamic_force_n for entry in recordings])[self.recording]
-        distinct, frequency = np.unique(self.row_frequency, return_inverse=True)
-        lines, self.line = np.unique(contact[self.recording] * len(distinct) + frequency, return_inverse=True)
+        distinct, frequency = _distinct(lines_hz)
+        own_line = contact[self.recording] * len(distinct) + frequency
+        measured = np.zeros(len(contacts) * len(distinct), dtype=bool)
+        measured[own_line] = True
+        lines = np.flatnonzero(measured)
+        self.line: Indices = (np.cumsum(measured) - 1)[own_line]
         self.line_contact, self.line_frequency = lines // len(distinct), distinct[lines % len(distinct)]
 
 
@@ -74,6 +78,15 @@ def frequencies(entry: FrfConditions) -> Floats:
     if entry.frequency_hz is None:
         raise required(f"recordings[{entry.id}].frequency_hz", "required for a prediction")
     return entry.frequency_hz
+
+
+def _distinct(columns: Sequence[Floats]) -> tuple[Floats, Indices]:
+    """The distinct frequencies of recordings, most of which share their lines, and which of them each row has."""
+    keys = [column.tobytes() for column in columns]
+    shared = dict(zip(keys, columns, strict=True))
+    distinct = np.unique(np.concatenate(list(shared.values())))
+    places = {key: np.searchsorted(distinct, column) for key, column in shared.items()}
+    return distinct, np.concatenate([places[key] for key in keys])
 
 
 def _neighbours(places: Floats) -> Mask:
