@@ -22,9 +22,14 @@ from underskin.mechanisms.models.frf import FrfModel
 from underskin.units import Floats, Indices
 
 _NEAR = 4.0  # standard deviations from a bound within which it counts
-_POLISHING, _POLISHED = 4, 0.05  # steps at most, and the gain in log posterior below which it stops
+_POLISHING, _POLISHING_CURVES, _POLISHED = (
+    4,
+    12,
+    0.05,
+)  # steps at most, of curves as well, and the gain in log posterior below which it stops
 _LEAST_COVARIANCE_CURVATURE = 0.3  # of logarithms of noise levels: their priors are not wider
 _TRUSTED = 1.0  # gain in log posterior that polishing may leave
+_ASTRAY = -50.0  # nats that bounds can never take from an integral around a point within them
 _LEAST_EIGENVALUE = 1e-11  # of the correlations' information
 _FLAT = 1e-3  # least standard deviations of the quadratic within a parameter's bounds: keeps H invertible
 
@@ -90,7 +95,7 @@ def around(fitter: Fitter, at: Evaluated) -> list[Evidence]:
     if len(unknown):
         at = fitter.replaced(at, unknown, fitter.with_growth(at[unknown]))
     moving = np.arange(len(at))
-    for _ in range(_POLISHING):
+    for _ in range(_POLISHING_CURVES if fitter.lines.curves else _POLISHING):
         moving, at = _polish(fitter, at, moving)
         if not len(moving):
             break
@@ -123,7 +128,10 @@ def around_mean(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:
         gain = 0.5 * gradient @ covariance @ gradient
         volume = 0.5 * len(fit) * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(information)[1]
         mean = (fit - covariance @ gradient).astype(np.float64)
-        values.append(float(-at.cost[number] + gain + volume + log_box(mean, covariance, low, high)))
+        beyond = gain + log_box(mean, covariance, low, high)
+        if beyond < _ASTRAY:  # truncating one bound after another fails where a quadratic leads far out of several
+            beyond = log_box(fit, covariance, low, high)
+        values.append(float(-at.cost[number] + volume + beyond))
         covariances.append(covariance)
     return np.array(values), covariances
 
