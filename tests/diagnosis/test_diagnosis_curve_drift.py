@@ -39,6 +39,23 @@ def test_a_drift_as_large_as_the_force_is_told_by_the_samples_in_the_air(table: 
     assert (report["verdict"], report["probability"] > 0.95) == ("no_mismatch", True)
 
 
+@pytest.mark.parametrize("rate", [-1.2e-3, 1.2e-3])
+@pytest.mark.parametrize("exponent", [1.5, 2.5])
+def test_the_air_after_contact_tells_a_drift_where_that_before_is_too_short(rate: float, exponent: float) -> None:
+    """Ten samples of air before contact and four hundred after it, of a law that rises otherwise than Hertz's."""
+    random = np.random.default_rng(8)
+    depth = np.concatenate([np.linspace(-0.01, 0.4, 400), np.linspace(0.4, -0.4, 800)])
+    time = np.linspace(0, 300, len(depth))
+    noise = 2e-3
+    force = np.maximum(depth / 0.4, 0.0) ** exponent + rate * time + noise * random.normal(size=len(depth))
+    assert course(depth, force, time).drift == pytest.approx(rate, rel=0.05)
+    steady = course(depth, force - rate * time, time)
+    assert steady.drift == 0.0
+    # A tail that ends where the force did not begin is no drift of the cell.
+    sticking = force - rate * time + 0.3 * np.maximum(time - 150, 0.0) / 150
+    assert course(depth, sticking, time).drift in (0.0, pytest.approx(0.3 / 150, rel=0.05))
+
+
 @pytest.mark.parametrize("exponent", [1.5, 2.0, 2.5])
 @pytest.mark.parametrize("noise", [1e-4, 1e-2])
 def test_the_foot_of_a_contact_is_no_drift(exponent: float, noise: float) -> None:

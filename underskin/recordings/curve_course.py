@@ -147,7 +147,7 @@ def _drifting_air(
 
     See `_straight_air`.
     """
-    air = _straight_air(displacement[:count], force[:count], time[:count], noise)
+    air = _straight_air(displacement[:count], force[:count], time[:count], noise, 1.0)
     return air if air is not None and _believed(displacement, force, time, count, noise, air[1]) else None
 
 
@@ -157,19 +157,22 @@ def _drift_after(displacement: Floats, force: Floats, time: Floats, leave: int, 
     It is believed if it leads from where the force began to where it ended.
     """
     after = slice(None, leave, -1)
-    air = _straight_air(displacement[after], force[after], time[after], noise)
+    air = _straight_air(displacement[after], force[after], time[after], noise, _LEAST_AIR)
     if air is None:
         return 0.0
     expected = air[1] * float(time[-1] - time[0])
     return air[1] if abs(float(force[-1] - force[0]) - expected) < 0.5 * abs(expected) + 4 * noise else 0.0
 
 
-def _straight_air(displacement: Floats, force: Floats, time: Floats, noise: float) -> tuple[int, float] | None:
+def _straight_air(
+    displacement: Floats, force: Floats, time: Floats, noise: float, least: float
+) -> tuple[int, float] | None:
     """How many samples, the first of which lie in the air and the last deepest, lie before contact, and the drift of
     the force in time; None where it does not plainly drift.
 
     F = b + s t + k (d − d0)^(3/2) by least squares with and without the drift s over a grid of contact points d0; the
-    samples in the air must lie on a straight line.
+    samples before d0, or the first of them but at least a share `least`, must lie on a straight line: a law that rises
+    otherwise than Hertz's begins earlier, but so the foot of a contact passes for air.
     """
     count = len(displacement)
     at = np.linspace(0, count - 1, min(count, _FITTED)).round().astype(int)
@@ -187,11 +190,12 @@ def _straight_air(displacement: Floats, force: Floats, time: Floats, noise: floa
     first = int(np.argmax(displacement > begins))
     if first < _LEAST_AIR * count or steady < (1 + _PLAIN / len(at)) * drifting:
         return None
-    while first >= _LEAST_AIR * count:
+    shortest = max(least * first, _LEAST_AIR * count)
+    while first >= shortest:
         line = np.polyfit(time[:first], force[:first], 1)
         if np.std(force[:first] - np.polyval(line, time[:first])) < _STRAIGHT * noise:
             return first, float(line[0])
-        first = int(_SHORTER * first)  # a law that rises otherwise than Hertz's begins earlier
+        first = int(_SHORTER * first)
     return None
 
 
