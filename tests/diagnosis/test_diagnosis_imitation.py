@@ -2,61 +2,20 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from scipy.optimize import brentq
 
-from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from tests.support.pressed_curves import explained, pressed
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation.imitation import Imitation, imitation
-from underskin.recordings.campaign import Campaign, parse
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
-MODULUS, NOISE = 2.0, 5e-4  # MPa, and of the largest force
 SUPPORTED = 6
 
 
 @pytest.fixture(scope="module")
 def table() -> SigmaTable:
     return load_table()
-
-
-def force_on_stage(travel: float, radius: float, stiffness: float) -> float:
-    """F [N] of Hertz' contact behind a stage of that stiffness [N/mm], travel and radius in mm."""
-
-    def beyond(force: float) -> float:
-        return force - 16 / 9 * MODULUS * np.sqrt(radius) * max(travel - force / stiffness, 0.0) ** 1.5
-
-    return float(brentq(beyond, 0.0, 100.0)) if travel > 0 else 0.0
-
-
-def pressed(stiffness: float, radii: tuple[float, ...]) -> Campaign:
-    """Curves with air before them and a way back, pressed through a stage."""
-    random = np.random.default_rng(4)
-    way_in = np.linspace(-0.05, 0.3, 150)
-    travel = np.concatenate([way_in, way_in[::-1]])
-    recordings = []
-    for number, radius in enumerate(radii):
-        force = np.array([force_on_stage(one, radius, stiffness) for one in travel])
-        force += NOISE * force.max() * random.normal(size=len(force))
-        curve = {"displacement_mm": travel.tolist(), "force_n": force.tolist()}
-        time = np.linspace(0, 20, len(travel)).tolist()
-        named = {"id": f"c{number}", "kind": "indentation", "indenter_radius_mm": radius}
-        recordings.append({**named, **curve, "time_s": time})
-    skin = {"thickness_mm": 80.0, "poisson_ratio": 0.5}
-    return parse({"schema": "campaign/1", "name": "pressed", "skin": skin, "recordings": recordings})
-
-
-def explained(campaign: Campaign, names: tuple[str, ...], table: SigmaTable) -> tuple[Explanation, Explanation]:
-    """The explanation by these mechanisms, and the null hypothesis."""
-    problem = FittingProblem(curve_lines(campaign, "indentation"), table)
-    (null,) = problem.explain([Request(())])
-    assert null is not None
-    (found,) = problem.explain([Request(names, begin=null.point)])
-    assert found is not None
-    return found, null
 
 
 def imitated(stiffness: float, radii: tuple[float, ...], table: SigmaTable) -> Imitation:
@@ -101,3 +60,12 @@ def test_an_unlisted_law_outweighs_only_sets_of_several_mechanisms(table: SigmaT
         assert (beside[names] >= beside[("none_of_these",)]) is (least > 0)
         assert beside[names] >= least
         assert search.shown_or_nothing(replace(search.answers[0], explanation=None)) is leader
+
+
+@pytest.mark.slow
+def test_a_cantilever_that_gives_is_named_under_a_sphere_of_micrometres(table: SigmaTable) -> None:
+    report = diagnosis_report(pressed(2.5e-3, (5e-3,), depth=2e-4), table)
+    assert [entry["name"] for entry in report["mechanisms"]] == ["instrument_compliance"]
+    (stiffness,) = report["mechanisms"][0]["parameters"]
+    assert stiffness["low"] < 2.5e-3 < stiffness["high"]
+    assert stiffness["value"] == pytest.approx(2.5e-3, rel=0.2)

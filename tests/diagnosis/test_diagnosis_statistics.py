@@ -11,10 +11,11 @@ from scipy.stats import multivariate_normal, multivariate_t
 
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.nested_sampling import Posterior, nested
+from tests.support.pressed_curves import explained, pressed
 from underskin.diagnosis.data.dataset import Lines, lines
 from underskin.diagnosis.inference.evidence import Evidence, laplace
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request, integrated
-from underskin.diagnosis.inference.laplace import log_box
+from underskin.diagnosis.inference.laplace import around_mean, log_box
 from underskin.diagnosis.inference.likelihood import log_likelihoods
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
@@ -204,6 +205,27 @@ CASES: list[tuple[tuple[str, ...], tuple[float, ...]]] = [
     (("contact_resonance",), (3.0, 0.05)),
     (("moving_contact_edge", "ageing"), (0.7, 0.2, 500.0, 0.0)),
 ]
+
+
+@pytest.mark.slow
+def test_an_integral_around_any_point_within_the_bounds_stays_of_the_posterior_s_height(table: SigmaTable) -> None:
+    """Where a fit hangs at several bounds, the quadratic's mean may lie far outside all of them."""
+    random = np.random.default_rng(1)
+    found, _ = explained(pressed(10.0, (5.0,)), ("strain_stiffening", "instrument_compliance"), table)
+    hypothesis = found.best.hypothesis
+    fitter = Fitter([hypothesis])
+    low, high = hypothesis.bounds
+    beyond = []
+    for _ in range(150):
+        fit, draw = found.point.fit.copy(), random.random(hypothesis.own_parameters)
+        own = fit[: len(draw)] + 0.1 * random.normal(size=len(draw))
+        fit[: len(draw)] = np.where(draw < 0.3, low[: len(draw)], np.where(draw < 0.6, high[: len(draw)], own))
+        at = fitter.evaluate(fitter.at(replace(found.point, fit=np.clip(fit, low, high))))
+        if np.isfinite(at.cost[0]):
+            beyond.append(float(around_mean(fitter, at)[0][0] + at.cost[0]))
+    assert len(beyond) > 50
+    assert min(beyond) > -300  # of about ten parameters, each to 1e-6 of its unit or better
+    assert max(beyond) < 50
 
 
 def laplace_of(names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable) -> Evidence:

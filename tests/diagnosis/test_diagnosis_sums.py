@@ -1,17 +1,24 @@
 """Compiled sums of a diagnosis against the plain formulas."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize, minimize_scalar
 
-from tests.support.diagnosis_campaigns import Made, design
+from tests.support.diagnosis_campaigns import Made, campaign, design
 from underskin.diagnosis.data.dataset import lines
+from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.inference.frf_products import RowSums
+from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.inference.pickup_kernel import lost, slopes_lost
 from underskin.diagnosis.noise.noise_priors import level_prior
 from underskin.diagnosis.noise.roughness_kernel import roughness_cost
 from underskin.diagnosis.selection.process_kernel import at_best_level
 from underskin.mechanisms.models.frf_design import frf_design
+from underskin.recordings.campaign import FrfRecording, frf_recordings
+from underskin.surrogate.sigma_table import load_table
+from underskin.units import Floats
 
 
 @pytest.mark.parametrize(
@@ -27,6 +34,40 @@ def test_sums_over_rows_are_those_of_each_recordings_lines(made: Made) -> None:
     assert found.shape == (2, 3, rows.recordings)
     expected = np.add.reduceat(weight * values[..., layout.line], rows.first, axis=-1)
     assert found == pytest.approx(expected, rel=1e-10, abs=1e-10)
+
+
+def test_lines_that_recordings_measure_at_other_frequencies_are_each_found() -> None:
+    made = design(Made(lines=5, sensors=2, preloads_n=(0.5, 2.0), spheres_mm=(4.0,)))
+    first, *others = frf_recordings(made)
+    hz = np.array([30.0, 41.0, 500.0])
+    changed = FrfRecording.of_lines(first, hz, np.ones(3, dtype=complex))
+    layout = frf_design(replace(made, recordings=(changed, *others)), (), neighbours=False)
+    assert layout.line_frequency[layout.line] == pytest.approx(layout.row_frequency, rel=0)
+    assert np.array_equal(layout.line_contact[layout.line], layout.point_contact[layout.point][layout.recording])
+    pairs = {*zip(layout.line_contact.tolist(), layout.line_frequency.tolist(), strict=True)}
+    assert len(pairs) == len(layout.line_frequency) == layout.line.max() + 1
+
+
+def test_steps_of_noise_levels_end_where_the_cost_is_least() -> None:
+    """Against a general minimisation; a level that is held stays, and what is infinite is left alone."""
+    made = Made(lines=5, sensors=2, preloads_n=(0.5, 1.0, 2.0), gain=0.03, position_mm=0.1)
+    problem = FittingProblem(lines(campaign(made, load_table())), load_table())
+    for placed in (False, True):
+        fitter = Fitter([problem.hypothesis((), placed)])
+        begun = fitter.begin([np.zeros((1, 0))])
+        settled = fitter.settle(begun, 60)
+
+        def cost(levels: Floats, fitter: Fitter = fitter, begun: Evaluated = begun) -> float:
+            return float(fitter.costs(begun, levels[None, None])[0, 0])
+
+        least = minimize(cost, begun.points.covariance[0], method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-8})
+        assert settled.cost[0] == pytest.approx(least.fun, abs=5e-3)
+        assert fitter.costs(begun, settled.points.covariance[:, None])[0, 0] == pytest.approx(settled.cost[0], abs=1e-9)
+        held = fitter.settle(begun, 60, held=0)
+        assert held.points.covariance[0, 0] == begun.points.covariance[0, 0]
+        assert settled.cost[0] < held.cost[0] < begun.cost[0]
+        lost = fitter.settle(replace(begun, cost=np.array([np.inf])), 3)
+        assert np.array_equal(lost.points.covariance, begun.points.covariance)
 
 
 def test_what_pick_up_takes_is_the_difference_of_the_weights() -> None:

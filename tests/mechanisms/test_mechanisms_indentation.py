@@ -24,8 +24,10 @@ from tests.mechanisms.indentation_loops import (
 from tests.support.mechanism_campaigns import fit_of, predicted, table
 from tests.support.sphere_contact import SphereOnLayer
 from underskin.mechanisms import Unsupported, compose
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.physics.elastic_layer import Layer
 from underskin.recordings.campaign import IndentationRecording
+from underskin.recordings.conditions import Conditions, IndentationConditions, SkinDescription
 
 # A loop that relaxes.
 
@@ -261,3 +263,16 @@ def test_two_recordings_do_not_feel_each_other() -> None:
     assert found[: len(LOOP)] == pytest.approx(force_at(names, LOOP, **CREEP, **WORK, **STAGE))
     alone = predicted(names, replace(one, recordings=(other,)), **CREEP, **WORK, **STAGE, **{"contact_point j": 0.01})
     assert found[len(LOOP) :] == pytest.approx(alone)
+
+
+def test_a_stage_is_expected_as_stiff_as_the_sphere_s_size_says() -> None:
+    """A stage of 20 N/mm and a cantilever of 2 N/m are as usual beside their spheres of 5 mm and 5 µm."""
+    usual = []
+    for radius in (5.0, 5e-3):
+        curve = IndentationConditions("c", radius, np.linspace(0.0, 0.01, 5))
+        conditions = Conditions("c", SkinDescription(poisson_ratio=0.5, youngs_modulus_mpa=1.0), (curve,))
+        (stiffness,) = CATALOGUE["instrument_compliance"].parameters(conditions, "indentation")
+        usual.append(stiffness.quantile(0.5))
+        assert stiffness.bounds[0] < np.log(1e-5)  # N/mm: the softest cantilevers
+    assert usual[0] - usual[1] == pytest.approx(np.log(1000.0), abs=0.01)
+    assert np.exp(usual[0]) == pytest.approx(150.0, rel=0.01)

@@ -29,7 +29,7 @@ _POLISHING, _POLISHING_CURVES, _POLISHED = (
 )  # steps at most, of curves as well, and the gain in log posterior below which it stops
 _LEAST_COVARIANCE_CURVATURE = 0.3  # of logarithms of noise levels: their priors are not wider
 _TRUSTED = 1.0  # gain in log posterior that polishing may leave
-_ASTRAY = -50.0  # nats that bounds can never take from an integral around a point within them
+_ASTRAY = -50.0  # nats: bounds take less from an integral around a point within them, and add nothing
 _LEAST_EIGENVALUE = 1e-11  # of the correlations' information
 _FLAT = 1e-3  # least standard deviations of the quadratic within a parameter's bounds: keeps H invertible
 
@@ -129,7 +129,7 @@ def around_mean(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:
         volume = 0.5 * len(fit) * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(information)[1]
         mean = (fit - covariance @ gradient).astype(np.float64)
         beyond = gain + log_box(mean, covariance, low, high)
-        if beyond < _ASTRAY:  # truncating one bound after another fails where a quadratic leads far out of several
+        if not _ASTRAY < beyond < 2 * _TRUSTED:  # truncating one bound after another fails where a quadratic leads far out of several
             beyond = log_box(fit, covariance, low, high)
         values.append(float(-at.cost[number] + volume + beyond))
         covariances.append(covariance)

@@ -9,9 +9,10 @@ from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage,
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.recordings.conditions import Conditions, IndentationConditions
 
-_REASON = """an instrument is about as stiff as what it presses: stages of spheres of millimetres 10 to 1000 N/mm,
-cantilevers of spheres of micrometres 0.01 to 100 N/m; 30 N/mm for each mm of the sphere's radius (of several, the
-median), within a factor of 7"""
+_REASON = (
+    "an instrument is about as stiff as what it presses: stages of spheres of millimetres 10 to 1000 N/mm, cantilevers "
+    "of spheres of micrometres 0.01 to 100 N/m; 30 N/mm for each mm of the sphere's radius, within a factor of 7"
+)
 _OF_RADIUS, _USUAL_RADIUS_MM = 30.0, 5.0  # N/mm for each mm
 _SD = 2.0
 
