@@ -129,7 +129,8 @@ def around_mean(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:
         volume = 0.5 * len(fit) * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(information)[1]
         mean = (fit - covariance @ gradient).astype(np.float64)
         beyond = gain + log_box(mean, covariance, low, high)
-        if not _ASTRAY < beyond < 2 * _TRUSTED:  # truncating one bound after another fails where a quadratic leads far out of several
+        if not _ASTRAY < beyond < 2 * _TRUSTED:
+            # Truncating one bound after another fails where a quadratic leads far out of several.
             beyond = log_box(fit, covariance, low, high)
         values.append(float(-at.cost[number] + volume + beyond))
         covariances.append(covariance)
