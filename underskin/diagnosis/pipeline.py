@@ -15,12 +15,7 @@ from underskin.diagnosis.inference.residuals import residuals, whole_prediction
 from underskin.diagnosis.localisation.effect_size import effect
 from underskin.diagnosis.localisation.permutation_test import SEED, locate
 from underskin.diagnosis.localisation.region import in_region, region
-from underskin.diagnosis.localisation.residual_shape import (
-    above_noise,
-    describe,
-    keeps_structure,
-    largest_floor_percent,
-)
+from underskin.diagnosis.localisation.residual_shape import describe
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
@@ -35,6 +30,7 @@ from underskin.diagnosis.validation.identifiability import confounding, left_ope
 from underskin.diagnosis.validation.imitation import imitation
 from underskin.diagnosis.validation.platen_seating import without_seating
 from underskin.diagnosis.validation.power import power
+from underskin.diagnosis.validation.residual_noise import above_noise, keeps_structure, largest_floor_percent
 from underskin.diagnosis.validation.signatures import Signatures
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding

@@ -5,7 +5,7 @@ import numpy as np
 from underskin.diagnosis.data.names import SIMPLEST, in_words
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import own_places
-from underskin.diagnosis.localisation.residual_shape import NOISY
+from underskin.diagnosis.validation.residual_noise import NOISY
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 

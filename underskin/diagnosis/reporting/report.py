@@ -14,7 +14,7 @@ from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.localisation.effect_size import EffectSize
 from underskin.diagnosis.localisation.permutation_test import AxisResult
 from underskin.diagnosis.localisation.region import reaches_all_along
-from underskin.diagnosis.localisation.residual_shape import REACHES_NOISE, Shape
+from underskin.diagnosis.localisation.residual_shape import Shape
 from underskin.diagnosis.planning.optimal_design import NextRecordings
 from underskin.diagnosis.reporting import next_experiment, statements
 from underskin.diagnosis.reporting.caveats import caveats
@@ -25,6 +25,7 @@ from underskin.diagnosis.selection.search import Answer, Search
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import Confounding
 from underskin.diagnosis.validation.power import Power
+from underskin.diagnosis.validation.residual_noise import REACHES_NOISE
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lacking

@@ -54,7 +54,7 @@ class Answer:
 class Search:
     """What was tried: explanations, processes on top of some of them, and what the campaign does not support.
 
-    `contradicted`: sets under which the residual keeps structure, or its noise is no noise (see residual_shape.py);
+    `contradicted`: sets under which the residual keeps structure, or its noise is no noise (see residual_noise.py);
     their probability is that of `none_of_these`. `imitating`: the odds of an unlisted law that looks like a set on
     these recordings; `none_of_these` has them beside the leading set.
     """
