@@ -20,6 +20,7 @@ from bench import (
     single_requests,
     start,
     store,
+    waits,
 )
 from bench import against as against_revision
 from bench.page import keep, markdown, write
@@ -37,6 +38,7 @@ PARTS = {
     "nested": nested.measure,
     "store": store.measure,
     "pages": pages.measure,
+    "waits": waits.measure,
 }
 _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem", "dynesty")
 

@@ -30,6 +30,7 @@ _SECTIONS = {
     "pages": "Pages",
     "mechanisms": "Predictions of composed mechanisms",
     "diagnosis": "A whole diagnosis",
+    "waits": "What a reader waits for",
     "curves": "Curves of spheres",
     "nested": "Evidences against nested sampling",
 }
