@@ -43,7 +43,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 _CURVES: tuple[Kind, ...] = ("indentation", "compression")
 _FAR_ABOVE = 3.0  # times the noise floor, beyond which an error of indentations held out contradicts an explanation
-_WORTH_SAYING = 0.05  # odds of an unlisted law
+_WORTH_SAYING = 0.01  # odds of an unlisted law
 _LEAST_TO_AGREE = 3  # FRFs: d33 takes up what two have in common, and their gain scatters by what they differ
 _LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
 
@@ -162,12 +162,11 @@ def _beside_unlisted(
     if problem.kind != "indentation" or leader is None or not leader.names:
         return begun, result
     found = imitation(leader, nothing, result.supported)
-    if found is None:
+    if found is None or found.odds < _WORTH_SAYING:
         return begun, result
-    if found.odds > _WORTH_SAYING:
-        arguments = {"laws": found.laws, "imitated": found.imitated, "mechanisms": leader.names}
-        begun = begun.with_findings(Finding(Reason.IMITATED, "", "force_n", arguments))
-    return begun, replace(result, imitating={leader.names: found.odds})
+    arguments = {"laws": found.laws, "imitated": found.imitated, "mechanisms": leader.names}
+    finding = Finding(Reason.IMITATED, "", "force_n", arguments)
+    return begun.with_findings(finding), replace(result, imitating={leader.names: found.odds})
 
 
 def diagnosis_report(campaign: Campaign, table: SigmaTable, refused: Sequence[RecordingProblem] = ()) -> dict[str, Any]:

@@ -213,7 +213,7 @@ def imitated(laws: int, imitated: int, mechanisms: Sequence[str]) -> str:
     named = " and ".join(mechanisms).replace("_", " ")
     return (
         f"of {laws} simple laws that no catalogue lists, {imitated} would look like {named} in these recordings at the "
-        "strength that is seen; spheres of other radii, other speeds and a hold would tell them apart"
+        "strength that is seen; spheres of other radii, other speeds or a hold may tell them apart"
     )
 
 

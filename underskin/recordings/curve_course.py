@@ -40,7 +40,7 @@ class Course:
     snap_in: int | None
     pull_off: int | None
     air: Indices
-    zero: float  # what the cell shows in the air, or at the first sample
+    zero: float  # what the cell shows in the air (where that is after contact, less the drift), or at the first sample
     drift: float  # of the force in the air in time, where it is plain; else 0
 
     @property
@@ -79,13 +79,15 @@ def _course(*columns: bytes) -> Course:
     still = steps <= _HELD * float(np.median(np.abs(np.diff(displacement)))) + 1e-300
     leave = turn + int(np.argmin(still))
     drifting = None if snap_in is not None else _drifting_air(displacement, force, time, turn + 1, noise)
-    drift = 0.0 if drifting is None else drifting[1]
     if drifting is None and snap_in is None and pull_off is None:
-        drift = _drift_after(displacement, force, time, leave, noise)
-    steady = force - drift * (time - time[0])
-    air = _air(steady, turn, snap_in, pull_off, noise, span) if drifting is None else np.arange(drifting[0])
+        back = _drifting_after(displacement, force, time, leave, noise)
+        if back is not None:
+            air, drift = np.arange(len(force) - back[0], len(force)), back[1]
+            zero = float(np.median(force[air] - drift * (time[air] - time[0])))
+            return Course(noise, turn, leave, None, None, air, zero, drift)
+    air = _air(force, turn, snap_in, pull_off, noise, span) if drifting is None else np.arange(drifting[0])
     zero = float(np.median(force[air])) if len(air) >= _AIR else float(force[0])
-    return Course(noise, turn, leave, snap_in, pull_off, air, zero, drift)
+    return Course(noise, turn, leave, snap_in, pull_off, air, zero, 0.0 if drifting is None else drifting[1])
 
 
 def roughness(force: Floats) -> float:
@@ -151,17 +153,17 @@ def _drifting_air(
     return air if air is not None and _believed(displacement, force, time, count, noise, air[1]) else None
 
 
-def _drift_after(displacement: Floats, force: Floats, time: Floats, leave: int, noise: float) -> float:
-    """The drift of the force in time that the air after contact plainly shows; 0 where it does not.
-
-    It is believed if it leads from where the force began to where it ended.
-    """
+def _drifting_after(
+    displacement: Floats, force: Floats, time: Floats, leave: int, noise: float
+) -> tuple[int, float] | None:
+    """How many samples lie in the air after contact, and the drift of the force in time that they show; None where it
+    is not plain, or does not lead from where the force began to where it ended."""
     after = slice(None, leave, -1)
     air = _straight_air(displacement[after], force[after], time[after], noise, _LEAST_AIR)
     if air is None:
-        return 0.0
+        return None
     expected = air[1] * float(time[-1] - time[0])
-    return air[1] if abs(float(force[-1] - force[0]) - expected) < 0.5 * abs(expected) + 4 * noise else 0.0
+    return air if abs(float(force[-1] - force[0]) - expected) < 0.5 * abs(expected) + 4 * noise else None
 
 
 def _straight_air(
@@ -191,7 +193,7 @@ def _straight_air(
     if first < _LEAST_AIR * count or steady < (1 + _PLAIN / len(at)) * drifting:
         return None
     shortest = max(least * first, _LEAST_AIR * count)
-    while first >= shortest:
+    while first >= max(shortest, _AIR) and np.ptp(time[:first]) > 0:
         line = np.polyfit(time[:first], force[:first], 1)
         if np.std(force[:first] - np.polyval(line, time[:first])) < _STRAIGHT * noise:
             return first, float(line[0])

@@ -131,7 +131,8 @@ def around_mean(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:
         beyond = gain + log_box(mean, covariance, low, high)
         if not _ASTRAY < beyond < 2 * _TRUSTED:
             # Truncating one bound after another fails where a quadratic leads far out of several.
-            beyond = log_box(fit, covariance, low, high)
+            deviation = np.where(free, 0.0, np.diag(information) ** -0.5)
+            beyond = log_box(fit, covariance, low, high) - float(np.log1p(np.abs(gradient) * deviation).sum())
         values.append(float(-at.cost[number] + volume + beyond))
         covariances.append(covariance)
     return np.array(values), covariances

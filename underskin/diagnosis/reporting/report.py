@@ -21,7 +21,7 @@ from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded, without_effect
-from underskin.diagnosis.selection.search import Answer, Search
+from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import Confounding
 from underskin.diagnosis.validation.power import Power
@@ -121,6 +121,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         caveats=caveats(findings),
         power=diagnosis.power,
         idle=without_effect(named) if named is not None else (),
+        imitating=shown.names if shown.names in search.imitating else (),
     )
     return {
         **document,
@@ -128,7 +129,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         "statement": statement,
         "location": _location(diagnosis, problem, stated == "no_mismatch"),
         "mechanisms": [] if named is None else _mechanisms(search, problem, named),
-        "alternatives": _alternatives(search.answers),
+        "alternatives": _alternatives(search),
         "not_identifiable": [
             {
                 "mechanism": entry.mechanism,
@@ -186,7 +187,8 @@ def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanatio
     ]
 
 
-def _alternatives(answers: Sequence[Answer]) -> list[dict[str, Any]]:
+def _alternatives(search: Search) -> list[dict[str, Any]]:
+    answers = search.answers
     leader = answers[0]
     alternatives: list[dict[str, Any]] = []
     for answer in answers[1:]:
@@ -194,7 +196,7 @@ def _alternatives(answers: Sequence[Answer]) -> list[dict[str, Any]]:
         if enough or len(alternatives) >= _ALTERNATIVES:
             break
         said = {"mechanisms": list(answer.names), "probability": round(answer.probability, 3)}
-        alternatives.append({**said, "why_not": statements.why_not(answer, leader)})
+        alternatives.append({**said, "why_not": statements.why_not(answer, leader, search.imitating)})
     return alternatives
 
 

@@ -1,6 +1,6 @@
 """What a report says in words, for people who press skins: no statistics but percentages, values with their units."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -42,13 +42,15 @@ def answer_statement(
     caveats: str = "",
     power: Sequence[Power] = (),
     idle: Sequence[str] = (),
+    imitating: Sequence[str] = (),
 ) -> str:
     """Some plain sentences: what is missing, what decides how far that can be trusted (`caveats`), the laws; of curves
     also the modulus under the stated answer; where nothing is missing, what would have shown (`power`).
 
-    `idle`: mechanisms of the leading answer that may as well have no effect.
+    `idle`: mechanisms of the leading answer that may as well have no effect; `imitating`: those that look like an
+    unlisted law.
     """
-    first, rest = _answer(answers, verdict, shape, SIMPLEST[kind], idle, all_used=not caveats)
+    first, rest = _answer(answers, verdict, shape, SIMPLEST[kind], idle, imitating, all_used=not caveats)
     parts = [first, caveats, rest]
     if verdict == "no_mismatch":
         parts.append(power_statement(power, kind))
@@ -77,7 +79,14 @@ def first_and_rest(statement: str) -> tuple[str, str]:
 
 
 def _answer(
-    answers: Sequence[Answer], verdict: str, shape: Shape | None, model: str, idle: Sequence[str], *, all_used: bool
+    answers: Sequence[Answer],
+    verdict: str,
+    shape: Shape | None,
+    model: str,
+    idle: Sequence[str],
+    imitating: Sequence[str],
+    *,
+    all_used: bool,
 ) -> tuple[str, str]:
     """The verdict in one sentence, and what else there is to say of it."""
     leader = answers[0]
@@ -90,6 +99,9 @@ def _answer(
         if leader.probability >= EXPLAINED or not rivals:
             return f"{agree}; nothing needs to be added{'' if all_used else ' for those that were used'}.", ""
         return f"{agree}, but they do not rule out: {listed}.", _laws(tuple(mentioned))
+    if verdict == "unexplained" and imitating:
+        together = f"{in_words(imitating)} would describe it together"
+        return f"Something is missing: {together}, but one law without a name more probably does ({percent}).", ""
     if verdict == "unexplained":
         missing = f"Something is missing that none of the known mechanisms describes (probability {percent})."
         return missing, shape_statement(shape)
@@ -152,12 +164,16 @@ def _form_axis(form: ShapeForm) -> str:
     return words if form.component is None else f"{words} ({'xy'[form.component]})"
 
 
-def why_not(answer: Answer, leader: Answer) -> str:
-    """Why an answer is less probable than the leading one."""
+def why_not(answer: Answer, leader: Answer, imitating: Collection[tuple[str, ...]] = ()) -> str:
+    """Why an answer is less probable than the leading one; `imitating`: sets that look like an unlisted law."""
     if answer.probability > 0.25 * leader.probability:
         return "the recordings hardly tell it from the leading explanation"
     if answer.explanation is None and answer.probability < _UNTHOUGHT_AT_MOST:
         return "nothing in the recordings asks for it; a small share always stays for what nobody thought of"
+    if answer.explanation is None and imitating:
+        return "few laws without a name would look like the leading explanation in these recordings"
+    if answer.names in imitating:
+        return "one law without a name is more probable than all of these together"
     if answer.explanation is None:
         return "a smooth discrepancy without a name explains the recordings less well, or no better at a higher price"
     if leader.explanation is None:

@@ -2,12 +2,14 @@
 
 Such a law acts as listed ones do: it multiplies the force, shifts the travel or adds a force, by a simple form of the
 force, the depth, the time or the way back. Each is given the strength that the explanation's own mechanisms show, χ²
-beyond what the nuisances take up, under the noise that was found. It is imitated if what the explanation's parameters
-leave of it is too little to be named (to first order in the parameters). The prior of unlisted physics is shared evenly
-by these laws; one that is imitated explains the recordings as well as the set that imitates it. It is never more
-probable than one listed mechanism that does the same, but it may be than two or three that do so together.
+beyond what the nuisances take up, under the noise that was found. It is imitated if the explanation would be named for
+it: its parameters leave too little to be named, and without any one of its mechanisms more than that is left (all to
+first order in the parameters). The prior of unlisted physics times the share of such laws that are imitated is the
+weight of those beside the set's own prior. It is never more than that of one listed mechanism that does the same, but
+it may be more than that of two or three that do so together.
 """
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -16,6 +18,7 @@ import numpy as np
 from underskin.diagnosis.data.names import NONE_OF_THESE
 from underskin.diagnosis.inference.curve_products import CurveProducts
 from underskin.diagnosis.inference.explanation import Explanation
+from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.inference.likelihood import Likelihoods
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.selection.search import PRIORS, least_evidence, log_prior
@@ -32,6 +35,7 @@ _FORMS: Mapping[str, Callable[[Floats], Floats]] = {  # of a variable from 0 to 
     "threshold": lambda x: np.maximum(x - 0.5, 0.0),
     "step": lambda x: (x > 0.5).astype(float),
 }
+_FLAT = 1e-3  # of a parameter's bounds: deviations of the least prior, for those that change nothing
 _TAKEN_UP = 1e-6  # of a law's own χ²: what is left beside the nuisances is rounding
 
 
@@ -61,19 +65,24 @@ def imitation(explanation: Explanation, null: Explanation, supported: int) -> Im
     stiffness = -slopes[model.contact_points].sum(axis=0)
     recordings = [one for one in hypothesis.lines.campaign.recordings if isinstance(one, CurveConditions)]
     unlisted = _unlisted(recordings, fit[model.contact_points], force, stiffness)
-    change = force - null.best.prediction.value.real
+    null_model = null.best.hypothesis.model
+    assert isinstance(null_model, CurveModel)
+    change = force - null_model.forces(null.point.fit[None])[0]
     information = _information(explanation, np.concatenate([slopes, unlisted, change[None]]))
-    count, own = len(fit), hypothesis.own_parameters
-    precision = hypothesis.priors[0]
-    shown, left = (_left(information, places, precision) for places in (np.arange(own, count), np.arange(count)))
-    laws = shown[:-1] > _TAKEN_UP * np.diag(information)[count:-1]
+    every = np.arange(len(fit))
+    precision = hypothesis.priors[0] + (_FLAT / np.ptp(hypothesis.bounds, axis=0)) ** 2
+    shown = _left(information, every[hypothesis.own_parameters :], precision)
+    laws = shown[:-1] > _TAKEN_UP * np.diag(information)[len(fit) : -1]
     if not (laws.any() and shown[-1] > 0):
         return None
+    strength = shown[-1] / shown[:-1][laws]
     least = least_chi2(supported, least_evidence(explanation))
-    imitated = shown[-1] * left[:-1][laws] < least * shown[:-1][laws]
-    unlisted_prior = PRIORS[NONE_OF_THESE] * float(imitated.mean())
+    imitated = strength * _left(information, every, precision)[:-1][laws] < least
+    for own in own_places(explanation.names, hypothesis.lines).values():
+        imitated &= strength * _left(information, np.delete(every, own), precision)[:-1][laws] > least
+    share = (imitated.sum() + 0.5) / (laws.sum() + 1)  # of all such laws, by Jeffreys' prior: these are but a sample
     size = len(explanation.names)
-    odds = float(unlisted_prior / np.exp(log_prior(size, supported)))
+    odds = float(PRIORS[NONE_OF_THESE] * share / np.exp(log_prior(size, supported)))
     return Imitation(int(laws.sum()), int(imitated.sum()), min(odds, 1.0) if size == 1 else odds)
 
 
@@ -89,12 +98,14 @@ def _unlisted(
     time = np.concatenate([times_of(one) - times_of(one)[0] for one in recordings])
     back = np.concatenate([np.arange(len(one)) > int(np.argmax(one)) for one in travel]).astype(float)
     followed = {"force": np.maximum(force, 0.0), "depth": depth, "time": time}
-    shapes = [back]
-    for variable in followed.values():
-        largest = float(variable.max())
-        shapes += [form(variable / largest) for form in _FORMS.values() if largest > 0]
-    laws = [factor * shape for factor in (force, stiffness) for shape in shapes]
-    return np.array([*laws, *shapes[-len(_FORMS) :]])  # a force of its own follows time
+    shapes = {
+        name: [form(variable / variable.max()) for form in _FORMS.values()]
+        for name, variable in followed.items()
+        if variable.max() > 0
+    }
+    factors = [back, *itertools.chain(*shapes.values())]
+    laws = [factor * shape for factor in (force, stiffness) for shape in factors]
+    return np.array([*laws, *shapes.get("time", [])])  # a force of its own follows time
 
 
 def _information(explanation: Explanation, rows: Floats) -> Floats:
@@ -113,6 +124,5 @@ def _left(information: Floats, places: Indices, precision: Floats) -> Floats:
     """χ² that the parameters at `places`, with their priors' precision, leave of each change behind them (changes,)."""
     first = len(precision)
     own = information[np.ix_(places, places)] + np.diag(precision[places])
-    own += 1e-12 * np.diag(np.diag(own))  # of a parameter that changes nothing
     shared = information[first:, places]
     return np.asarray(np.diag(information)[first:] - np.einsum("ij,ji->i", shared, np.linalg.solve(own, shared.T)))

@@ -10,11 +10,11 @@ from underskin.mechanisms.models.curve_state import Curve
 from underskin.recordings.conditions import Conditions, IndentationConditions
 
 _REASON = (
-    "an instrument is about as stiff as what it presses: stages of spheres of millimetres 10 to 1000 N/mm, cantilevers "
-    "of spheres of micrometres 0.01 to 100 N/m; 30 N/mm for each mm of the sphere's radius, within a factor of 7"
+    "an instrument is about as stiff as what it presses: stages of spheres of millimetres 10 to 1000 N/mm, those "
+    "of spheres of micrometres 0.1 to 1000 N/m; 30 N/mm for each mm of radius, within a factor of 20"
 )
 _OF_RADIUS, _USUAL_RADIUS_MM = 30.0, 5.0  # N/mm for each mm
-_SD = 2.0
+_SD = 3.0
 
 
 class InstrumentCompliance(Mechanism):

@@ -15,6 +15,7 @@ from underskin.recordings.conditions import Conditions, FrfConditions, frf_of
 from underskin.units import Floats, Indices, Mask, to_si
 
 NEIGHBOUR_PITCHES = 1.2
+_SPARSE = 8  # contacts times frequencies for each row, beyond which most were not measured
 
 
 class FrfDesign:
@@ -57,11 +58,15 @@ class FrfDesign:
         self.row_frequency = np.concatenate(lines_hz)
         self.row_dynamic_force: Floats = np.array([entry.dynamic_force_n for entry in recordings])[self.recording]
         distinct, frequency = _distinct(lines_hz)
+        self.line: Indices
         own_line = contact[self.recording] * len(distinct) + frequency
-        measured = np.zeros(len(contacts) * len(distinct), dtype=bool)
-        measured[own_line] = True
-        lines = np.flatnonzero(measured)
-        self.line: Indices = (np.cumsum(measured) - 1)[own_line]
+        if len(contacts) * len(distinct) > _SPARSE * len(own_line):
+            lines, self.line = np.unique(own_line, return_inverse=True)
+        else:  # without sorting all rows
+            measured = np.zeros(len(contacts) * len(distinct), dtype=bool)
+            measured[own_line] = True
+            lines = np.flatnonzero(measured)
+            self.line = (np.cumsum(measured) - 1)[own_line]
         self.line_contact, self.line_frequency = lines // len(distinct), distinct[lines % len(distinct)]
 
 
