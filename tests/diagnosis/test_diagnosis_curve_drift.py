@@ -51,9 +51,36 @@ def test_the_air_after_contact_tells_a_drift_where_that_before_is_too_short(rate
     assert course(depth, force, time).drift == pytest.approx(rate, rel=0.05)
     steady = course(depth, force - rate * time, time)
     assert steady.drift == 0.0
+    seen = course(depth, force, time)
+    assert len(seen.air) > 100
+    assert depth[seen.air].max() < 0.1
+    assert seen.zero == pytest.approx(0.0, abs=0.1 * abs(rate) * 300)
     # A tail that ends where the force did not begin is no drift of the cell.
     sticking = force - rate * time + 0.3 * np.maximum(time - 150, 0.0) / 150
     assert course(depth, sticking, time).drift in (0.0, pytest.approx(0.3 / 150, rel=0.05))
+
+
+def test_a_drift_after_contact_counts_where_no_sample_lies_before_it() -> None:
+    random = np.random.default_rng(9)
+    depth = np.concatenate([np.linspace(0.05, 0.4, 60), np.linspace(0.4, -0.4, 120)])
+    time = np.linspace(0, 300, len(depth))
+    force = np.maximum(depth / 0.4, 0.0) ** 1.5 + 2e-3 * random.normal(size=len(depth))
+    rate = float(force[0] - force[-1]) / 300 + 2e-3  # leads from the first reading to the last, a contact's each
+    curve = IndentationRecording("i", 5.0, depth, force + rate * time, time_s=time)
+    seen = course(curve.displacement_mm, curve.force_n, time)
+    assert seen.has_air
+    assert seen.drift == pytest.approx(rate, rel=0.05)
+    lines = curve_lines(Campaign("c", SkinDescription(poisson_ratio=0.5), (curve,)), "indentation")
+    assert lines.smooth is not None
+    assert np.abs(lines.smooth.columns[:, 1]).max() == pytest.approx(rate * 300, rel=0.1)
+
+
+def test_samples_that_share_a_coarse_time_show_no_drift() -> None:
+    random = np.random.default_rng(10)
+    depth = np.concatenate([np.linspace(-0.2, 0.4, 300), np.linspace(0.4, -0.4, 400)])
+    force = np.maximum(depth / 0.4, 0.0) ** 2.5 + 2e-3 * random.normal(size=len(depth))
+    for time in (np.zeros(len(depth)), np.repeat([0.0, 1.0], len(depth) // 2)):
+        assert abs(course(depth, force, time).drift) * max(np.ptp(time), 1.0) < 0.02
 
 
 @pytest.mark.parametrize("exponent", [1.5, 2.0, 2.5])

@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from tests.support.pressed_curves import explained, pressed
 from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.reporting.statements import answer_statement, why_not
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation.imitation import Imitation, imitation
+from underskin.recordings.campaign import IndentationRecording
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 SUPPORTED = 6
@@ -60,6 +63,31 @@ def test_an_unlisted_law_outweighs_only_sets_of_several_mechanisms(table: SigmaT
         assert (beside[names] >= beside[("none_of_these",)]) is (least > 0)
         assert beside[names] >= least
         assert search.shown_or_nothing(replace(search.answers[0], explanation=None)) is leader
+
+
+@pytest.mark.slow
+def test_without_times_no_law_follows_time(table: SigmaTable) -> None:
+    campaign = pressed(3.0, (5.0,))
+    curves = [one for one in campaign.recordings if isinstance(one, IndentationRecording)]
+    still = tuple(replace(one, time_s=np.zeros(len(one.displacement_mm))) for one in curves)
+    laws = []
+    for tried in (campaign, replace(campaign, recordings=still)):
+        result = imitation(*explained(tried, ("instrument_compliance",), table), SUPPORTED)
+        assert result is not None
+        laws.append(result.laws)
+    assert laws[0] > laws[1] >= 20
+
+
+def test_what_one_law_may_do_better_than_several_is_said(table: SigmaTable) -> None:
+    """`none_of_these` leads beside a pair that describes the recordings."""
+    _, null = explained(pressed(60.0, (5.0,)), ("instrument_compliance",), table)
+    pair = replace(null, names=("contact_creep", "instrument_compliance"), log_evidence=null.log_evidence + 40)
+    search = Search((null, pair), (), {}, imitating={pair.names: 9.0})
+    first = search.answers[0]
+    assert (first.explanation, round(first.probability, 2)) == (None, 0.9)
+    said = answer_statement(search.answers, "unexplained", kind="indentation", imitating=pair.names)
+    assert "contact creep and instrument compliance would describe it together" in said
+    assert "one law without a name" in why_not(search.answers[1], first, search.imitating)
 
 
 @pytest.mark.slow
