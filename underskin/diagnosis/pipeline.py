@@ -164,9 +164,10 @@ def _beside_unlisted(
     found = imitation(leader, nothing, result.supported)
     if found is None or found.odds < _WORTH_SAYING:
         return begun, result
-    arguments = {"laws": found.laws, "imitated": found.imitated, "mechanisms": leader.names}
-    finding = Finding(Reason.IMITATED, "", "force_n", arguments)
-    return begun.with_findings(finding), replace(result, imitating={leader.names: found.odds})
+    if found.imitated:
+        arguments = {"laws": found.laws, "imitated": found.imitated, "mechanisms": leader.names}
+        begun = begun.with_findings(Finding(Reason.IMITATED, "", "force_n", arguments))
+    return begun, replace(result, imitating={leader.names: found.odds})
 
 
 def diagnosis_report(campaign: Campaign, table: SigmaTable, refused: Sequence[RecordingProblem] = ()) -> dict[str, Any]:
