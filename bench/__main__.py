@@ -88,13 +88,16 @@ def _processor_times() -> tuple[int, int]:
     return times[3] + times[4], sum(times)
 
 
-parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
-parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all, if none is given")
-parser.add_argument("--against", metavar="REV", help="with diagnosis: processor time beside that of another revision")
-given = parser.parse_args()
-unknown = set(given.parts) - set(PARTS)
-if unknown:
-    parser.error(f"no such part: {', '.join(sorted(unknown))}")
-if given.against is not None and given.parts != ["diagnosis"]:
-    parser.error("--against goes with diagnosis alone")
-main(given.parts, given.against)
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all, if none is given")
+    parser.add_argument(
+        "--against", metavar="REV", help="with diagnosis: processor time beside that of another revision"
+    )
+    given = parser.parse_args()
+    unknown = set(given.parts) - set(PARTS)
+    if unknown:
+        parser.error(f"no such part: {', '.join(sorted(unknown))}")
+    if given.against is not None and given.parts != ["diagnosis"]:
+        parser.error("--against goes with diagnosis alone")
+    main(given.parts, given.against)

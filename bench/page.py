@@ -19,7 +19,7 @@ ratios: `idle_percent` is how idle it was before the start. A target is what the
 one that was not met.
 """
 
-_SECTIONS = {
+SECTIONS = {
     "accuracy": "Accuracy of the shipped table",
     "batch": "Batches over HTTP",
     "requests": "Single requests",
@@ -35,7 +35,7 @@ _SECTIONS = {
     "nested": "Evidences against nested sampling",
 }
 
-_EXPLANATIONS = {
+EXPLANATIONS = {
     "accuracy": """Errors are relative. The fresh solves share nothing with the table but the code of the elements; an
 independent finite-element code is compared in `tests/surrogate/test_felupe.py`.""",
     "batch": """One request of 100,000 rows, the server on one core; in turns with it a FastAPI route that reads and
@@ -50,6 +50,9 @@ server and Tesseract Core's runtime, each serving the same spline.""",
 server, over HTTP on one machine, the median of nine after the first; weight as sent, without plotly's script. The
 main thread is Chromium's, from the start of the page on, with plotly's script in its cache.""",
     "diagnosis": "Campaigns of the virtual rig; each diagnosis in a fresh process with one BLAS thread.",
+    "waits": """The server and its workers have one core, and Chromium runs beside them; a worker is ready before each
+click. The files are campaigns of 64 recordings × 60 lines, whose reports are the same to the byte for one process and
+two.""",
     "curves": """Ratios are of the root mean squares that plain least squares leave of one curve alone, the modulus, the
 contact point and the force's zero free: the diagnosis' own fit, by which it states `fit.before.rmse_percent`, beside
 SciPy's `least_squares` from several starts, with Hertz' and Johnson, Kendall and Roberts' laws written out in
@@ -75,11 +78,11 @@ def write() -> None:
     """Write the page from all stored results."""
     text = _INTRODUCTION
     results = _results()
-    for part, title in _SECTIONS.items():
+    for part, title in SECTIONS.items():
         if part in results:
             figures = [Figure(**figure) for figure in results[part]["figures"]]
             machine = ", ".join(f"{name} {value}" for name, value in results[part]["machine"].items())
-            text += f"\n## {title}\n\n`python -m bench {part}`. {_EXPLANATIONS[part]}\n\n"
+            text += f"\n## {title}\n\n`python -m bench {part}`. {EXPLANATIONS[part]}\n\n"
             text += f"{markdown(figures)}\n\nMeasured on: {machine}.\n"
     PAGE.write_text(text)
 
