@@ -17,11 +17,12 @@ from tests.support.repository import ROOT
 from underskin import ExtensionError, InvalidInput, extensions
 from underskin.autodiff import Differentiated
 from underskin.mechanisms import CATALOGUE, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
-from underskin.mechanisms.base import AXES, NEEDED_FIELDS, UNITS, ActsOn
+from underskin.mechanisms.base import AXES, NEEDED_FIELDS, UNITS
 from underskin.mechanisms.contract import HOOKS, check
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.models.pickup import Pickup, together
+from underskin.mechanisms.parameter import ActsOn
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.registry import GROUP, built_in
 from underskin.recordings.conditions import Conditions

@@ -19,6 +19,7 @@ KERNELS = (
     "underskin.diagnosis.inference.cost_kernel",
     "underskin.diagnosis.inference.normal_kernel",
     "underskin.diagnosis.inference.pickup_kernel",
+    "underskin.diagnosis.inference.settle_kernel",
     "underskin.diagnosis.noise.roughness_kernel",
     "underskin.diagnosis.selection.process_kernel",
     "underskin.mechanisms.models.creep_kernel",

@@ -1,4 +1,4 @@
-"""What a mechanism is: a law that the base model leaves out, its parameters, and where in the model it acts.
+"""What a mechanism is: a law that the base model leaves out, and where in the model it acts.
 
 A mechanism is one file: a class that states its texts and traits as attributes and overrides the hooks of the stages at
 which it acts. It keeps no state. Values inside hooks are SI, parameters are in their units.
@@ -7,16 +7,12 @@ which it acts. It keeps no state. Values inside hooks are SI, parameters are in 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Literal
-
-import numpy as np
-from scipy.special import ndtr, ndtri
 
 from underskin.autodiff import Differentiated
 from underskin.errors import UnderskinError
+from underskin.mechanisms.parameter import Parameter
 from underskin.recordings.conditions import Conditions
 from underskin.units import Array, Floats
 
@@ -27,8 +23,6 @@ if TYPE_CHECKING:
     from underskin.mechanisms.models.pickup import Pickup
 
 Kind = Literal["frf", "indentation", "compression"]
-# What a parameter changes: the predicted mean; the spread of the sensors' gains; the variance of single lines.
-ActsOn = Literal["mean", "gain_spread", "line_variance"]
 UNITS = (
     *("-", "mm", "MPa", "1/MPa", "GPa", "N/mm", "N", "1/N", "g", "J/m²", "Hz", "s", "1/s", "ms", "µs", "°"),
     *("pC", "pC/N", "pF", "MΩ", "cycles"),
@@ -69,139 +63,6 @@ class Unsupported(UnderskinError):
         self.mechanism = mechanism
         self.reason = reason
         super().__init__(f"{mechanism}: {reason}")
-
-
-@dataclass(frozen=True)
-class Normal:
-    """A normal distribution on the fit coordinate."""
-
-    mean: float
-    sd: float
-
-
-@dataclass(frozen=True)
-class Uniform:
-    """Equal density on the fit coordinate between the bounds."""
-
-
-Prior = Normal | Uniform
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A number that a fit may change. Its fit coordinate is the value (`linear`) or its natural logarithm (`log`).
-
-    `low`, `high` and `limit` are values in `unit`; the prior lives on the fit coordinate, truncated to the bounds and
-    normalised there. `limit` is the value at which the base model is recovered (it may lie outside the bounds: 0 or ∞
-    of a logarithm), None where no finite or infinite value does that. `shown` is the value at which the mechanism's
-    figure has it, None for a typical strength. The response is `proportional` to a parameter such as d33. A parameter
-    that does not act on the mean is positive and has the scale `log`.
-
-    A parameter `relative_to` another one of its mechanism is fitted as a multiple of it: `low`, `high`, `limit` and
-    the prior are of the multiple, while laws and reports have the product, in `unit`.
-    """
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    prior: Prior
-    scale: Literal["linear", "log"]
-    limit: float | None
-    reason: str
-    acts_on: ActsOn = "mean"
-    shown: float | None = None
-    proportional: bool = False
-    relative_to: str | None = None
-
-    @property
-    def moves_covariance(self) -> bool:
-        """Whether it changes the covariance of the rows and not their mean."""
-        return self.acts_on != "mean"
-
-    @cached_property
-    def bounds(self) -> tuple[float, float]:
-        """Lowest and highest fit coordinate."""
-        return self.to_fit(self.low), self.to_fit(self.high)
-
-    @property
-    def start(self) -> float:
-        """The prior's centre on the fit coordinate."""
-        low, high = self.bounds
-        return min(max(self.prior.mean, low), high) if isinstance(self.prior, Normal) else (low + high) / 2
-
-    @property
-    def typical(self) -> float:
-        """The fit coordinate of a typical strength: the quartile of the prior that is farther from the limit."""
-        if self.limit is None or not isinstance(self.prior, Normal):
-            return self.quantile(0.5)
-        limit = self.fit_limit
-        if limit is None:
-            return self.quantile(0.5)
-        return max(self.quantile(0.25), self.quantile(0.75), key=lambda end: abs(end - limit))
-
-    @property
-    def fit_limit(self) -> float | None:
-        """The limit's fit coordinate; None where there is no limit, or it is infinite there."""
-        if self.limit is None or (self.scale == "log" and not 0 < self.limit < np.inf):
-            return None
-        return self.to_fit(self.limit)
-
-    def to_fit(self, value: float) -> float:
-        """The fit coordinate of a value."""
-        return value if self.scale == "linear" else float(np.log(value))
-
-    def from_fit(self, fit: float) -> float:
-        """The value at a fit coordinate."""
-        return fit if self.scale == "linear" else float(np.exp(fit))
-
-    def log_prior(self, fit: float) -> float:
-        """The logarithm of the prior's density, truncated to the bounds and normalised there.
-
-        Parameters
-        ----------
-        fit
-            Fit coordinate: the value in `unit`, or its natural logarithm.
-
-        Returns
-        -------
-        float
-            Natural logarithm of the density per unit of the fit coordinate; −∞ outside the bounds.
-        """
-        low, high = self.bounds
-        if not low <= fit <= high:
-            return -np.inf
-        if isinstance(self.prior, Uniform):
-            return -float(np.log(high - low))
-        return float(-0.5 * ((fit - self.prior.mean) / self.prior.sd) ** 2 - self._log_area)
-
-    @cached_property
-    def _log_area(self) -> float:
-        """The logarithm of the integral of a normal prior's unnormalised density between the bounds."""
-        assert isinstance(self.prior, Normal)
-        mean, sd = self.prior.mean, self.prior.sd
-        inside = ndtr((self.bounds[1] - mean) / sd) - ndtr((self.bounds[0] - mean) / sd)
-        return float(np.log(sd * np.sqrt(2 * np.pi) * inside))
-
-    def quantile(self, probability: float) -> float:
-        """The prior's quantile.
-
-        Parameters
-        ----------
-        probability
-            From 0 to 1.
-
-        Returns
-        -------
-        float
-            Fit coordinate below which the prior has that probability; within the bounds.
-        """
-        low, high = self.bounds
-        if isinstance(self.prior, Uniform):
-            return low + probability * (high - low)
-        mean, sd = self.prior.mean, self.prior.sd
-        bottom, top = ndtr((low - mean) / sd), ndtr((high - mean) / sd)
-        return float(np.clip(mean + sd * ndtri(bottom + probability * (top - bottom)), low, high))
 
 
 Values = Mapping[str, Differentiated]  # of one mechanism's parameters, by name, in their units

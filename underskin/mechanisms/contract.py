@@ -13,12 +13,13 @@ import numpy as np
 from underskin.errors import InvalidInput, not_finite, not_unique, required
 from underskin.extensions import described
 from underskin.mechanisms import base
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Uniform
+from underskin.mechanisms.base import Kind, Mechanism, Stage
 from underskin.mechanisms.models.compression import CompressionModel
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.models.indentation import IndentationModel
 from underskin.mechanisms.models.nuisances import FRF_NUISANCES
 from underskin.mechanisms.models.response import joined
+from underskin.mechanisms.parameter import Normal, Parameter, Uniform
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import load_table

@@ -14,9 +14,10 @@ from scipy.special import ndtri
 
 from underskin.errors import InvalidInput, conflicting
 from underskin.findings import sentences
-from underskin.mechanisms.base import Mechanism, Parameter, Stage
+from underskin.mechanisms.base import Mechanism, Stage
 from underskin.mechanisms.models.composed import forward_model
 from underskin.mechanisms.models.composition import chosen, parameters_together
+from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.prediction import plausibility
 from underskin.prediction.forward_model import needed_fields, require_fields

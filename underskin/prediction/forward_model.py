@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.errors import conflicting, not_one_of, out_of_range, required, wrong_type
-from underskin.mechanisms.base import Kind, Mechanism, Parameter
+from underskin.mechanisms.base import Kind, Mechanism
 from underskin.mechanisms.models.composed import Model, forward_model
 from underskin.mechanisms.models.composition import chosen, kind_of, parameters_together
+from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.conditions import Conditions, FrfConditions
 from underskin.surrogate.sigma_table import SigmaTable

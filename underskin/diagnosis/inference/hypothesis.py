@@ -13,11 +13,11 @@ from underskin.diagnosis.inference.likelihood import Curvature
 from underskin.diagnosis.inference.pickup_rows import PickupRows, pickup_rows
 from underskin.diagnosis.noise.correlated_error import USUAL
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR, Plateau, level_prior
-from underskin.mechanisms.base import Normal, Parameter
 from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.models.composition import parameters_together
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.models.frf import FrfModel
+from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Floats
 

@@ -19,7 +19,7 @@ from underskin.diagnosis.inference.products import Products, joined
 from underskin.diagnosis.noise.noise_levels import SeveralLevels
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.frf_models import FrfModels
-from underskin.units import Floats, Indices
+from underskin.units import Floats
 
 GAIN, LEVEL, POSITION = 0, 1, 2  # places among the covariance's parameters, the last where there is such scatter
 SMOOTH = 2  # of curves, which have no place
@@ -205,7 +205,7 @@ class Evaluator:
         """
         if isinstance(at.products, FrfProducts) and not self.own.size and self.hypotheses[0].model.pickup is None:
             return self._settled_apart(at, at.products, steps, held)
-        from underskin.diagnosis.inference.cost_kernel import LARGEST_STEP, LEAST_GAIN, SHORTER, TRIES
+        from underskin.diagnosis.inference.settle_kernel import LARGEST_STEP, LEAST_GAIN, SHORTER, TRIES
 
         low, high = self._lowest, self._highest
         points, cost, moving = at.points, at.cost.copy(), np.arange(len(at))
@@ -235,7 +235,9 @@ class Evaluator:
                 if not len(trying):
                     break
                 step = step / SHORTER
-            points = self._moved(points, moving, covariance)
+            whole = points.covariance.copy()
+            whole[moving] = covariance
+            points = self.with_covariance(points, whole)
             cost[moving] = reached
             moving = moving[gained >= LEAST_GAIN]
             if not len(moving):
@@ -244,7 +246,7 @@ class Evaluator:
 
     def _settled_apart(self, at: Evaluated, products: FrfProducts, steps: int, held: int | None) -> Evaluated:
         """The same where no mechanism acts on the covariance: each parameter moves on its own."""
-        from underskin.diagnosis.inference.cost_kernel import settle
+        from underskin.diagnosis.inference.settle_kernel import settle
 
         covariance, cost = at.points.covariance.copy(), at.cost.copy()
         about_means, numbers = self.lines.about_means
@@ -270,11 +272,6 @@ class Evaluator:
         )
         return replace(at, points=replace(at.points, covariance=covariance), cost=cost)
 
-    def _moved(self, points: Points, moving: Indices, covariance: Floats) -> Points:
-        whole = points.covariance.copy()
-        whole[moving] = covariance
-        return self.with_covariance(points, whole)
-
     def with_covariance(self, points: Points, covariance: Floats) -> Points:
         """The points with other covariance parameters, a mechanism's own among the coordinates of the fit."""
         fit = points.fit.copy()
@@ -284,7 +281,7 @@ class Evaluator:
     def covariance_equations(self, at: Evaluated, *, first_mixed: int = 0) -> tuple[Floats, Floats]:
         """Gradient and Hessian of the costs in the covariance parameters, by differences; without mixed terms of the
         parameters before the `first_mixed`."""
-        from underskin.diagnosis.inference.cost_kernel import STEP
+        from underskin.diagnosis.inference.settle_kernel import STEP
 
         here = at.points.covariance
         count = here.shape[1]

@@ -11,7 +11,7 @@ from underskin.diagnosis.inference.curve_starts import softer, with_contact_poin
 from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis, own_places
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.inference.points import Points, together
-from underskin.mechanisms.base import Parameter
+from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Floats, Indices, Mask
 

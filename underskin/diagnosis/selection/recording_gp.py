@@ -18,7 +18,7 @@ from underskin.diagnosis.inference.evidence import Evidence
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, normalised
-from underskin.mechanisms.base import Normal, Parameter
+from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
 from underskin.units import Floats, Indices
 

@@ -16,9 +16,10 @@ from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.inference.likelihood import Likelihoods
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.noise.noise_levels import NoiseLevels, SeveralLevels
-from underskin.mechanisms.base import Normal, Parameter, Unsupported
+from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.models.frf import FrfModel
+from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Array, Floats
 

@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
+from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.campaign import IndentationRecording
 from underskin.recordings.conditions import Conditions, IndentationConditions
 from underskin.recordings.curve_course import course

@@ -3,8 +3,9 @@
 import numpy as np
 
 from underskin.autodiff import Differentiated, chain, log
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
+from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.parameter import Normal, Parameter, Uniform
 from underskin.recordings.conditions import Conditions, frf_of
 
 _SMALL = 1e-3  # below it (1 − e^(−x))/x is taken from its series

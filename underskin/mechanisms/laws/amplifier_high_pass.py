@@ -1,9 +1,10 @@
 """The mechanism `amplifier_high_pass`."""
 
 from underskin.autodiff import Differentiated
-from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.parameter import Normal, Parameter
 
 _REASON = "charge amplifiers have corners of 0.01 to some Hz; 0.5 Hz within a factor of 4.5"
 

@@ -3,7 +3,8 @@
 import numpy as np
 
 from underskin.autodiff import Differentiated
-from underskin.mechanisms.base import Kind, Mechanism, Parameter, Stage, Uniform, Values
+from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.parameter import Parameter, Uniform
 from underskin.recordings.conditions import Conditions, frf_of
 from underskin.units import Array, Floats
 

@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.autodiff import exp
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
+from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.models.curve_timing import time_runs_with_displacement
+from underskin.mechanisms.parameter import Normal, Parameter, Uniform
 from underskin.recordings.conditions import CompressionConditions, Conditions, IndentationConditions
 from underskin.units import Floats
 

@@ -3,9 +3,10 @@
 import numpy as np
 
 from underskin.autodiff import Differentiated
-from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.parameter import Normal, Parameter
 
 _MASS = "what sits in front of a force cell, from a bead to a shaker's table: 2 g within a factor of 6"
 _DAMPING = "silicones lose little, tan δ 0.02 to 0.3, ζ half of it: 0.05 within a factor of 2.7"

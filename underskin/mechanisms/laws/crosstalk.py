@@ -3,8 +3,9 @@
 import numpy as np
 
 from underskin.autodiff import Differentiated
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.frf_design import frf_design
+from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.conditions import Conditions
 from underskin.units import to_si
 

@@ -2,8 +2,9 @@
 
 import math
 
-from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.parameter import Normal, Parameter
 
 _REASON = "(G_glue/G) (h/t): a tape 0.1 mm thick, 1000 times softer, has 0.02; above 50 no effect"
 

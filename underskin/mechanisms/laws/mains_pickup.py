@@ -6,9 +6,10 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage
+from underskin.mechanisms.base import Kind, Mechanism, Stage
 from underskin.mechanisms.models.frf_design import FrfDesign, frequencies
 from underskin.mechanisms.models.pickup import Pickup
+from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.conditions import Conditions, frf_of
 from underskin.recordings.frf.estimation import Frf, lines_of

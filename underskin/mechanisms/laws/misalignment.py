@@ -6,7 +6,8 @@ import numpy as np
 
 from underskin.autodiff import Differentiated
 from underskin.errors import conflicting
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.conditions import Conditions, frf_of, offsets
 
 _LARGEST_MM = 2.0

@@ -1,8 +1,9 @@
 """The mechanism `modulus_error`."""
 
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
+from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.conditions import Conditions
 
 _REASON = "E from a durometer, a data sheet or another cure is off by tens of percent"

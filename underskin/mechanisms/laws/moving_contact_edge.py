@@ -3,7 +3,8 @@
 import numpy as np
 
 from underskin.autodiff import Differentiated
-from underskin.mechanisms.base import Mechanism, Parameter, Stage, Uniform, Values
+from underskin.mechanisms.base import Mechanism, Stage, Values
+from underskin.mechanisms.parameter import Parameter, Uniform
 from underskin.units import Array, Floats
 
 _STEP = 1e-3  # of the central difference over F, relative; its error is of the order of the step's square

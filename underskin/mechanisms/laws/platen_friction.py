@@ -1,7 +1,8 @@
 """The mechanism `platen_friction`."""
 
-from underskin.mechanisms.base import Mechanism, Parameter, Stage, Uniform, Values
+from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.curve_state import Curve
+from underskin.mechanisms.parameter import Parameter, Uniform
 
 _REASON = "from well oiled to bonded: nothing is known beforehand"
 

@@ -3,9 +3,10 @@
 import numpy as np
 
 from underskin.autodiff import chain
-from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
+from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
+from underskin.mechanisms.parameter import Normal, Parameter, Uniform
 from underskin.recordings.conditions import Conditions
 from underskin.units import Array
 

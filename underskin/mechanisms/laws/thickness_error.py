@@ -1,7 +1,8 @@
 """The mechanism `thickness_error`."""
 
-from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.parameter import Normal, Parameter
 
 _REASON = "a cast layer differs from its mould by shrinkage, meniscus and tilt: some to 20 percent"
 

@@ -3,9 +3,10 @@
 import numpy as np
 
 from underskin.autodiff import Differentiated, exp
-from underskin.mechanisms.base import Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.parameter import Normal, Parameter
 
 _REASON = "multiplexed converters and their filters delay by a few samples at 1 to 50 kS/s"
 

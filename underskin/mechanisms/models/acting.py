@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from underskin.autodiff import Differentiated
-from underskin.mechanisms.base import Mechanism, Parameter, Values
+from underskin.mechanisms.base import Mechanism, Values
+from underskin.mechanisms.parameter import Parameter
 from underskin.units import Floats, Indices, Mask
 
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from underskin.autodiff import Differentiated, variables
 from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique
-from underskin.mechanisms.base import Kind, Mechanism, Parameter, Unsupported, Values
+from underskin.mechanisms.base import Kind, Mechanism, Unsupported, Values
+from underskin.mechanisms.parameter import Parameter
 from underskin.recordings.conditions import Conditions
 from underskin.units import Array, Floats, Indices, Mask
 

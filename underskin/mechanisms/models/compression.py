@@ -10,11 +10,12 @@ import numpy as np
 
 from underskin.autodiff import constant
 from underskin.errors import InvalidInput
-from underskin.mechanisms.base import Mechanism, Parameter, Values
+from underskin.mechanisms.base import Mechanism, Values
 from underskin.mechanisms.models.curve_state import Curve, numbers
 from underskin.mechanisms.models.curves import CurveModel, declared_modulus
 from underskin.mechanisms.models.nuisances import contact_point, modulus_parameter, required_modulus
 from underskin.mechanisms.models.relaxation import memories
+from underskin.mechanisms.parameter import Parameter
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings import elastomer
 from underskin.recordings.campaign import CompressionRecording

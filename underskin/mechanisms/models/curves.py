@@ -10,10 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from underskin.mechanisms.base import Kind, Mechanism, Parameter, Values
+from underskin.mechanisms.base import Kind, Mechanism, Values
 from underskin.mechanisms.models.composition import Composition, Prediction
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.models.pickup import Pickup
+from underskin.mechanisms.parameter import Parameter
 from underskin.recordings.conditions import Conditions, CurveConditions
 from underskin.units import Floats, Indices, Mask, to_si
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from underskin.autodiff import constant
 from underskin.errors import InvalidInput
-from underskin.mechanisms.base import Mechanism, Parameter, Values
+from underskin.mechanisms.base import Mechanism, Values
 from underskin.mechanisms.models.creeping_contact import Adhesion, Path, relaxing, relaxing_on_stage
 from underskin.mechanisms.models.curve_state import Curve, numbers
 from underskin.mechanisms.models.curves import CurveModel, declared_modulus, times_of
@@ -27,6 +27,7 @@ from underskin.mechanisms.models.sphere_contact import (
     in_contact,
     layer_ratios,
 )
+from underskin.mechanisms.parameter import Parameter
 from underskin.recordings import elastomer
 from underskin.recordings.campaign import IndentationRecording
 from underskin.recordings.conditions import Conditions, IndentationConditions, SkinDescription

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from underskin.errors import required
-from underskin.mechanisms.base import Normal, Parameter
+from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.conditions import SkinDescription
 from underskin.units import to_lab
 
