@@ -134,11 +134,14 @@ class FittingProblem:
         fits: list[list[tuple[float, Evidence]]] = [[] for _ in requests]
         log_priors = np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER])
         also_placed: dict[int, Points] = {}
-        for number, improved, evidence in _fitted(plain, starts, requests, best):
+        fitted = _fitted(plain, starts, requests, best)
+        alone = {number: improved for number, improved, _ in fitted if requests[number].parent is None}
+        matters = self._position_matters(plain, alone)
+        for number, improved, evidence in fitted:
             parent = requests[number].parent
             if evidence is None and parent is not None and parent.placed <= 0.5:
                 continue
-            also = parent.placed > 1 - _DECIDED if parent else self._position_matters(plain[number], improved)
+            also = parent.placed > 1 - _DECIDED if parent else matters[number]
             if evidence is not None:
                 fits[number].append((float(log_priors[0]) if also or parent else 0.0, evidence))
             if also:
@@ -178,17 +181,23 @@ class FittingProblem:
             for entry, evidence in zip(explanations, each, strict=True)
         ]
 
-    def _position_matters(self, hypothesis: Hypothesis, points: Points) -> bool:
-        """Whether positioning scatter as large as it usually gets would show in some recording."""
+    def _position_matters(self, hypotheses: Sequence[Hypothesis], points: Mapping[int, Points]) -> dict[int, bool]:
+        """Of those hypotheses that have points, whether positioning scatter as large as it usually gets would show in
+        some recording."""
+        matters = dict.fromkeys(points, False)
         if self.lines.curves:
-            return False
-        products = Fitter([hypothesis]).products(points, slopes=False, place=True)
-        if products.place_slopes is None:
-            return False
-        p = POSITION_RANGE[1]
-        first = (products.place_slopes**2).sum(axis=0) / (products.level**2 + 1e-300)
-        effect = p**2 * first + 0.5 * p**4 * self.curvature.square
-        return bool(effect.max() > _LEAST_SCATTER**2)
+            return matters
+        for members in _groups(points, hypotheses):
+            fitter = Fitter([hypotheses[number] for number in members])
+            together = _stacked([points[number] for number in members])
+            products = fitter.products(together, slopes=False, place=True)
+            if products.place_slopes is not None:
+                first = (products.place_slopes**2).sum(axis=0) / (products.level**2 + 1e-300)
+                effect = POSITION_RANGE[1] ** 2 * first + 0.5 * POSITION_RANGE[1] ** 4 * self.curvature.square
+                shows = effect.max(axis=1) > _LEAST_SCATTER**2
+                for owner, number in enumerate(members):
+                    matters[number] = bool(shows[together.owner == owner].any())
+        return matters
 
 
 def integrated(explanations: Sequence[Explanation]) -> list[Explanation]:

@@ -249,25 +249,21 @@ class PickupProducts:
         return self.rows.slopes_less(sums, self.line, self.u, self.v, levels.pickup[:, 0], levels.level[:, 0, 0])
 
 
-@lru_cache(maxsize=64)
-def _pairs(count: int) -> tuple[Indices, Indices]:
-    """All pairs of so many, each with itself too."""
-    return np.triu_indices(count)
-
-
 def _turned(lines: FrfLines, u: Array, slopes: Array) -> tuple[Floats, Floats, SlopeSums]:
     """Re u*u, Re u*y and the sums with the derivatives v of u (points, parameters, lines)."""
+    from underskin.diagnosis.inference.line_kernel import line_products, spread_sums
+
     moving, count = np.flatnonzero(slopes.any(axis=(0, 2))), slopes.shape[1]
-    each = np.concatenate([u[:, None], slopes[:, moving]], axis=1)
-    real, imag = np.ascontiguousarray(each.real), np.ascontiguousarray(each.imag)
-    one, other = _pairs(each.shape[1])
-    both = lines.weight(real[:, one] * real[:, other] + imag[:, one] * imag[:, other])
-    with_y = lines.real(real) + lines.imag(imag)
-    uv, vy, vv = (np.zeros((len(u), both.shape[-1], *further)) for further in ((count,), (count,), (count, count)))
-    uv[..., moving] = both[:, 1 : each.shape[1]].transpose(0, 2, 1)
-    vy[..., moving] = with_y[:, 1:].transpose(0, 2, 1)
-    for a, b, products in zip(one.tolist(), other.tolist(), both.transpose(1, 0, 2), strict=True):
-        if a:
-            p, q = moving[a - 1], moving[b - 1]
-            vv[..., p, q] = vv[..., q, p] = products
+    points, several = len(u), 1 + len(moving)
+    each = np.empty((points, several, u.shape[1]), dtype=complex)
+    each[:, 0], each[:, 1:] = u, slopes[:, moving]
+    products = np.empty((points, several * (several + 1) // 2, u.shape[1]))
+    real, imag = np.empty(each.shape), np.empty(each.shape)
+    line_products(each, products, real, imag)
+    both = np.ascontiguousarray(lines.weight(products))
+    with_y = np.ascontiguousarray(lines.real(real) + lines.imag(imag))
+    recordings = both.shape[-1]
+    uv, vy = (np.zeros((points, recordings, count)) for _ in range(2))
+    vv = np.zeros((points, recordings, count, count))
+    spread_sums(both, with_y, moving, uv, vy, vv)
     return both[:, 0], with_y[:, 0], SlopeSums(uv, vy, vv)

@@ -28,7 +28,7 @@ _BEST = 3  # nothing and two more: processes are tried on top of the best two
 SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
 _SHOWS_ON_CURVES = 5.0  # the same where neighbouring samples may share what no noise model knows
 _UNTHOUGHT = 0.015  # probability that none of what was compared is right
-_WITHIN = 8.0  # nats behind the best within which evidence is worth integrating: that moves it by less than 2
+_WITHIN = 6.0  # nats behind the best within which evidence is worth integrating: that moves it by less than 2
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
 
 

@@ -17,7 +17,6 @@ from underskin.diagnosis.inference.likelihood import Likelihoods
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.noise.noise_levels import NoiseLevels, SeveralLevels
 from underskin.mechanisms.base import Unsupported
-from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.mechanisms.registry import CATALOGUE
@@ -54,9 +53,11 @@ class Signatures:
                 hypothesis = problem.hypothesis((name,), placed=False)
             except Unsupported:
                 continue
-            for own in _shapes(parameters):
+            shapes = np.array([[*own, *point] for own in _shapes(parameters)])
+            model = hypothesis.model
+            for value in model.values(shapes) if isinstance(model, FrfModel) else model.forces(shapes):
                 self.owners.append(name)
-                self._add(_predicted(hypothesis.model, np.concatenate([own, point])), hypothesis.lines)
+                self._add(value, hypothesis.lines)
 
     def _add(self, value: Array, lines: Lines) -> None:
         """The change is judged on the rows of these lines: 100 · √(Σ|change|² / Σ|base|²)."""
@@ -140,10 +141,6 @@ class _Rows:
 
     def _sums(self, rows: Floats) -> Floats:
         return np.add.reduceat(rows, self._lines.first)
-
-
-def _predicted(model: Model, fit: Floats) -> Array:
-    return model.predict(fit, slopes=False).value if isinstance(model, FrfModel) else model.predict(fit).value
 
 
 def _shapes(parameters: Sequence[Parameter]) -> list[Floats]:

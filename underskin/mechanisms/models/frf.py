@@ -110,6 +110,11 @@ class FrfModel:
             inside=response.inside[self.recording],
         )
 
+    def values(self, fit: Floats) -> Array:
+        """The FRF (points, rows) at points (points, parameters), without derivatives."""
+        response = self.respond(fit, slopes=False)
+        return np.stack([response.part(point).on_rows(self.design)[0] for point in range(len(fit))])
+
     def numbers(self, variables: int) -> int:
         """How many numbers the largest arrays of a response with derivatives by so many variables take, roughly: bounds
         the points that are worked out at once."""

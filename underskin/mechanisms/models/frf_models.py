@@ -148,24 +148,30 @@ class FrfModels:
         Inside means also that the sensor's disc lies within the stress profile, beyond whose end σ is 0.
         """
         design, table = model.design, model.sigma
-        rho = model.sensor_radius / contacts.thickness
+        if contacts.layered or model.needs_stiffness or not as_in_the_table(contacts):
+            of_contacts = self._of_pressed(model, contacts)
+        else:
+            of_contacts = SigmaOfContacts(table, contacts, model.sensor_radius)
+        nodes, places = len(model.force), len(design.point_contact)
+        contact = (design.point_contact + len(design.force) * np.arange(nodes)[:, None]).ravel()
+        offset = self._offset(model, points, seeds) / contacts.thickness
+        every = np.tile(np.arange(places), nodes)
+        sigma = of_contacts.at(contact, offset.spread(places)[every] if nodes > 1 else offset)
+        near = (offset.value <= table.end) & (offset.value + of_contacts.rho.value <= PROFILE_END)
+        reached = of_contacts.inside[..., contact]
+        inside = near & reached.reshape(*reached.shape[:-1], nodes, places).all(axis=-2)
+        return [sigma[places * node : places * (node + 1)] for node in range(nodes)] if nodes > 1 else [sigma], inside
+
+    def _of_pressed(self, model: FrfModel, contacts: Contacts) -> SigmaOfContacts:
+        """σ of contacts that the table is not of, or whose stiffness is asked for."""
+        table = model.sigma
         layer = None
         if contacts.layered or model.needs_stiffness:
             layer = layer_curves(table.contact_grid, layer_of(contacts))
         pressed = press(contacts, layer if contacts.layered else None)
         if layer is not None and model.needs_stiffness:
             contacts.stiffness = stiffness(contacts, pressed, layer)
-        of_contacts = SigmaOfContacts(table, contacts, pressed, rho, layer if contacts.layered else None)
-        offset = self._offset(model, points, seeds) / contacts.thickness
-        nodes, places = len(model.force), len(design.point_contact)
-        every = np.tile(np.arange(places), nodes)
-        contact = (design.point_contact + len(design.force) * np.arange(nodes)[:, None]).ravel()
-        at_nodes = offset.spread(places)[every] if nodes > 1 else offset
-        sigma = of_contacts.at(contact, at_nodes)
-        near = (offset.value <= table.end) & (offset.value + rho.value <= PROFILE_END)
-        reached = of_contacts.inside[..., contact]
-        inside = near & reached.reshape(*reached.shape[:-1], nodes, places).all(axis=-2)
-        return [sigma[places * node : places * (node + 1)] for node in range(nodes)] if nodes > 1 else [sigma], inside
+        return SigmaOfContacts(table, contacts, model.sensor_radius, pressed, layer if contacts.layered else None)
 
     def _offset(self, model: FrfModel, points: Indices, seeds: Seeds) -> Differentiated:
         """The distance of each place's contact from its sensor's centre [m], where positions vary, with them."""

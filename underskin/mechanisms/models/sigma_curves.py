@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import j0
 
-from underskin.autodiff import Differentiated, chain, contiguous
+from underskin.autodiff import Differentiated, as_columns, chain, contiguous, unfilled
 from underskin.mechanisms.models.contact_stage import PressedContacts
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.off_centre_response import PANEL, OffsetSigma
@@ -26,25 +26,32 @@ from underskin.units import Floats, Indices
 
 
 class SigmaOfContacts:
-    """σ of all contacts at any place beside them. Attributes: `inside` (…, contacts), which are within the tables."""
+    """σ of all contacts at any place beside them.
+
+    Attributes: `inside` (…, contacts), which are within the tables; `rho`, rT/h.
+    """
 
     def __init__(
         self,
         sigma: OffsetSigma,
         contacts: Contacts,
-        pressed: PressedContacts,
-        rho: Differentiated,
-        layer: ContactCurves | None,
+        sensor_radius: float,
+        pressed: PressedContacts | None = None,
+        layer: ContactCurves | None = None,
     ) -> None:
-        """`layer` where the contact is the layer's own; all contacts then are on one and the same layer."""
+        """`pressed` where the table is not of such contacts as they are; `layer` where the contact is the layer's own:
+        all contacts then are on one and the same layer."""
         self._sigma = sigma
-        self._variables = [pressed.a_over_h, pressed.cbrt_load, rho]
-        self.inside = sigma.contains(pressed.a_over_h.value, pressed.cbrt_load.value)
+        self._sensor_radius, self._thickness = sensor_radius, contacts.thickness
+        self.rho = sensor_radius / contacts.thickness
+        a, x = _spheres(contacts) if pressed is None else (pressed.a_over_h, pressed.cbrt_load)
+        self._variables = [a, x, self.rho]
+        self.inside = sigma.contains(a.value, x.value)
         self._linear: Floats | None = None
-        if layer is not None or not as_in_the_table(contacts):
-            self._linear, further = _transforms(sigma.wavenumber, contacts, pressed, rho.value, layer)
+        if pressed is not None and (layer is not None or not as_in_the_table(contacts)):
+            self._linear, further = _transforms(sigma.wavenumber, contacts, pressed, self.rho.value, layer)
             self._variables += further
-            self.inside = self.inside & (pressed.a_over_h.value < LARGEST_A_OVER_H)
+            self.inside = self.inside & (a.value < LARGEST_A_OVER_H)
 
     def at(self, contact: Indices, offset: Differentiated) -> Differentiated:
         """σ (…, points) at these offsets e/h from these contacts (points,)."""
@@ -56,6 +63,23 @@ class SigmaOfContacts:
         linear, *partial, by_offset = self._sigma.linear_at(self._linear, contact, offset.value, points)
         variables = (variable[contact] for variable in (a, rho, *further))
         return sigma + chain(linear, (by_offset, offset), *zip(partial, variables, strict=bool(partial)))
+
+
+def _spheres(contacts: Contacts) -> tuple[Differentiated, Differentiated]:
+    """a/h and L^(1/3) of contacts that the table is of."""
+    from underskin.mechanisms.models.hertz_kernel import spheres
+
+    modulus, thickness = contacts.modulus, contacts.thickness
+    shape = max(len(modulus.value), len(thickness.value)), len(contacts.force)
+    a, x = (unfilled(len(modulus.slopes), shape) for _ in range(2))
+    spheres(
+        contacts.force,
+        contacts.indenter_radius,
+        *as_columns(modulus),
+        *as_columns(thickness),
+        *(a.value, a.slopes, x.value, x.slopes),
+    )
+    return a, x
 
 
 def layer_of(contacts: Contacts) -> Layer:
