@@ -72,8 +72,10 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     api.state.access = access
     api.state.store = store
     memory_bytes = int(settings.diagnosis_memory_mb * 1e6)
-    processes = WorkerProcesses(settings.tables / SIGMA_TABLE, table.sha256, memory_bytes)
-    api.state.runner = Runner(store, processes, settings.diagnosis_workers, settings.diagnosis_ready)
+    processes = WorkerProcesses(
+        settings.tables / SIGMA_TABLE, table.sha256, memory_bytes, keeps_ready=settings.diagnosis_ready
+    )
+    api.state.runner = Runner(store, processes, settings.diagnosis_workers)
     api.state.planner = Planner(store, processes, settings.diagnosis_workers)
     install_handlers(api, problem_page, _methods)
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"]), Depends(known_query)])

@@ -55,8 +55,8 @@ class Settings(BaseSettings):
     )
     diagnosis_ready: bool = Field(
         default=True,
-        description="Whether a process with the program loaded waits for the next diagnosis (some 150 MB of memory); "
-        "without it each diagnosis begins a second or two later.",
+        description="Whether a process with the program loaded waits to fork the next diagnosis (some 200 MB of "
+        "memory); without it a diagnosis begins a second or two later.",
     )
     hosts: str = Field(
         default="",

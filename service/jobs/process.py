@@ -1,10 +1,14 @@
-"""The server's end of worker processes (worker.py): one is kept ready, so that a job does not wait for it to load."""
+"""The server's end of worker processes: a fork server (fork_server.py), and the workers that it forks."""
 
 import os
+import select
+import signal
+import socket
 import subprocess
 import sys
 import tempfile
 import threading
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,52 +25,113 @@ _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 _LAST_WORDS = 2000
 
 
-@dataclass(frozen=True)
-class WorkerProcess:
-    """A process that waits for a job, and the file that it writes its errors to."""
+class ForkServer:
+    """A process that forks workers; it loads the program and a table first."""
 
-    process: "subprocess.Popen[bytes]"
-    stderr: BinaryIO
-    _shared: ExitStack
-
-    @classmethod
-    def started(cls, table: Path) -> Self:
-        """A new one, which loads this table; raises OSError where the system has no room for a process."""
+    def __init__(self, table: Path) -> None:
+        """Start it; raises OSError where the system has no room for a process."""
         environment = {key: os.environ[key] for key in _INHERITED if key in os.environ} | _ONE_THREAD
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))  # the packages of this process
+        command = [sys.executable, "-P", "-m", "service.jobs.fork_server", str(table)]
         with ExitStack() as shared:
-            stderr = shared.enter_context(tempfile.TemporaryFile())
-            command = [sys.executable, "-P", "-m", "service.jobs.worker", str(table)]
-            pipe = subprocess.PIPE
-            process = shared.enter_context(
-                subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=stderr, env=environment)
+            self._stderr = shared.enter_context(tempfile.TemporaryFile())
+            self._socket, theirs = map(shared.enter_context, socket.socketpair())
+            self._process = subprocess.Popen(
+                command, stdin=theirs.fileno(), stdout=subprocess.DEVNULL, stderr=self._stderr, env=environment
             )
-            return cls(process, stderr, shared.pop_all())
+            theirs.close()
+            self._shared = shared.pop_all()
+
+    @property
+    def runs(self) -> bool:
+        """Whether it has not ended."""
+        return self._process.poll() is None
+
+    def fork(self) -> "WorkerProcess":
+        """A new worker; raises OSError with the process' last words where it has ended."""
+        with ExitStack() as ours, ExitStack() as theirs:
+
+            def pipe(*, to_worker: bool) -> BinaryIO:
+                reads, writes = os.pipe()
+                own, other = (writes, reads) if to_worker else (reads, writes)
+                descriptors.append(other)
+                theirs.callback(os.close, other)
+                return ours.enter_context(os.fdopen(own, "wb" if to_worker else "rb"))
+
+            descriptors: list[int] = []
+            stdin, stdout = pipe(to_worker=True), pipe(to_worker=False)
+            stderr = ours.enter_context(tempfile.TemporaryFile())
+            descriptors.append(stderr.fileno())
+            status = pipe(to_worker=False)
+            try:
+                socket.send_fds(self._socket, [b"f"], descriptors)
+                _, forked, _, _ = socket.recv_fds(self._socket, 1, 1)
+            except ConnectionError:
+                forked = []
+            if not forked:
+                raise OSError(f"no worker could be started: {_end_of(self._stderr)}")
+            ours.callback(os.close, forked[0])
+            return WorkerProcess(forked[0], stdin, stdout, stderr, status, ours.pop_all())
 
     def end(self) -> None:
-        """Kill it, whatever it does, and close what is shared with it."""
-        self.process.kill()
+        """Kill it; its workers go on."""
+        self._process.kill()
+        self._process.wait()
+        self._shared.close()
+
+
+@dataclass(frozen=True)
+class WorkerProcess:
+    """A worker's process descriptor and what is shared with it; from `status` its exit code can be read at its end."""
+
+    descriptor: int
+    stdin: BinaryIO
+    stdout: BinaryIO
+    stderr: BinaryIO
+    status: BinaryIO
+    _shared: ExitStack
+
+    def kill(self) -> None:
+        """End it, whatever it does."""
+        with suppress(ProcessLookupError):
+            signal.pidfd_send_signal(self.descriptor, signal.SIGKILL)
+
+    def wait(self) -> int | None:
+        """Its exit code, or −signal, once it has ended; None where the process that forked it has ended before."""
+        select.select([self.descriptor], [], [])
+        code = self.status.read()
+        return int(code) if code else None
+
+    def close(self) -> None:
+        """Close what is shared with it."""
         with suppress(OSError):  # what it had not read is lost with it
             self._shared.close()
 
 
-class WorkerProcesses:
-    """Worker processes for jobs; once `keep_ready` was called, one more waits for the next job, until `stop`."""
+def _end_of(stderr: BinaryIO) -> str:
+    stderr.seek(max(0, stderr.seek(0, os.SEEK_END) - _LAST_WORDS))
+    return stderr.read().decode("utf-8", "replace")
 
-    def __init__(self, table: Path, table_sha256: str, memory_bytes: int) -> None:
+
+class WorkerProcesses:
+    """Workers for jobs. Their fork server starts with the first one, or when it is to be ready, and goes on until
+    `stop` or, where none is to be kept ready, until the last worker has ended."""
+
+    def __init__(self, table: Path, table_sha256: str, memory_bytes: int, *, keeps_ready: bool) -> None:
         """`memory_bytes`: what a job may take beyond its program."""
         self.table_sha256 = table_sha256
         self._table = table
         self._memory_bytes = memory_bytes
-        self._ready: WorkerProcess | None = None
-        self._keeps = False
+        self._keeps_ready = keeps_ready
+        self._server: ForkServer | None = None
+        self._at_work = 0
         self._lock = threading.Lock()
 
-    def keep_ready(self) -> None:
-        """See to it that one is ready, from now on."""
-        with self._lock:
-            self._keeps = True
-            self._start()
+    def get_ready(self) -> None:
+        """See to it that the fork server runs, if it is to be kept ready; without room for it now, a job starts it."""
+        if self._keeps_ready:
+            with self._lock, suppress(OSError):
+                self._running()
 
     def at_work(
         self, campaign: Campaign, excluded: tuple[tuple[str, str], ...] = (), limits: dict[str, Any] | None = None
@@ -74,43 +139,46 @@ class WorkerProcesses:
         """A worker at its job, on a campaign."""
         content = json_file.write(campaign)
         job = Job(len(content), self.table_sha256, self._memory_bytes, excluded, limits)
-        return Worker(job, content, self._take())
-
-    def _take(self) -> WorkerProcess:
-        """The one that is ready, or a new one."""
         with self._lock:
-            ready, self._ready = self._ready, None
-            if ready is not None and ready.process.poll() is not None:
-                ready.end()
-                ready = None
-            taken = ready or WorkerProcess.started(self._table)
-            if self._keeps:
-                self._start()
-            return taken
+            process = self._running().fork()
+            self._at_work += 1
+        return Worker(job, content, process, self._is_done)
 
     def stop(self) -> None:
-        """End the one that is ready."""
+        """End the fork server."""
         with self._lock:
-            self._keeps = False
-            if self._ready is not None:
-                self._ready.end()
-                self._ready = None
+            self._end()
 
-    def _start(self) -> None:
-        """Without room for it now, the next job has to wait for its own process to load."""
-        if self._ready is None:
-            with suppress(OSError):
-                self._ready = WorkerProcess.started(self._table)
+    def _running(self) -> ForkServer:
+        if self._server is not None and not self._server.runs:
+            self._end()
+        if self._server is None:
+            self._server = ForkServer(self._table)
+        return self._server
+
+    def _is_done(self) -> None:
+        """A worker has ended."""
+        with self._lock:
+            self._at_work -= 1
+            if not self._at_work and not self._keeps_ready:
+                self._end()
+
+    def _end(self) -> None:
+        if self._server is not None:
+            self._server.end()
+            self._server = None
 
 
 class Worker:
     """A worker at its job. `news` is set when it has ended. Leaving the block ends it in any case."""
 
-    def __init__(self, job: Job, campaign: bytes, worker: WorkerProcess) -> None:
+    def __init__(self, job: Job, campaign: bytes, process: WorkerProcess, is_done: Callable[[], None]) -> None:
+        """`is_done` is called once the process has ended and nothing is shared with it any more."""
         self.said: dict[str, Any] = {"progress": 0.0}  # the latest of each message, by its name
         self.news = threading.Event()
         self.ended = False
-        self._worker, self._process, self._stderr = worker, worker.process, worker.stderr
+        self._process, self._is_done = process, is_done
+        self._code: int | None = None
         threading.Thread(target=self._send, args=(job, campaign), daemon=True).start()
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
@@ -121,39 +189,37 @@ class Worker:
     def __exit__(self, *_: object) -> None:
         self._process.kill()
         self._listener.join()
-        self._worker.end()
+        self._process.close()
+        self._is_done()
 
     @property
     def failure(self) -> str:
         """Why there is no report, once it has ended."""
-        status = self._process.returncode
         if "error" in self.said:
             return str(self.said["error"])
-        if status < 0:
-            return f"its process was killed by signal {-status}; where nobody did that, memory was short"
+        if self._code is None:
+            return "its process ended with the one that had started it"
+        if self._code < 0:
+            return f"its process was killed by signal {-self._code}; where nobody did that, memory was short"
         last = self.last_words.strip().splitlines()[-1:]
-        return f"its process ended with status {status}" + "".join(f": {line[:500]}" for line in last)
+        return f"its process ended with status {self._code}" + "".join(f": {line[:500]}" for line in last)
 
     @property
     def last_words(self) -> str:
         """The end of what it wrote to stderr."""
-        self._stderr.seek(max(0, self._stderr.seek(0, os.SEEK_END) - _LAST_WORDS))
-        return self._stderr.read().decode("utf-8", "replace")
+        return _end_of(self._process.stderr)
 
     def _send(self, job: Job, campaign: bytes) -> None:
-        assert self._process.stdin is not None
         with suppress(OSError, ValueError):  # it has ended already
             self._process.stdin.write(job.line() + campaign)
             self._process.stdin.flush()  # and stays open: its end is the runner's
 
     def _listen(self) -> None:
-        assert self._process.stdout is not None
-        with self._process.stdout as lines:
-            for line in lines:
-                try:
-                    self.said |= orjson.loads(line)
-                except orjson.JSONDecodeError:  # killed in the midst of a line
-                    break
-        self._process.wait()
+        for line in self._process.stdout:
+            try:
+                self.said |= orjson.loads(line)
+            except orjson.JSONDecodeError:  # killed in the midst of a line
+                break
+        self._code = self._process.wait()
         self.ended = True
         self.news.set()

@@ -24,12 +24,11 @@ _STORE_FAILED = (SQLAlchemyError, StorageFull, StoreMoved, OSError)
 class Runner:
     """Runs the queue in threads of the server's process, between `start` and `stop`."""
 
-    def __init__(self, store: Database, processes: WorkerProcesses, workers: int, keeps_ready: bool) -> None:
-        """`workers`: how many diagnoses run at once; `keeps_ready`: whether a process waits for the next one."""
+    def __init__(self, store: Database, processes: WorkerProcesses, workers: int) -> None:
+        """`workers`: how many diagnoses run at once."""
         self._store = store
         self._processes = processes
         self._workers = workers
-        self._keeps_ready = keeps_ready
         self._server = secrets.token_hex(8)
         self._ending = threading.Event()
         self._stirred = threading.Event()
@@ -71,8 +70,8 @@ class Runner:
                     thread.start()
             except _STORE_FAILED as error:
                 self._failure.log("no diagnosis can be claimed", error)
-            if not self._stirred.wait(_POLL_S) and self._keeps_ready:
-                self._processes.keep_ready()  # now that nothing else is going on
+            if not self._stirred.wait(_POLL_S):
+                self._processes.get_ready()  # now that nothing else is going on
 
     def _claim(self) -> AnyRow | None:
         row = self._store.write(diagnoses.claim, self._server, self._processes.table_sha256, __version__)

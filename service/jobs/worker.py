@@ -1,8 +1,6 @@
-"""The worker process: one campaign in, its report or next experiment out, at the lowest priority and within a limit on
-memory.
+"""A worker: one campaign in, its report or next experiment out, within a limit on memory.
 
-It is started ahead of its job, and has loaded the program and the table (its argument) when that comes. Its name in a
-list of processes says which: `underskin-ready`, then `underskin-works`.
+It is a process that fork_server.py forks for one job, so that nothing of a job is left for the next.
 
 Standard input: a line of JSON (`Job`), then the campaign (`campaign/1`), then nothing until the runner ends: a worker
 whose runner is gone ends too. Standard output: a line of JSON for each progress, then one with the report and one with
@@ -15,8 +13,6 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import orjson
@@ -24,8 +20,30 @@ import orjson
 if TYPE_CHECKING:
     from underskin.surrogate.sigma_table import SigmaTable
 
-_NICENESS = 10
-_LOADED = "underskin.diagnosis.pipeline", "underskin.diagnosis.reporting.figures"  # ahead of the job
+_FEW_NUMBERS: dict[str, Any] = {
+    "schema": "campaign/1",
+    "name": "a few numbers",
+    "skin": {
+        "thickness_mm": 2.5,
+        "youngs_modulus_mpa": 16.0,
+        "poisson_ratio": 0.5,
+        "sensor_radius_mm": 1.5,
+        "sensors": [{"id": "s", "x_mm": 0.0, "y_mm": 0.0}],
+    },
+    "recordings": [
+        {
+            "id": str(number),
+            "sensor": "s",
+            "indenter_radius_mm": 4.0,
+            "preload_n": 0.5 + number / 2,
+            "dynamic_force_n": 0.05,
+            "frequency_hz": [1.0, 3.0, 10.0, 30.0, 100.0],
+            "frf_re_pc_per_n": [6.0, 6.01, 6.0, 6.02, 5.99],
+            "frf_im_pc_per_n": [0.0, 0.01, 0.0, -0.01, 0.01],
+        }
+        for number in range(4)
+    ],
+}
 
 
 @dataclass(frozen=True)
@@ -46,36 +64,24 @@ class Job:
         return orjson.dumps(asdict(self), option=orjson.OPT_APPEND_NEWLINE)
 
 
-def main() -> None:
-    """The process."""
+def work(table: "SigmaTable | None", problem: str) -> None:
+    """The job on standard input; `problem` says why there is no table."""
+    from underskin.errors import UnderskinError
+
     answers = os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)  # what a library prints is no answer
 
     def say(message: dict[str, Any]) -> None:
         answers.write(orjson.dumps(message, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_APPEND_NEWLINE))
 
-    os.nice(_NICENESS)
-    _be_called("underskin-ready")
-    for module in _LOADED:
-        import_module(module)
-    from underskin.compiled import load_all
-    from underskin.errors import UnderskinError
-    from underskin.surrogate.sigma_table import load_table
-
-    load_all()
-    try:
-        table = load_table(Path(sys.argv[1]))
-        problem = ""
-    except UnderskinError as error:
-        problem = str(error)
-    line = sys.stdin.buffer.readline()
+    stdin = os.fdopen(0, "rb", closefd=False)
+    line = stdin.readline()
     if not line:
         return  # the server ended before there was a job
     job = Job(**orjson.loads(line))
-    _be_called("underskin-works")
-    campaign = sys.stdin.buffer.read(job.campaign_bytes)
-    threading.Thread(target=_end_with_the_runner, args=(sys.stdin.buffer,), daemon=True).start()
-    if problem:
+    campaign = stdin.read(job.campaign_bytes)
+    threading.Thread(target=_end_with_the_runner, args=(stdin,), daemon=True).start()
+    if table is None:
         say({"error": problem})
         return
     try:
@@ -86,10 +92,16 @@ def main() -> None:
         say({"error": f"it takes more than {job.memory_bytes / 1e6:g} MB of memory (UNDERSKIN_DIAGNOSIS_MEMORY_MB)"})
 
 
-def _be_called(name: str) -> None:
-    """Of this process, in lists of processes; at most 15 characters."""
-    with suppress(OSError):
-        Path("/proc/self/comm").write_text(name)
+def warm_up(table: "SigmaTable") -> None:
+    """Diagnose a few numbers, so that what is loaded at its first use is loaded before the first job."""
+    from underskin.diagnosis.pipeline import diagnose
+    from underskin.diagnosis.reporting.figures import figures
+    from underskin.diagnosis.reporting.report import report
+    from underskin.recordings.campaign import parse
+
+    diagnosis = diagnose(parse(_FEW_NUMBERS), table)
+    for figure in figures(diagnosis, report(diagnosis)).values():
+        figure.to_json()
 
 
 def _work(job: Job, campaign: bytes, table: "SigmaTable", say: Callable[[dict[str, Any]], None]) -> None:
@@ -108,7 +120,7 @@ def _work(job: Job, campaign: bytes, table: "SigmaTable", say: Callable[[dict[st
         raise TableError(f"{sys.argv[1]} changed since the server started: restart it")
     limit_process(job.memory_bytes)
     limits = RigLimits(**job.limits or {})
-    diagnosis = diagnose(parse(orjson.loads(campaign)), table, lambda share: say({"progress": share}), limits)
+    diagnosis = diagnose(parse(_read(campaign)), table, lambda share: say({"progress": share}), limits)
     if job.limits is not None:
         say({"plan": diagnosis.next_experiment})
         return
@@ -120,11 +132,15 @@ def _work(job: Job, campaign: bytes, table: "SigmaTable", say: Callable[[dict[st
     say({"figures": {name: figure.to_json() for name, figure in figures(diagnosis, document).items()}})
 
 
+def _read(campaign: bytes) -> Any:
+    """The campaign's JSON, which the server has written: where it cannot be read, memory is short."""
+    try:
+        return orjson.loads(campaign)
+    except orjson.JSONDecodeError as error:
+        raise MemoryError from error
+
+
 def _end_with_the_runner(stdin: BinaryIO) -> None:
     with suppress(OSError):
         stdin.read(1)
     os._exit(1)
-
-
-if __name__ == "__main__":
-    main()

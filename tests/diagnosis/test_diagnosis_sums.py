@@ -10,6 +10,7 @@ from tests.support.diagnosis_campaigns import Made, campaign, design
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.inference.frf_products import RowSums
+from underskin.diagnosis.inference.line_kernel import line_products, spread_sums
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.inference.pickup_kernel import lost, slopes_lost
 from underskin.diagnosis.noise.noise_priors import level_prior
@@ -34,6 +35,30 @@ def test_sums_over_rows_are_those_of_each_recordings_lines(made: Made) -> None:
     assert found.shape == (2, 3, rows.recordings)
     expected = np.add.reduceat(weight * values[..., layout.line], rows.first, axis=-1)
     assert found == pytest.approx(expected, rel=1e-10, abs=1e-10)
+
+
+def test_products_of_line_factors_are_those_of_complex_numbers() -> None:
+    random = np.random.default_rng(4)
+    points, recordings, parameters, of_lines = 2, 3, 5, 4
+    moving = np.array([1, 4])
+    each = random.normal(size=(points, 3, of_lines)) + 1j * random.normal(size=(points, 3, of_lines))
+    products, real, imag = np.empty((points, 6, of_lines)), np.empty(each.shape), np.empty(each.shape)
+    line_products(each, products, real, imag)
+    pairs = [(one, other) for one in range(3) for other in range(one, 3)]
+    expected = np.stack([(each[:, one].conj() * each[:, other]).real for one, other in pairs], axis=1)
+    assert products == pytest.approx(expected)
+    assert np.array_equal(real + 1j * imag, each)
+
+    weight = random.uniform(size=(of_lines, recordings))
+    both, with_y = products @ weight, real @ weight
+    uv, vy = (np.zeros((points, recordings, parameters)) for _ in range(2))
+    vv = np.zeros((points, recordings, parameters, parameters))
+    spread_sums(both, with_y, moving, uv, vy, vv)
+    slopes = np.zeros((points, parameters, of_lines), dtype=complex)
+    slopes[:, moving] = each[:, 1:]
+    assert uv == pytest.approx(np.einsum("pl,pkl,lr->prk", each[:, 0].conj(), slopes, weight).real)
+    assert vv == pytest.approx(np.einsum("pjl,pkl,lr->prjk", slopes.conj(), slopes, weight).real)
+    assert vy == pytest.approx(np.einsum("pkl,lr->prk", slopes.real, weight))
 
 
 def test_lines_that_recordings_measure_at_other_frequencies_are_each_found() -> None:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,6 +24,7 @@ from underskin.parallel import one_blas_thread, processes
 if TYPE_CHECKING:
     from underskin.client.service_client import Client
     from underskin.recordings.rig_description import RigDescription
+    from underskin.surrogate.sigma_table import SigmaTable
 
 FilesArgument = Annotated[
     list[Path] | None, typer.Argument(help="Campaigns (campaign/1, JSON, or any format that is read).")
@@ -179,11 +180,10 @@ def _one(file: Path, *, rig: "RigDescription | None", output_dir: Path, html: bo
     from underskin.diagnosis.pipeline import with_refused
     from underskin.diagnosis.reporting.report import report
     from underskin.recordings import read_file
-    from underskin.surrogate.sigma_table import load_table
 
     try:
         reading = read_file(file, file.name, rig)
-        diagnosis = with_refused(work_out(reading.campaign, load_table()), reading.problems)
+        diagnosis = with_refused(work_out(reading.campaign, _table()), reading.problems)
     except UnderskinError as error:
         return _Outcome(str(file), f"{file}: {' '.join(str(error).split())}")
     document = report(diagnosis)
@@ -194,6 +194,14 @@ def _one(file: Path, *, rig: "RigDescription | None", output_dir: Path, html: bo
 
         _write(page(document, figures(diagnosis, document)), output_dir / f"{file.stem}.html")
     return _Outcome(str(file), verdict=str(document["verdict"]), notes=tuple(reading_notes(reading)))
+
+
+@cache
+def _table() -> "SigmaTable":
+    """The table, loaded once in a process."""
+    from underskin.surrogate.sigma_table import load_table
+
+    return load_table()
 
 
 def _of_store(campaigns: Sequence[str], output_dir: Path, html: bool, url: str, key: str | None) -> Iterator[_Outcome]:

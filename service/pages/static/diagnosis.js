@@ -3,6 +3,7 @@
 
 const place = document.querySelector("[data-progress]");
 const far = document.getElementById("far");
+const SOON = 10_000; // ms of the page's life in which most diagnoses end
 const bar = place.querySelector("progress");
 
 async function look() {
@@ -19,6 +20,6 @@ async function look() {
   bar.value = job.progress;
   const said = job.state === "queued" ? "It waits for its turn." : `It runs: ${Math.round(100 * job.progress)} % done.`;
   if (far.textContent !== said) far.textContent = said;
-  setTimeout(look, 1000);
+  setTimeout(look, performance.now() < SOON ? 150 : 1000);
 }
-setTimeout(look, 1000);
+setTimeout(look, 150);

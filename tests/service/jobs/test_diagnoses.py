@@ -28,15 +28,21 @@ def file_place(tmp_path: Path) -> Place:
 
 
 def workers_of(server: Server, name: str = "underskin-works") -> list[int]:
-    """Process ids of the worker processes of a server that are at a job, or of those that are ready for one."""
-    found = []
+    """Process ids of the worker processes of a server that are at a job, or of the process that forks them."""
+    pids = []
     for entry in Path("/proc").iterdir():
         with suppress(OSError):
             if entry.name.isdigit() and (entry / "comm").read_text().strip() == name:
-                fields = (entry / "stat").read_text().rpartition(")")[2].split()
-                if fields[0] != "Z" and int(fields[1]) == server.process.pid:
-                    found.append(int(entry.name))
-    return found
+                parent, state = _parent(entry.name)
+                if state != "Z" and server.process.pid in (parent, _parent(str(parent))[0]):
+                    pids.append(int(entry.name))
+    return pids
+
+
+def _parent(pid: str) -> tuple[int, str]:
+    """A process' parent, and its state."""
+    fields = Path("/proc", pid, "stat").read_text().rpartition(")")[2].split()
+    return int(fields[1]), fields[0]
 
 
 def await_workers(server: Server, count: int, name: str = "underskin-works") -> list[int]:
@@ -128,19 +134,40 @@ def test_cancelled_while_it_runs_and_while_it_waits(file_place: Place) -> None:
         assert found(server, first)["state"] == found(server, second)["state"] == "cancelled"
 
 
-def test_a_worker_is_kept_ready_for_the_next_job(file_place: Place) -> None:
+def test_a_fork_server_is_kept_ready_for_the_next_job(file_place: Place) -> None:
     with running(file_place, **ONE, UNDERSKIN_DIAGNOSIS_READY="true") as server:
         (ready,) = await_workers(server, 1, "underskin-ready")
         diagnosis_id = asked(server, sent(server, resonant("array")))
-        assert await_workers(server, 1) == [ready]
-        (after,) = await_workers(server, 1, "underskin-ready")
+        (worker,) = await_workers(server, 1)
+        assert _parent(str(worker))[0] == ready
         assert awaited(server, diagnosis_id)["state"] == "done"
-        os.kill(after, signal.SIGKILL)
-        assert is_gone(after)
+        assert is_gone(worker)
+        assert await_workers(server, 1, "underskin-ready") == [ready]
+        os.kill(ready, signal.SIGKILL)
+        assert is_gone(ready)
         again = asked(server, sent(server, resonant("again")))
         assert awaited(server, again)["state"] == "done"
         (last,) = await_workers(server, 1, "underskin-ready")
     assert is_gone(last)
+
+
+def test_a_worker_whose_fork_server_is_killed_goes_on(file_place: Place) -> None:
+    with running(file_place, **ONE) as server:
+        diagnosis_id = asked(server, sent(server, resonant("array")))
+        (worker,) = await_workers(server, 1)
+        os.kill(_parent(str(worker))[0], signal.SIGKILL)
+        done = awaited(server, diagnosis_id)
+        assert (done["state"], done["report"]) == ("done", report())
+
+
+def test_a_killed_server_leaves_no_process(file_place: Place) -> None:
+    with running(file_place, **ONE, UNDERSKIN_DIAGNOSIS_READY="true") as server:
+        (ready,) = await_workers(server, 1, "underskin-ready")
+        asked(server, sent(server, resonant("array")))
+        (worker,) = await_workers(server, 1)
+        server.kill()
+        assert is_gone(worker)
+        assert is_gone(ready)
 
 
 def test_a_worker_that_dies_is_told(file_place: Place) -> None:
@@ -159,7 +186,7 @@ def test_a_worker_that_dies_is_told(file_place: Place) -> None:
 
 
 def test_a_diagnosis_that_needs_more_memory_than_it_may_have_fails(file_place: Place) -> None:
-    document = resonant("large", preloads=[0.5 + 0.01 * step for step in range(100)], lines=200)
+    document = resonant("large", preloads=[0.5 + 0.01 * step for step in range(100)], lines=800)
     with running(file_place, **ONE, UNDERSKIN_DIAGNOSIS_MEMORY_MB="100") as server:
         failed = awaited(server, asked(server, sent(server, document)))
         assert failed["state"] == "failed"

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import pairwise
 from typing import Any, Self
 
@@ -17,6 +16,7 @@ from underskin.diagnosis.noise.noise_levels import SeveralLevels
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.models.response import Response
 from underskin.units import Array, Floats, Indices
+from underskin.weak_cache import cached_while_alive
 
 _LARGE, _FULL = 2000, 0.7  # rows for each contact, and their share of a block, from which on a block is dense
 
@@ -73,7 +73,7 @@ class RowSums:
         return total.reshape(*values.shape[:-1], -1)
 
 
-@lru_cache(maxsize=4)  # by identity: a diagnosis weighs dozens of models of one design
+@cached_while_alive  # a diagnosis weighs dozens of models of one design
 def frf_lines(lines: Lines, design: FrfDesign) -> FrfLines:
     """The matrices of these lines for models of this design."""
     return FrfLines(lines, design)

@@ -1,7 +1,5 @@
 """Rows that mains pick-up reaches: they weigh less, the more of it there is, and sums over rows lose as much."""
 
-from functools import lru_cache
-
 import numpy as np
 
 from underskin.autodiff import contiguous
@@ -10,6 +8,7 @@ from underskin.diagnosis.inference.sums import SlopeSums, Sums
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.models.pickup import Pickup
 from underskin.units import Array, Floats, Indices
+from underskin.weak_cache import cached_while_alive
 
 
 class PickupRows:
@@ -59,7 +58,7 @@ class PickupRows:
         return SlopeSums(uv, vy, vv)
 
 
-@lru_cache(maxsize=4)  # by identity: a diagnosis weighs dozens of models of one design
+@cached_while_alive  # a diagnosis weighs dozens of models of one design
 def pickup_rows(lines: Lines, pickup: Pickup, design: FrfDesign) -> PickupRows:
     """Those of these lines that a pick-up reaches, for models of this design."""
     return PickupRows(lines, pickup, design)

@@ -212,12 +212,11 @@ def _grams(columns: Floats, count: int) -> Floats:
 
 def relative_place_slopes(best: Evidence) -> Floats:
     """∇m/m of each recording over its contact's place [1/m] (2, recordings)."""
-    first, slopes = best.hypothesis.lines.first, best.prediction.position_slopes
-    value = best.prediction.value[first]
-    if slopes is None:
-        return np.zeros((2, len(first)))
+    response = best.hypothesis.frf_model.respond(best.point.fit, slopes=False, place=True)
+    assert response.place_slopes is not None
+    value = response.level.value
     answers = np.abs(value) > _FAINT * np.abs(value).max()
-    return np.asarray((slopes[:, first] / np.where(answers, value, np.inf)).real)
+    return np.asarray(response.place_slopes / np.where(answers, value, np.inf))
 
 
 def _shares(positions: Floats) -> dict[float, float]:

@@ -123,22 +123,32 @@ def hold_out(
     """Predict each group from the rest; `ranked` are the sets found on everything, the best first."""
     weights = [entry.log_evidence + log_prior(len(entry.names), supported) for entry in ranked]
     rivals = [entry for entry, w in zip(ranked, weights, strict=True) if w > weights[0] - _BEHIND][:_BEST]
-    held_out = []
-    for name, rows in groups(problem.lines).items():
-        smaller = FittingProblem(problem.lines.part(~rows), problem.table)
-        entries = {entry.names: entry for entry in (nothing, *rivals)}
-        fits = {entry.names: entry for entry in smaller.refit(list(entries.values())) if entry is not None}
-        if nothing.names not in fits:
-            continue
-        chosen = max(fits.values(), key=lambda entry: entry.log_evidence + log_prior(len(entry.names), supported))
-        before, after = (_predict(smaller, fits[names], problem, rows) for names in (nothing.names, chosen.names))
-        held_out.append(HeldOut(name, chosen.names, before, after))
-    return held_out
+    each = (_without(problem, name, rows, rivals, nothing, supported) for name, rows in groups(problem.lines).items())
+    return [entry for entry in each if entry is not None]
+
+
+def _without(
+    problem: FittingProblem,
+    name: str,
+    rows: Mask,
+    rivals: Sequence[Explanation],
+    nothing: Explanation,
+    supported: int,
+) -> HeldOut | None:
+    """Predict one group from the rest; None where the rest does not support the null hypothesis."""
+    smaller = FittingProblem(problem.lines.part(~rows), problem.table)
+    entries = {entry.names: entry for entry in (nothing, *rivals)}
+    fits = {entry.names: entry for entry in smaller.refit(list(entries.values())) if entry is not None}
+    if nothing.names not in fits:
+        return None
+    chosen = max(fits.values(), key=lambda entry: entry.log_evidence + log_prior(len(entry.names), supported))
+    before, after = (_predict(smaller, fits[names], problem, rows) for names in (nothing.names, chosen.names))
+    return HeldOut(name, chosen.names, before, after)
 
 
 def _predict(smaller: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: Mask) -> PredictionScore:
     """Some of the rows from a fit to others; sensors that were seen keep the gain that was found for them."""
-    left = problem.lines.part(rows)
+    left = problem.lines if rows.all() else problem.lines.part(rows)
     model = problem.hypothesis(explanation.names, placed=False, whole=True).model
     point, levels = explanation.point, explanation.best.levels
     whole = model.predict(point.fit, slopes=False) if isinstance(model, FrfModel) else model.predict(point.fit)

@@ -41,8 +41,10 @@ class Signatures:
         self._base = self._fitter.hypotheses[0].model.predict(point)
         self.owners: list[str] = []
         self.percent: list[float] = []
-        self._values: list[tuple[Array, Lines]] = []
+        self._values: list[tuple[Array, Lines]] = []  # of curves, whose smooth error is yet to be found
         self._known_products: dict[float, tuple[Floats, Floats]] = {}
+        rows = None if problem.lines.curves else _Rows(problem, self._base.value, 0.0)
+        parts = [] if rows is None else self._of_nuisances(rows)
         for name, mechanism in CATALOGUE.items():
             if problem.kind not in mechanism.kinds:
                 continue
@@ -57,13 +59,21 @@ class Signatures:
             model = hypothesis.model
             for value in model.values(shapes) if isinstance(model, FrfModel) else model.forces(shapes):
                 self.owners.append(name)
-                self._add(value, hypothesis.lines)
+                self.percent.append(self._size(value, hypothesis.lines))
+                if rows is None:
+                    self._values.append((value, hypothesis.lines))
+                else:
+                    parts.append(rows.split_change(value, hypothesis.lines))
+        if rows is not None:
+            self._known_products[0.0] = rows.products(parts)
 
-    def _add(self, value: Array, lines: Lines) -> None:
-        """The change is judged on the rows of these lines: 100 · √(Σ|change|² / Σ|base|²)."""
+    def _size(self, value: Array, lines: Lines) -> float:
+        """The change on the rows of these lines: 100 · √(Σ|change|² / Σ|base|²)."""
         base = self._base.value if len(value) == len(self._base.value) else self._base.value[lines.recording]
-        self.percent.append(100 * float(np.sqrt((np.abs(value - base) ** 2).sum() / (np.abs(base) ** 2).sum())))
-        self._values.append((value, lines))
+        return 100 * float(np.sqrt((np.abs(value - base) ** 2).sum() / (np.abs(base) ** 2).sum()))
+
+    def _of_nuisances(self, rows: "_Rows") -> list[tuple[Floats, Floats | None]]:
+        return [rows.split(slope, self._fitter.lines) for slope in self._base.slopes]
 
     def left(self, levels: NoiseLevels) -> tuple[Floats, Floats]:
         """The information on the signatures (signatures, signatures) under this noise: what the nuisances leave of it,
@@ -79,10 +89,7 @@ class Signatures:
         """Re u*J and Re JᵀJ of the nuisances and the signatures; of curves with a smooth error of that share."""
         if smooth not in self._known_products:
             rows = _Rows(self._problem, self._base.value, smooth)
-            parts = [rows.split(slope, self._fitter.lines) for slope in self._base.slopes]
-            for value, lines in self._values:
-                along, across = rows.split(value, lines)
-                parts.append((along - rows.base, across))
+            parts = self._of_nuisances(rows) + [rows.split_change(*entry) for entry in self._values]
             self._known_products[smooth] = rows.products(parts)
         return self._known_products[smooth]
 
@@ -121,6 +128,11 @@ class _Rows:
         along = self._sums(self._direction * whitened) / self._size
         across = whitened - self._direction * (along / self._size)[lines.recording]
         return along, across if lines.curves else np.concatenate([across, self._whitened(value.imag)])
+
+    def split_change(self, value: Array, lines: Lines) -> tuple[Floats, Floats | None]:
+        """The same of what a prediction changes of the base model's."""
+        along, across = self.split(value, lines)
+        return along - self.base, across
 
     def products(self, parts: Sequence[tuple[Floats, Floats | None]]) -> tuple[Floats, Floats]:
         """Re u*J (1, recordings, P) and Re JᵀJ (1, P, P) of columns J split like that."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from underskin.recordings.conditions import Conditions, frf_of
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.recordings.frf.mains import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ
 from underskin.units import Floats, Indices
+from underskin.weak_cache import cached_while_alive
 
 _WIDTH_HZ = 1.5  # where it is asked which mains stand out
 _FURTHEST_HZ = 20.0  # beyond which no line reaches, and short of half way from one harmonic to the next
@@ -66,7 +67,7 @@ class MainsPickup(Mechanism):
         return _pickup(conditions, design)
 
 
-@lru_cache(maxsize=4)  # by identity: a diagnosis composes dozens of models of one campaign
+@cached_while_alive  # a diagnosis composes dozens of models of one campaign
 def _pickup(conditions: Conditions, design: FrfDesign) -> Pickup:
     away = np.abs(design.row_frequency[:, None] - _outstanding_mains(conditions) * HARMONICS)
     rows = np.flatnonzero(away.min(axis=1) < _FURTHEST_HZ)
@@ -83,7 +84,7 @@ def _pickup(conditions: Conditions, design: FrfDesign) -> Pickup:
     return Pickup(rows, deviation, row.reshape(-1))
 
 
-@lru_cache(maxsize=4)  # by the conditions' identity: a diagnosis composes dozens of models of one campaign
+@cached_while_alive  # a diagnosis composes dozens of models of one campaign
 def _outstanding_mains(conditions: Conditions) -> float:
     """The mains frequency [Hz] whose lines stand out; where none does, the one that has a line nearest."""
     lines = np.concatenate([frequencies(entry) for entry in frf_of(conditions)])

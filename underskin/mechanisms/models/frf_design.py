@@ -5,7 +5,6 @@ are points, and a contact at one frequency is a line. Only these distinct ones a
 """
 
 from collections.abc import Collection, Sequence
-from functools import lru_cache
 
 import numpy as np
 from scipy.spatial.distance import cdist
@@ -13,6 +12,7 @@ from scipy.spatial.distance import cdist
 from underskin.errors import required
 from underskin.recordings.conditions import Conditions, FrfConditions, frf_of
 from underskin.units import Floats, Indices, Mask, to_si
+from underskin.weak_cache import cached_while_alive
 
 NEIGHBOUR_PITCHES = 1.2
 _SPARSE = 8  # contacts times frequencies for each row, beyond which most were not measured
@@ -70,7 +70,7 @@ class FrfDesign:
         self.line_contact, self.line_frequency = lines // len(distinct), distinct[lines % len(distinct)]
 
 
-_kept = lru_cache(maxsize=8)(FrfDesign)  # by the conditions' identity: a diagnosis composes dozens of models of one
+_kept = cached_while_alive(FrfDesign)  # a diagnosis composes dozens of models of one campaign
 
 
 def frf_design(conditions: Conditions, fields: Collection[str], *, neighbours: bool) -> FrfDesign:
