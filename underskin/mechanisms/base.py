@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Kind = Literal["frf", "indentation", "compression"]
 UNITS = (
     *("-", "mm", "MPa", "1/MPa", "GPa", "N/mm", "N", "1/N", "g", "J/m²", "Hz", "s", "1/s", "ms", "µs", "°"),
-    *("pC", "pC/N", "pF", "MΩ", "cycles"),
+    *("pC", "pC/N", "pF", "MΩ", "cycles", "h"),
 )
 AXES = (  # fields of a campaign along which an effect can show
     *("preload_n", "indenter_radius_mm", "position_mm", "sensor", "dwell_s", "load_cycles", "dynamic_force_n"),
@@ -94,10 +94,12 @@ class Mechanism:
     # layer that much thicker or thinner.
     needs_stiffness: ClassVar[bool] = False
     needs_neighbours: ClassVar[bool] = False
+    tells_recordings_apart: ClassVar[bool] = False  # its lines differ between recordings of one and the same contact
     largest_offset: ClassVar[float] = 0.0
     largest_stretch: ClassVar[float] = 1.0
     moves_predictions: ClassVar[bool] = True  # False: it acts on the covariance alone
     moves_contact_points: ClassVar[bool] = False  # of indentations: contact begins elsewhere than the base model has it
+    begins_at_guesses: ClassVar[bool] = False  # fits begin there alone, not at quantiles of its priors
     needs_history: ClassVar[bool] = False  # a curve without its beginning cannot be predicted
     imitated_by_seating: ClassVar[bool] = False  # a platen that seats bends the beginning of a compression alike
     # Axes of its figure, keys of PANELS in docs/mechanisms/signatures.py; empty: the first two of `axes` with a panel.

@@ -4,7 +4,7 @@ A mechanism of this package is a module of `underskin.mechanisms.laws`; one of a
 point of the group `underskin.mechanisms`, as a subclass of `Mechanism` or an instance of one.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -12,7 +12,7 @@ from inspect import isclass
 from pkgutil import iter_modules
 
 from underskin import extensions
-from underskin.errors import InvalidInput
+from underskin.errors import InvalidInput, not_one_of
 from underskin.mechanisms import laws
 from underskin.mechanisms.base import Mechanism
 
@@ -46,6 +46,41 @@ class Catalogue(Mapping[str, Mechanism]):
 
 
 CATALOGUE = Catalogue()
+
+
+class Known(Mapping[str, Mechanism]):
+    """What one diagnosis composes its models of: the catalogue less what is left out, and laws bound to its recordings.
+
+    Those are added as a screening finds them, and come last.
+    """
+
+    def __init__(self, without: Collection[str] = ()) -> None:
+        """Raises InvalidInput where `without` names something that is not in the catalogue."""
+        for name in without:
+            if name not in CATALOGUE:
+                raise not_one_of("without", name, CATALOGUE)
+        self._named = {name: mechanism for name, mechanism in CATALOGUE.items() if name not in without}
+        self._bound: dict[str, Mechanism] = {}
+        self.without = tuple(name for name in CATALOGUE if name in without)
+
+    def __getitem__(self, name: str) -> Mechanism:
+        return self._named[name] if name in self._named else self._bound[name]
+
+    def __iter__(self) -> Iterator[str]:
+        yield from self._named
+        yield from self._bound
+
+    def __len__(self) -> int:
+        return len(self._named) + len(self._bound)
+
+    @property
+    def named(self) -> Mapping[str, Mechanism]:
+        """Those of the catalogue."""
+        return self._named
+
+    def add(self, law: Mechanism) -> None:
+        """One more, bound to the recordings of this diagnosis."""
+        self._bound[law.name] = law
 
 
 @cache

@@ -28,6 +28,7 @@ _WANDERING = np.array([0.1e-3, 0.3e-3, 1.0e-3])  # [m] amplitudes of a place tha
 _WANDERING_LANDMARKS = 12
 _SHORTEST_PERIOD, _MOST_PERIODS = 3.0, 100  # recordings
 _GAINS = np.geomspace(0.005, 0.5, 9)
+_USUAL_GAIN = 3  # of these
 _USUAL_POSITION = np.geomspace(0.05e-3, 0.3e-3, 4)  # [m], beside a process; without one the scatter may be larger
 _ANY_POSITION = np.geomspace(0.03e-3, 0.6e-3, 12)
 _FAINT = 1e-12  # of the largest response, below which a recording has no direction
@@ -188,6 +189,16 @@ class GainResidual:
         without = self._usual if alike is None else [entry.summed(alike) for entry in self._usual]
         each = np.concatenate([_with(sets, amplitudes, entry) for entry in without])
         return np.asarray(logsumexp(each, axis=0) - self._plain)
+
+
+    def amplitudes(self, sets: Floats) -> Floats:
+        """The most probable amplitudes of features whose prior sd is 1, at a usual scatter (sets, features)."""
+        without = self._usual[0]
+        root, taken, weighed = (values[_USUAL_GAIN] for values in (without.root, without.taken, without.weighed))
+        reduced = np.einsum("cr,srf->scf", taken, sets)
+        gram = np.einsum("srf,r,srg->sfg", sets, root**2, sets, optimize=True)
+        gram = gram - reduced.transpose(0, 2, 1) @ reduced + np.eye(sets.shape[2])
+        return np.asarray(np.linalg.solve(gram, np.einsum("srf,r->sf", sets, weighed)[..., None])[..., 0])
 
 
 def _with(sets: Floats, amplitudes: Floats, without: _WithoutProcess) -> Floats:

@@ -69,7 +69,8 @@ class Search:
     @property
     def supported(self) -> int:
         """How many mechanisms the campaign supports."""
-        return len(CATALOGUE) - len(self.unsupported)
+        lines = self.explanations[0].best.hypothesis.lines
+        return len(lines.mechanisms.named) - len(self.unsupported)
 
     def log_weight(self, explanation: Explanation) -> float:
         """Prior times evidence."""
@@ -156,12 +157,13 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
     explanations: Explanations = {frozenset(entry.names): entry for entry in known}
     tried = {frozenset[str]()}
     unsupported: dict[str, str] = {}
-    for name in CATALOGUE:
+    known = problem.lines.mechanisms.named
+    for name in known:
         try:
             problem.hypothesis((name,), placed=False)
         except Unsupported as refusal:
             unsupported[name] = refusal.reason
-    names = [name for name in CATALOGUE if name not in unsupported]
+    names = [name for name in known if name not in unsupported]
     singles = [Request(()), *(Request((name,)) for name in names)]
     tried |= {frozenset(request.names) for request in singles}
     if problem.lines.curves:  # whose contact points the null hypothesis finds once for all
@@ -176,7 +178,7 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
             requests = _all_pairs(names, explanations)
         else:
             requests = [
-                Request(tuple(entry for entry in CATALOGUE if entry in {*parent.names, name}), parent)
+                Request(tuple(entry for entry in known if entry in {*parent.names, name}), parent)
                 for parent in _parents(Search(tuple(explanations.values()), (), unsupported), size)
                 for name in names
                 if name not in parent.names

@@ -20,7 +20,6 @@ from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Array, Floats
 
 _ENDS = (0.1, 0.9)  # of a shape's usual range
@@ -44,7 +43,7 @@ class Signatures:
         self.percent: list[float] = []
         self._values: list[tuple[Array, Lines]] = []
         self._known_products: dict[float, tuple[Floats, Floats]] = {}
-        for name, mechanism in CATALOGUE.items():
+        for name, mechanism in problem.lines.mechanisms.named.items():
             if problem.kind not in mechanism.kinds:
                 continue
             parameters = mechanism.parameters(problem.lines.campaign, problem.kind)
