@@ -25,6 +25,7 @@ from underskin.diagnosis.screening.physical_limits import without_extremes
 from underskin.diagnosis.screening.unusable_curves import without_unusable
 from underskin.diagnosis.selection.noise_refinement import frf_problem
 from underskin.diagnosis.selection.search import Search, search
+from underskin.diagnosis.selection.unnamed_search import with_laws
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import confounding, left_open
 from underskin.diagnosis.validation.imitation import imitation
@@ -36,7 +37,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.base import Kind
-from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.registry import CATALOGUE, Known
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
 from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
@@ -93,8 +94,10 @@ def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits
     begun = begun.with_findings(*inspected.findings)
     if inspected.lacking:
         return replace(begun, lacking=inspected.lacking)
-    problem, known = frf_problem(inspected.campaign, inspected.uneven, table)
-    return _work_out(begun, problem, search(problem, known), progress, limits)
+    problem, known = frf_problem(inspected.campaign, inspected.uneven, table, Known())
+    result = search(problem, known)
+    result = replace(result, laws=tuple(with_laws(problem, result)))
+    return _work_out(begun, problem, result, progress, limits)
 
 
 def _work_out(

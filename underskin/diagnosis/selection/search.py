@@ -18,7 +18,7 @@ from underskin.diagnosis.inference.explanation import integrated as integrate
 from underskin.diagnosis.selection.occam_correction import without_occam
 from underskin.diagnosis.selection.unnamed_rivals import Discrepancy, discrepancy
 from underskin.mechanisms.base import Unsupported
-from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.unnamed.laws import UnnamedLaw
 from underskin.units import Floats
 
 # "Nothing" stands for all that does not show as well, which is every other campaign.
@@ -64,6 +64,7 @@ class Search:
     unsupported: dict[str, str]
     contradicted: frozenset[tuple[str, ...]] = frozenset()
     imitating: Mapping[tuple[str, ...], float] = field(default_factory=dict)
+    laws: tuple[Explanation, ...] = ()  # sets with one law that nobody listed
     tried: int = 0  # sets, of which the explanations are those that were not left out early
 
     @property
@@ -73,13 +74,22 @@ class Search:
         return len(lines.mechanisms.named) - len(self.unsupported)
 
     def log_weight(self, explanation: Explanation) -> float:
-        """Prior times evidence."""
-        return explanation.log_evidence + log_prior(len(explanation.names), self.supported)
+        """Prior times evidence; a law that nobody listed has its share of the prior of something undescribed."""
+        known = explanation.best.hypothesis.lines.mechanisms
+        laws = [known[name] for name in explanation.names if name not in known.named]
+        if not laws:
+            return explanation.log_evidence + log_prior(len(explanation.names), self.supported)
+        prior = log_prior_beneath(len(explanation.names) - 1, self.supported)
+        return explanation.log_evidence + prior + sum(law.log_share for law in laws if isinstance(law, UnnamedLaw))
+
+    def log_prior_beneath(self, explanation: Explanation) -> float:
+        """The logarithm of the prior of something undescribed on top of a set."""
+        return log_prior_beneath(len(explanation.names), self.supported)
 
     def shows(self, explanation: Explanation) -> bool:
         """Whether each mechanism of a set shows: without it, evidence is lost. A set that holds one that does not says
         no more than the smaller one, which stands for both."""
-        evidence = {frozenset(entry.names): entry.log_evidence for entry in self.explanations}
+        evidence = {frozenset(entry.names): entry.log_evidence for entry in (*self.explanations, *self.laws)}
         whole = frozenset(explanation.names)
         smaller = [evidence.get(whole - {name}, -math.inf) for name in whole]
         return all(explanation.log_evidence > without + least_evidence(explanation) for without in smaller)
@@ -92,11 +102,18 @@ class Search:
         imitating = [entry for entry in self.explanations if entry.names in self.imitating]
         if imitating:
             return imitating[0]
+        if self.law is not None:
+            return self.law
         beneath = [pair for pair in self.discrepancies if self.shows(pair[0])]
         return max(beneath, key=lambda pair: self._log_weight_beneath(*pair))[0]
 
     def _log_weight_beneath(self, explanation: Explanation, process: Discrepancy) -> float:
         return process.log_evidence + log_prior_beneath(len(explanation.names), self.supported)
+
+    @cached_property
+    def law(self) -> Explanation | None:
+        """The most probable set with a law that nobody listed, each member of which shows."""
+        return max((entry for entry in self.laws if self.shows(entry)), key=self.log_weight, default=None)
 
     @cached_property
     def answers(self) -> list[Answer]:
@@ -112,6 +129,7 @@ class Search:
             for entry, process in self.discrepancies
             if process.log_evidence > entry.log_evidence + least_evidence(entry)
         ]
+        showing += [self.log_weight(entry) for entry in self.laws if self.shows(entry)]
         weights.append(float(np.logaddexp.reduce(showing)) if showing else -math.inf)
         probabilities = (1 - _UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
         probabilities[-1] += _UNTHOUGHT

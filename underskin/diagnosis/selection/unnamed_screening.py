@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import logsumexp
 
 from underskin.autodiff import Differentiated
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
@@ -29,12 +28,20 @@ _USUAL_CHANGE = np.array([1.0])  # times the sd of each amplitude's prior
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """What a law gains in log evidence on top of an explanation, and fit coordinates where it gains most."""
+    """What a law gains in log evidence on top of an explanation; and where it gains most, its amplitudes over the sds of
+    their priors, and what bends it."""
 
     law: UnnamedLaw
     gain: float
     log_share: float
-    guess: Floats
+    amplitudes: Floats
+    bending: Floats
+
+    @property
+    def guess(self) -> Floats:
+        """The law's fit coordinates there."""
+        count = len(self.law.parameters_bound) - len(self.law.amplitudes)
+        return np.concatenate([self.amplitudes * _sds(self.law), self.bending[:count]])
 
 
 class Screening:
@@ -88,14 +95,15 @@ class Screening:
         return each
 
     def _collected(self, columns: "_Columns", gains: Floats, amplitudes: Floats) -> list[Score]:
+        first, counts = columns.first[:-1], np.diff(columns.first)
+        means = np.logaddexp.reduceat(gains, first) - np.log(counts)
         scores = []
-        for number, place in enumerate(columns.laws):
-            rows = slice(columns.first[number], columns.first[number + 1])
-            best = columns.first[number] + int(np.argmax(gains[rows]))
-            law = self._grammar.laws[place]
-            guess = np.concatenate([amplitudes[best] * _sds(law), columns.grid[best][: _bends(law)]])
-            gain = float(logsumexp(gains[rows]) - np.log(len(gains[rows])))
-            scores.append(Score(law, gain, float(self._grammar.log_shares[place]), guess))
+        for number, (place, gain) in enumerate(zip(columns.laws, means.tolist(), strict=True)):
+            law, start = self._grammar.laws[place], int(first[number])
+            best = start + int(np.argmax(gains[start : start + counts[number]]))
+            scores.append(
+                Score(law, gain, float(self._grammar.log_shares[place]), amplitudes[best], columns.grid[best])
+            )
         return scores
 
     @cached_property
@@ -219,10 +227,6 @@ def _at(bending: Sequence[Parameter], grid: Floats) -> dict[str, Differentiated]
 def _sds(law: UnnamedLaw) -> Floats:
     priors = [entry.prior for entry in law.parameters_bound[: len(law.amplitudes)]]
     return np.array([prior.sd for prior in priors if isinstance(prior, Normal)])
-
-
-def _bends(law: UnnamedLaw) -> int:
-    return len(law.parameters_bound) - len(law.amplitudes)
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,8 @@ class UnnamedLaw(Mechanism):
     share: float
     grid: Floats
     amplitudes: tuple[str, ...]
-    guess: Floats | None = None  # fit coordinates where a screening found it
+    log_share: float = 0.0  # in the prior of something unnamed
+    found: tuple[Floats, ...] = ()  # fit coordinates where screenings found it
 
     def parameters(self, conditions: object, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The same for all campaigns: they are bound to one."""
@@ -66,10 +67,11 @@ class UnnamedLaw(Mechanism):
     parameters_bound: tuple[Parameter, ...]
 
     def guesses(self, conditions: object, kind: Kind) -> Sequence[Sequence[float]]:
-        """Where a screening found it."""
-        if self.guess is None:
-            return ()
-        return [[entry.from_fit(at) for entry, at in zip(self.parameters_bound, self.guess.tolist(), strict=True)]]
+        """Where screenings found it."""
+        return [
+            [entry.from_fit(at) for entry, at in zip(self.parameters_bound, found.tolist(), strict=True)]
+            for found in self.found
+        ]
 
 
 class RecordingLaw(UnnamedLaw):
