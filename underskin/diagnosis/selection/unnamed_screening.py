@@ -202,14 +202,17 @@ class _Columns:
             changes = [change(law) * _sds(law) for _, law in members]
             counts = [len(entry) for entry in changes]
             widest = max((law.grid.shape[1] for _, law in members), default=0)
-            grid = [np.pad(law.grid, ((0, 0), (0, widest - law.grid.shape[1]))) for _, law in members]
+            grid = np.zeros((sum(counts), widest))
+            edges = np.cumsum([0, *counts])
+            for (_, law), start, end in zip(members, edges[:-1], edges[1:], strict=True):
+                grid[start:end, : law.grid.shape[1]] = law.grid
             each.append(
                 cls(
                     [place for place, _ in members],
-                    np.cumsum([0, *counts]),
+                    edges,
                     np.repeat([place for place, _ in members], counts),
                     np.concatenate(changes),
-                    np.concatenate(grid),
+                    grid,
                 )
             )
         return each
