@@ -25,7 +25,7 @@ from underskin.diagnosis.screening.physical_limits import without_extremes
 from underskin.diagnosis.screening.unusable_curves import without_unusable
 from underskin.diagnosis.selection.noise_refinement import frf_problem
 from underskin.diagnosis.selection.search import Search, search
-from underskin.diagnosis.selection.unnamed_search import with_laws
+from underskin.diagnosis.selection.unnamed_search import law_of, with_laws
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import confounding, left_open
 from underskin.diagnosis.validation.imitation import imitation
@@ -38,6 +38,7 @@ from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE, Known
+from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
 from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
@@ -46,6 +47,7 @@ _CURVES: tuple[Kind, ...] = ("indentation", "compression")
 _FAR_ABOVE = 3.0  # times the noise floor, beyond which an error of indentations held out contradicts an explanation
 _WORTH_SAYING = 0.01  # odds of an unlisted law
 _LEAST_TO_AGREE = 3  # FRFs: d33 takes up what two have in common, and their gain scatters by what they differ
+_LAWS_HELD_OUT = 4  # of laws, and of sets of mechanisms, among which the choice is repeated
 _LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
 
 Progress = Callable[[float], None]
@@ -121,7 +123,7 @@ def _work_out(
     )
     progress(0.8)
     ranked = [answer.explanation for answer in result.answers if answer.explanation is not None]
-    groups = cross_validation.hold_out(problem, ranked, nothing, result.supported)
+    groups = _held_out(problem, result, ranked, nothing)
     progress(0.95)
     doubted = (nothing, *(ranked if problem.kind == "indentation" else ranked[:1]))
     contradicted = {entry.names for entry in doubted if keeps_structure(problem, entry, nothing)}
@@ -132,6 +134,8 @@ def _work_out(
         result = replace(result, contradicted=frozenset(contradicted))
         leader = result.answers[0]
         shown = result.shown_or_nothing(leader)
+    if leader.explanation is not None and result.answers[0].explanation is None and result.law is not None:
+        groups = _held_out(problem, result, ranked, nothing)
     begun, result = _beside_unlisted(begun, problem, result, nothing)
     leader = result.answers[0]
     shown = result.shown_or_nothing(leader)
@@ -141,7 +145,8 @@ def _work_out(
     if leader.explanation is nothing and problem.kind == "frf" and problem.lines.recordings < _LEAST_TO_AGREE:
         few = {"recordings": problem.lines.recordings, "least": _LEAST_TO_AGREE}
         return replace(begun, lacking=Lacking(Lack.FEW_TO_AGREE, few))
-    shape = describe(problem, shown) if leader.explanation is None and shown.names not in result.imitating else None
+    undescribed = leader.explanation is None and shown.names not in result.imitating and result.law is None
+    shape = describe(problem, shown) if undescribed else None
     return replace(
         begun.with_findings(*above_noise(problem, shown, groups)),
         search=result,
@@ -154,6 +159,26 @@ def _work_out(
         power=power(signatures, shown, result.supported),
         shape=shape,
         plan=plan(problem, result, limits),
+    )
+
+
+def _held_out(
+    problem: FittingProblem, result: Search, ranked: Sequence[Explanation], nothing: Explanation
+) -> list[cross_validation.HeldOut]:
+    """What groups held out say; of a law that nobody listed, which predicts within its range only, thirds along it."""
+    law = result.law
+    if result.answers[0].explanation is not None or law is None:
+        return cross_validation.hold_out(
+            problem, ranked, nothing, result.log_prior, cross_validation.groups(problem.lines)
+        )
+    laws = sorted((entry for entry in result.laws if result.shows(entry)), key=result.log_weight, reverse=True)
+    both = sorted([*laws[:_LAWS_HELD_OUT], *ranked[:_LAWS_HELD_OUT]], key=result.log_weight, reverse=True)
+    leading = law_of(problem, law)
+    ids = [entry.id for entry in problem.lines.campaign.recordings]
+    over_recordings = isinstance(leading, RecordingLaw | LagLaw)
+    column = leading.axis.of(ids) if over_recordings else np.arange(len(ids), dtype=float)
+    return cross_validation.hold_out(
+        problem, both, nothing, result.log_prior, cross_validation.thirds(problem.lines, column)
     )
 
 

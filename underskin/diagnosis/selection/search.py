@@ -74,13 +74,17 @@ class Search:
         return len(lines.mechanisms.named) - len(self.unsupported)
 
     def log_weight(self, explanation: Explanation) -> float:
-        """Prior times evidence; a law that nobody listed has its share of the prior of something undescribed."""
+        """Prior times evidence."""
+        return explanation.log_evidence + self.log_prior(explanation)
+
+    def log_prior(self, explanation: Explanation) -> float:
+        """The logarithm of its prior; a law that nobody listed has its share of that of something undescribed."""
         known = explanation.best.hypothesis.lines.mechanisms
         laws = [known[name] for name in explanation.names if name not in known.named]
         if not laws:
-            return explanation.log_evidence + log_prior(len(explanation.names), self.supported)
+            return log_prior(len(explanation.names), self.supported)
         prior = log_prior_beneath(len(explanation.names) - 1, self.supported)
-        return explanation.log_evidence + prior + sum(law.log_share for law in laws if isinstance(law, UnnamedLaw))
+        return prior + sum(law.log_share for law in laws if isinstance(law, UnnamedLaw))
 
     def log_prior_beneath(self, explanation: Explanation) -> float:
         """The logarithm of the prior of something undescribed on top of a set."""
@@ -111,6 +115,15 @@ class Search:
         return process.log_evidence + log_prior_beneath(len(explanation.names), self.supported)
 
     @cached_property
+    def processes_showing(self) -> list[float]:
+        """Prior times evidence of each process that shows."""
+        return [
+            self._log_weight_beneath(entry, process)
+            for entry, process in self.discrepancies
+            if process.log_evidence > entry.log_evidence + least_evidence(entry)
+        ]
+
+    @cached_property
     def law(self) -> Explanation | None:
         """The most probable set with a law that nobody listed, each member of which shows."""
         return max((entry for entry in self.laws if self.shows(entry)), key=self.log_weight, default=None)
@@ -124,12 +137,7 @@ class Search:
         """
         kept = [entry for entry in self.explanations if self.shows(entry)]
         weights = without_occam(kept, [self.log_weight(entry) for entry in kept]).tolist()
-        showing = [
-            self._log_weight_beneath(entry, process)
-            for entry, process in self.discrepancies
-            if process.log_evidence > entry.log_evidence + least_evidence(entry)
-        ]
-        showing += [self.log_weight(entry) for entry in self.laws if self.shows(entry)]
+        showing = [*self.processes_showing, *(self.log_weight(entry) for entry in self.laws if self.shows(entry))]
         weights.append(float(np.logaddexp.reduce(showing)) if showing else -math.inf)
         probabilities = (1 - _UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
         probabilities[-1] += _UNTHOUGHT

@@ -43,7 +43,8 @@ class FrequencyLaw(UnnamedLaw):
     stage = Stage.LINES
     order = 210
 
-    def __init__(self, law: _Law) -> None:
+    def __init__(self, law: _Law, middle: float) -> None:
+        """`middle` of the band [Hz], to which powers refer."""
         self.name = "__".join([f"{PREFIX}frequency_response", "frequency_hz", law.form, law.variant])
         self.spoken = Spoken("frequency_response", "frequency_hz", law.form)
         self.variant = law.variant
@@ -51,11 +52,12 @@ class FrequencyLaw(UnnamedLaw):
         self.amplitudes = tuple(entry.name for entry in law.amplitudes)
         self.parameters_bound = (*law.amplitudes, *law.bending)
         self.grid = np.array(law.grid, dtype=float).reshape(len(law.grid), -1)
-        self._factor = law.factor
+        self.factor = law.factor
+        self.middle_hz = middle
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         """The factor on each distinct line."""
-        return self._factor(design.line_frequency, values)
+        return self.factor(design.line_frequency, values)
 
     def tangents(self, frequency: Floats) -> Array:
         """∂ ln factor by each amplitude at 0, at the grid of what bends it (points, frequencies, amplitudes)."""
@@ -70,7 +72,7 @@ class FrequencyLaw(UnnamedLaw):
                 at = self.grid[:, number - count, None]
                 value = np.exp(at) if entry.scale == "log" else at
             values[entry.name] = Differentiated(value, slopes)
-        answer = self._factor(frequency, values)
+        answer = self.factor(frequency, values)
         return np.moveaxis(answer.slopes / answer.value, 0, -1)
 
 
@@ -81,7 +83,7 @@ def frequency_laws(frequency: Floats) -> list[FrequencyLaw]:
         return []
     middle = float(np.sqrt(low * high))
     each = [*_phases(middle), *_powers(low, high, middle), *_peaks(low, high), _echo(low, high), _free(low, high)]
-    return [FrequencyLaw(law) for law in each]
+    return [FrequencyLaw(law, middle) for law in each]
 
 
 def _amplitude(sd: float, name: str = "law_change") -> Parameter:

@@ -190,7 +190,7 @@ class LagLaw(UnnamedLaw):
         self.spoken = Spoken("frequency_response", axis.name, shape.form)
         self.axis, self.shape, self.kind = axis, shape, kind
         self.share = shape.share / 3
-        self._middle, self._highest = middle_hz, highest_hz
+        self.middle_hz, self.highest_hz = middle_hz, highest_hz
         usual = _USUAL["frequency_response"] * (0.3 if kind == "power" else 1.0)
         power = shape.logarithmic
         self.amplitudes = tuple(
@@ -219,8 +219,8 @@ class LagLaw(UnnamedLaw):
         if self.kind == "angle":
             return exp(lag * -1j)
         if self.kind == "delay":
-            return exp(lag * (-1j * design.line_frequency / self._highest))
-        return exp(lag * -(np.log(design.line_frequency / self._middle) + 0.5j * np.pi))
+            return exp(lag * (-1j * design.line_frequency / self.highest_hz))
+        return exp(lag * -(np.log(design.line_frequency / self.middle_hz) + 0.5j * np.pi))
 
 
 __all__ = ["ACTS_ON", "AXES", "LagLaw", "RecordingLaw", "Spoken", "UnnamedLaw", "log_positive"]
