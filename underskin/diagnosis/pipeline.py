@@ -175,8 +175,7 @@ def _held_out(
     both = sorted([*laws[:_LAWS_HELD_OUT], *ranked[:_LAWS_HELD_OUT]], key=result.log_weight, reverse=True)
     leading = law_of(problem, law)
     ids = [entry.id for entry in problem.lines.campaign.recordings]
-    over_recordings = isinstance(leading, RecordingLaw | LagLaw)
-    column = leading.axis.of(ids) if over_recordings else np.arange(len(ids), dtype=float)
+    column = leading.axis.of(ids) if isinstance(leading, RecordingLaw | LagLaw) else np.arange(len(ids), dtype=float)
     return cross_validation.hold_out(
         problem, both, nothing, result.log_prior, cross_validation.thirds(problem.lines, column)
     )

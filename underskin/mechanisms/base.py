@@ -77,7 +77,7 @@ class Mechanism:
     composition; `kinds` of recordings that it acts on; `axes` of the campaign on which the effect shows.
     """
 
-    name: ClassVar[str]
+    name: str
     plain: ClassVar[str]
     law: ClassVar[str]
     assumptions: ClassVar[str]

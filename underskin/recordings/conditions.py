@@ -66,8 +66,9 @@ class SkinDescription:
 class FrfConditions:
     """The skin is pressed by `preload_n` and shaken by `dynamic_force_n` (peak amplitude) at `frequency_hz`.
 
-    `conditions` holds what else the lab noted, numbers or words by names of its own. A `dynamic_force_n` of 0 stands for the limit of a small oscillation. `frequency_hz` is None where a time series is
-    recorded, whose lines are yet to be estimated.
+    A `dynamic_force_n` of 0 stands for the limit of a small oscillation. `frequency_hz` is None where a time series is
+    recorded, whose lines are yet to be estimated. `conditions` holds what else the lab noted, numbers or words by names
+    of its own.
     """
 
     id: field.Name

@@ -68,7 +68,9 @@ def fit_summary(
     floor = outside[1].floor_percent if outside[1].recordings else inside[1].floor_percent
     return {
         **parts,
-        "mechanisms": [name for name in explanation.names if name in problem.lines.mechanisms.named],  # of `after`, also where something beyond them is unexplained
+        "mechanisms": [
+            name for name in explanation.names if name in problem.lines.mechanisms.named
+        ],  # of `after`, also where something beyond them is unexplained
         "noise_floor_percent": rounded(floor),
         "groups": [
             {

@@ -114,6 +114,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     fit = fit_summary(search, problem, diagnosis.groups, shown)
     named = leader.explanation if stated in ("explained", "ambiguous") else None
     leading = LeadingLaw.of(problem, shown) if stated == "unexplained" else None
+    stated_set = named if leading is None else leading.explanation
     law = None if leading is None else unnamed(search, problem, leading, diagnosis.groups)
     stands = stated in ("explained", "no_mismatch") and leader.probability >= EXPLAINED
     d33, implausible = _d33(problem, shown, fit) if stands else (None, [])
@@ -140,7 +141,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         "probability": round(leader.probability, 3),
         "statement": statement,
         "location": _location(diagnosis, problem, stated == "no_mismatch"),
-        "mechanisms": _mechanisms(search, problem, named or leading.explanation) if named or leading else [],
+        "mechanisms": [] if stated_set is None else _mechanisms(search, problem, stated_set),
         "unnamed": law,
         "alternatives": _alternatives(search),
         "not_identifiable": [

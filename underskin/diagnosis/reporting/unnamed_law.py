@@ -201,7 +201,7 @@ def _edge(law: RecordingLaw | LagLaw) -> dict[str, Any]:
 
 
 def statement(probability: float, leading: LeadingLaw, document: Mapping[str, Any], floor: float) -> str:
-    """What is missing in plain words, with its numbers, what it is worth, and which physics usually does such a thing."""
+    """What is missing in plain words, with its numbers, what it is worth, and which physics usually does this."""
     law = leading.law
     acts_on, axis = law.spoken.acts_on, law.spoken.axis
     beside = tuple(name for name in leading.explanation.names if name != law.name)

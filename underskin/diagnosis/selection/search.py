@@ -183,13 +183,13 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
     explanations: Explanations = {frozenset(entry.names): entry for entry in known}
     tried = {frozenset[str]()}
     unsupported: dict[str, str] = {}
-    known = problem.lines.mechanisms.named
-    for name in known:
+    catalogue = problem.lines.mechanisms.named
+    for name in catalogue:
         try:
             problem.hypothesis((name,), placed=False)
         except Unsupported as refusal:
             unsupported[name] = refusal.reason
-    names = [name for name in known if name not in unsupported]
+    names = [name for name in catalogue if name not in unsupported]
     singles = [Request(()), *(Request((name,)) for name in names)]
     tried |= {frozenset(request.names) for request in singles}
     if problem.lines.curves:  # whose contact points the null hypothesis finds once for all
@@ -204,7 +204,7 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
             requests = _all_pairs(names, explanations)
         else:
             requests = [
-                Request(tuple(entry for entry in known if entry in {*parent.names, name}), parent)
+                Request(tuple(entry for entry in catalogue if entry in {*parent.names, name}), parent)
                 for parent in _parents(Search(tuple(explanations.values()), (), unsupported), size)
                 for name in names
                 if name not in parent.names

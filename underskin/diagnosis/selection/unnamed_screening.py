@@ -1,8 +1,8 @@
 """A score test of several hundred laws that nobody listed: what each would gain on top of an explanation, roughly.
 
-What an explanation leaves is projected onto the change that a law would make, over a small grid of what bends it: linear
-algebra under the noise, no fit. A law that acts on whole recordings is weighed on their gains (recording_gp.py), one
-that acts along frequency on what lines lie off their own recording's best real multiple (residuals.py).
+What an explanation leaves is projected onto the change that a law would make, over a small grid of what bends it:
+linear algebra under the noise, no fit. A law that acts on whole recordings is weighed on their gains (recording_gp.py),
+one that acts along frequency on what lines lie off their own recording's best real multiple (residuals.py).
 """
 
 from collections.abc import Callable, Sequence
@@ -28,7 +28,7 @@ _USUAL_CHANGE = np.array([1.0])  # times the sd of each amplitude's prior
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """What a law gains in log evidence on top of an explanation; and where it gains most, its amplitudes over the sds of
+    """What a law gains in log evidence on top of an explanation; where it gains most, its amplitudes over the sds of
     their priors, and what bends it."""
 
     law: UnnamedLaw
@@ -74,9 +74,7 @@ class Screening:
             grid = np.array(law.shape.grid, dtype=float).reshape(len(law.shape.grid), -1)
             values = _at(law.shape.bending, grid)
             each = [
-                np.broadcast_to(
-                    one.value if isinstance(one, Differentiated) else one, (len(grid), len(self._ids))
-                )
+                np.broadcast_to(one.value if isinstance(one, Differentiated) else one, (len(grid), len(self._ids)))
                 for one in law.shape.features(law.axis.of(self._ids), values)
             ]
             self._features[key] = np.stack(each, axis=2)
@@ -167,7 +165,9 @@ class Screening:
             gram_of = weights @ np.abs(pattern) ** 2 - means**2 / own
             sums[kind] = gram_of, (moments @ pattern.conj()).real
         for columns in self._lags:
-            kinds = [self._grammar.laws[place].kind for place in columns.owner]  # type: ignore[attr-defined]
+            kinds = [
+                law.kind for law in (self._grammar.laws[place] for place in columns.owner) if isinstance(law, LagLaw)
+            ]
             gram_of, along_of = (np.array([sums[kind][which] for kind in kinds]) for which in (0, 1))
             changes = columns.changes.real
             gram = np.einsum("pri,pr,prj->pij", changes, gram_of, changes, optimize=True)
@@ -179,8 +179,8 @@ class Screening:
 class _Columns:
     """Changes by the amplitudes, times the sd of their priors, of laws with equally many (points, rows, amplitudes).
 
-    `laws`: their places in the grammar; `first` point of each, and one more; `owner` of each point; `grid` of each, what
-    bends it.
+    `laws`: their places in the grammar; `first` point of each, and one more; `owner` of each point; `grid` of each,
+    what bends it.
     """
 
     laws: list[int]
@@ -190,9 +190,7 @@ class _Columns:
     grid: Floats
 
     @classmethod
-    def of(
-        cls, laws: Sequence[tuple[int, UnnamedLaw]], change: Callable[[UnnamedLaw], Array]
-    ) -> list["_Columns"]:
+    def of(cls, laws: Sequence[tuple[int, UnnamedLaw]], change: Callable[[UnnamedLaw], Array]) -> list["_Columns"]:
         """`change` by the amplitudes of one law (points, rows, amplitudes)."""
         groups: dict[int, list[tuple[int, UnnamedLaw]]] = {}
         for place, law in laws:
@@ -251,4 +249,4 @@ class _Levels:
             level = np.maximum(1.0, left / max(self.freedom, 1))
         determinant = np.linalg.slogdet(eye + gram / level[:, None, None])[1]
         after = -0.5 * left / level - 0.5 * self.freedom * np.log(level) - 0.5 * determinant
-        return np.asarray(after - before), solved
+        return np.asarray(after - before), np.asarray(solved)

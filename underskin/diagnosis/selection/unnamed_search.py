@@ -17,7 +17,10 @@ from underskin.mechanisms.unnamed.laws import UnnamedLaw
 
 _BENEATH = 2  # sets of mechanisms, the most probable, on top of which laws are tried, and nothing
 _FITTED = 8  # laws at most
-_BEHIND, _BEHIND_SHARE = 12.0, 0.35  # nats of the best by its score, or that share of what it gains, behind which none is
+_BEHIND, _BEHIND_SHARE = (
+    12.0,
+    0.35,
+)  # nats of the best by its score, or that share of what it gains, behind which none is
 _MAY_MATTER = 6.0  # nats behind the most probable answer by its score
 _ALONE_IN_COMPANY = 2  # laws that are tried beside every mechanism
 _INTEGRATED, _WITHIN = 4, 6.0
@@ -27,9 +30,7 @@ def with_laws(problem: FittingProblem, search: Search) -> list[Explanation]:
     """The explanations that hold a law, fitted, of those that may matter; none of recordings that show too little."""
     if problem.kind != "frf":
         return []
-    grammar = Grammar.of(
-        problem.collapsed.campaign, problem.lines.frequency, problem.table, tuple(CATALOGUE.values())
-    )
+    grammar = Grammar.of(problem.collapsed.campaign, problem.lines.frequency, problem.table, tuple(CATALOGUE.values()))
     if not grammar.laws:
         return []
     screening = Screening(problem, grammar)
@@ -47,7 +48,7 @@ def with_laws(problem: FittingProblem, search: Search) -> list[Explanation]:
     least = candidates[0][0] - max(_BEHIND, _BEHIND_SHARE * (candidates[0][0] - best))
     chosen = [entry for entry in candidates[:_FITTED] if entry[0] > max(least, best - _MAY_MATTER)]
     fitted = _fitted(problem, [(beneath, score) for _, beneath, score in chosen])
-    fitted += _beside_named(problem, search, nothing, fitted)
+    fitted += _beside_named(problem, search, fitted)
     fitted += _without_company(problem, fitted)
     fitted.sort(key=search.log_weight, reverse=True)
     close = [entry for entry in fitted if search.log_weight(entry) > search.log_weight(fitted[0]) - _WITHIN]
@@ -97,21 +98,21 @@ def _admit(problem: FittingProblem, score: Score) -> None:
     problem.lines.mechanisms.add(law)
 
 
-def _beside_named(
-    problem: FittingProblem, search: Search, nothing: Explanation, fitted: Sequence[Explanation]
-) -> list[Explanation]:
+def _beside_named(problem: FittingProblem, search: Search, fitted: Sequence[Explanation]) -> list[Explanation]:
     """The best laws that were fitted alone, beside each mechanism, where they may lead."""
     alone = [entry for entry in fitted if len(entry.names) == 1]
     alone = sorted(alone, key=search.log_weight, reverse=True)[:_ALONE_IN_COMPANY]
     known = {frozenset(entry.names) for entry in fitted}
     best = max((search.log_weight(entry) for entry in search.explanations), default=0.0)
-    requests = []
+    requests: list[Request] = []
     for entry in alone:
         if search.log_weight(entry) < best - _MAY_MATTER:
             continue
-        for name in problem.lines.mechanisms.named:
-            if name not in search.unsupported and frozenset((name, *entry.names)) not in known:
-                requests.append(Request((name, *entry.names), entry))
+        requests += [
+            Request((name, *entry.names), entry)
+            for name in problem.lines.mechanisms.named
+            if name not in search.unsupported and frozenset((name, *entry.names)) not in known
+        ]
     explained = problem.explain(requests) if requests else []
     return [entry for entry in explained if entry is not None]
 

@@ -1,4 +1,4 @@
-"""What a law that nobody listed may follow, from recording to recording: fields, times, places, order, and `conditions`.
+"""What a law that nobody listed may follow, from recording to recording: fields, times, places, order, `conditions`.
 
 An axis holds one number a recording, by the recording's id: laws are bound to it, so that a campaign of which some
 recordings are left out has the same order, the same preload before, and the same range.
@@ -108,7 +108,11 @@ def axes_of(conditions: Conditions) -> list[Axis]:
     rank = recording_order(entries)
     columns["order"] = rank.tolist()
     ids = [entry.id for entry in entries]
-    axes = [Axis(name, dict(zip(ids, column, strict=True))) for name, column in columns.items() if None not in column]
+    axes = [
+        Axis(name, dict(zip(ids, known, strict=True)))
+        for name, column in columns.items()
+        if len(known := [value for value in column if value is not None]) == len(ids)
+    ]
     axes += _previous(entries, rank)
     axes.append(_worded("sensor", ids, [entry.sensor for entry in entries]))
     axes += _further(entries)
@@ -118,10 +122,11 @@ def axes_of(conditions: Conditions) -> list[Axis]:
 def recording_order(entries: Sequence[FrfConditions]) -> Floats:
     """Which recording came how late, from 0 (recordings,): by its time, else by its load cycles, else as listed."""
     times = _times(entries)
-    cycles = [entry.load_cycles for entry in entries]
-    for column in (times, None if None in cycles else cycles):
-        if column is not None and len(set(column)) == len(column):
-            return np.argsort(np.array(sorted(range(len(column)), key=lambda number: column[number]))).astype(float)
+    seconds = None if times is None else [time.timestamp() for time in times]
+    cycles = [float(entry.load_cycles) for entry in entries if entry.load_cycles is not None]
+    for column in (seconds, cycles):
+        if column is not None and len(set(column)) == len(entries):
+            return np.argsort(np.argsort(np.array(column))).astype(float)
     return np.arange(len(entries), dtype=float)
 
 

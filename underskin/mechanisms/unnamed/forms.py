@@ -23,7 +23,7 @@ Features = Callable[[Floats, Values], Sequence[Feature]]
 
 FORMS: tuple[Form, ...] = get_args(Form)
 _LEAST_LEVELS = {"power": 3, "exponential": 5, "saturating": 4, "threshold": 4, "periodic": 6, "peak": 6, "free": 4}
-_MOST_EDGES, _MOST_PERIODS = 24, 24
+_MOST_EDGES, _MOST_PERIODS = 24, 48
 _SHORTEST_PERIOD = 3.0  # levels
 _LANDMARKS, _LENGTH = 6, 0.3  # of a free process, over the range
 _FROM_PLACES = ("x_mm", "y_mm")
@@ -76,14 +76,14 @@ def _linear(axis: Axis) -> list[Shape]:
 
     def of(variant: str) -> Shape:
         zero = reference(axis, variant)
-        return Shape("linear", lambda x, values: [(x - zero) / axis.span], variant=variant, share=0.5)
+        return Shape("linear", lambda x, _: [(x - zero) / axis.span], variant=variant, share=0.5)
 
     return [of(variant) for variant in variants]
 
 
 def _power(axis: Axis) -> Shape:
     middle = float(np.sqrt(axis.low * axis.high))
-    return Shape("power", lambda x, values: [np.log(x / middle)], logarithmic=True)
+    return Shape("power", lambda x, _: [np.log(x / middle)], logarithmic=True)
 
 
 def _exponential(axis: Axis) -> list[Shape]:
@@ -144,9 +144,7 @@ def _step(axis: Axis) -> list[Shape]:
         edges = edges[np.unique(np.linspace(0, len(edges) - 1, _MOST_EDGES).round().astype(int))]
 
     def of(edge: float) -> Shape:
-        return Shape(
-            "step", lambda x, values: [(x > edge).astype(float)], variant=f"{edge!r}", share=1 / len(edges)
-        )
+        return Shape("step", lambda x, _: [(x > edge).astype(float)], variant=f"{edge!r}", share=1 / len(edges))
 
     return [of(edge) for edge in edges.tolist()]
 
@@ -157,7 +155,7 @@ def _periodic(axis: Axis) -> list[Shape]:
         periods, half_width = [24.0], 1e-3
     else:
         most = len(axis.levels) / _SHORTEST_PERIOD
-        turns = np.arange(0.75, max(most, 0.75) + 1e-9, max(0.5, (most - 0.75) / _MOST_PERIODS))
+        turns = np.arange(0.75, max(most, 0.75) + 1e-9, max(0.5, (most - 0.75) / _MOST_PERIODS))  # resolved: 0.5
         periods, half_width = (axis.span / turns).tolist(), 0.0
 
     def of(place: int, period: float) -> Shape:
@@ -188,9 +186,7 @@ def _periodic(axis: Axis) -> list[Shape]:
 
 def _peak(axis: Axis) -> list[Shape]:
     """1/(1 + ((x − x1)/w)²)."""
-    centre = Parameter(
-        "law_centre", axis.unit, axis.low, axis.high, Uniform(), "linear", limit=None, reason=_SHARP
-    )
+    centre = Parameter("law_centre", axis.unit, axis.low, axis.high, Uniform(), "linear", limit=None, reason=_SHARP)
     width = _bend("law_width", axis, 0.03, 0.35, 0.12, "from a few levels to a third of the measured range")
     grid = tuple(
         (axis.low + share * axis.span, float(np.log(wide * axis.span)))
@@ -216,7 +212,7 @@ def _free(axis: Axis) -> list[Shape]:
 
     root = np.linalg.cholesky(matern(landmarks, landmarks) + 1e-8 * np.eye(count))
 
-    def free(x: Floats, values: Values) -> list[Feature]:
+    def free(x: Floats, _: Values) -> list[Feature]:
         u = np.clip((x - axis.low) / axis.span, 0.0, 1.0)
         return list(np.linalg.solve(root, matern(landmarks, u)))
 
@@ -229,7 +225,7 @@ def _of_words(axis: Axis) -> list[Shape]:
     def of(word: int) -> Shape:
         return Shape(
             "step",
-            lambda x, values: [(x == word).astype(float)],
+            lambda x, _: [(x == word).astype(float)],
             variant=axis.words[word],
             share=1 / len(axis.words),
         )
@@ -237,9 +233,7 @@ def _of_words(axis: Axis) -> list[Shape]:
     words = range(len(axis.words))
     each = [of(word) for word in (words if len(axis.words) > 2 else words[1:])]
     if len(axis.words) > 2:
-        each.append(
-            Shape("free", lambda x, values: [(x == word).astype(float) for word in words], count=len(axis.words))
-        )
+        each.append(Shape("free", lambda x, _: [(x == word).astype(float) for word in words], count=len(axis.words)))
     return each
 
 

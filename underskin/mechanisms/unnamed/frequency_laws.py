@@ -141,9 +141,9 @@ def _peaks(low: float, high: float) -> list[_Law]:
         for at in _over_band(low, high, count)
     ]
     numerators: dict[str, Callable[[Differentiated, Values], Differentiated | complex]] = {
-        "inertia": lambda u, values: u * u,
+        "inertia": lambda u, _: u * u,
         "loss": lambda u, values: 2j * values["law_damping"] * u,
-        "spring": lambda u, values: 1.0,
+        "spring": lambda *_: 1.0,
     }
 
     def of(name: str) -> _Law:
@@ -178,7 +178,9 @@ def _free(low: float, high: float) -> _Law:
     def factor(frequency: Floats, values: Values) -> Differentiated:
         total: Differentiated | None = None
         away = (np.log(frequency) - centres[:, None]) / width
-        for name, log_magnitude, phase in zip(names, np.exp(-0.5 * away**2), phase_of_bump(away, float(width)), strict=True):
+        for name, log_magnitude, phase in zip(
+            names, np.exp(-0.5 * away**2), phase_of_bump(away, float(width)), strict=True
+        ):
             part = values[name] * (log_magnitude + 1j * phase)
             total = part if total is None else total + part
         assert total is not None

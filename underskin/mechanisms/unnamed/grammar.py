@@ -45,7 +45,7 @@ _FORMS: Mapping[Form, float] = {
 _COLUMNS = 1.5  # axes that all columns of `conditions` count for
 _FREQUENCY = 0.5  # of the frequency response: laws over frequency alone
 _PLACES_FOLLOW = ("order", "recorded_at", "time_of_day", "previous_preload_n", "preload_n", "load_cycles")
-_RATES = ("dynamic_force_n",)
+_OF_LEVELS: tuple[ActsOn, ...] = ("gain", "modulus", "thickness", "contact_radius", "force", "position")
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +56,7 @@ class Grammar:
     log_shares: Floats  # (laws,)
 
     @classmethod
-    def of(
-        cls, conditions: Conditions, frequency: Floats, table: SigmaTable, beside: Sequence[Mechanism]
-    ) -> "Grammar":
+    def of(cls, conditions: Conditions, frequency: Floats, table: SigmaTable, beside: Sequence[Mechanism]) -> "Grammar":
         """Of FRFs at these distinct lines [Hz]; `beside` mechanisms for which σ has room."""
         laws: list[UnnamedLaw] = []
         shares: list[float] = []
@@ -90,15 +88,15 @@ def _share(law: UnnamedLaw) -> float:
 def _over_recordings(axis: Axis, lines: Floats, tables: LevelTables) -> list[UnnamedLaw]:
     each: list[UnnamedLaw] = []
     for shape in shapes(axis):
-        for acts_on in ("gain", "modulus", "thickness", "contact_radius", "force", "position"):
-            if _makes_sense(acts_on, axis, shape):
-                each.append(RecordingLaw(acts_on, axis, shape, tables))
+        each += [
+            RecordingLaw(acts_on, axis, shape, tables) for acts_on in _OF_LEVELS if _makes_sense(acts_on, axis, shape)
+        ]
         if len(lines) >= 2 and shape.form != "free":
             middle = float(np.exp(np.log(lines).mean()))
             kinds = ("angle", "delay", "power")
             each += [LagLaw(kind, axis, shape, middle, float(lines[-1])) for kind in kinds]
     if axis.name == "preload_n":
-        lost = Shape("threshold", lambda x, values: [-np.ones_like(x)], variant="lost")
+        lost = Shape("threshold", lambda x, _: [-np.ones_like(x)], variant="lost")
         each.append(RecordingLaw("force", axis, lost, tables))
     return each
 

@@ -130,7 +130,7 @@ class RecordingLaw(UnnamedLaw):
         return self._tables.factor(self._acts_on, rows, log)
 
     def sensitivity(self, ids: tuple[str, ...]) -> Floats:
-        """∂ ln level by the law's features where their amplitudes are 0 (recordings, 1), of a place by x and y (…, 2)."""
+        """∂ ln level by the law's features at amplitudes of 0 (recordings, 1); of a place by x and y (…, 2)."""
         rows = self._rows(ids)
         if self._acts_on == "position":
             none = Differentiated(np.zeros((1, 1)), np.zeros((2, 1, 1)))

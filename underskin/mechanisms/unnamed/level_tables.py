@@ -33,7 +33,7 @@ _ANY_LINE = np.array([1.0])  # Hz
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Values at equal strides of x, from `first` on (rows, nodes), with their slopes: cubic between, constant beyond."""
+    """Values at equal strides of x from `first` on (rows, nodes), and their slopes: cubic between, constant beyond."""
 
     first: float
     stride: float

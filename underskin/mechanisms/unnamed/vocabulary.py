@@ -3,9 +3,7 @@
 from typing import Literal
 
 ActsOn = Literal["gain", "modulus", "thickness", "contact_radius", "force", "position", "frequency_response"]
-Form = Literal[
-    "linear", "power", "exponential", "saturating", "threshold", "step", "periodic", "peak", "notch", "free"
-]
+Form = Literal["linear", "power", "exponential", "saturating", "threshold", "step", "periodic", "peak", "notch", "free"]
 ACTS_ON: dict[ActsOn, tuple[str, str]] = {  # what it is called, and its symbol
     "gain": ("gain of the charge", "Q"),
     "modulus": ("modulus", "E"),
