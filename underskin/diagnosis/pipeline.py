@@ -1,7 +1,7 @@
 """A campaign's diagnosis: screening → rows with noise → search → location → held-out groups → plan → report."""
 
 import importlib.metadata
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -55,22 +55,30 @@ NO_LIMITS = RigLimits()
 
 
 def diagnose(
-    campaign: Campaign, table: SigmaTable, progress: Progress = lambda _: None, limits: RigLimits = NO_LIMITS
+    campaign: Campaign,
+    table: SigmaTable,
+    progress: Progress = lambda _: None,
+    limits: RigLimits = NO_LIMITS,
+    without: Collection[str] = (),
 ) -> DiagnosisResult:
     """What recordings and model disagree about, and what physics was left out.
 
     FRFs are diagnosed where the campaign has any; else its indentation curves, else its compression curves. From a
     campaign that holds nothing usable nothing is concluded. Deterministic, but for a campaign that states times to come
-    (`recordings/plausibility.py`).
+    (`recordings/plausibility.py`). Mechanisms `without` which it is to be explained are left out of the catalogue.
+
+    Raises InvalidInput where one of those is not in it.
     """
-    diagnosis = _diagnosed(campaign, table, progress, limits)
+    diagnosis = _diagnosed(campaign, table, progress, limits, Known(without))
     return replace(diagnosis, findings=tuple(dict.fromkeys((*implausible(campaign), *diagnosis.findings))))
 
 
-def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits: RigLimits) -> DiagnosisResult:
+def _diagnosed(
+    campaign: Campaign, table: SigmaTable, progress: Progress, limits: RigLimits, mechanisms: Known
+) -> DiagnosisResult:
     progress(0.05)
     possible = without_extremes(campaign)
-    begun = DiagnosisResult(campaign.name, possible.findings, _provenance(table))
+    begun = DiagnosisResult(campaign.name, possible.findings, _provenance(table, mechanisms))
     if possible.findings and possible.lacking:
         return replace(begun, lacking=possible.lacking)
     campaign = possible.campaign
@@ -82,7 +90,7 @@ def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits
         begun = begun.with_findings(*unusable, *curves.findings)
         if curves.findings and curves.lacking:
             return replace(begun, lacking=curves.lacking)
-        rows = curve_lines(curves.campaign, kind)
+        rows = replace(curve_lines(curves.campaign, kind), mechanisms=mechanisms)
         if rows.recordings:
             problem = FittingProblem(rows, table)
             result = search(problem)
@@ -96,7 +104,7 @@ def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits
     begun = begun.with_findings(*inspected.findings)
     if inspected.lacking:
         return replace(begun, lacking=inspected.lacking)
-    problem, known = frf_problem(inspected.campaign, inspected.uneven, table, Known())
+    problem, known = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
     result = search(problem, known)
     result = replace(result, laws=tuple(with_laws(problem, result)))
     return _work_out(begun, problem, result, progress, limits)
@@ -218,7 +226,7 @@ def with_refused(diagnosis: DiagnosisResult, refused: Sequence[RecordingProblem]
     return replace(diagnosis, findings=(*problems, *diagnosis.findings), lacking=lacking)
 
 
-def _provenance(table: SigmaTable) -> dict[str, Any]:
+def _provenance(table: SigmaTable, mechanisms: Known) -> dict[str, Any]:
     return {
         "underskin": importlib.metadata.version(underskin.__name__),
         "numpy": np.__version__,
@@ -226,4 +234,5 @@ def _provenance(table: SigmaTable) -> dict[str, Any]:
         "tables": {"sigma": table.sha256},
         "seed": SEED,
         **({"mechanisms": dict(CATALOGUE.packages)} if CATALOGUE.packages else {}),
+        **({"without": list(mechanisms.without)} if mechanisms.without else {}),
     }

@@ -23,6 +23,7 @@ from underskin.units import Floats
 
 # "Nothing" stands for all that does not show as well, which is every other campaign.
 PRIORS = {"nothing_missing": 0.45, "one": 0.34, "two": 0.14, "three": 0.02, "none_of_these": 0.05}
+_OF_LAWS = 0.7  # of "none of these": laws of one form over one axis; the rest are processes of any course
 _PARENTS = 3
 _BEST = 3  # nothing and two more: processes are tried on top of the best two
 SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
@@ -84,11 +85,11 @@ class Search:
         if not laws:
             return log_prior(len(explanation.names), self.supported)
         prior = log_prior_beneath(len(explanation.names) - 1, self.supported)
-        return prior + sum(law.log_share for law in laws if isinstance(law, UnnamedLaw))
+        return prior + math.log(_OF_LAWS) + sum(law.log_share for law in laws if isinstance(law, UnnamedLaw))
 
     def log_prior_beneath(self, explanation: Explanation) -> float:
-        """The logarithm of the prior of something undescribed on top of a set."""
-        return log_prior_beneath(len(explanation.names), self.supported)
+        """The logarithm of the prior of a law that nobody listed on top of a set."""
+        return log_prior_beneath(len(explanation.names), self.supported) + math.log(_OF_LAWS)
 
     def shows(self, explanation: Explanation) -> bool:
         """Whether each mechanism of a set shows: without it, evidence is lost. A set that holds one that does not says
@@ -112,7 +113,8 @@ class Search:
         return max(beneath, key=lambda pair: self._log_weight_beneath(*pair))[0]
 
     def _log_weight_beneath(self, explanation: Explanation, process: Discrepancy) -> float:
-        return process.log_evidence + log_prior_beneath(len(explanation.names), self.supported)
+        prior = log_prior_beneath(len(explanation.names), self.supported) + math.log(1 - _OF_LAWS)
+        return process.log_evidence + prior
 
     @cached_property
     def processes_showing(self) -> list[float]:

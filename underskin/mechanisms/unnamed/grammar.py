@@ -42,6 +42,9 @@ _FORMS: Mapping[Form, float] = {
     "peak": 0.05,
     "free": 0.05,
 }
+_LOST = (
+    4.0  # as a form of a force over the preload a constant that is lost has the share that linear ones have elsewhere
+)
 _COLUMNS = 1.5  # axes that all columns of `conditions` count for
 _FREQUENCY = 0.5  # of the frequency response: laws over frequency alone
 _PLACES_FOLLOW = ("order", "recorded_at", "time_of_day", "previous_preload_n", "preload_n", "load_cycles")
@@ -96,7 +99,7 @@ def _over_recordings(axis: Axis, lines: Floats, tables: LevelTables) -> list[Unn
             kinds = ("angle", "delay", "power")
             each += [LagLaw(kind, axis, shape, middle, float(lines[-1])) for kind in kinds]
     if axis.name == "preload_n":
-        lost = Shape("threshold", lambda x, _: [-np.ones_like(x)], variant="lost")
+        lost = Shape("threshold", lambda x, _: [-np.ones_like(x)], variant="lost", share=_LOST)
         each.append(RecordingLaw("force", axis, lost, tables))
     return each
 

@@ -25,7 +25,7 @@ _LOGS: Mapping[str, tuple[float, float]] = {  # s that are tabulated
     "thickness": (-0.45, 0.45),
     "contact_radius": (-0.9, 0.7),
 }
-_NODES = 22
+_NODES, _NODES_OF_RADIUS = 22, 12
 _FURTHEST_MM, _PLACES = 2.0, 41  # beyond the largest offset; how many places from the sensor's centre
 _FAINT = 1e-3  # of the largest level, below which a factor on it says nothing
 _ANY_LINE = np.array([1.0])  # Hz
@@ -103,7 +103,7 @@ class LevelTables:
         return np.array([entry.start for entry in self._model.parameters])
 
     def _tabulated(self, acts_on: str) -> Curve:
-        s = np.linspace(*_LOGS[acts_on], _NODES)
+        s = np.linspace(*_LOGS[acts_on], _NODES_OF_RADIUS if acts_on == "contact_radius" else _NODES)
         if acts_on == "contact_radius":
             levels = np.stack([self._of_radius(value) for value in s.tolist()])
         else:
