@@ -33,7 +33,7 @@ def campaign() -> Campaign:
     recordings: list[FrfRecording] = []
     for number, entry in enumerate(reference_campaign("frf").recordings):
         assert isinstance(entry, FrfRecording)
-        noted = {"temperature_c": 20.0 + 0.7 * number, "operator": "ab"[number % 2]}
+        noted: dict[str, float | str] = {"temperature_c": 20.0 + 0.7 * number, "operator": "ab"[number % 2]}
         at = f"2020-01-0{1 + number // 7}T{9 + number % 7:02d}:00:00Z"
         recordings.append(replace(entry, recorded_at=at, conditions=noted))
     return replace(reference_campaign("frf"), recordings=tuple(recordings))
@@ -233,11 +233,11 @@ def test_columns_that_a_lab_adds_are_axes_where_most_recordings_have_them(campai
     temperature = along(campaign, "temperature_c")
     assert temperature.high - temperature.low == pytest.approx(0.7 * (len(campaign.recordings) - 1))
     assert along(campaign, "operator").words == ("a", "b")
-    few = [
+    few = tuple(
         replace(entry, conditions={"seldom": 1.0 * number} if number < 4 else None)
         for number, entry in enumerate(frf_of(campaign))
-    ]
-    assert "seldom" not in [axis.name for axis in axes_of(replace(campaign, recordings=tuple(few)))]  # type: ignore[arg-type]
+    )
+    assert "seldom" not in [axis.name for axis in axes_of(Conditions("few", campaign.skin, few))]
 
 
 def test_many_columns_share_what_one_and_a_half_axes_have(campaign: Campaign, table: SigmaTable) -> None:
@@ -246,7 +246,7 @@ def test_many_columns_share_what_one_and_a_half_axes_have(campaign: Campaign, ta
         replace(entry, conditions={f"column_{place}": float(x) for place, x in enumerate(random.normal(size=20))})
         for entry in frf_of(campaign)
     )
-    many = Grammar.of(replace(campaign, recordings=entries), lines_of(campaign), table, tuple(CATALOGUE.values()))
+    many = Grammar.of(Conditions("many", campaign.skin, entries), lines_of(campaign), table, tuple(CATALOGUE.values()))
     shares = np.exp(many.log_shares)
     added = sum(share for law, share in zip(many.laws, shares, strict=True) if "column" in law.spoken.axis)
     one = sum(share for law, share in zip(many.laws, shares, strict=True) if law.spoken.axis == "order")

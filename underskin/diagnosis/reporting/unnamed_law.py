@@ -257,6 +257,9 @@ def _size(leading: LeadingLaw) -> str:
     if law.spoken.acts_on in ("force", "position"):
         unit = "N" if law.spoken.acts_on == "force" else "mm"
         return f"{size:+.3g} {unit} ({size - half:+.3g} to {size + half:+.3g}) {where}"
+    if isinstance(law, LagLaw) and law.kind == "corner":
+        hz = [law.lowest_hz * (size + way * half) for way in (0, -1, 1)]
+        return f"lines below a corner of {hz[0]:.3g} Hz ({hz[1]:.3g} to {hz[2]:.3g}) fall off {where}"
     if leading.is_phase or (isinstance(law, LagLaw) and law.kind != "power"):
         turned = np.degrees([size, size - half, size + half]) * (1 if leading.is_phase else -1)
         low, high = sorted(turned[1:])

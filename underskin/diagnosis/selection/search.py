@@ -15,7 +15,7 @@ import numpy as np
 from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.explanation import integrated as integrate
-from underskin.diagnosis.selection.occam_correction import without_occam
+from underskin.diagnosis.selection.occam_correction import fit_and_plausibility, without_occam
 from underskin.diagnosis.selection.unnamed_rivals import Discrepancy, discrepancy
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.unnamed.laws import UnnamedLaw
@@ -75,8 +75,28 @@ class Search:
         return len(lines.mechanisms.named) - len(self.unsupported)
 
     def log_weight(self, explanation: Explanation) -> float:
-        """Prior times evidence."""
-        return explanation.log_evidence + self.log_prior(explanation)
+        """Prior times evidence; a law that nobody listed gains nothing by a narrower prior than mechanisms have."""
+        weight = explanation.log_evidence + self.log_prior(explanation)
+        if not self._holds_law(explanation):
+            return weight
+        rival = self._rival_of_size.get(len(explanation.names))
+        occam = explanation.log_evidence - fit_and_plausibility(explanation)
+        return weight if rival is None else weight - max(0.0, occam - rival)
+
+    @cached_property
+    def _rival_of_size(self) -> dict[int, float]:
+        """Occam's factor of the best set of mechanisms of each size, in nats."""
+        best: dict[int, Explanation] = {}
+        for entry in self.explanations:
+            size = len(entry.names)
+            if size not in best or entry.log_evidence > best[size].log_evidence:
+                best[size] = entry
+        return {size: entry.log_evidence - fit_and_plausibility(entry) for size, entry in best.items()}
+
+    @staticmethod
+    def _holds_law(explanation: Explanation) -> bool:
+        known = explanation.best.hypothesis.lines.mechanisms
+        return any(name not in known.named for name in explanation.names)
 
     def log_prior(self, explanation: Explanation) -> float:
         """The logarithm of its prior; a law that nobody listed has its share of that of something undescribed."""

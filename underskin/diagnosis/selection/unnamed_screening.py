@@ -153,17 +153,13 @@ class Screening:
             gram = gram - np.einsum("pir,r,pjr->pij", means, 1 / own, means, optimize=True)
             along = (changes.conj() @ moment).real
             found.append((columns, *noise.gains(gram, along)))
-        logs = np.log(frequency / np.exp(np.log(frequency).mean()))
-        patterns = {
-            "angle": np.full(len(frequency), -1j),
-            "delay": -1j * frequency / frequency[-1],
-            "power": -(logs + 0.5j * np.pi),
-        }
-        sums = {}
-        for kind, pattern in patterns.items():
-            means = weights @ pattern.real
-            gram_of = weights @ np.abs(pattern) ** 2 - means**2 / own
-            sums[kind] = gram_of, (moments @ pattern.conj()).real
+        sums: dict[str, tuple[Floats, Floats]] = {}
+        for _, law in self._some(LagLaw):
+            assert isinstance(law, LagLaw)
+            if law.kind not in sums:
+                pattern = law.pattern(frequency)
+                spread = weights @ np.abs(pattern) ** 2 - (weights @ pattern.real) ** 2 / own
+                sums[law.kind] = spread, (moments @ pattern.conj()).real
         for columns in self._lags:
             kinds = [
                 law.kind for law in (self._grammar.laws[place] for place in columns.owner) if isinstance(law, LagLaw)

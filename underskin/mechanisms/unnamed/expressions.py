@@ -160,6 +160,8 @@ def _of_lag(law: LagLaw, values: Numbers) -> str:
         return f"FRF = FRF0·exp(−i·({change}))"
     if law.kind == "delay":
         return f"FRF = FRF0·exp(−i·({change})·f/{number(law.highest_hz)} Hz)"
+    if law.kind == "corner":
+        return f"FRF = FRF0/(1 + ({change})·{number(law.lowest_hz)} Hz/(i·f))"
     return f"FRF = FRF0·(i·f/{number(law.middle_hz)} Hz)^(−({change}))"
 
 

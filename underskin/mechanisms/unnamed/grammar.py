@@ -14,7 +14,7 @@ from underskin.mechanisms.base import Mechanism
 from underskin.mechanisms.unnamed.axes import BUILT_IN, Axis, axes_of
 from underskin.mechanisms.unnamed.forms import Shape, shapes
 from underskin.mechanisms.unnamed.frequency_laws import FrequencyLaw, frequency_laws
-from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
+from underskin.mechanisms.unnamed.laws import LAG_KINDS, LagLaw, RecordingLaw, UnnamedLaw
 from underskin.mechanisms.unnamed.level_tables import LevelTables
 from underskin.mechanisms.unnamed.vocabulary import ActsOn, Form
 from underskin.recordings.conditions import Conditions
@@ -95,9 +95,7 @@ def _over_recordings(axis: Axis, lines: Floats, tables: LevelTables) -> list[Unn
             RecordingLaw(acts_on, axis, shape, tables) for acts_on in _OF_LEVELS if _makes_sense(acts_on, axis, shape)
         ]
         if len(lines) >= 2 and shape.form != "free":
-            middle = float(np.exp(np.log(lines).mean()))
-            kinds = ("angle", "delay", "power")
-            each += [LagLaw(kind, axis, shape, middle, float(lines[-1])) for kind in kinds]
+            each += [LagLaw(kind, axis, shape, lines) for kind in LAG_KINDS]
     if axis.name == "preload_n":
         lost = Shape("threshold", lambda x, _: [-np.ones_like(x)], variant="lost", share=_LOST)
         each.append(RecordingLaw("force", axis, lost, tables))

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -16,9 +16,11 @@ from underskin.mechanisms.unnamed.axes import Axis
 from underskin.mechanisms.unnamed.forms import Feature, Shape
 from underskin.mechanisms.unnamed.level_tables import LevelTables
 from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, AXES, ActsOn, Form
-from underskin.units import Floats, Indices
+from underskin.units import Array, Floats, Indices
 
 PREFIX = "unnamed_"
+LagKind = Literal["angle", "delay", "power", "corner"]
+LAG_KINDS: tuple[LagKind, ...] = get_args(LagKind)
 _USUAL: dict[ActsOn, float] = {  # sd of the prior of a change, relative; of a place in mm, of a lag in rad
     "gain": 0.2,
     "modulus": 0.4,
@@ -178,20 +180,25 @@ def _name(acts_on: ActsOn, axis: Axis, shape: Shape, variant: str = "") -> str:
 
 
 class LagLaw(UnnamedLaw):
-    """A response that lags by an angle, a time or a power of frequency which follows an axis of the recordings."""
+    """A response that lags, or whose lines fall off, by something that follows an axis of the recordings.
+
+    `kind`: an angle, the same at all frequencies; a delay, ∝ f; a power (if)^n; the corner of a high pass. Of the lag φ
+    they make exp(−iφ), exp(−iφ f/f_highest), (if/f_middle)^(−φ) and 1/(1 + φ f_lowest/(if)).
+    """
 
     stage = Stage.LINES
     order = 200
     tells_recordings_apart = True
 
-    def __init__(self, kind: str, axis: Axis, shape: Shape, middle_hz: float, highest_hz: float) -> None:
-        """`kind`: angle (the same at all frequencies), delay (∝ f), or power ((if)^n, magnitude and phase)."""
+    def __init__(self, kind: LagKind, axis: Axis, shape: Shape, lines: Floats) -> None:
+        """Over the band of these lines [Hz]."""
         self.name = _name("frequency_response", axis, shape, kind)
         self.spoken = Spoken("frequency_response", axis.name, shape.form)
         self.axis, self.shape, self.kind = axis, shape, kind
-        self.share = shape.share / 3
-        self.middle_hz, self.highest_hz = middle_hz, highest_hz
-        usual = _USUAL["frequency_response"] * (0.3 if kind == "power" else 1.0)
+        self.share = shape.share / len(LAG_KINDS)
+        self.lowest_hz, self.highest_hz = float(lines[0]), float(lines[-1])
+        self.middle_hz = float(np.exp(np.log(lines).mean()))
+        usual = _USUAL["frequency_response"] * {"power": 0.3, "corner": 2.0}.get(kind, 1.0)
         power = shape.logarithmic
         self.amplitudes = tuple(
             f"law_lag_{number + 1}" if shape.count > 1 else "law_lag" for number in range(shape.count)
@@ -216,11 +223,20 @@ class LagLaw(UnnamedLaw):
         """The factor on each distinct line."""
         ids = [design.ids[number] for number in design.contact_recording]
         lag = self.lag(ids, values).spread(len(ids))[design.line_contact]
-        if self.kind == "angle":
-            return exp(lag * -1j)
-        if self.kind == "delay":
-            return exp(lag * (-1j * design.line_frequency / self.highest_hz))
-        return exp(lag * -(np.log(design.line_frequency / self.middle_hz) + 0.5j * np.pi))
+        pattern = self.pattern(design.line_frequency)
+        return 1.0 / (1.0 - lag * pattern) if self.kind == "corner" else exp(lag * pattern)
+
+    def pattern(self, frequency: Floats) -> Array:
+        """∂ ln factor by the lag, where that is 0."""
+        match self.kind:
+            case "angle":
+                return np.full(len(frequency), -1j)
+            case "delay":
+                return np.asarray(-1j * frequency / self.highest_hz)
+            case "power":
+                return np.asarray(-(np.log(frequency / self.middle_hz) + 0.5j * np.pi))
+            case "corner":
+                return np.asarray(1j * self.lowest_hz / frequency)
 
 
 __all__ = ["ACTS_ON", "AXES", "LagLaw", "RecordingLaw", "Spoken", "UnnamedLaw", "log_positive"]
