@@ -116,7 +116,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     leading = LeadingLaw.of(problem, shown) if stated == "unexplained" else None
     stated_set = named if leading is None else leading.explanation
     law = None if leading is None else unnamed(search, problem, leading, diagnosis.groups)
-    stands = stated in ("explained", "no_mismatch") and leader.probability >= EXPLAINED
+    stands = (stated in ("explained", "no_mismatch") or leading is not None) and leader.probability >= EXPLAINED
     d33, implausible = _d33(problem, shown, fit) if stands else (None, [])
     findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *implausible)]
     modulus = fit["after"].get("youngs_modulus")
@@ -165,6 +165,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         # The rest was left early: hopeless, or without a gain over the smaller set that it grew from.
         "provenance": {
             **diagnosis.provenance,
+            **({} if leading is None else {"unnamed": leading.as_fitted}),
             "sets_of_mechanisms": {"tried": search.tried, "fitted": len(search.explanations)},
         },
     }

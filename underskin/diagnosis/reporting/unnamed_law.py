@@ -50,6 +50,11 @@ class LeadingLaw:
         return cls(law, values, explanation)
 
     @property
+    def as_fitted(self) -> dict[str, Any]:
+        """What an adopted model is made of."""
+        return {"law": self.law.name, "parameters": {name: rounded(value, 10) for name, value in self.values.items()}}
+
+    @property
     def form(self) -> str:
         """A peak of negative size is a notch."""
         if self.law.spoken.form == "peak" and self.values["law_change"] < 0:

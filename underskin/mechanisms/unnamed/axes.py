@@ -47,6 +47,7 @@ class Axis:
     words: tuple[str, ...] = ()
     relative: bool = False
     range: tuple[float, float] | None = None  # where laws are bound to that of another campaign
+    origin: datetime | None = None  # from which times count
 
     @property
     def unit(self) -> str:
@@ -90,6 +91,14 @@ def axes_of(conditions: Conditions) -> list[Axis]:
 
     A column of `conditions` is one as well, where at least two thirds of the recordings have it.
     """
+    axes = [axis for axis in every_axis(conditions) if len(axis.levels) > 1]
+    days = {int(value // 24) for axis in axes if axis.name == "recorded_at" for value in axis.values.values()}
+    return axes if len(days) > 1 else [axis for axis in axes if axis.name != "time_of_day"]  # which then is the time
+
+
+def every_axis(conditions: Conditions, origin: datetime | None = None) -> list[Axis]:
+    """The axes that the FRF recordings have, whether or not they differ; times count from the `origin` where one is
+    given, else from the first midnight."""
     entries = frf_of(conditions)
     columns: dict[str, list[float | None]] = {
         name: [getattr(entry, name) for entry in entries]
@@ -100,23 +109,21 @@ def axes_of(conditions: Conditions) -> list[Axis]:
     columns |= {"x_mm": position[:, 0].tolist(), "y_mm": position[:, 1].tolist()}
     times = _times(entries)
     if times is not None:
-        midnight = min(times).replace(hour=0, minute=0, second=0, microsecond=0)
-        columns["recorded_at"] = [(time - midnight).total_seconds() / 3600 for time in times]
+        origin = origin or min(times).replace(hour=0, minute=0, second=0, microsecond=0)
+        columns["recorded_at"] = [(time - origin).total_seconds() / 3600 for time in times]
         columns["time_of_day"] = [(time.hour * 3600 + time.minute * 60 + time.second) / 3600 for time in times]
-        if len({time.date() for time in times}) == 1:
-            del columns["time_of_day"]  # one day: it is the time
     rank = recording_order(entries)
     columns["order"] = rank.tolist()
     ids = [entry.id for entry in entries]
     axes = [
-        Axis(name, dict(zip(ids, known, strict=True)))
+        Axis(name, dict(zip(ids, known, strict=True)), origin=origin if name == "recorded_at" else None)
         for name, column in columns.items()
         if len(known := [value for value in column if value is not None]) == len(ids)
     ]
     axes += _previous(entries, rank)
     axes.append(_worded("sensor", ids, [entry.sensor for entry in entries]))
     axes += _further(entries)
-    return [axis for axis in axes if len(axis.levels) > 1]
+    return axes
 
 
 def recording_order(entries: Sequence[FrfConditions]) -> Floats:

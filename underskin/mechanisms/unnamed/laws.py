@@ -1,6 +1,7 @@
 """Laws that nobody listed, bound to the recordings of a campaign: mechanisms like any other."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import ClassVar, Literal, get_args
@@ -89,7 +90,7 @@ class RecordingLaw(UnnamedLaw):
         self.spoken = Spoken(acts_on, axis.name, shape.form)
         self.axis, self.shape = axis, shape
         self.share = shape.share
-        self._acts_on, self._tables = acts_on, tables
+        self._acts_on, self.tables = acts_on, tables
         self._unit = _unit_of_change(acts_on)
         scale = float(np.median(list(tables.force.values()))) if acts_on == "force" else 1.0
         usual = _USUAL[acts_on] * scale
@@ -103,6 +104,12 @@ class RecordingLaw(UnnamedLaw):
         )
         self.parameters_bound = (*changes, *shape.bending)
         self.grid = np.array(shape.grid, dtype=float).reshape(len(shape.grid), -1)
+
+    def on(self, axis: Axis, tables: LevelTables) -> "RecordingLaw":
+        """The same law on other recordings."""
+        other = copy(self)
+        other.axis, other.tables = axis, tables
+        return other
 
     def features(self, ids: Sequence[str], values: Values) -> Sequence[Feature]:
         """Of recordings (…, recordings)."""
@@ -118,18 +125,18 @@ class RecordingLaw(UnnamedLaw):
                 _summed([values[name] * one for name, one in zip(names, features, strict=True)])
                 for names in (self.amplitudes[:half], self.amplitudes[half:])
             )
-            return self._tables.moved(rows, x, y)
+            return self.tables.moved(rows, x, y)
         change = _summed([values[name] * one for name, one in zip(self.amplitudes, features, strict=True)])
         if self.shape.logarithmic:
             log = change
         elif self._acts_on == "force":
-            force = np.array([self._tables.force[name] for name in design.ids])
+            force = np.array([self.tables.force[name] for name in design.ids])
             log = log_positive(change / force)
         else:
             log = log_positive(change)
         if self._acts_on == "gain":
             return exp(log)
-        return self._tables.factor(self._acts_on, rows, log)
+        return self.tables.factor(self._acts_on, rows, log)
 
     def sensitivity(self, ids: tuple[str, ...]) -> Floats:
         """∂ ln level by the law's features at amplitudes of 0 (recordings, 1); of a place by x and y (…, 2)."""
@@ -137,17 +144,17 @@ class RecordingLaw(UnnamedLaw):
         if self._acts_on == "position":
             none = Differentiated(np.zeros((1, 1)), np.zeros((2, 1, 1)))
             x, y = (Differentiated(none.value, np.eye(2)[place][:, None, None]) for place in (0, 1))
-            moved = self._tables.moved(rows, x, y)
+            moved = self.tables.moved(rows, x, y)
             return np.asarray((moved.slopes / moved.value)[:, 0].T)
         if self._acts_on == "gain":
             return np.ones((len(ids), 1))
         seed = Differentiated(np.zeros((1, len(ids))), np.ones((1, 1, len(ids))))
-        by_log = self._tables.factor(self._acts_on, rows, seed).slopes[0, 0]
-        scale = np.array([self._tables.force[name] for name in ids]) if self._acts_on == "force" else 1.0
+        by_log = self.tables.factor(self._acts_on, rows, seed).slopes[0, 0]
+        scale = np.array([self.tables.force[name] for name in ids]) if self._acts_on == "force" else 1.0
         return np.asarray(by_log / scale)[:, None]
 
     def _rows(self, ids: tuple[str, ...]) -> Indices:
-        return _rows(self._tables, ids)
+        return _rows(self.tables, ids)
 
 
 @lru_cache(maxsize=16)
@@ -211,6 +218,12 @@ class LagLaw(UnnamedLaw):
         self.parameters_bound = (*lags, *([exponent] if power else []), *shape.bending)
         grid = [(value,) for value in (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)] if power else shape.grid
         self.grid = np.array(grid, dtype=float).reshape(len(grid), -1)
+
+    def on(self, axis: Axis) -> "LagLaw":
+        """The same law on other recordings."""
+        other = copy(self)
+        other.axis = axis
+        return other
 
     def lag(self, ids: Sequence[str], values: Values) -> Differentiated:
         """Of these recordings (…, recordings): an angle [rad] or an exponent."""
