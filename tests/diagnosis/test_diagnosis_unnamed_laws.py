@@ -34,7 +34,7 @@ def table() -> SigmaTable:
     return load_table()
 
 
-def changed(made: Campaign, factor: Callable[[FrfRecording, int, Floats], Complexes | float]) -> Campaign:
+def changed(made: Campaign, factor: Callable[[FrfRecording, int, Floats], Complexes | complex]) -> Campaign:
     """Each recording's lines times a factor that its conditions, its number and its lines give."""
     entries = []
     for number, entry in enumerate(made.recordings):
