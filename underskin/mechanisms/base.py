@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from underskin.mechanisms.models.curve_state import Curve
     from underskin.mechanisms.models.frf_design import FrfDesign
     from underskin.mechanisms.models.pickup import Pickup
+    from underskin.surrogate.sigma_table import SigmaTable
 
 Kind = Literal["frf", "indentation", "compression"]
 UNITS = (
@@ -78,16 +79,16 @@ class Mechanism:
     """
 
     name: str
-    plain: ClassVar[str]
-    law: ClassVar[str]
-    assumptions: ClassVar[str]
-    source: ClassVar[str]
+    plain: str
+    law: str
+    assumptions: str
+    source: str
     stage: ClassVar[Stage]
     order: ClassVar[int] = 100
     kinds: ClassVar[tuple[Kind, ...]] = ("frf",)
     axes: ClassVar[tuple[str, ...]]
-    needs: ClassVar[str] = "nothing beyond the recordings themselves"
-    parameters_stated: ClassVar[tuple[Parameter, ...]] = ()  # those that are the same for all campaigns and kinds
+    needs: str = "nothing beyond the recordings themselves"
+    parameters_stated: tuple[Parameter, ...] = ()  # those that are the same for all campaigns and kinds
     # Fields of a recording without which it cannot be predicted, of NEEDED_FIELDS; they tell contacts apart.
     needs_fields: ClassVar[tuple[str, ...]] = ()
     # What a model prepares for it: the contacts' stiffness, the neighbours' charge, room for an offset [m] and for a
@@ -136,6 +137,10 @@ class Mechanism:
         Raises InvalidInput where they say too little for that campaign.
         """
         return values
+
+    def bind(self, conditions: Conditions, table: SigmaTable) -> Mechanism:
+        """The mechanism for the recordings of one campaign and their parts; itself where it needs no campaign."""
+        return self
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """What the campaign lacks to support it, in words; None where nothing is lacking."""

@@ -1,20 +1,29 @@
-"""All mechanisms by name, in the order in which a model composes them: those of this package, then those of others.
+"""All mechanisms by name, in the order in which a model composes them: this package's, those of others, the lab's own.
 
 A mechanism of this package is a module of `underskin.mechanisms.laws`; one of another package is named by an entry
-point of the group `underskin.mechanisms`, as a subclass of `Mechanism` or an instance of one.
+point of the group `underskin.mechanisms`, as a subclass of `Mechanism` or an instance of one; the lab's own are files
+(`mechanism/1`) in the folder that `UNDERSKIN_MECHANISMS` names.
 """
 
+from __future__ import annotations
+
+import os
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from inspect import isclass
 from pkgutil import iter_modules
+from typing import TYPE_CHECKING
 
 from underskin import extensions
-from underskin.errors import InvalidInput, not_one_of
+from underskin.errors import FileError, InvalidInput, not_one_of
 from underskin.mechanisms import laws
 from underskin.mechanisms.base import Mechanism
+
+if TYPE_CHECKING:
+    from underskin.recordings.conditions import Conditions
+    from underskin.surrogate.sigma_table import SigmaTable
 
 GROUP = "underskin.mechanisms"
 
@@ -78,6 +87,11 @@ class Known(Mapping[str, Mechanism]):
         """Those of the catalogue."""
         return self._named
 
+    def bind(self, conditions: Conditions, table: SigmaTable) -> None:
+        """Bind the lab's own mechanisms to the recordings of this diagnosis."""
+        for name, mechanism in self._named.items():
+            self._named[name] = mechanism.bind(conditions, table)
+
     def add(self, law: Mechanism) -> None:
         """One more, bound to the recordings of this diagnosis."""
         self._bound[law.name] = law
@@ -109,7 +123,19 @@ def _loaded() -> _Loaded:
         mechanism = _checked(extension, mechanisms)
         packages[mechanism.name] = extension.package
         mechanisms.append(mechanism)
+    for declared, file in _declared():
+        if declared.name in {other.name for other in mechanisms}:
+            raise FileError(file, "name", f"{declared.name!r} is taken by another mechanism")
+        packages[declared.name] = file
+        mechanisms.append(declared)
     return _Loaded({mechanism.name: mechanism for mechanism in _in_order(mechanisms)}, packages)
+
+
+def _declared() -> list[tuple[Mechanism, str]]:
+    """Those of the lab's folder, each with its file."""
+    from underskin.mechanisms.declared.document import in_folder  # the models, which few callers need
+
+    return [*in_folder()] if os.environ.get("UNDERSKIN_MECHANISMS") else []
 
 
 def _checked(extension: extensions.Extension, others: list[Mechanism]) -> Mechanism:

@@ -29,7 +29,9 @@ def frf_problem(
     campaign: Campaign, uneven: Mapping[str, Floats], table: SigmaTable, mechanisms: Known
 ) -> tuple[FittingProblem, list[Explanation]]:
     """The lines of a campaign's FRFs with their noise, ready to be explained; and the explanations that are known."""
-    problem = FittingProblem(replace(lines(campaign, uneven), mechanisms=mechanisms), table)
+    measured = replace(lines(campaign, uneven), mechanisms=mechanisms)
+    mechanisms.bind(measured.campaign, table)
+    problem = FittingProblem(measured, table)
     nothing, *singles = known = _along_frequency(problem)
     fixed = [one for one in singles if not any(entry.acts_on == "line_variance" for entry in one.model.parameters)]
     best = max(fixed, key=lambda entry: entry.log_evidence, default=nothing)

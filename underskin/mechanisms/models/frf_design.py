@@ -25,6 +25,7 @@ class FrfDesign:
         """`fields` may name what else tells contacts apart: "dwell_s", "dynamic_force_n", "id" (every recording)."""
         recordings = frf_of(conditions)
         count = len(recordings)
+        self.conditions = conditions
         self.ids = tuple(entry.id for entry in recordings)
         number = {sensor.id: index for index, sensor in enumerate(conditions.skin.sensors)}
         places = to_si("thickness_mm", [(sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors])

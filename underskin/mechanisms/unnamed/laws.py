@@ -164,10 +164,15 @@ def _rows(tables: LevelTables, ids: tuple[str, ...]) -> Indices:
 
 def log_positive(change: Differentiated) -> Differentiated:
     """ln(1 + change), below a quantity of 0.1 continued by its tangent's exponential."""
-    factor = 1 + change.value
+    return log_of(1.0 + change)
+
+
+def log_of(quantity: Differentiated) -> Differentiated:
+    """The logarithm of a relative quantity, below 0.1 continued along its tangent."""
+    factor = quantity.value
     inside = factor > _LEAST
     value = np.where(inside, np.log(np.where(inside, factor, 1.0)), np.log(_LEAST) + factor / _LEAST - 1)
-    return chain(value, (1 / np.where(inside, factor, _LEAST), change))
+    return chain(value, (1 / np.where(inside, factor, _LEAST), quantity))
 
 
 def _summed(parts: Sequence[Differentiated]) -> Differentiated:
