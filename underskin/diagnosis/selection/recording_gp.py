@@ -18,12 +18,13 @@ from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, normalised
 from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
-from underskin.units import Floats, Indices
+from underskin.units import Floats, Indices, Mask
 
 _LENGTHS = (0.15, 0.4, 1.2)  # of a recording's axis, over its range
 _LEAST_RECORDINGS = 4
 _GAINS = np.geomspace(0.005, 0.5, 9)
 _USUAL_GAIN = 3  # of these
+_GONE = 60.0  # nats behind the best node, which a process of few features cannot lose there
 _USUAL_POSITION = np.geomspace(0.05e-3, 0.3e-3, 4)  # [m], beside a process; without one the scatter may be larger
 _ANY_POSITION = np.geomspace(0.03e-3, 0.6e-3, 12)
 _FAINT = 1e-12  # of the largest response, below which a recording has no direction
@@ -65,6 +66,10 @@ class _WithoutProcess:
         log_determinant += 2 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
         log_density = nodes.log_weights - 0.5 * (weighed @ nodes.residual + log_determinant)
         return cls(log_density, np.sqrt(precision), taken, weighed)
+
+    def of_gains(self, kept: Mask) -> "_WithoutProcess":
+        """At some of the scatters of gain."""
+        return _WithoutProcess(self.log_density[kept], self.root[kept], self.taken[kept], self.weighed[kept])
 
     def summed(self, alike: Indices) -> "_WithoutProcess":
         """With the sums over recordings that are alike, which have the same features, in their place."""
@@ -143,7 +148,20 @@ class GainResidual:
 
     @cached_property
     def _usual(self) -> list[_WithoutProcess]:
-        return [_WithoutProcess.of(nodes, self.fixed) for nodes in self.usual]
+        """Of nodes that can matter: no process gains more in one than half of χ² there."""
+        each = [_WithoutProcess.of(nodes, self.fixed) for nodes in self.usual]
+        least = max(float(entry.log_density.max()) for entry in each) - _GONE
+        mattering = []
+        for entry, nodes in zip(each, self.usual, strict=True):
+            kept = entry.log_density + 0.5 * (entry.weighed @ nodes.residual) > least
+            if kept.any():
+                mattering.append(entry.of_gains(kept))
+        return mattering
+
+    @cached_property
+    def _still(self) -> _WithoutProcess:
+        """Without scatter of place, at one usual scatter of gain."""
+        return _WithoutProcess.of(self.usual[0], self.fixed).of_gains(np.arange(len(_GAINS)) == _USUAL_GAIN)
 
     def gains(self, sets: Floats, amplitudes: Floats, alike: Indices | None = None) -> Floats:
         """What each set of features (sets, recordings, features) gains over none at all, in log evidence (sets,).
@@ -157,8 +175,7 @@ class GainResidual:
 
     def amplitudes(self, sets: Floats) -> Floats:
         """The most probable amplitudes of features whose prior sd is 1, at a usual scatter (sets, features)."""
-        without = self._usual[0]
-        root, taken, weighed = (values[_USUAL_GAIN] for values in (without.root, without.taken, without.weighed))
+        root, taken, weighed = (values[0] for values in (self._still.root, self._still.taken, self._still.weighed))
         reduced = np.einsum("cr,srf->scf", taken, sets)
         gram = np.einsum("srf,r,srg->sfg", sets, root**2, sets, optimize=True)
         gram = gram - reduced.transpose(0, 2, 1) @ reduced + np.eye(sets.shape[2])

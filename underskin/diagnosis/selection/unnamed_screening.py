@@ -153,7 +153,7 @@ class Screening:
             gram = gram - np.einsum("pir,r,pjr->pij", means, 1 / own, means, optimize=True)
             along = (changes.conj() @ moment).real
             found.append((columns, *noise.gains(gram, along)))
-        sums: dict[str, tuple[Floats, Floats]] = {}
+        sums: dict[str, tuple[Floats, Floats]] = {}  # of each kind of lag, by recording
         for _, law in self._some(LagLaw):
             assert isinstance(law, LagLaw)
             if law.kind not in sums:
@@ -161,13 +161,21 @@ class Screening:
                 spread = weights @ np.abs(pattern) ** 2 - (weights @ pattern.real) ** 2 / own
                 sums[law.kind] = spread, (moments @ pattern.conj()).real
         for columns in self._lags:
-            kinds = [
-                law.kind for law in (self._grammar.laws[place] for place in columns.owner) if isinstance(law, LagLaw)
-            ]
-            gram_of, along_of = (np.array([sums[kind][which] for kind in kinds]) for which in (0, 1))
-            changes = columns.changes.real
-            gram = np.einsum("pri,pr,prj->pij", changes, gram_of, changes, optimize=True)
-            found.append((columns, *noise.gains(gram, np.einsum("pri,pr->pi", changes, along_of))))
+            kinds = np.array(
+                [law.kind for law in (self._grammar.laws[place] for place in columns.owner) if isinstance(law, LagLaw)]
+            )
+            count = columns.changes.shape[2]
+            gram, along = np.empty((len(kinds), count, count)), np.empty((len(kinds), count))
+            for kind, (gram_of, along_of) in sums.items():
+                own = kinds == kind
+                changes = columns.changes[own].real
+                turned = changes.transpose(0, 2, 1)
+                along[own] = turned @ along_of
+                if count == 1:
+                    gram[own, :, 0] = turned**2 @ gram_of
+                else:
+                    gram[own] = (turned * gram_of) @ changes
+            found.append((columns, *noise.gains(gram, along)))
         return found
 
 

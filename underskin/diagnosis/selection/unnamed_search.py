@@ -15,7 +15,7 @@ from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.grammar import Grammar, combination
 from underskin.mechanisms.unnamed.laws import UnnamedLaw
 
-_BENEATH = 2  # sets of mechanisms, the most probable, on top of which laws are tried, and nothing
+_BENEATH = 1  # sets of mechanisms, the most probable, on top of which laws are tried, and nothing
 _FITTED = 8  # laws at most
 _BEHIND, _BEHIND_SHARE = (
     12.0,

@@ -76,9 +76,9 @@ def _check(node: ast.AST, field: str, known: Collection[str], called: Collection
 
 
 def _value(node: ast.expr, values: Mapping[str, Value]) -> Value:
+    if isinstance(node, ast.Constant):
+        return float(node.value)  # type: ignore[arg-type]
     match node:
-        case ast.Constant(value=number) if isinstance(number, int | float):
-            return float(number)
         case ast.Name(id=name):
             return CONSTANTS[name] if name in CONSTANTS else values[name]
         case ast.UnaryOp(op=op, operand=operand):
@@ -104,7 +104,7 @@ def _combined(op: ast.operator, a: Value, b: Value) -> Value:
     if isinstance(b, Differentiated):
         return _exp(b * _log(a))
     if isinstance(a, Differentiated):
-        return a ** float(np.real(b)) if np.ndim(b) == 0 else _exp(_log(a) * b)
+        return a ** float(np.asarray(b).real) if np.ndim(b) == 0 else _exp(_log(a) * b)
     return np.asarray(a, dtype=complex if np.iscomplexobj(a) else float) ** b
 
 
