@@ -19,6 +19,7 @@ from underskin.diagnosis.pipeline import diagnose, diagnosis_report
 from underskin.diagnosis.reporting.hints import HINTS
 from underskin.diagnosis.reporting.report import report
 from underskin.errors import InvalidInput
+from underskin.mechanisms import registry
 from underskin.prediction.adopted_model import adopted, not_adopted
 from underskin.recordings.campaign import Campaign, FrfRecording, from_dict
 from underskin.recordings.conditions import frf_of
@@ -254,3 +255,19 @@ def test_most_laws_of_an_independent_rig_are_found_and_predict_what_was_held_out
             shares.append((before**2 - after**2) / (before**2 - document["fit"]["noise_floor_percent"] ** 2))
     assert right >= 9
     assert np.median(shares) > 0.8
+
+
+def test_what_the_lab_declared_is_recognised_by_name(
+    warming: Campaign, table: SigmaTable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("UNDERSKIN_MECHANISMS", "examples/mechanisms")
+    registry._loaded.cache_clear()
+    try:
+        document = diagnosis_report(warming, table)
+    finally:
+        registry._loaded.cache_clear()
+    assert document["verdict"] == "explained"
+    (mechanism,) = document["mechanisms"]
+    assert mechanism["name"] == "warm_film"
+    assert mechanism["parameters"][0]["unit"] == "1/°C"
+    assert document["provenance"]["mechanisms"]["warm_film"].startswith("warm_film.yaml ")
